@@ -1,0 +1,1 @@
+"""Composition roots: operator window, scripted API, command line."""

@@ -1,0 +1,1 @@
+"""What every subsystem shares and knows none of them (CoSMic-Frame, thesis 5.3)."""

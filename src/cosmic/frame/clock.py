@@ -1,0 +1,150 @@
+"""The only source of time.
+
+Physics, procedures, time stamps and motion time-outs use the platform's clock, which may run
+faster than the wall. Dead-man, lease, stale-data and thread limits use `WALL`.
+"""
+
+import threading
+import time
+from abc import abstractmethod
+from typing import Final, Protocol
+
+from typing_extensions import override
+
+
+class Clock(Protocol):
+    """A monotonic time in seconds and a way to wait for it; any thread."""
+
+    @property
+    @abstractmethod
+    def rate(self) -> float:
+        """Platform seconds per second of the wall; 0 where a test moves the time."""
+
+    @abstractmethod
+    def now_s(self) -> float:
+        """Return the time in seconds since the clock was made; never goes back."""
+
+    @abstractmethod
+    def wait(self, condition: threading.Condition, until_s: float) -> None:
+        """Wait on `condition`, which the caller holds, until notified or until `until_s`.
+
+        May return early; the caller checks what it waits for, as with any condition.
+        """
+
+    @abstractmethod
+    def sleep(self, duration_s: float) -> None:
+        """Block the calling thread for `duration_s` of this clock's time."""
+
+
+class RatedClock(Clock):
+    """A clock that runs `rate` times as fast as the wall.
+
+    Raises
+    ------
+    ValueError
+        `rate` is not a positive finite number.
+    """
+
+    def __init__(self, rate: float = 1.0) -> None:
+        if not 0.0 < rate < 1e6:
+            raise ValueError(f"a clock's rate must lie between 0 and 1e6, got {rate!r}")
+        self._rate = rate
+        self._start_s = time.monotonic()
+
+    @property
+    @override
+    def rate(self) -> float:
+        return self._rate
+
+    @override
+    def now_s(self) -> float:
+        return (time.monotonic() - self._start_s) * self._rate
+
+    @override
+    def wait(self, condition: threading.Condition, until_s: float) -> None:
+        left_s = (until_s - self.now_s()) / self._rate
+        if left_s > 0.0:
+            condition.wait(min(left_s, threading.TIMEOUT_MAX))
+
+    @override
+    def sleep(self, duration_s: float) -> None:
+        if duration_s > 0.0:
+            time.sleep(duration_s / self._rate)
+
+
+class WallClock(RatedClock):
+    """Real time."""
+
+    def __init__(self) -> None:
+        super().__init__(1.0)
+
+
+class ManualClock(Clock):
+    """A clock that a test moves.
+
+    Parameters
+    ----------
+    auto_advance : bool
+        True: whoever waits moves the time itself, so that a single thread runs as fast as it
+        can (lock-step). False: waiting threads wait until another thread calls `advance`.
+    """
+
+    def __init__(self, *, auto_advance: bool = False) -> None:
+        self._auto = auto_advance
+        self._now_s = 0.0
+        self._lock = threading.Condition()
+        self._waiting: list[threading.Condition] = []
+
+    @property
+    @override
+    def rate(self) -> float:
+        return 0.0
+
+    @override
+    def now_s(self) -> float:
+        with self._lock:
+            return self._now_s
+
+    def advance(self, duration_s: float) -> None:
+        """Move the time forward by `duration_s` and wake whoever waits."""
+        if not 0.0 <= duration_s < float("inf"):
+            raise ValueError(f"time moves forward by a finite step, got {duration_s!r}")
+        with self._lock:
+            self._now_s += duration_s
+            waiting = list(self._waiting)
+            self._lock.notify_all()
+        for condition in waiting:
+            with condition:
+                condition.notify_all()
+
+    @override
+    def wait(self, condition: threading.Condition, until_s: float) -> None:
+        with self._lock:
+            left_s = until_s - self._now_s
+            if left_s > 0.0 and self._auto:
+                self._now_s = until_s
+                self._lock.notify_all()
+                return
+            if left_s <= 0.0:
+                return
+            self._waiting.append(condition)
+        try:
+            # A step of the time between the look above and this wait is caught by the poll.
+            condition.wait(0.05)
+        finally:
+            with self._lock:
+                self._waiting.remove(condition)
+
+    @override
+    def sleep(self, duration_s: float) -> None:
+        with self._lock:
+            until_s = self._now_s + duration_s
+            if self._auto:
+                self._now_s = max(self._now_s, until_s)
+                self._lock.notify_all()
+                return
+            while self._now_s < until_s:
+                self._lock.wait()
+
+
+WALL: Final[Clock] = WallClock()

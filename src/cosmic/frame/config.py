@@ -1,0 +1,84 @@
+"""Strict configuration: TOML read once at start into frozen models, every error named."""
+
+import tomllib
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from cosmic.frame.errors import ConfigError
+
+M = TypeVar("M", bound="StrictModel")
+
+
+class StrictModel(BaseModel):
+    """Base of every configuration model: frozen; unknown and missing keys are errors."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True
+    )
+
+
+def shipped_config_dir() -> Path:
+    """Return the folder with the configuration that ships with CoSMic."""
+    package = Path(__file__).resolve().parents[1]
+    installed = package / "_config"
+    return installed if installed.is_dir() else package.parents[1] / "config"
+
+
+def read_toml(path: Path) -> dict[str, object]:
+    """Read a TOML file.
+
+    Raises
+    ------
+    ConfigError
+        The file is missing, not readable, not UTF-8 or not TOML; the text says which and where.
+    """
+    try:
+        with path.open("rb") as file:
+            return tomllib.load(file)
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: there is no such file") from None
+    except UnicodeDecodeError as exc:
+        raise ConfigError(f"{path}: not UTF-8 text ({exc.reason} at byte {exc.start})") from exc
+    except tomllib.TOMLDecodeError as exc:
+        raise ConfigError(f"{path}: not valid TOML: {exc}") from exc
+    except OSError as exc:
+        raise ConfigError(f"{path}: cannot be read: {exc.strerror or exc}") from exc
+
+
+def load_model(path: Path, model: type[M]) -> M:
+    """Read `path` into `model`.
+
+    Raises
+    ------
+    ConfigError
+        One line per wrong, missing or unknown key, each with file, key and reason.
+    """
+    data = read_toml(path)
+    try:
+        return model.model_validate(data)
+    except ValidationError as exc:
+        raise ConfigError("\n".join(_lines(path, exc))) from None
+
+
+def _lines(path: Path, error: ValidationError) -> list[str]:
+    return [
+        f"{path}: {_key(item['loc'])}: {_reason(item['type'], item['msg'])}"
+        for item in error.errors(include_url=False)
+    ]
+
+
+def _key(loc: tuple[int | str, ...]) -> str:
+    key = ""
+    for part in loc:
+        key += f"[{part}]" if isinstance(part, int) else f".{part}" if key else part
+    return key or "(file)"
+
+
+def _reason(kind: str, message: str) -> str:
+    if kind == "extra_forbidden":
+        return "unknown key; is it misspelt?"
+    if kind == "missing":
+        return "key is missing"
+    return message.removeprefix("Value error, ")

@@ -1,0 +1,144 @@
+"""The one tree of exceptions; everything CoSMic raises on purpose is a `CosmicError`."""
+
+from collections.abc import Iterable
+from enum import StrEnum
+
+from typing_extensions import override
+
+from cosmic.frame.verdict import MoveVerdict, Reason
+
+
+class CosmicError(Exception):
+    """Base of every failure that CoSMic foresees; its text is fit for the operator."""
+
+
+class ConfigError(CosmicError):
+    """A configuration file is broken; the text names file, key and reason, all at once."""
+
+
+class ProtocolError(CosmicError):
+    """A peer or a device spoke in a way its protocol does not allow."""
+
+
+class NotAvailable(CosmicError):  # noqa: N818 - public name of the scripted API
+    """An application, a device or a function is not built, not hosted or not there."""
+
+
+class QuantityError(CosmicError, ValueError):
+    """A text is not a number with a unit that fits."""
+
+
+class UnknownAxisError(CosmicError, KeyError):
+    """No axis of that name; the text lists those there are."""
+
+    def __init__(self, name: object, known: Iterable[str]) -> None:
+        self.text = f"there is no axis {name!r}; known axes: {', '.join(known) or 'none'}"
+        super().__init__(self.text)
+
+    @override
+    def __str__(self) -> str:
+        return self.text
+
+
+class WrongThreadError(CosmicError):
+    """A blocking call was made in the GUI thread, which must never wait."""
+
+
+class MoveCancelled(CosmicError):  # noqa: N818 - reads as what happened
+    """A movement ended before its target: cancelled, or replaced by a newer command."""
+
+
+class DeviceFault(StrEnum):
+    """What went wrong at a device, in words that every vendor library shares."""
+
+    END_STOP = "end stop reached"
+    NO_CHANNEL = "no such channel"
+    NO_SENSOR = "no sensor"
+    WRONG_KIND = "wrong positioner type"
+    OVERRIDDEN = "overridden by the hand control unit"
+    OVERHEATED = "overheated"
+    HIGH_VOLTAGE = "high voltage supply out of range"
+    CALIBRATION = "calibration failed"
+    REFERENCE = "referencing failed"
+    BUSY = "not possible while moving"
+    PARAMETER = "parameter not accepted"
+    UNSUPPORTED = "not supported by this controller or library"
+    COMMUNICATION = "communication with the controller failed"
+    TIMEOUT = "no answer in time"
+    STATE = "library not in the right state"
+    OTHER = "unclassified failure"
+
+
+class DeviceError(CosmicError):
+    """A device refused or failed; the text names device, channel, call and answer.
+
+    Attributes
+    ----------
+    fault : DeviceFault
+        What went wrong, independent of the vendor.
+    code : int or None
+        The vendor's own status code.
+    device, channel : int or None
+        Where, both counted from zero.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        *,
+        fault: DeviceFault = DeviceFault.OTHER,
+        code: int | None = None,
+        device: int | None = None,
+        channel: int | None = None,
+    ) -> None:
+        super().__init__(text)
+        self.fault = fault
+        self.code = code
+        self.device = device
+        self.channel = channel
+
+
+class DeviceTimeout(DeviceError):  # noqa: N818 - name fixed by the conventions
+    """A device did not answer in time."""
+
+
+class NotConnectedError(DeviceError):
+    """A device or its library is not there."""
+
+
+class MoveRefused(CosmicError):  # noqa: N818 - public name of the scripted API
+    """The gate refused a movement; nothing was sent to the hardware.
+
+    Attributes
+    ----------
+    verdict : MoveVerdict
+        The gate's answer.
+    """
+
+    def __init__(self, verdict: MoveVerdict) -> None:
+        super().__init__(str(verdict))
+        self.verdict = verdict
+
+
+class LimitError(MoveRefused):
+    """The target lies outside the soft limits."""
+
+
+class CollisionError(MoveRefused):
+    """Two bodies would come closer than their margin."""
+
+
+class StoppedError(MoveRefused):
+    """The stop is latched, or ended this movement."""
+
+
+_REFUSALS: dict[Reason, type[MoveRefused]] = {
+    Reason.LIMIT: LimitError,
+    Reason.COLLISION: CollisionError,
+    Reason.STOPPED: StoppedError,
+}
+
+
+def refusal(verdict: MoveVerdict) -> MoveRefused:
+    """Return the exception that says `verdict`."""
+    return _REFUSALS.get(verdict.reason, MoveRefused)(verdict)

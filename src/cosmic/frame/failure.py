@@ -1,0 +1,122 @@
+"""One way from a failure to the log, the operator and a safe stop.
+
+See docs/explanation/errors.md for the policy that this module enforces.
+"""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from threading import Lock, local
+from typing import Generic, ParamSpec, TypeVar
+
+from cosmic.frame.errors import CosmicError
+
+logger = logging.getLogger(__name__)
+
+P = ParamSpec("P")
+R = TypeVar("R")
+C = TypeVar("C", bound=Callable[..., object])
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """One failure, as the operator is told of it.
+
+    Attributes
+    ----------
+    where : str
+        The place, such as "thread 'device 0'" or "window".
+    text : str
+        What happened, in one line, without a traceback.
+    defect : bool
+        True when nobody foresaw it: a mistake in the program, and a reason to stop all motion.
+    """
+
+    where: str
+    text: str
+    defect: bool
+
+
+class _Subscribers(Generic[C]):
+    """A list of callables that may be changed while it is being called."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self.all: tuple[C, ...] = ()
+
+    def add(self, callable_: C) -> Callable[[], None]:
+        with self._lock:
+            self.all = (*self.all, callable_)
+
+        def remove() -> None:
+            with self._lock:
+                self.all = tuple(each for each in self.all if each != callable_)
+
+        return remove
+
+
+class FailurePolicy:
+    """Receives every failure that nothing else handled; any thread.
+
+    A defect (any exception that is no `CosmicError`) and the death of a thread stop all motion.
+    A `CosmicError` is foreseen: it is logged and told, and the hardware is left as it is.
+    """
+
+    def __init__(self) -> None:
+        self._safe_stops: _Subscribers[Callable[[str], None]] = _Subscribers()
+        self._listeners: _Subscribers[Callable[[Failure], None]] = _Subscribers()
+        self._busy = local()
+
+    def on_safe_stop(self, stop: Callable[[str], None]) -> Callable[[], None]:
+        """Call `stop(reason)` when motion must end; returns the function that undoes it."""
+        return self._safe_stops.add(stop)
+
+    def subscribe(self, listener: Callable[[Failure], None]) -> Callable[[], None]:
+        """Call `listener` with each failure, in the thread where it happened."""
+        return self._listeners.add(listener)
+
+    def report(self, error: BaseException, where: str, *, thread_died: bool = False) -> Failure:
+        """Log `error` with its traceback, stop what must stop, and tell the operator."""
+        defect = not isinstance(error, CosmicError)
+        text = str(error) or type(error).__name__
+        if defect:
+            text = f"{type(error).__name__}: {text}"
+        failure = Failure(where=where, text=text, defect=defect)
+        if getattr(self._busy, "flag", False):
+            logger.error("%s: %s (while another failure was reported)", where, text)
+            return failure
+        self._busy.flag = True
+        try:
+            if defect or thread_died:
+                self._stop_everything(f"{where}: {text}")
+            logger.error("%s: %s", where, text, exc_info=error if defect else None)
+            self._tell(failure)
+        finally:
+            self._busy.flag = False
+        return failure
+
+    def _stop_everything(self, reason: str) -> None:
+        for stop in self._safe_stops.all:
+            try:
+                stop(reason)
+            except Exception:
+                logger.exception("a safe stop failed")
+
+    def _tell(self, failure: Failure) -> None:
+        for listener in self._listeners.all:
+            try:
+                listener(failure)
+            except Exception:
+                logger.exception("a failure listener failed")
+
+    def guarded(self, where: str, function: Callable[P, R], fallback: R) -> Callable[P, R]:
+        """Wrap a driver callback, out of which no exception may escape into C code."""
+
+        def call(*args: P.args, **kwargs: P.kwargs) -> R:
+            try:
+                return function(*args, **kwargs)
+            except Exception as exc:  # noqa: BLE001 - the edge to foreign code
+                self.report(exc, where)
+                return fallback
+
+        return call

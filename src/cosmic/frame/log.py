@@ -1,0 +1,86 @@
+"""Logging: one set-up for the process, and a ring of recent records for the log panel."""
+
+import logging
+from collections import deque
+from collections.abc import Callable
+from logging.handlers import RotatingFileHandler
+from pathlib import Path
+from threading import Lock
+from typing import Final
+
+from typing_extensions import override
+
+LINE_FORMAT: Final = "%(asctime)s.%(msecs)03d %(levelname)-7s %(name)s: %(message)s"
+TIME_FORMAT: Final = "%Y-%m-%d %H:%M:%S"
+
+Listener = Callable[[logging.LogRecord], None]
+
+
+class RingBufferHandler(logging.Handler):
+    """Keeps the newest `capacity` records and tells listeners of each new one; any thread.
+
+    Listeners are called in the thread that logs and must return at once.
+    """
+
+    def __init__(self, capacity: int = 5000, level: int = logging.INFO) -> None:
+        super().__init__(level)
+        self._records: deque[logging.LogRecord] = deque(maxlen=capacity)
+        self._listeners: tuple[Listener, ...] = ()
+        self._guard = Lock()
+
+    @override
+    def emit(self, record: logging.LogRecord) -> None:
+        record.message = record.getMessage()
+        self._records.append(record)
+        for listener in self._listeners:
+            listener(record)
+
+    def records(self) -> list[logging.LogRecord]:
+        """Return the records kept, oldest first."""
+        return list(self._records)
+
+    def subscribe(self, listener: Listener) -> Callable[[], None]:
+        """Call `listener` with each new record; returns the function that ends it."""
+        with self._guard:
+            self._listeners = (*self._listeners, listener)
+
+        def unsubscribe() -> None:
+            with self._guard:
+                self._listeners = tuple(each for each in self._listeners if each is not listener)
+
+        return unsubscribe
+
+
+def set_up_logging(
+    ring: RingBufferHandler, *, file: Path | None = None, console: bool = False
+) -> Callable[[], None]:
+    """Send the records of ``cosmic`` to `ring`, a rotating file and the terminal.
+
+    Returns the function that undoes it.
+    """
+    root = logging.getLogger("cosmic")
+    handlers: list[logging.Handler] = [ring]
+    formatter = logging.Formatter(LINE_FORMAT, TIME_FORMAT)
+    if file is not None:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        handlers.append(
+            RotatingFileHandler(
+                file, maxBytes=5_000_000, backupCount=3, encoding="utf-8", delay=True
+            )
+        )
+    if console:
+        handlers.append(logging.StreamHandler())
+    for handler in handlers:
+        handler.setFormatter(formatter)
+        root.addHandler(handler)
+    before = root.level
+    root.setLevel(logging.INFO)
+
+    def undo() -> None:
+        root.setLevel(before)
+        for handler in handlers:
+            root.removeHandler(handler)
+            if handler is not ring:
+                handler.close()
+
+    return undo

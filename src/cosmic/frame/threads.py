@@ -1,0 +1,89 @@
+"""The only threads there are: `WorkerThread` and its subclasses."""
+
+import atexit
+import sys
+import threading
+import weakref
+from typing import Final
+
+from PySide6.QtCore import QObject, QThread
+from typing_extensions import override
+
+from cosmic.frame.failure import FailurePolicy
+
+JOIN_TIMEOUT_S: Final = 5.0
+
+
+class WorkerThread(QThread):
+    """A named thread that ends in order and whose failure cannot pass unseen.
+
+    Either a subclass overrides `run_body`, the only code that runs in the new thread, or the
+    default runs an event loop for the QObjects moved to it. Everything else a subclass offers
+    must be thread-safe and return at once: slots of a QThread run where it was made.
+
+    Parameters
+    ----------
+    name : str
+        Shown in logs and debuggers.
+    policy : FailurePolicy
+        Told when the body raises; motion is then stopped.
+    """
+
+    def __init__(self, name: str, policy: FailurePolicy, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName(name)
+        self._policy = policy
+        self._end_requested = threading.Event()
+        _alive.add(self)
+
+    @property
+    def name(self) -> str:
+        """Name of the thread."""
+        return self.objectName()
+
+    @property
+    def end_requested(self) -> bool:
+        """True once `request_end` was called; a body leaves its loop then."""
+        return self._end_requested.is_set()
+
+    def run_body(self) -> None:
+        """Run in the new thread; override it."""
+        self.exec()
+
+    def request_end(self) -> None:
+        """Ask the body to leave; returns at once. Subclasses wake their waits here as well."""
+        self._end_requested.set()
+        self.quit()
+
+    def join(self, timeout_s: float = JOIN_TIMEOUT_S) -> bool:
+        """Wait until the thread has ended; False when it had not after `timeout_s` of wall time."""
+        return self.wait(int(timeout_s * 1000))
+
+    @override
+    def run(self) -> None:
+        trace = threading.gettrace()
+        if trace is not None:  # coverage does not see threads that Qt started
+            sys.settrace(trace)
+        threading.current_thread().name = self.name
+        try:
+            self.run_body()
+        except Exception as exc:  # noqa: BLE001 - the end of the thread body
+            self._policy.report(exc, f"thread {self.name!r}", thread_died=True)
+
+
+_alive: "weakref.WeakSet[WorkerThread]" = weakref.WeakSet()
+
+
+def running_threads() -> list[WorkerThread]:
+    """Return the worker threads that run now."""
+    return [thread for thread in list(_alive) if thread.isRunning()]
+
+
+@atexit.register
+def _end_what_still_runs() -> None:
+    """End threads that nobody ended: Qt aborts the process over a running thread."""
+    left = running_threads()
+    for thread in left:
+        thread.request_end()
+    for thread in left:
+        thread.join(2.0)

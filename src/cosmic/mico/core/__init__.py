@@ -1,0 +1,1 @@
+"""What MiCo does: devices, gate, positions; QtCore at most."""

@@ -1,0 +1,1 @@
+"""Widgets of MiCo (thesis appendix E)."""

@@ -1,0 +1,1 @@
+"""The simulated platform as plain physics; numpy only, no Qt."""
