@@ -4,11 +4,13 @@ import atexit
 import sys
 import threading
 import weakref
+from collections.abc import Callable
 from typing import Final
 
 from PySide6.QtCore import QObject, QThread
 from typing_extensions import override
 
+from cosmic.frame.errors import WrongThreadError
 from cosmic.frame.failure import FailurePolicy
 
 JOIN_TIMEOUT_S: Final = 5.0
@@ -87,3 +89,30 @@ def _end_what_still_runs() -> None:
         thread.request_end()
     for thread in left:
         thread.join(2.0)
+
+
+_gui_threads: set[int] = set()
+
+
+def declare_gui_thread() -> Callable[[], None]:
+    """Say that the calling thread runs a window, so that nothing may block it.
+
+    Returns the function that takes it back.
+    """
+    ident = threading.get_ident()
+    _gui_threads.add(ident)
+    return lambda: _gui_threads.discard(ident)
+
+
+def forbid_in_gui_thread(what: str) -> None:
+    """Raise where `what` would freeze a window.
+
+    Raises
+    ------
+    WrongThreadError
+        The calling thread was declared a GUI thread.
+    """
+    if threading.get_ident() in _gui_threads:
+        raise WrongThreadError(
+            f"{what} would freeze the window; use wait=False, or run it in the console or a thread"
+        )

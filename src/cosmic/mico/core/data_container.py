@@ -1,0 +1,214 @@
+"""`DeviceDataContainer`: the thread-safe state of one device's positioners (thesis 6.1.1)."""
+
+import logging
+from collections.abc import Callable, Mapping
+from threading import Condition
+
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import DeviceFault
+from cosmic.mico.core.orders import Step
+from cosmic.mico.core.positioner import (
+    POSITIONER_CLASSES,
+    Confidence,
+    PositionerBase,
+    PositionerState,
+)
+from cosmic.mico.core.settings import PositionerSettings
+from cosmic.mico.hw.interface import (
+    ActivityRead,
+    Channel,
+    Event,
+    Failed,
+    PositionerKind,
+    PositionerType,
+    PositionKnownRead,
+    PositionRead,
+    SensorPresentRead,
+    TypeRead,
+)
+
+logger = logging.getLogger(__name__)
+
+Observer = Callable[[Event, PositionerState | None], None]
+
+_LOST_POSITION = (DeviceFault.NO_SENSOR,)
+
+
+class DeviceDataContainer:
+    """Keeps what is known of the positioners of one device; any thread.
+
+    `DeviceListener` writes through `apply`, `Device` reads and observes; neither knows the
+    other. Observers are called in the thread that wrote, after the state has changed, and must
+    return at once.
+
+    Parameters
+    ----------
+    device : int
+        Index of the device.
+    configured : mapping of PositionerSettings
+        The positioners that the configuration expects here, by channel.
+    hold_s : float
+        How long closed-loop positions are held; inf for ever.
+    """
+
+    def __init__(
+        self, device: int, configured: Mapping[int, PositionerSettings], hold_s: float
+    ) -> None:
+        self.device = device
+        self._configured = dict(configured)
+        self._hold_s = hold_s
+        self._changed = Condition()
+        self._positioners: dict[int, PositionerBase] = {}
+        self._unclear: set[int] = set()
+        self._observers: tuple[Observer, ...] = ()
+
+    def observe(self, observer: Observer) -> None:
+        """Call `observer(event, state)` after each event."""
+        self._observers = (*self._observers, observer)
+
+    # What is there
+
+    def expect(self, channel: int) -> None:
+        """Say that an answer about `channel` is awaited."""
+        with self._changed:
+            self._unclear.add(channel)
+
+    def settle(self, channel: int, kind: PositionerKind | None, reason: str = "") -> None:
+        """Say what `channel` has: a kind, or nothing (None)."""
+        with self._changed:
+            self._settle(channel, kind, None, reason)
+            self._changed.notify_all()
+
+    def wait_until_clear(self, timeout_s: float) -> bool:
+        """Wait until every expected channel has answered; False after `timeout_s` of wall time."""
+        with self._changed:
+            return self._changed.wait_for(lambda: not self._unclear, timeout_s)
+
+    @property
+    def clear(self) -> bool:
+        """True when every expected channel has answered."""
+        return not self._unclear
+
+    def _settle(
+        self, channel: int, kind: PositionerKind | None, found: PositionerType | None, reason: str
+    ) -> None:
+        self._unclear.discard(channel)
+        settings = self._configured.get(channel) or self._unconfigured(channel, kind)
+        if settings is None:
+            return
+        wanted = settings.positioner_kind
+        positioner = POSITIONER_CLASSES[wanted](settings, found, self._hold_s)
+        if channel not in self._configured:
+            positioner.update(present=False, error="not in the configuration: add it there")
+        elif kind is not wanted:
+            seen = kind.value if kind else reason or "nothing"
+            text = f"configured as {wanted}, but the controller finds {seen}"
+            positioner.update(present=False, error=text)
+            logger.error("%s: %s", settings.name, text)
+        self._positioners[channel] = positioner
+
+    def _unconfigured(self, channel: int, kind: PositionerKind | None) -> PositionerSettings | None:
+        """Make up settings for a sensor nobody configured; a channel without one is empty."""
+        if kind is None or kind is PositionerKind.OPEN_LOOP:
+            return None
+        name = f"device{self.device}.channel{channel}"
+        unit = "deg" if kind is PositionerKind.ROTARY else "um"
+        return PositionerSettings.model_validate(
+            {
+                "name": name,
+                "device": self.device,
+                "channel": channel,
+                "kind": kind.value,
+                f"limits_{unit}": (-1e-6, 1e-6),
+            }
+        )
+
+    # Reading
+
+    def positioner(self, channel: int) -> PositionerBase | None:
+        """Return the positioner on `channel`, or None where there is none."""
+        return self._positioners.get(channel)
+
+    def state(self, channel: int) -> PositionerState | None:
+        """Return the state of the positioner on `channel`, or None where there is none."""
+        positioner = self._positioners.get(channel)
+        return positioner.state if positioner else None
+
+    def channels(self) -> list[int]:
+        """Return the channels that have a positioner."""
+        return sorted(self._positioners)
+
+    def states(self) -> list[PositionerState]:
+        """Return the state of every positioner, by channel."""
+        return [self._positioners[channel].state for channel in self.channels()]
+
+    # Writing
+
+    def update(self, channel: int, **changes: object) -> PositionerState | None:
+        """Change fields of one positioner's state and return it."""
+        with self._changed:
+            positioner = self._positioners.get(channel)
+            return positioner.update(**changes) if positioner else None
+
+    def count_steps(self, channel: int, motion: Step, largest_step_um: float) -> None:
+        """Estimate where an axis without sensor is after `motion`."""
+        positioner = self._positioners.get(channel)
+        if positioner is None or positioner.has_sensor:
+            return
+        state = positioner.state
+        way = motion.steps * largest_step_um * motion.amplitude_v / 100.0
+        self.update(channel, position=(state.position or 0.0) + way, read_wall_s=WALL.now_s())
+
+    def lose(self, reason: str) -> list[PositionerState]:
+        """Say that the whole device is gone; positions are worth nothing from now on."""
+        with self._changed:
+            return [
+                each.update(
+                    present=False,
+                    error=reason,
+                    confidence=Confidence.UNKNOWN if each.has_sensor else each.state.confidence,
+                    in_motion=False,
+                )
+                for each in self._positioners.values()
+            ]
+
+    def apply(self, event: Event) -> None:
+        """Take in one event of the controller; listener thread."""
+        with self._changed:
+            state = self._apply(event)
+            self._changed.notify_all()
+        for observer in self._observers:
+            observer(event, state)
+
+    def _apply(self, event: Event) -> PositionerState | None:
+        match event:
+            case SensorPresentRead():
+                if not event.present:
+                    self._settle(event.channel.channel, PositionerKind.OPEN_LOOP, None, "")
+            case TypeRead():
+                reason = f"the unknown type {event.positioner.name}"
+                self._settle(event.channel.channel, event.positioner.kind, event.positioner, reason)
+        if event.channel is None:
+            return None
+        positioner = self._positioners.get(event.channel.channel)
+        return None if positioner is None else _reflect(event, positioner)
+
+    def address(self, channel: int) -> Channel:
+        """Return the full address of `channel`."""
+        return Channel(self.device, channel)
+
+
+def _reflect(event: Event, positioner: PositionerBase) -> PositionerState:
+    """Write `event` into `positioner`."""
+    match event:
+        case PositionRead() if event.unit == positioner.state.unit:
+            return positioner.update(position=event.value, read_wall_s=WALL.now_s())
+        case ActivityRead():
+            return positioner.update(activity=event.activity)
+        case PositionKnownRead():
+            known = Confidence.KNOWN if event.known else Confidence.UNKNOWN
+            return positioner.update(confidence=known)
+        case Failed() if event.error.fault in _LOST_POSITION and positioner.has_sensor:
+            return positioner.update(confidence=Confidence.UNKNOWN)
+        case _:
+            return positioner.state

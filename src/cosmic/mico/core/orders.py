@@ -1,0 +1,120 @@
+"""What can be asked of an axis, as frozen data."""
+
+from dataclasses import dataclass, field
+from itertools import count
+from typing import Final
+
+from cosmic.frame.units import AxisUnit
+from cosmic.mico.core.movement import Movement
+from cosmic.mico.hw.interface import Direction
+
+_numbers: Final = count(1)
+
+LARGEST_STEPS: Final = 29999
+FREQUENCY_HZ: Final = (1, 18500)
+AMPLITUDE_V: Final = (15.0, 100.0)
+
+
+@dataclass(frozen=True, slots=True)
+class MoveTo:
+    """Go to a position in gate coordinates."""
+
+    target: float
+    unit: AxisUnit
+
+
+@dataclass(frozen=True, slots=True)
+class MoveBy:
+    """Go a distance from where the axis stands, or from where it is going."""
+
+    distance: float
+    unit: AxisUnit
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Make steps without looking at a sensor; the sign is the direction."""
+
+    steps: int
+    amplitude_v: float
+    frequency_hz: int
+
+
+@dataclass(frozen=True, slots=True)
+class Jog:
+    """Keep moving while somebody renews it; `speed` in um/s, deg/s, or Hz for open loop."""
+
+    direction: int
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class Calibrate:
+    """Calibrate the sensor; sweeps several millimetres both ways."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """Find the reference; may sweep the whole travel."""
+
+
+@dataclass(frozen=True, slots=True)
+class ToEndStop:
+    """Drive until the travel ends."""
+
+    direction: Direction
+
+
+Motion = MoveTo | MoveBy | Step | Jog | Calibrate | Reference | ToEndStop
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """All places of one axis that a movement can take it to, in the axis' unit."""
+
+    low: float
+    high: float
+
+    def hull(self, other: "Interval") -> "Interval":
+        """Return the smallest interval that holds both."""
+        return Interval(min(self.low, other.low), max(self.high, other.high))
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """The gate's leave to make one movement, void after the next stop."""
+
+    epoch: int
+    target: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """One command on its way to a `Device`.
+
+    Attributes
+    ----------
+    channel : int
+        Channel of the device it is sent to.
+    motion : Motion
+        What to do.
+    token : str
+        Who sends it (see `Lease`).
+    source : str
+        Where it came from, for the log: "window", "key", "script" ...
+    consent : bool
+        The operator agreed to move an axis whose position is unknown.
+    movement : Movement
+        Completed when the movement ends.
+    grant : Grant or None
+        Set where the gate has already decided, together with others.
+    """
+
+    channel: int
+    motion: Motion
+    token: str
+    source: str = "script"
+    consent: bool = False
+    movement: Movement = field(default_factory=Movement)
+    grant: Grant | None = None
+    number: int = field(default_factory=lambda: next(_numbers))

@@ -1,0 +1,211 @@
+"""The gate's checks of a single axis, as pure functions in the order they are made."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from cosmic.frame.units import format_quantity
+from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.mico.core.orders import (
+    AMPLITUDE_V,
+    FREQUENCY_HZ,
+    LARGEST_STEPS,
+    Interval,
+    Motion,
+    MoveBy,
+    MoveTo,
+    Step,
+)
+from cosmic.mico.core.positioner import POSITIONER_CLASSES, Confidence, PositionerState
+from cosmic.mico.hw.interface import PositionerKind
+
+EVERYWHERE: Final = Interval(-math.inf, math.inf)
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What the rules take from the configuration.
+
+    Attributes
+    ----------
+    largest_step : mapping of float
+        By unit, the longest way that one step can go: bounds what open-loop steps may sweep.
+    stale_s : float
+        Age in wall seconds beyond which a position is no answer.
+    """
+
+    largest_step: dict[str, float]
+    stale_s: float
+
+
+def check_axis(
+    motion: Motion,
+    state: PositionerState,
+    *,
+    consent: bool,
+    running_target: float | None,
+    age_s: float,
+    rules: Limits,
+) -> MoveVerdict | None:
+    """Return why this axis must not make `motion`, or None."""
+    return (
+        _not_finite(motion, state)
+        or _wrong_kind(motion, state)
+        or _step_range(motion, state)
+        or _device(state)
+        or _position_unknown(state, consent=consent)
+        or _stale(state, age_s, rules)
+        or _limit(motion, state, planned_target(motion, state, running_target), rules)
+    )
+
+
+def planned_target(
+    motion: Motion, state: PositionerState, running_target: float | None
+) -> float | None:
+    """Return where a closed-loop movement will end, in gate coordinates; None if open-loop."""
+    match motion:
+        case MoveTo():
+            return motion.target
+        case MoveBy():
+            base = state.position if running_target is None else running_target
+            return None if base is None else base + motion.distance
+        case _:
+            return None
+
+
+def swept_interval(
+    motion: Motion,
+    state: PositionerState,
+    target: float | None,
+    held: Interval | None,
+    rules: Limits,
+) -> Interval:
+    """Return all places the movement can take the axis to, whatever is interrupted when."""
+    if state.position is None:
+        return EVERYWHERE
+    start = Interval(state.position, state.position)
+    if held is not None:
+        start = start.hull(held)
+    if target is not None:
+        return start.hull(Interval(target, target))
+    if isinstance(motion, Step):
+        reach = motion.steps * rules.largest_step[state.unit]
+        return start.hull(Interval(start.low + min(reach, 0.0), start.high + max(reach, 0.0)))
+    return EVERYWHERE
+
+
+def _not_finite(motion: Motion, state: PositionerState) -> MoveVerdict | None:
+    match motion:
+        case MoveTo():
+            numbers: tuple[object, ...] = (motion.target,)
+        case MoveBy():
+            numbers = (motion.distance,)
+        case Step():
+            numbers = (motion.steps, motion.amplitude_v, motion.frequency_hz)
+        case _:
+            return None
+    for number in numbers:
+        fine = isinstance(number, (int, float)) and not isinstance(number, bool)
+        if not (fine and math.isfinite(number)):  # type: ignore[arg-type]
+            return refuse(
+                Reason.NOT_FINITE,
+                f"{state.name}: {number!r} is not a finite number",
+                axis=state.name,
+            )
+    return None
+
+
+def _wrong_kind(motion: Motion, state: PositionerState) -> MoveVerdict | None:
+    cls = POSITIONER_CLASSES[state.kind]
+    unit = getattr(motion, "unit", None)
+    if isinstance(motion, cls.motions) and unit in (None, state.unit):
+        return None
+    asked = f"a movement in {unit}" if unit else type(motion).__name__
+    return refuse(
+        Reason.WRONG_KIND,
+        f"{state.name}: {asked} does not fit a {state.kind} axis; {cls.advice}",
+        axis=state.name,
+        unit=state.unit,
+    )
+
+
+def _step_range(motion: Motion, state: PositionerState) -> MoveVerdict | None:
+    if not isinstance(motion, Step):
+        return None
+    checks = (
+        ("steps", motion.steps, -LARGEST_STEPS, LARGEST_STEPS, "steps"),
+        ("amplitude", motion.amplitude_v, *AMPLITUDE_V, "V"),
+        ("frequency", motion.frequency_hz, *FREQUENCY_HZ, "Hz"),
+    )
+    for what, value, low, high, unit in checks:
+        if not low <= value <= high:
+            return refuse(
+                Reason.LIMIT,
+                f"{state.name}: {what} {value:g} {unit} is outside {low:g} to {high:g} {unit}",
+                axis=state.name,
+                value=float(value),
+                limit=float(high if value > high else low),
+                unit=unit,
+            )
+    return None
+
+
+def _device(state: PositionerState) -> MoveVerdict | None:
+    if state.present:
+        return None
+    why = state.error or "its device does not answer"
+    return refuse(Reason.DEVICE, f"{state.name}: {why}; check it, then rescan", axis=state.name)
+
+
+def _position_unknown(state: PositionerState, *, consent: bool) -> MoveVerdict | None:
+    if state.kind is PositionerKind.OPEN_LOOP or consent:
+        return None
+    if state.confidence is not Confidence.UNKNOWN:
+        return None
+    return refuse(
+        Reason.POSITION_UNKNOWN,
+        f"{state.name}: its position is unknown; initialise the platform, or give consent",
+        axis=state.name,
+    )
+
+
+def _stale(state: PositionerState, age_s: float, rules: Limits) -> MoveVerdict | None:
+    if state.kind is PositionerKind.OPEN_LOOP:
+        return None
+    if state.position is None:
+        return refuse(
+            Reason.NO_ANSWER, f"{state.name}: no position has been read yet", axis=state.name
+        )
+    if age_s <= rules.stale_s:
+        return None
+    return refuse(
+        Reason.NO_ANSWER,
+        f"{state.name}: its position was last read {age_s:.1f} s ago; is the device connected?",
+        axis=state.name,
+    )
+
+
+def _limit(
+    motion: Motion, state: PositionerState, target: float | None, rules: Limits
+) -> MoveVerdict | None:
+    if state.limits is None:
+        return None
+    low, high = state.limits
+    if target is None:
+        if not isinstance(motion, Step):
+            return None
+        swept = swept_interval(motion, state, None, None, rules)
+        target = swept.high if motion.steps > 0 else swept.low
+    if low <= target <= high:
+        return None
+    value, limit = target - state.zero, (high if target > high else low) - state.zero
+    what = "could reach" if isinstance(motion, Step) else "target"
+    return refuse(
+        Reason.LIMIT,
+        f"{state.name}: {what} {format_quantity(value, state.unit)} is outside its limit "
+        f"{format_quantity(limit, state.unit)}",
+        axis=state.name,
+        value=value,
+        limit=limit,
+        unit=state.unit,
+    )

@@ -1,0 +1,190 @@
+"""What platform.toml says about MiCo."""
+
+import math
+from collections import Counter
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from cosmic.frame.config import StrictModel
+from cosmic.frame.units import AxisUnit
+from cosmic.mico.hw.interface import Channel, PositionerKind
+
+Range = Annotated[tuple[float, float], Field(strict=False)]
+Names = Annotated[tuple[str, ...], Field(strict=False)]
+Text = Annotated[str, Field(min_length=1)]
+
+
+class MotionDefaults(StrictModel):
+    """What a movement uses where nothing else is said."""
+
+    hold_s: Annotated[float, Field(ge=0, lt=60)] | Literal["forever"] = "forever"
+    closed_loop_frequency_hz: int = Field(default=5000, ge=1, le=18500)
+    steps: int = Field(default=100, ge=0, le=29999)
+    frequency_hz: int = Field(default=1000, ge=1, le=18500)
+    amplitude_v: float = Field(default=100.0, ge=15, le=100)
+    distance_um: float = Field(default=100.0, gt=0)
+    distance_deg: float = Field(default=1.0, gt=0)
+    largest_step_um: float = Field(default=3.0, gt=0)
+    largest_step_deg: float = Field(default=0.05, gt=0)
+
+    @property
+    def hold(self) -> float:
+        """Hold time in seconds; inf for ever."""
+        return math.inf if self.hold_s == "forever" else self.hold_s
+
+
+class JogSettings(StrictModel):
+    """How jogging moves: as long as a key is held, in short packets."""
+
+    speed_um_s: float = Field(default=200.0, gt=0)
+    speed_deg_s: float = Field(default=2.0, gt=0)
+    frequency_hz: int = Field(default=200, ge=1, le=18500)
+    packet_s: float = Field(default=0.1, gt=0, le=0.1)
+    dead_man_s: float = Field(default=0.25, ge=0.05, le=1.0)
+
+
+class WatchSettings(StrictModel):
+    """How closely positions are watched; all times but `stall_s` count on the wall clock."""
+
+    poll_hz: float = Field(default=20.0, gt=0, le=100)
+    poll_total_hz: float = Field(default=400.0, gt=0, le=2000)
+    idle_poll_s: float = Field(default=0.5, ge=0.1, le=10)
+    stale_s: float = Field(default=5.0, ge=1, le=60)
+    stall_s: float = Field(default=5.0, ge=0.5, le=120)
+    answer_s: float = Field(default=5.0, ge=0.5, le=60)
+
+
+class PositionerSettings(StrictModel):
+    """One positioner: where it is connected, what it may do and how the window shows it."""
+
+    name: str = Field(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)?$")
+    title: str = ""
+    device: int = Field(ge=0)
+    channel: int = Field(ge=0, le=2)
+    kind: Literal["linear", "rotary", "open-loop"]
+    limits_um: Range | None = None
+    limits_deg: Range | None = None
+    start_um: float | None = None
+    start_deg: float | None = None
+    forward_text: Text = "+"
+    backward_text: Text = "-"
+    forward_key: str = ""
+    backward_key: str = ""
+
+    @property
+    def address(self) -> Channel:
+        """Device and channel it is connected to."""
+        return Channel(self.device, self.channel)
+
+    @property
+    def positioner_kind(self) -> PositionerKind:
+        """Kind as the hardware layer names it."""
+        return PositionerKind(self.kind)
+
+    @property
+    def unit(self) -> AxisUnit:
+        """Unit of its positions; an open-loop axis is estimated in um."""
+        return "deg" if self.kind == "rotary" else "um"
+
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """Soft limits in `unit`, None for an open-loop axis."""
+        return self.limits_deg if self.kind == "rotary" else self.limits_um
+
+    @property
+    def start(self) -> float | None:
+        """Start pose in `unit`, None where it has none."""
+        return self.start_deg if self.kind == "rotary" else self.start_um
+
+    @model_validator(mode="after")
+    def _units_fit(self) -> Self:
+        wrong = {"linear": "deg", "rotary": "um"}.get(self.kind)
+        for key in ("limits", "start"):
+            for unit in (wrong,) if wrong else ("um", "deg"):
+                if getattr(self, f"{key}_{unit}") is not None:
+                    raise ValueError(f"{self.name}: a {self.kind} axis has no {key}_{unit}")
+        if wrong and self.limits is None:
+            raise ValueError(f"{self.name}: a {self.kind} axis needs limits_{self.unit}")
+        if self.limits and not self.limits[0] < self.limits[1]:
+            raise ValueError(f"{self.name}: limits must be (low, high) with low < high")
+        if self.limits and self.start is not None:
+            low, high = self.limits
+            if not low <= self.start <= high:
+                raise ValueError(
+                    f"{self.name}: start {self.start:g} lies outside {low:g}..{high:g}"
+                )
+        return self
+
+
+class GroupSettings(StrictModel):
+    """A group of positioners as the window arranges them."""
+
+    title: Text
+    positioners: Names
+
+
+class InitialisationSettings(StrictModel):
+    """The safe order in which axes are referenced; a group moves at once, one after another."""
+
+    order: Annotated[tuple[Names, ...], Field(strict=False)] = ()
+    go_to_start: bool = True
+
+
+class MicoSettings(StrictModel):
+    """Section ``[mico]`` of platform.toml."""
+
+    backend: Literal["simulated", "scu3d"] = "simulated"
+    library: str = ""
+    serials: Annotated[tuple[int, ...], Field(strict=False)] = ()
+    defaults: MotionDefaults = MotionDefaults()
+    jog: JogSettings = JogSettings()
+    watch: WatchSettings = WatchSettings()
+    initialisation: InitialisationSettings = InitialisationSettings()
+    positioner: Annotated[tuple[PositionerSettings, ...], Field(strict=False)]
+    group: Annotated[tuple[GroupSettings, ...], Field(strict=False)] = ()
+
+    @model_validator(mode="after")
+    def _names_fit(self) -> Self:
+        wrong = [
+            *self._twice("name", [each.name for each in self.positioner]),
+            *self._same_channel(),
+            *self._twice("key", self._keys()),
+            *self._unknown_names(),
+        ]
+        if wrong:
+            raise ValueError("; ".join(wrong))
+        return self
+
+    def _keys(self) -> list[str]:
+        keys = [key for each in self.positioner for key in (each.forward_key, each.backward_key)]
+        return [key.upper() for key in keys if key]
+
+    @staticmethod
+    def _twice(what: str, values: list[str]) -> list[str]:
+        return [
+            f"{what} {value!r} is used {count} times"
+            for value, count in Counter(values).items()
+            if count > 1
+        ]
+
+    def _same_channel(self) -> list[str]:
+        names: dict[Channel, list[str]] = {}
+        for each in self.positioner:
+            names.setdefault(each.address, []).append(each.name)
+        return [
+            f"{' and '.join(group)} are both on device {where.device} channel {where.channel}"
+            for where, group in names.items()
+            if len(group) > 1
+        ]
+
+    def _unknown_names(self) -> list[str]:
+        known = {each.name for each in self.positioner}
+        used = [(f"group {group.title!r}", group.positioners) for group in self.group]
+        used += [("initialisation.order", names) for names in self.initialisation.order]
+        return [
+            f"{where}: there is no positioner {name!r}"
+            for where, names in used
+            for name in names
+            if name not in known
+        ]

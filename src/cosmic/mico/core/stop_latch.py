@@ -1,0 +1,62 @@
+"""The stop that stays: set by anybody, reset only on purpose."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from threading import Lock
+
+
+@dataclass(frozen=True, slots=True)
+class StopState:
+    """Whether motion is stopped, and why.
+
+    Attributes
+    ----------
+    reason : str or None
+        Why, or None while motion is allowed.
+    epoch : int
+        Number of stops so far. A grant is void when a stop came after it, even if it was reset.
+    """
+
+    reason: str | None
+    epoch: int
+
+    @property
+    def latched(self) -> bool:
+        """True while nothing may move."""
+        return self.reason is not None
+
+
+class StopLatch:
+    """Thread-safe latch that every loop polls; reading it takes no lock."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._state = StopState(reason=None, epoch=0)
+        self._listeners: tuple[Callable[[StopState], None], ...] = ()
+
+    @property
+    def state(self) -> StopState:
+        """The state now."""
+        return self._state
+
+    def set(self, reason: str) -> None:
+        """Latch; the first reason stays until the reset."""
+        with self._lock:
+            before = self._state
+            self._state = StopState(reason=before.reason or reason, epoch=before.epoch + 1)
+
+    def reset(self) -> None:
+        """Allow motion again; what was stopped does not go on by itself."""
+        with self._lock:
+            self._state = StopState(reason=None, epoch=self._state.epoch)
+        self.announce()
+
+    def subscribe(self, listener: Callable[[StopState], None]) -> None:
+        """Call `listener` after each change, in the thread that made it."""
+        self._listeners = (*self._listeners, listener)
+
+    def announce(self) -> None:
+        """Tell the listeners; apart from `set`, so that stopping comes before telling."""
+        state = self._state
+        for listener in self._listeners:
+            listener(state)
