@@ -1,0 +1,312 @@
+"""SCU3DControl's C interface, one to one: packet, constants, prototypes, and binding by name.
+
+Names and numbers are those of the vendor's header 1.5.7 (2018), which contains header 1.2 (2010)
+unchanged. Nothing is converted and nothing raises on a status here; that is one floor up in
+`scu3d`. The calling convention is cdecl on Windows as on Linux, hence `ctypes.CDLL`.
+"""
+
+import ctypes
+import ctypes.util
+import struct
+import sys
+from collections.abc import Callable
+from ctypes import POINTER, c_int32, c_uint32, c_void_p
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+from cosmic.frame.errors import DeviceFault, NotConnectedError
+
+
+class SA_PACKET(ctypes.Structure):
+    """One answer of the asynchronous mode: 20 bytes without padding; all integers 32 bit."""
+
+    _fields_ = (
+        ("packetType", c_uint32),
+        ("channelIndex", c_uint32),
+        ("data1", c_uint32),
+        ("data2", c_int32),
+        ("data3", c_int32),
+    )
+
+
+# configuration flags of SA_InitDevices; the reset is a bit to add
+SA_SYNCHRONOUS_COMMUNICATION: Final = 0
+SA_ASYNCHRONOUS_COMMUNICATION: Final = 1
+SA_HARDWARE_RESET: Final = 2
+# SA_SetReportOnComplete_A
+SA_NO_REPORT_ON_COMPLETE: Final = 0
+SA_REPORT_ON_COMPLETE: Final = 1
+# what every function returns
+SA_OK: Final = 0
+SA_INITIALIZATION_ERROR: Final = 1
+SA_NOT_INITIALIZED_ERROR: Final = 2
+SA_NO_DEVICES_FOUND_ERROR: Final = 3
+SA_TOO_MANY_DEVICES_ERROR: Final = 4
+SA_INVALID_DEVICE_INDEX_ERROR: Final = 5
+SA_INVALID_CHANNEL_INDEX_ERROR: Final = 6
+SA_TRANSMIT_ERROR: Final = 7
+SA_WRITE_ERROR: Final = 8
+SA_INVALID_PARAMETER_ERROR: Final = 9
+SA_READ_ERROR: Final = 10
+SA_INTERNAL_ERROR: Final = 12  # there is no 11
+SA_WRONG_MODE_ERROR: Final = 13
+SA_PROTOCOL_ERROR: Final = 14
+SA_TIMEOUT_ERROR: Final = 15
+SA_NOTIFICATION_ALREADY_SET_ERROR: Final = 16
+SA_ID_LIST_TOO_SMALL_ERROR: Final = 17
+SA_DEVICE_ALREADY_ADDED_ERROR: Final = 18
+SA_DEVICE_NOT_FOUND_ERROR: Final = 19
+SA_INVALID_COMMAND_ERROR: Final = 128
+SA_COMMAND_NOT_SUPPORTED_ERROR: Final = 129
+SA_NO_SENSOR_PRESENT_ERROR: Final = 130
+SA_WRONG_SENSOR_TYPE_ERROR: Final = 131
+SA_END_STOP_REACHED_ERROR: Final = 132
+SA_COMMAND_OVERRIDDEN_ERROR: Final = 133  # header 1.2 ends here
+SA_HV_RANGE_ERROR: Final = 134
+SA_TEMP_OVERHEAT_ERROR: Final = 135
+SA_CALIBRATION_FAILED_ERROR: Final = 136
+SA_REFERENCING_FAILED_ERROR: Final = 137
+SA_NOT_PROCESSABLE_ERROR: Final = 138
+SA_OTHER_ERROR: Final = 255
+# SA_PACKET.packetType
+SA_NO_PACKET_TYPE: Final = 0
+SA_ERROR_PACKET_TYPE: Final = 1
+SA_POSITION_PACKET_TYPE: Final = 2
+SA_ANGLE_PACKET_TYPE: Final = 3
+SA_COMPLETED_PACKET_TYPE: Final = 4
+SA_STATUS_PACKET_TYPE: Final = 5
+SA_CLOSED_LOOP_FREQUENCY_PACKET_TYPE: Final = 6
+SA_SENSOR_TYPE_PACKET_TYPE: Final = 7
+SA_SENSOR_PRESENT_PACKET_TYPE: Final = 8
+SA_AMPLITUDE_PACKET_TYPE: Final = 9
+SA_POSITIONER_ALIGNMENT_PACKET_TYPE: Final = 10
+SA_SAFE_DIRECTION_PACKET_TYPE: Final = 11  # header 1.2 ends here
+SA_SCALE_PACKET_TYPE: Final = 12
+SA_PHYSICAL_POSITION_KNOWN_PACKET_TYPE: Final = 13
+SA_CHANNEL_PROPERTY_PACKET_TYPE: Final = 14
+SA_SYSTEM_PROPERTY_PACKET_TYPE: Final = 15
+SA_INVALID_PACKET_TYPE: Final = 255
+# SA_GetStatus
+SA_STOPPED_STATUS: Final = 0
+SA_SETTING_AMPLITUDE_STATUS: Final = 1
+SA_MOVING_STATUS: Final = 2
+SA_TARGETING_STATUS: Final = 3
+SA_HOLDING_STATUS: Final = 4
+SA_CALIBRATING_STATUS: Final = 5
+SA_MOVING_TO_REFERENCE_STATUS: Final = 6
+# directions, auto zero, sensor, known position, alignment
+SA_BACKWARD_DIRECTION: Final = 0
+SA_FORWARD_DIRECTION: Final = 1
+SA_NO_AUTO_ZERO: Final = 0
+SA_AUTO_ZERO: Final = 1
+SA_NO_SENSOR_PRESENT: Final = 0
+SA_SENSOR_PRESENT: Final = 1
+SA_PHYSICAL_POSITION_UNKNOWN: Final = 0
+SA_PHYSICAL_POSITION_KNOWN: Final = 1
+SA_HORIZONTAL_ALIGNMENT: Final = 0
+SA_VERTICAL_ALIGNMENT: Final = 1
+# sensor types; the whole list, with kinds and references, is in scu3d_types
+SA_NO_SENSOR_TYPE: Final = 0
+SA_M_SENSOR_TYPE: Final = 1
+SA_GC_SENSOR_TYPE: Final = 4
+SA_RA_SENSOR_TYPE: Final = 7
+SA_GF_SENSOR_TYPE: Final = 8
+SA_RB_SENSOR_TYPE: Final = 9
+SA_LC_SENSOR_TYPE_CODE: Final = 18
+SA_LR_SENSOR_TYPE_CODE: Final = 19
+SA_L_SENSOR_TYPE_CODE: Final = 21
+# system properties: degree Celsius, 0.1 V, number
+SA_INTERNAL_TEMPERATURE_PROP: Final = 1
+SA_INTERNAL_VOLTAGE_PROP: Final = 2
+SA_HARDWARE_VERSION_CODE_PROP: Final = 3
+# channel properties: nm, 1 to 127, exponent of two, Hz, 0 or 1
+SA_TARGET_READCHED_THRESHOLD_PROP: Final = 3  # spelt so in the header
+SA_KP_PROP: Final = 5
+SA_KPD_PROP: Final = 6
+SA_DEFAULT_MAX_CLOSED_LOOP_FREQUENCY_PROP: Final = 15
+SA_ADVANCED_STEPPING_MODE_ENABLED_PROP: Final = 21
+
+ArgTypes = tuple[type, ...]
+
+_U, _I = c_uint32, c_int32
+_U_OUT, _I_OUT = POINTER(c_uint32), POINTER(c_int32)
+_PACKET_OUT = POINTER(SA_PACKET)
+_DEVICE: ArgTypes = (_U,)
+_CHANNEL: ArgTypes = (_U, _U)
+
+_SECTION_I: Final[dict[str, ArgTypes]] = {
+    "SA_GetDLLVersion": (_U_OUT,),
+    "SA_GetAvailableDevices": (_U_OUT, _U_OUT),
+    "SA_AddDeviceToInitDevicesList": (_U,),
+    "SA_ClearInitDevicesList": (),
+    "SA_InitDevices": (_U,),
+    "SA_ReleaseDevices": (),
+    "SA_GetNumberOfDevices": (_U_OUT,),
+    "SA_GetDeviceID": (*_DEVICE, _U_OUT),
+    "SA_GetDeviceFirmwareVersion": (*_DEVICE, _U_OUT),
+}
+# Both forms exist: _S takes the address, what goes in and what comes out; _A answers by packet.
+_PAIRS_V12: Final[dict[str, tuple[ArgTypes, ArgTypes]]] = {
+    "SetClosedLoopMaxFrequency": ((*_CHANNEL, _U), ()),
+    "GetClosedLoopMaxFrequency": (_CHANNEL, (_U_OUT,)),
+    "SetZero": (_CHANNEL, ()),
+    "GetSensorPresent": (_CHANNEL, (_U_OUT,)),
+    "SetSensorType": ((*_CHANNEL, _U), ()),
+    "GetSensorType": (_CHANNEL, (_U_OUT,)),
+    "SetPositionerAlignment": ((*_CHANNEL, _U, _U, _U), ()),
+    "GetPositionerAlignment": (_CHANNEL, (_U_OUT, _U_OUT, _U_OUT)),
+    "SetSafeDirection": ((*_CHANNEL, _U), ()),
+    "GetSafeDirection": (_CHANNEL, (_U_OUT,)),
+    "MoveStep": ((*_CHANNEL, _I, _U, _U), ()),
+    "SetAmplitude": ((*_CHANNEL, _U), ()),
+    "GetAmplitude": (_CHANNEL, (_U_OUT,)),
+    "MovePositionAbsolute": ((*_CHANNEL, _I, _U), ()),
+    "MovePositionRelative": ((*_CHANNEL, _I, _U), ()),
+    "MoveAngleAbsolute": ((*_CHANNEL, _I, _I, _U), ()),
+    "MoveAngleRelative": ((*_CHANNEL, _I, _I, _U), ()),
+    "CalibrateSensor": (_CHANNEL, ()),
+    "MoveToReference": ((*_CHANNEL, _U, _U), ()),
+    "MoveToEndStop": ((*_CHANNEL, _U, _U, _U), ()),
+    "Stop": (_CHANNEL, ()),
+    "GetStatus": (_CHANNEL, (_U_OUT,)),
+    "GetPosition": (_CHANNEL, (_I_OUT,)),
+    "GetAngle": (_CHANNEL, (_I_OUT, _I_OUT)),
+}
+_PAIRS_LATER: Final[dict[str, tuple[ArgTypes, ArgTypes]]] = {
+    "SetScale": ((*_CHANNEL, _I, _U), ()),
+    "GetScale": (_CHANNEL, (_I_OUT, _U_OUT)),
+    "GetPhysicalPositionKnown": (_CHANNEL, (_U_OUT,)),
+    "SetChannelProperty": ((*_CHANNEL, _I, _I), ()),
+    "GetChannelProperty": ((*_CHANNEL, _I), (_I_OUT,)),
+    "SetSystemProperty": ((*_DEVICE, _I, _I), ()),
+    "GetSystemProperty": ((*_DEVICE, _I), (_I_OUT,)),
+}
+_ONLY_A: Final[dict[str, ArgTypes]] = {
+    "SA_SetReportOnComplete_A": (*_CHANNEL, _U),
+    "SA_SetReceiveNotification_A": (*_DEVICE, c_void_p),
+    "SA_ReceiveNextPacket_A": (*_DEVICE, _U, _PACKET_OUT),
+    "SA_ReceiveNextPacketIfChannel_A": (*_CHANNEL, _U, _PACKET_OUT),
+    "SA_LookAtNextPacket_A": (*_DEVICE, _U, _PACKET_OUT),
+    "SA_DiscardPacket_A": _DEVICE,
+}
+
+
+def _both_forms(pairs: dict[str, tuple[ArgTypes, ArgTypes]]) -> dict[str, ArgTypes]:
+    sync = {f"SA_{base}_S": (*given, *answers) for base, (given, answers) in pairs.items()}
+    return sync | {f"SA_{base}_A": given for base, (given, _) in pairs.items()}
+
+
+_V12: Final = _SECTION_I | _both_forms(_PAIRS_V12) | _ONLY_A
+PROTOTYPES: Final[dict[str, ArgTypes]] = _V12 | _both_forms(_PAIRS_LATER)
+"""All 77 functions of header 1.5 with their argument types; each returns a status, c_uint32."""
+FUNCTIONS_V12: Final = frozenset(_V12)
+"""The 63 functions of header 1.2 (2010)."""
+
+
+@cache
+def function_type(name: str) -> type[Any]:
+    """Return the C function type of `name`, cdecl; the class makes pointers and callbacks.
+
+    Raises
+    ------
+    KeyError
+        The header declares no such function.
+    """
+    return ctypes.CFUNCTYPE(c_uint32, *PROTOTYPES[name])
+
+
+class Scu3dLibrary:
+    """The functions of one SCU3DControl library, each bound when it is first called.
+
+    Parameters
+    ----------
+    library : ctypes.CDLL or object
+        A loaded library, or anything that has the C function pointers as attributes `SA_...`.
+
+    Notes
+    -----
+    Any thread. An old library lacks functions; those answer like a device that lacks a command.
+    """
+
+    def __init__(self, library: object) -> None:
+        self._library = library
+        self._bound: dict[str, Callable[..., int] | None] = {}
+
+    def has(self, name: str) -> bool:
+        """Return whether the library has the function `name`."""
+        return self._function(name) is not None
+
+    def call(self, name: str, *args: object) -> int:
+        """Call `name` and return its status; 129 (command not supported) where it is missing.
+
+        Raises
+        ------
+        KeyError
+            The header declares no such function.
+        """
+        function = self._function(name)
+        return SA_COMMAND_NOT_SUPPORTED_ERROR if function is None else int(function(*args))
+
+    def _function(self, name: str) -> Callable[..., int] | None:
+        # Two threads may bind the same name at once; both make the same binding.
+        if name not in self._bound:
+            self._bound[name] = self._bind(name)
+        return self._bound[name]
+
+    def _bind(self, name: str) -> Callable[..., int] | None:
+        prototype = function_type(name)
+        if isinstance(self._library, ctypes.CDLL):
+            try:
+                pointer: Callable[..., int] = prototype((name, self._library))
+            except AttributeError:
+                return None
+            return pointer
+        found: Callable[..., int] | None = getattr(self._library, name, None)
+        # A NULL pointer is false; calling it would end the process.
+        return found or None
+
+
+def default_library_name() -> str:
+    """Return the file name under which SmarAct ships the library for this system."""
+    return "SCU3DControl.dll" if sys.platform == "win32" else "libscu3dcontrol.so"
+
+
+def load_library(path: str = "") -> ctypes.CDLL:
+    """Load the vendor's library from `path`, or from where the system looks when it is empty.
+
+    Raises
+    ------
+    NotConnectedError
+        There is no such file, it does not fit this Python, or it is another library.
+    """
+    wanted = path or default_library_name()
+    try:
+        library = ctypes.CDLL(_located(wanted))
+    except (OSError, ValueError) as exc:
+        raise NotConnectedError(
+            _cannot_load(wanted, reason=str(exc)), fault=DeviceFault.COMMUNICATION
+        ) from exc
+    if not hasattr(library, "SA_InitDevices"):
+        raise NotConnectedError(
+            f"{wanted} was loaded but has no function SA_InitDevices: it is not SmarAct's "
+            f"SCU3DControl (the controllers MCS and MCS2 have other libraries)",
+            fault=DeviceFault.UNSUPPORTED,
+        )
+    return library
+
+
+def _located(wanted: str) -> str:
+    # Since Python 3.8 a bare name is no longer looked for along PATH on Windows; this does it.
+    if sys.platform == "win32" and Path(wanted).name == wanted:
+        return ctypes.util.find_library(wanted) or wanted
+    return wanted
+
+
+def _cannot_load(wanted: str, *, reason: str) -> str:
+    bits = struct.calcsize("P") * 8
+    return (
+        f"cannot load SmarAct's library {wanted!r}: {reason}. Install the SmarAct SCU SDK "
+        f"(SCU3DControl.dll on Windows, libscu3dcontrol.so on Linux) and name the file in "
+        f"platform.toml, [mico] library. This Python has {bits} bit; the library must have too"
+    )
