@@ -5,7 +5,7 @@
 # pyproject.toml asks for at the versions of constraints.txt. When nothing has changed since the
 # last time this takes some hundredths of a second and no network.
 
-venv=$root/.venv
+venv=${root:?is set by the script that sources this}/.venv
 tab=$(printf '\t')
 
 say() { printf '%s\n' "$*" >&2; }
@@ -173,7 +173,7 @@ prepare() {
 
     venv_works || make_venv
     rm -f -- "$venv"/.cosmic-*
-    if [ "$1" = dev ]; then what="$root[dev]"; else what=$root; fi
+    if [ "$1" = dev ]; then what="${root}[dev]"; else what=$root; fi
     say "Installing what CoSMic needs into .venv (the first time takes a minute or more) ..."
     "$venv/bin/python" -m pip install --quiet --no-input --disable-pip-version-check \
         --constraint "$root/constraints.txt" --editable "$what" ||
