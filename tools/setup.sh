@@ -144,10 +144,13 @@ make_venv() {
     "$python" -m venv "$venv" || die "The virtual environment could not be made in $root."
 }
 
-# Sets $python_now to "Python 3.11" or the like, empty when there is no Python that works.
+# Sets $python_now to the version of the environment's Python, empty when something is not there.
 find_venv_version() {
-    python_now=$("$venv/bin/python" -V 2>/dev/null) || python_now=
-    python_now=${python_now%.*}
+    python_now=$("$venv/bin/python" -c 'import sys
+from importlib.util import find_spec
+print("Python %d.%d" % sys.version_info[:2])
+sys.exit(not all(map(find_spec, ("cosmic", "PySide6", "numpy", "pydantic"))))' 2>/dev/null) ||
+        python_now=
 }
 
 # What an installation depends on, in one text: compared with the stamp that it left.
