@@ -6,7 +6,6 @@ from threading import Condition
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceFault
-from cosmic.mico.core.orders import Step
 from cosmic.mico.core.positioner import (
     POSITIONER_CLASSES,
     Confidence,
@@ -149,15 +148,6 @@ class DeviceDataContainer:
         with self._changed:
             positioner = self._positioners.get(channel)
             return positioner.update(**changes) if positioner else None
-
-    def count_steps(self, channel: int, motion: Step, largest_step_um: float) -> None:
-        """Estimate where an axis without sensor is after `motion`."""
-        positioner = self._positioners.get(channel)
-        if positioner is None or positioner.has_sensor:
-            return
-        state = positioner.state
-        way = motion.steps * largest_step_um * motion.amplitude_v / 100.0
-        self.update(channel, position=(state.position or 0.0) + way, read_wall_s=WALL.now_s())
 
     def lose(self, reason: str) -> list[PositionerState]:
         """Say that the whole device is gone; positions are worth nothing from now on."""

@@ -1,54 +1,133 @@
-"""What a `Device` remembers of one channel: the order under way and what it has asked."""
+"""One order on its way through a channel, and the bookkeeping of what was asked about it."""
 
+import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from cosmic.mico.core.orders import Order
+from cosmic.frame.clock import Clock
+from cosmic.frame.errors import CosmicError, DeviceError
+from cosmic.frame.units import format_quantity
+from cosmic.frame.verdict import MoveVerdict
+from cosmic.mico.core.data_container import DeviceDataContainer
+from cosmic.mico.core.gate import Gate
+from cosmic.mico.core.jog import JogRun
+from cosmic.mico.core.orders import Jog, Order, Step
+from cosmic.mico.core.positioner import PositionerState
+from cosmic.mico.core.settings import MicoSettings
+from cosmic.mico.hw.interface import Controller
 
 
 @dataclass(slots=True)
 class Flight:
-    """One order that the controller has taken.
+    """One order that was sent to the controller.
 
     Attributes
     ----------
-    at_rest : bool
-        The controller says, asked after the start, that the channel stands.
-    error : Exception or None
+    rests_seen : int
+        How many answers, asked after the start, said that the channel stands.
+    known_pending : bool
+        The controller still has to say whether the reference was found.
+    error : CosmicError or None
         Why the movement will fail once it stands.
     progress_s : float
-        Platform time of the last sign of life: a new position or activity.
+        Platform time of the last sign of life.
+    progress_position : float or None
+        Where it was then.
     """
 
     order: Order
+    target: float | None
     started_s: float
     progress_s: float
-    at_rest: bool = False
-    error: Exception | None = None
+    progress_position: float | None = None
+    rests_seen: int = 0
+    known_pending: bool = False
+    error: CosmicError | None = None
+    jog: JogRun | None = None
+
+    @property
+    def at_rest(self) -> bool:
+        """True when the channel was twice said to stand; one answer may be too early."""
+        return self.rests_seen >= 2
+
+    def note_position(self, position: float | None, now_s: float) -> None:
+        """Take a new position as a sign of life, the same one as none."""
+        if position != self.progress_position:
+            self.progress_position, self.progress_s = position, now_s
+
+    def patience_s(self, settings: MicoSettings, rate: float) -> float:
+        """Return how long it may go without a sign of life, in platform seconds.
+
+        A fast clock must not turn the jitter of the wall into a time-out.
+        """
+        patience_s = max(settings.watch.stall_s, rate)
+        motion = self.order.motion
+        if isinstance(motion, Step):
+            patience_s += abs(motion.steps) / motion.frequency_hz
+        return patience_s
 
 
 @dataclass(slots=True)
-class ChannelDesk:
-    """What is under way on one channel; device thread only.
+class PilotContext:
+    """What the pilots of one device share."""
 
-    An answer says what was true when it was given, not now: one that was asked for before a
-    movement started says nothing about it. The controller answers each channel in order, so the
-    numbers of the orders that were current when each question was asked tell old from new. A lost
-    answer makes later ones look older than they are, which is safe: the next poll repeats them.
+    controller: Controller
+    container: DeviceDataContainer
+    gate: Gate
+    clock: Clock
+    settings: MicoSettings
+    on_refused: Callable[[MoveVerdict], None]
+    on_finished: Callable[[str, float | None], None]
+    on_failed: Callable[[str, CosmicError], None]
+    on_state: Callable[[int], None]
+    poll_s: float = 0.05
+
+
+@dataclass(slots=True)
+class Questions:
+    """Order numbers that were current when each open question was asked.
+
+    An answer says what was true when it was given: one asked for before a movement started says
+    nothing about it. Each channel answers in order, so the oldest number belongs to the next
+    answer. A lost answer makes later ones look older than they are; the next poll repeats them.
     """
 
-    flight: Flight | None = None
-    activity_asked: deque[int] = field(default_factory=lambda: deque(maxlen=64))
-    position_asked: deque[int] = field(default_factory=lambda: deque(maxlen=64))
-    next_poll_s: float = 0.0
-    silent_polls: int = 0
+    numbers: deque[int] = field(default_factory=lambda: deque(maxlen=64))
 
-    @property
-    def order_number(self) -> int:
-        """Number of the order under way, 0 without one."""
-        return self.flight.order.number if self.flight else 0
+    def asked(self, number: int) -> None:
+        """Note a question."""
+        self.numbers.append(number)
 
-    def answers_current(self, asked: deque[int]) -> bool:
-        """Take the oldest open question and say whether it was asked in this flight."""
-        number = asked.popleft() if asked else 0
-        return self.flight is not None and number == self.flight.order.number
+    def answered(self) -> int:
+        """Return the number under which the oldest open question was asked, 0 without one."""
+        return self.numbers.popleft() if self.numbers else 0
+
+
+def missed_target(
+    flight: Flight, state: PositionerState, settings: MicoSettings
+) -> CosmicError | None:
+    """Return the failure of a movement that stands somewhere else than asked."""
+    if flight.target is None or state.position is None:
+        return None
+    watch = settings.watch
+    tolerance = watch.tolerance_deg if state.unit == "deg" else watch.tolerance_um
+    if abs(state.position - flight.target) <= tolerance:
+        return None
+    where = format_quantity(state.position - state.zero, state.unit)
+    wanted = format_quantity(flight.target - state.zero, state.unit)
+    return DeviceError(f"{state.name}: stopped at {where} instead of {wanted}")
+
+
+def counted_position(
+    flight: Flight, state: PositionerState, settings: MicoSettings, now_s: float
+) -> float:
+    """Estimate where an axis without sensor is after `flight`, in its unit."""
+    motion, made = flight.order.motion, 0.0
+    elapsed_s = now_s - flight.started_s
+    if isinstance(motion, Step):
+        ran = min(float(abs(motion.steps)), elapsed_s * motion.frequency_hz)
+        made = math.copysign(ran, motion.steps) * motion.amplitude_v / 100.0
+    elif isinstance(motion, Jog):
+        made = motion.direction * motion.speed * elapsed_s
+    return (state.position or 0.0) + made * settings.defaults.nominal_step(state.unit)

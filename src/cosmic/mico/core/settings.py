@@ -25,6 +25,8 @@ class MotionDefaults(StrictModel):
     amplitude_v: float = Field(default=100.0, ge=15, le=100)
     distance_um: float = Field(default=100.0, gt=0)
     distance_deg: float = Field(default=1.0, gt=0)
+    nominal_step_um: float = Field(default=1.5, gt=0)
+    nominal_step_deg: float = Field(default=0.025, gt=0)
     largest_step_um: float = Field(default=3.0, gt=0)
     largest_step_deg: float = Field(default=0.05, gt=0)
 
@@ -32,6 +34,10 @@ class MotionDefaults(StrictModel):
     def hold(self) -> float:
         """Hold time in seconds; inf for ever."""
         return math.inf if self.hold_s == "forever" else self.hold_s
+
+    def nominal_step(self, unit: AxisUnit) -> float:
+        """Return the way one step at 100 V is taken to go, in `unit`."""
+        return self.nominal_step_deg if unit == "deg" else self.nominal_step_um
 
 
 class JogSettings(StrictModel):
@@ -53,6 +59,8 @@ class WatchSettings(StrictModel):
     stale_s: float = Field(default=5.0, ge=1, le=60)
     stall_s: float = Field(default=5.0, ge=0.5, le=120)
     answer_s: float = Field(default=5.0, ge=0.5, le=60)
+    tolerance_um: float = Field(default=2.0, gt=0)
+    tolerance_deg: float = Field(default=0.01, gt=0)
 
 
 class PositionerSettings(StrictModel):

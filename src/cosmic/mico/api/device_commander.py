@@ -1,0 +1,169 @@
+"""`DeviceCommander`: the run-time API of one device, decoupled by signals (thesis 6.1.2)."""
+
+from enum import Flag, auto
+
+from PySide6.QtCore import QObject, Qt, Signal
+
+from cosmic.frame.errors import NotConnectedError
+from cosmic.frame.units import AxisUnit
+from cosmic.mico.core.device import Device
+from cosmic.mico.core.movement import Movement
+from cosmic.mico.core.orders import (
+    Calibrate,
+    Grant,
+    Jog,
+    Motion,
+    MoveBy,
+    MoveTo,
+    Order,
+    Reference,
+    Step,
+    ToEndStop,
+)
+from cosmic.mico.hw.interface import Direction
+
+
+class CommanderType(Flag):
+    """What a commander is connected for (thesis program 6.2)."""
+
+    INPUT = auto()
+    """It commands movements."""
+    OUTPUT = auto()
+    """It hears what became of them."""
+    INPUT_OUTPUT = INPUT | OUTPUT
+
+
+class DeviceCommander(QObject):
+    """Commands the channels of whatever device it is connected to, and hears from it.
+
+    It knows nothing of the device: `connect_device_commander` joins the two. Each command emits
+    `order_issued` and returns at once with the `Movement`; any thread. Positions are in gate
+    coordinates.
+
+    Parameters
+    ----------
+    token : str
+        Proof of the lease.
+    source : str
+        Where its commands come from, for the log.
+
+    Signals
+    -------
+    order_issued(Order)
+        To the device.
+    position_changed(PositionChanged), state_changed(PositionerState),
+    movement_ended(MovementEnded), movement_refused(MoveVerdict)
+        From the device, in its thread.
+    """
+
+    order_issued = Signal(object)
+    jog_renewed = Signal(object)
+    halt_requested = Signal(int, str)
+    frequency_requested = Signal(int, int)
+    position_changed = Signal(object)
+    state_changed = Signal(object)
+    movement_ended = Signal(object)
+    movement_refused = Signal(object)
+
+    def __init__(self, token: str, source: str = "script", parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._token = token
+        self._source = source
+        self._may_command = False
+
+    def allow_commands(self) -> None:
+        """Say that somebody listens to its commands; for `connect_device_commander`."""
+        self._may_command = True
+
+    def move_absolute(
+        self, channel: int, target: float, unit: AxisUnit, *, consent: bool = False
+    ) -> Movement:
+        """Move to `target`."""
+        return self.send(channel, MoveTo(target, unit), consent=consent)
+
+    def move_relative(
+        self, channel: int, distance: float, unit: AxisUnit, *, consent: bool = False
+    ) -> Movement:
+        """Move by `distance`."""
+        return self.send(channel, MoveBy(distance, unit), consent=consent)
+
+    def move_steps(
+        self,
+        channel: int,
+        steps: int,
+        *,
+        amplitude_v: float,
+        frequency_hz: int,
+        consent: bool = False,
+    ) -> Movement:
+        """Make steps without looking at a sensor."""
+        return self.send(channel, Step(steps, amplitude_v, frequency_hz), consent=consent)
+
+    def calibrate(self, channel: int, *, consent: bool = False) -> Movement:
+        """Calibrate the sensor."""
+        return self.send(channel, Calibrate(), consent=consent)
+
+    def reference(self, channel: int, *, consent: bool = False) -> Movement:
+        """Find the reference."""
+        return self.send(channel, Reference(), consent=consent)
+
+    def move_to_end_stop(
+        self, channel: int, direction: Direction, *, consent: bool = False
+    ) -> Movement:
+        """Drive until the travel ends."""
+        return self.send(channel, ToEndStop(direction), consent=consent)
+
+    def jog(self, channel: int, direction: int, speed: float, *, consent: bool = False) -> Order:
+        """Begin to move continuously; call `renew_jog` several times within the dead-man time."""
+        return self._issue(channel, Jog(direction, speed), consent=consent)
+
+    def renew_jog(self, order: Order) -> None:
+        """Keep the jog begun by `order` alive."""
+        self.jog_renewed.emit(order)
+
+    def stop(self, channel: int, why: str = "stopped") -> None:
+        """Stop one channel; nothing is latched."""
+        self.halt_requested.emit(channel, why)
+
+    def set_frequency(self, channel: int, frequency_hz: int) -> None:
+        """Limit the closed-loop speed, 1 to 18500 Hz."""
+        self.frequency_requested.emit(channel, frequency_hz)
+
+    def send(
+        self, channel: int, motion: Motion, *, consent: bool = False, grant: Grant | None = None
+    ) -> Movement:
+        """Send any motion."""
+        return self._issue(channel, motion, consent=consent, grant=grant).movement
+
+    def _issue(
+        self, channel: int, motion: Motion, *, consent: bool, grant: Grant | None = None
+    ) -> Order:
+        if not self._may_command:
+            raise NotConnectedError("this commander is connected to no device, or only listens")
+        order = Order(channel, motion, self._token, self._source, consent, grant=grant)
+        self.order_issued.emit(order)
+        return order
+
+
+def connect_device_commander(
+    device: Device,
+    commander: DeviceCommander,
+    kind: CommanderType = CommanderType.INPUT_OUTPUT,
+) -> None:
+    """Join a device and a commander (thesis Fig. 6.4).
+
+    The connections are direct: a command goes into the device's queue in the caller's thread, so
+    that no event loop is needed to make a move.
+    """
+    direct = Qt.ConnectionType.DirectConnection
+    if CommanderType.INPUT in kind:
+        commander.order_issued.connect(device.submit, direct)
+        commander.jog_renewed.connect(device.renew_jog, direct)
+        commander.halt_requested.connect(device.halt, direct)
+        commander.frequency_requested.connect(device.set_frequency, direct)
+        commander.allow_commands()
+    if CommanderType.OUTPUT in kind:
+        device.position_changed.connect(commander.position_changed, direct)
+        device.state_changed.connect(commander.state_changed, direct)
+        device.movement_ended.connect(commander.movement_ended, direct)
+        device.movement_refused.connect(commander.movement_refused, direct)

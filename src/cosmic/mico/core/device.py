@@ -1,0 +1,357 @@
+"""`Device`: all calls to the controller library for one device (thesis 5.4, 6.1)."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from queue import Empty, SimpleQueue
+from threading import Event as ThreadEvent
+from threading import Lock
+from typing import Final
+
+from PySide6.QtCore import QObject, Signal
+from typing_extensions import override
+
+from cosmic.frame.clock import Clock
+from cosmic.frame.errors import (
+    CosmicError,
+    DeviceError,
+    DeviceFault,
+    MoveCancelled,
+    NotConnectedError,
+    refusal,
+)
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.threads import WorkerThread
+from cosmic.frame.verdict import Reason, refuse
+from cosmic.mico.core.data_container import DeviceDataContainer
+from cosmic.mico.core.flight import PilotContext
+from cosmic.mico.core.gate import Gate
+from cosmic.mico.core.messages import (
+    DeviceLost,
+    Halt,
+    Lost,
+    MovementEnded,
+    PositionChanged,
+    SetFrequency,
+    StopAll,
+    Wake,
+)
+from cosmic.mico.core.orders import Order
+from cosmic.mico.core.pilot import ChannelPilot
+from cosmic.mico.core.positioner import PositionerState
+from cosmic.mico.core.settings import MicoSettings
+from cosmic.mico.hw.interface import (
+    Channel,
+    Controller,
+    Event,
+    PositionerKind,
+    SensorPresentRead,
+    TypeRead,
+)
+
+logger = logging.getLogger(__name__)
+
+CHANNELS: Final = range(3)
+
+
+_Message = Order | Event | Halt | StopAll | Lost | SetFrequency | Wake
+
+
+class Device(WorkerThread):
+    """Drives one SmarAct device in a thread of its own; its public methods return at once.
+
+    Signals are emitted in the device thread, in the order in which things happened.
+
+    Signals
+    -------
+    position_changed(PositionChanged), state_changed(PositionerState),
+    movement_ended(MovementEnded), movement_refused(MoveVerdict), lost(DeviceLost)
+    """
+
+    position_changed = Signal(object)
+    state_changed = Signal(object)
+    movement_ended = Signal(object)
+    movement_refused = Signal(object)
+    lost = Signal(object)
+
+    def __init__(
+        self,
+        controller: Controller,
+        container: DeviceDataContainer,
+        *,
+        gate: Gate,
+        clock: Clock,
+        settings: MicoSettings,
+        policy: FailurePolicy,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(f"device {container.device}", policy, parent)
+        self._controller = controller
+        self.container = container
+        self._settings = settings
+        self._inbox: SimpleQueue[_Message] = SimpleQueue()
+        self._intake = Lock()
+        self._open = False
+        self._introduced = ThreadEvent()
+        self._pilots: dict[int, ChannelPilot] = {}
+        self._shown: dict[int, PositionerState] = {}
+        self._context = PilotContext(
+            controller=controller,
+            container=container,
+            gate=gate,
+            clock=clock,
+            settings=settings,
+            on_refused=self.movement_refused.emit,
+            on_finished=self._emit_finished,
+            on_failed=self._emit_failed,
+            on_state=self._emit_state,
+        )
+        container.observe(lambda event, _state: self._inbox.put(event))
+
+    @property
+    def index(self) -> int:
+        """Index of the device."""
+        return self.container.device
+
+    # For any thread
+
+    def set_poll_period(self, poll_s: float) -> None:
+        """Say how often the position of a moving axis is asked for, in wall seconds."""
+        self._context.poll_s = poll_s
+
+    def begin(self) -> None:
+        """Start the thread and take orders."""
+        self._open = True
+        self.start()
+
+    def submit(self, order: Order) -> None:
+        """Queue `order`; how it goes is told by its movement and by signals."""
+        with self._intake:
+            taken = self._open
+            if taken:
+                self._inbox.put(order)
+        if taken:
+            order.movement.on_cancel(lambda: self.halt(order.channel, "cancelled"))
+        else:
+            self._turn_away(order, self.container.state(order.channel))
+
+    def renew_jog(self, order: Order) -> None:
+        """Keep the jog started by `order` alive."""
+        pilot = self._pilots.get(order.channel)
+        if pilot is not None:
+            pilot.renew(order.number)
+
+    def halt(self, channel: int, why: str) -> None:
+        """Stop one channel past every queue; its movement fails with `MoveCancelled`."""
+        state = self.container.state(channel)
+        name = state.name if state else f"device {self.index} channel {channel}"
+        try:
+            self._controller.stop(Channel(self.index, channel))
+        except DeviceError as exc:
+            logger.warning("%s: %s", name, exc)
+        self._inbox.put(Halt(channel, MoveCancelled(f"{name}: {why}")))
+
+    def stop_later(self, error: CosmicError) -> None:
+        """Have the device thread repeat the stop of all channels after the call it is in."""
+        self._inbox.put(StopAll(error))
+
+    def lose(self, error: DeviceError) -> None:
+        """Say that the device cannot be reached any more."""
+        self._inbox.put(Lost(error))
+
+    def set_frequency(self, channel: int, frequency_hz: int) -> None:
+        """Limit the closed-loop speed of one channel, 1 to 18500 Hz."""
+        self._inbox.put(SetFrequency(channel, frequency_hz))
+
+    def wait_until_introduced(self, timeout_s: float) -> bool:
+        """Wait until every channel has told its type; False after `timeout_s` of wall time."""
+        return self._introduced.wait(timeout_s)
+
+    @override
+    def request_end(self) -> None:
+        super().request_end()
+        self._inbox.put(Wake())
+
+    # The device thread
+
+    @override
+    def run_body(self) -> None:
+        try:
+            self._guarded(self._introduce)
+            while not self.end_requested:
+                self._take_waiting()
+                self._guarded(self._poll)
+        finally:
+            self._close_intake()
+
+    def _take_waiting(self) -> None:
+        """Wait for a message, then take all there are, so that none waits behind a poll."""
+        try:
+            message = self._inbox.get(timeout=self._pause_s())
+            for _ in range(100):
+                self._guarded(partial(self._take, message))
+                message = self._inbox.get_nowait()
+        except Empty:
+            return
+
+    def _pause_s(self) -> float:
+        moving = any(pilot.flight is not None for pilot in self._pilots.values())
+        if not moving:
+            return self._settings.watch.idle_poll_s
+        jogging = any(pilot.flight and pilot.flight.jog for pilot in self._pilots.values())
+        if jogging:
+            rate = max(self._context.clock.rate, 1.0)
+            return max(0.002, 0.2 * self._settings.jog.packet_s / rate)
+        return self._context.poll_s
+
+    def _guarded(self, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except DeviceError as exc:
+            if exc.fault not in (DeviceFault.COMMUNICATION, DeviceFault.TIMEOUT):
+                raise
+            self._on_lost(exc)
+
+    def _take(self, message: _Message) -> None:
+        match message:
+            case Order():
+                self._on_order(message)
+            case Halt():
+                pilot = self._pilots.get(message.channel)
+                if pilot is not None:
+                    pilot.halt(message.error)
+            case StopAll():
+                for pilot in self._pilots.values():
+                    pilot.halt(message.error)
+            case Lost():
+                self._on_lost(message.error)
+            case SetFrequency():
+                channel = Channel(self.index, message.channel)
+                self._controller.set_closed_loop_frequency(channel, message.frequency_hz)
+            case Wake():
+                pass
+            case _:
+                self._on_event(message)
+
+    def _on_order(self, order: Order) -> None:
+        pilot = self._pilots.get(order.channel)
+        if pilot is None:
+            self._turn_away(order, None)
+        else:
+            pilot.launch(order)
+
+    def _turn_away(self, order: Order, state: PositionerState | None) -> None:
+        name = state.name if state else f"device {self.index} channel {order.channel}"
+        why = state.error if state and state.error else "it is not connected"
+        verdict = refuse(Reason.DEVICE, f"{name}: {why}; check it, then rescan", axis=name)
+        order.movement.fail(refusal(verdict))
+        self.movement_refused.emit(verdict)
+
+    def _poll(self) -> None:
+        for pilot in self._pilots.values():
+            pilot.poll()
+
+    # Who is there
+
+    def _introduce(self) -> None:
+        """Ask every channel what it has (Fig. 6.7)."""
+        for channel in CHANNELS:
+            self.container.expect(channel)
+        for channel in CHANNELS:
+            address = Channel(self.index, channel)
+            try:
+                self._controller.report_completion(address)
+                self._controller.ask_sensor_present(address)
+            except DeviceError as exc:
+                if exc.fault is not DeviceFault.NO_CHANNEL:
+                    raise
+                self.container.settle(channel, None, "no such channel")
+        self._note_if_introduced()
+
+    def _on_event(self, event: Event) -> None:
+        channel = event.channel.channel if event.channel else -1
+        pilot = self._pilots.get(channel)
+        if pilot is None:
+            self._on_introduction(event, channel)
+            return
+        pilot.take(event)
+        self._emit_state(channel)
+
+    def _on_introduction(self, event: Event, channel: int) -> None:
+        if isinstance(event, SensorPresentRead) and event.present:
+            self._controller.ask_type(event.channel)
+        elif isinstance(event, (SensorPresentRead, TypeRead)):
+            self._welcome(channel)
+        else:
+            logger.debug("device %d: %s", self.index, event)
+        self._note_if_introduced()
+
+    def _welcome(self, channel: int) -> None:
+        positioner = self.container.positioner(channel)
+        if positioner is None or not positioner.state.present:
+            return
+        pilot = ChannelPilot(positioner, self._context)
+        self._pilots[channel] = pilot
+        if positioner.state.kind is not PositionerKind.OPEN_LOOP:
+            frequency_hz = self._settings.defaults.closed_loop_frequency_hz
+            self._controller.set_closed_loop_frequency(positioner.state.address, frequency_hz)
+            pilot.ask_position_known()
+        pilot.ask_activity()
+        pilot.ask_position()
+
+    def _note_if_introduced(self) -> None:
+        if self.container.clear:
+            self._introduced.set()
+
+    # Trouble and the end
+
+    def _on_lost(self, error: DeviceError) -> None:
+        self._open = False
+        logger.error("device %d is lost: %s", self.index, error)
+        pilots, self._pilots = self._pilots, {}
+        in_motion = any(pilot.flight is not None for pilot in pilots.values())
+        reason = f"device {self.index} does not answer: {error}"
+        self.container.lose(reason)
+        for channel, pilot in pilots.items():
+            pilot.lose(NotConnectedError(f"{pilot.name}: {reason}", fault=error.fault))
+            self._emit_state(channel)
+        self._introduced.set()
+        self.lost.emit(DeviceLost(self.index, reason, in_motion))
+
+    def _close_intake(self) -> None:
+        """Leave no order unanswered and nothing moving."""
+        with self._intake:
+            self._open = False
+        error = MoveCancelled(f"device {self.index} was closed")
+        for channel, pilot in self._pilots.items():
+            try:
+                self._controller.stop(Channel(self.index, channel))
+            except DeviceError as exc:
+                logger.warning("%s: %s", pilot.name, exc)
+            pilot.lose(error)
+        while not self._inbox.empty():
+            message = self._inbox.get_nowait()
+            if isinstance(message, Order):
+                message.movement.fail(error)
+
+    # Telling
+
+    def _emit_state(self, channel: int) -> None:
+        state = self.container.state(channel)
+        if state is None:
+            return
+        before = self._shown.get(channel)
+        if before is not None and replace(before, read_wall_s=state.read_wall_s) == state:
+            return
+        self._shown[channel] = state
+        self.state_changed.emit(state)
+        moved = before is None or before.position != state.position
+        if moved and state.position is not None:
+            self.position_changed.emit(PositionChanged(state.name, state.position, state.unit))
+
+    def _emit_finished(self, name: str, position: float | None) -> None:
+        self.movement_ended.emit(MovementEnded(name, position, None))
+
+    def _emit_failed(self, name: str, error: CosmicError) -> None:
+        self.movement_ended.emit(MovementEnded(name, None, error))

@@ -1,0 +1,359 @@
+"""`DeviceManager`: finds the devices, owns their threads, and stops them all (thesis 6.1)."""
+
+import logging
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from threading import RLock
+
+from PySide6.QtCore import QObject, Qt, Signal
+
+from cosmic.frame.clock import Clock
+from cosmic.frame.errors import (
+    CosmicError,
+    DeviceError,
+    NotAvailable,
+    UnknownAxisError,
+    refusal,
+)
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.mico.core.collision import CollisionChecker, NoCollisionModel
+from cosmic.mico.core.data_container import DeviceDataContainer
+from cosmic.mico.core.device import CHANNELS, Device
+from cosmic.mico.core.device_listener import DeviceListener
+from cosmic.mico.core.gate import Gate, Request
+from cosmic.mico.core.lease import Lease
+from cosmic.mico.core.messages import DeviceLost
+from cosmic.mico.core.orders import Motion, Order
+from cosmic.mico.core.positioner import PositionerState
+from cosmic.mico.core.rules import Limits
+from cosmic.mico.core.settings import MicoSettings
+from cosmic.mico.core.stop_latch import StopLatch
+from cosmic.mico.hw.interface import Channel, Controller, DeviceIdentity
+
+logger = logging.getLogger(__name__)
+
+
+class Mode(StrEnum):
+    """What the manager is at."""
+
+    CLOSED = "closed"
+    INITIALISATION = "initialisation"
+    RUN_TIME = "run-time"
+    FAILED = "failed"
+
+
+class DeviceManager(QObject):
+    """Initialises the controller, makes a `Device` and a `DeviceListener` for each device.
+
+    Calls block for as long as the hardware takes and are made by the application's thread or by
+    tests; `stop` and `order` may be called from any thread and return at once.
+
+    Signals
+    -------
+    changed()
+        Mode, devices or the list of what is missing changed.
+    device_lost(DeviceLost)
+        A device cannot be reached any more.
+    """
+
+    changed = Signal()
+    device_lost = Signal(object)
+
+    def __init__(
+        self,
+        controller: Controller,
+        settings: MicoSettings,
+        *,
+        clock: Clock,
+        policy: FailurePolicy,
+        checker: CollisionChecker | None = None,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.controller = controller
+        self.settings = settings
+        self.clock = clock
+        self.latch = StopLatch()
+        self.lease = Lease()
+        self._policy = policy
+        self._busy = RLock()
+        self._devices: dict[int, Device] = {}
+        self._listeners: dict[int, DeviceListener] = {}
+        self._addresses: dict[str, Channel] = {}
+        self._missing: tuple[str, ...] = ()
+        self._mode = Mode.CLOSED
+        steps = {"um": settings.defaults.largest_step_um, "deg": settings.defaults.largest_step_deg}
+        self.gate = Gate(
+            latch=self.latch,
+            lease=self.lease,
+            checker=checker or NoCollisionModel(),
+            rules=Limits(largest_step=steps, stale_s=settings.watch.stale_s),
+            states=self.states,
+        )
+        self._arrange(())
+
+    # What there is
+
+    @property
+    def mode(self) -> Mode:
+        """What the manager is at."""
+        return self._mode
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """What was configured and not found, or was lost, a line each."""
+        return self._missing
+
+    @property
+    def devices(self) -> Mapping[int, Device]:
+        """The devices by index, also those configured and not found."""
+        return dict(self._devices)
+
+    def names(self) -> list[str]:
+        """Return the names of all axes: those configured, in their order, then any others."""
+        configured = [each.name for each in self.settings.positioner]
+        return [*configured, *(name for name in self._addresses if name not in configured)]
+
+    def address(self, name: str) -> Channel:
+        """Return where an axis is connected.
+
+        Raises
+        ------
+        UnknownAxisError
+            There is none of that name.
+        """
+        try:
+            return self._addresses[name]
+        except (KeyError, TypeError):
+            raise UnknownAxisError(name, self.names()) from None
+
+    def state(self, name: str) -> PositionerState:
+        """Return the state of an axis; raises `UnknownAxisError`."""
+        address = self.address(name)
+        state = self._devices[address.device].container.state(address.channel)
+        if state is None:
+            raise UnknownAxisError(name, self.names())
+        return state
+
+    def states(self) -> dict[str, PositionerState]:
+        """Return the state of every axis by name."""
+        return {
+            state.name: state
+            for device in list(self._devices.values())
+            for state in device.container.states()
+        }
+
+    def device(self, name: str) -> Device:
+        """Return the device that drives an axis; raises `UnknownAxisError`."""
+        return self._devices[self.address(name).device]
+
+    # Starting and ending
+
+    def initialize_devices(self) -> None:
+        """Find and open the hardware, start the threads, wait until every channel is known.
+
+        Raises
+        ------
+        DeviceError
+            No device at all, or the library failed; nothing is left open.
+        """
+        with self._busy:
+            self._set_mode(Mode.INITIALISATION)
+            try:
+                found = self.controller.find_devices()
+                wanted = self.settings.serials
+                present = tuple(serial for serial in wanted if serial in found)
+                identities = self.controller.open(present if wanted else ())
+            except DeviceError:
+                self.controller.close()
+                self._set_mode(Mode.FAILED)
+                raise
+            self._arrange(self._in_configured_order(identities))
+            self._start(identities)
+            self._set_mode(Mode.RUN_TIME)
+
+    def _in_configured_order(self, identities: Sequence[DeviceIdentity]) -> list[int]:
+        return [each.index for each in identities]
+
+    def _arrange(self, present: Sequence[int]) -> None:
+        """Make containers and devices for what is present and for what is only configured."""
+        configured = {each.device for each in self.settings.positioner}
+        hold_s = self.settings.defaults.hold
+        self._devices, self._addresses, missing = {}, {}, []
+        for index in sorted(configured | set(present)):
+            here = {each.channel: each for each in self.settings.positioner if each.device == index}
+            container = DeviceDataContainer(index, here, hold_s)
+            if index not in present:
+                for channel in here:
+                    container.settle(channel, None, "no device")
+                if present or self._mode is not Mode.CLOSED:
+                    names = ", ".join(each.name for each in here.values())
+                    missing.append(f"device {index} was not found ({names})")
+            self._devices[index] = self._make_device(container)
+            for positioner in here.values():
+                self._addresses[positioner.name] = positioner.address
+        self._missing = tuple(missing)
+
+    def _make_device(self, container: DeviceDataContainer) -> Device:
+        device = Device(
+            self.controller,
+            container,
+            gate=self.gate,
+            clock=self.clock,
+            settings=self.settings,
+            policy=self._policy,
+        )
+        device.lost.connect(self._on_device_lost, Qt.ConnectionType.DirectConnection)
+        return device
+
+    def _start(self, identities: Sequence[DeviceIdentity]) -> None:
+        channels = len(identities) * len(CHANNELS)
+        watch = self.settings.watch
+        for identity in identities:
+            device = self._devices[identity.index]
+            device.set_poll_period(max(1 / watch.poll_hz, channels / watch.poll_total_hz))
+            listener = DeviceListener(
+                self.controller, device.container, self._policy, on_lost=device.lose
+            )
+            self._listeners[identity.index] = listener
+            listener.start()
+            device.begin()
+        for identity in identities:
+            self._await_introduction(self._devices[identity.index])
+
+    def _await_introduction(self, device: Device) -> None:
+        if not device.wait_until_introduced(self.settings.watch.answer_s):
+            reason = f"device {device.index} did not tell what is connected to it"
+            logger.error("%s", reason)
+            self._missing = (*self._missing, reason)
+        for state in device.container.states():
+            self._addresses.setdefault(state.name, state.address)
+
+    def shut_down(self) -> None:
+        """Stop everything, release the hold, end the threads, close the library; any mode."""
+        with self._busy:
+            for device in self._devices.values():
+                device.request_end()
+            for device in self._devices.values():
+                device.join()
+            for listener in self._listeners.values():
+                listener.request_end()
+            for listener in self._listeners.values():
+                listener.join()
+            self._listeners.clear()
+            self.controller.close()
+            self._set_mode(Mode.CLOSED)
+
+    def rescan(self) -> None:
+        """Close everything and look again for the hardware; raises as `initialize_devices`.
+
+        Raises
+        ------
+        NotAvailable
+            An axis is moving.
+        """
+        moving = [state.name for state in self.states().values() if state.in_motion]
+        if moving:
+            raise NotAvailable(f"{', '.join(moving)} is moving; stop it before a rescan")
+        self.shut_down()
+        self.initialize_devices()
+
+    def _set_mode(self, mode: Mode) -> None:
+        self._mode = mode
+        self.changed.emit()
+
+    # Run time
+
+    def order(self, name: str, motion: Motion, *, source: str, consent: bool = False) -> Order:
+        """Send one order to the axis `name` and return it; raises `UnknownAxisError`."""
+        order = Order(
+            self.address(name).channel,
+            motion,
+            self.lease.holder.token,
+            source=source,
+            consent=consent,
+        )
+        self.device(name).submit(order)
+        return order
+
+    def check(self, motions: Mapping[str, Motion]) -> MoveVerdict:
+        """Return what the gate says to all of `motions` together, without moving anything."""
+        return self.gate.check(self._requests(motions, consent=False))
+
+    def order_together(
+        self, motions: Mapping[str, Motion], *, source: str, consent: bool = False
+    ) -> dict[str, Order]:
+        """Decide `motions` together and start them back to back, or none of them.
+
+        Raises
+        ------
+        MoveRefused
+            The gate refused; nothing moved.
+        UnknownAxisError
+            One axis does not exist; nothing moved.
+        """
+        requests = self._requests(motions, consent=consent)
+        verdict, grants = self.gate.decide(requests)
+        if not verdict.allowed:
+            logger.warning("refused (%s): %s", source, verdict)
+            raise refusal(verdict)
+        token = self.lease.holder.token
+        orders = {
+            name: Order(
+                self.address(name).channel, motion, token, source, consent, grant=grants[name]
+            )
+            for name, motion in motions.items()
+        }
+        for name, order in orders.items():
+            self.device(name).submit(order)
+        return orders
+
+    def _requests(self, motions: Mapping[str, Motion], *, consent: bool) -> list[Request]:
+        for name in motions:
+            self.address(name)
+        token = self.lease.holder.token
+        return [Request(name, motion, token, consent) for name, motion in motions.items()]
+
+    # Stopping
+
+    def stop(self, reason: str = "stop") -> None:
+        """Stop every channel now and stay stopped until `reset_stop`; any thread.
+
+        It overtakes every queue and takes no lock that a hardware call can hold. The device
+        threads repeat it after the call they may be in.
+        """
+        self.latch.set(reason)
+        error = refusal(refuse(Reason.STOPPED, f"stopped: {reason}"))
+        devices = list(self._devices.values())
+        for device in devices:
+            device.stop_later(error)
+        for device in devices:
+            if device.isRunning():
+                self._stop_channels(device)
+        logger.warning("stop: %s", reason)
+        self.latch.announce()
+
+    def _stop_channels(self, device: Device) -> None:
+        for channel in device.container.channels():
+            try:
+                self.controller.stop(Channel(device.index, channel))
+            except DeviceError as exc:
+                logger.error("device %d channel %d: stop failed: %s", device.index, channel, exc)
+
+    def reset_stop(self) -> None:
+        """Allow motion again."""
+        self.latch.reset()
+        logger.info("stop reset")
+
+    def _on_device_lost(self, lost: DeviceLost) -> None:
+        self._missing = (*self._missing, lost.reason)
+        if lost.in_motion:
+            self.stop(f"{lost.reason}; it was moving")
+        self._policy.report(_LostError(lost.reason), f"device {lost.index}")
+        self.device_lost.emit(lost)
+        self.changed.emit()
+
+
+class _LostError(CosmicError):
+    """Carries the loss of a device to the failure policy."""

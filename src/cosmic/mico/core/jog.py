@@ -1,0 +1,67 @@
+"""Continuous movement as a chain of short packets, each kept alive by whoever holds the key."""
+
+import math
+
+from cosmic.frame.clock import WALL
+from cosmic.mico.core.orders import Jog, Motion, MoveTo, Step
+from cosmic.mico.core.positioner import PositionerState
+from cosmic.mico.core.settings import MicoSettings
+from cosmic.mico.hw.interface import PositionerKind
+
+
+class JogRun:
+    """Works out the packets of one jog; device thread, except `renew`.
+
+    No packet is longer than `packet_s` of motion, so whatever dies, the axis stands soon after.
+    The dead-man deadline counts on the wall clock.
+    """
+
+    def __init__(self, jog: Jog, settings: MicoSettings) -> None:
+        self._jog = jog
+        self._settings = settings
+        self._renewed_wall_s = WALL.now_s()
+        self._started_s: float | None = None
+        self._start = 0.0
+        self._next_s = 0.0
+
+    def renew(self) -> None:
+        """Say that the key is still held; any thread."""
+        self._renewed_wall_s = WALL.now_s()
+
+    def due(self, now_s: float) -> bool:
+        """Return True when the next packet must be sent, or the dead-man deadline has passed."""
+        return now_s >= self._next_s or self._expired()
+
+    def _expired(self) -> bool:
+        return WALL.now_s() - self._renewed_wall_s > self._settings.jog.dead_man_s
+
+    def packet(self, state: PositionerState, now_s: float) -> Motion | None:
+        """Return the next packet, or None when the jog is over: let go, or at the limit."""
+        if self._expired():
+            return None
+        packet_s = self._settings.jog.packet_s
+        self._next_s = now_s + 0.4 * packet_s
+        if state.kind is PositionerKind.OPEN_LOOP:
+            frequency_hz = round(self._jog.speed)
+            steps = max(1, math.floor(frequency_hz * packet_s))
+            amplitude_v = self._settings.defaults.amplitude_v
+            return Step(self._jog.direction * steps, amplitude_v, frequency_hz)
+        return self._towards_limit(state, now_s, packet_s)
+
+    def _towards_limit(
+        self, state: PositionerState, now_s: float, packet_s: float
+    ) -> Motion | None:
+        position = state.position if state.position is not None else math.nan
+        if self._started_s is None:
+            self._started_s, self._start = now_s, position
+        sign, reach = self._jog.direction, self._jog.speed * packet_s
+        ahead = self._jog.speed * (now_s - self._started_s) + reach
+        # Never more than one packet ahead of where the axis really is.
+        way = min(ahead, sign * (position - self._start) + reach)
+        target = self._start + sign * way
+        if state.limits is not None:
+            outermost = state.limits[1] if sign > 0 else state.limits[0]
+            if sign * (outermost - position) <= 0.1 * min(reach, 1.0):
+                return None if now_s > self._started_s else MoveTo(target, state.unit)
+            target = sign * min(sign * target, sign * outermost)
+        return MoveTo(target, state.unit)

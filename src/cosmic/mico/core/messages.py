@@ -1,0 +1,73 @@
+"""What goes into a `Device`'s queue, and what comes out of its signals."""
+
+from dataclasses import dataclass
+
+from cosmic.frame.errors import CosmicError, DeviceError
+
+
+@dataclass(frozen=True, slots=True)
+class PositionChanged:
+    """A position that was read and differs from the one before.
+
+    Attributes
+    ----------
+    position : float
+        In gate coordinates and `unit`.
+    """
+
+    name: str
+    position: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class MovementEnded:
+    """How a movement of an axis ended; `error` is None when it reached its target."""
+
+    name: str
+    position: float | None
+    error: CosmicError | None
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceLost:
+    """A device cannot be reached; `in_motion` when one of its axes was moving."""
+
+    index: int
+    reason: str
+    in_motion: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Halt:
+    """Stop one channel again and fail its movement."""
+
+    channel: int
+    error: CosmicError
+
+
+@dataclass(frozen=True, slots=True)
+class StopAll:
+    """Stop every channel again and fail every movement."""
+
+    error: CosmicError
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """The listener cannot reach the device."""
+
+    error: DeviceError
+
+
+@dataclass(frozen=True, slots=True)
+class SetFrequency:
+    """Limit the closed-loop speed of one channel."""
+
+    channel: int
+    frequency_hz: int
+
+
+@dataclass(frozen=True, slots=True)
+class Wake:
+    """Nothing but a reason to look whether the thread shall end."""

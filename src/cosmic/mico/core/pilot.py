@@ -1,0 +1,334 @@
+"""`ChannelPilot`: takes one channel from order to standstill; device thread only."""
+
+import logging
+import math
+from collections.abc import Callable
+
+from cosmic.frame.errors import (
+    CosmicError,
+    DeviceError,
+    DeviceFault,
+    DeviceTimeout,
+    MoveCancelled,
+    refusal,
+)
+from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.mico.core.flight import (
+    Flight,
+    PilotContext,
+    Questions,
+    counted_position,
+    missed_target,
+)
+from cosmic.mico.core.gate import Request
+from cosmic.mico.core.jog import JogRun
+from cosmic.mico.core.orders import Grant, Jog, Motion, MoveBy, MoveTo, Order, Reference
+from cosmic.mico.core.positioner import Confidence, PositionerBase
+from cosmic.mico.hw.interface import (
+    ActivityRead,
+    Completed,
+    Event,
+    Failed,
+    PositionKnownRead,
+    PositionRead,
+)
+
+logger = logging.getLogger(__name__)
+
+
+class ChannelPilot:
+    """Launches orders for one channel, follows them, and says how they ended."""
+
+    def __init__(self, positioner: PositionerBase, context: PilotContext) -> None:
+        self._positioner = positioner
+        self._context = context
+        self._address = positioner.state.address
+        self._activity = Questions()
+        self._position = Questions()
+        self.flight: Flight | None = None
+        self.next_poll_s = 0.0
+
+    @property
+    def name(self) -> str:
+        """Name of the axis."""
+        return self._positioner.state.name
+
+    # Starting
+
+    def launch(self, order: Order) -> None:
+        """Ask the gate, send `order` to the library, and begin to follow it."""
+        if order.movement.cancelled:
+            order.movement.fail(MoveCancelled(f"{self.name}: cancelled before it started"))
+            return
+        if isinstance(order.motion, Jog):
+            self._start_jog(order, JogRun(order.motion, self._context.settings))
+            return
+        grant = order.grant or self._grant(order, order.motion)
+        if grant is None:
+            return
+        if not self._context.gate.still_valid(grant):
+            self.turn_away(order, _stopped(self.name))
+            return
+        self._begin(order, grant.target)
+        self._send(order.motion, grant)
+        self._announce()
+        self.ask_activity()
+
+    def _grant(self, order: Order, motion: Motion) -> Grant | None:
+        request = Request(self.name, motion, order.token, order.consent)
+        verdict, grants = self._context.gate.decide([request])
+        if verdict.allowed:
+            return grants[self.name]
+        if self.flight is not None and self.flight.order is order:
+            self._end_jog(refusal(verdict))
+        else:
+            self.turn_away(order, verdict)
+        return None
+
+    def turn_away(self, order: Order, verdict: MoveVerdict) -> None:
+        """Tell everybody that `order` was refused."""
+        logger.warning("refused (%s): %s", order.source, verdict)
+        order.movement.fail(refusal(verdict))
+        self._context.on_refused(verdict)
+
+    def _begin(self, order: Order, target: float | None, jog: JogRun | None = None) -> None:
+        if self.flight is not None:
+            self._conclude(MoveCancelled(f"{self.name}: replaced by a newer command"))
+        now_s = self._context.clock.now_s()
+        self.flight = Flight(order, target, started_s=now_s, progress_s=now_s, jog=jog)
+        self.flight.known_pending = isinstance(order.motion, Reference)
+        self._context.container.update(self._address.channel, in_motion=True, error="")
+        logger.info("%s: %s (%s)", self.name, order.motion, order.source)
+        self.next_poll_s = now_s + self._context.poll_s * max(self._context.clock.rate, 1.0)
+
+    def _send(self, motion: Motion, grant: Grant) -> None:
+        if isinstance(motion, MoveBy):
+            motion = MoveTo(math.nan if grant.target is None else grant.target, motion.unit)
+        try:
+            self._positioner.send(self._context.controller, motion)
+        except DeviceError as exc:
+            self._blame(exc)
+        if not self._context.gate.still_valid(grant):
+            self.halt(refusal(_stopped(self.name)))
+
+    # Jogging
+
+    def renew(self, order_number: int) -> None:
+        """Keep a jog alive; any thread."""
+        flight = self.flight
+        if flight is not None and flight.jog is not None and flight.order.number == order_number:
+            flight.jog.renew()
+
+    def _start_jog(self, order: Order, jog: JogRun) -> None:
+        packet = jog.packet(self._positioner.state, self._context.clock.now_s())
+        if packet is None:
+            order.movement.finish(self._positioner.state.position)
+            return
+        grant = self._grant(order, packet)
+        if grant is not None:
+            self._begin(order, target=None, jog=jog)
+            self._send(packet, grant)
+            self._announce()
+
+    def _next_packet(self, flight: Flight, jog: JogRun) -> None:
+        now_s = self._context.clock.now_s()
+        packet = jog.packet(self._positioner.state, now_s)
+        if packet is None:
+            self._end_jog(None)
+            return
+        grant = self._grant(flight.order, packet)
+        if grant is not None:
+            self._send(packet, grant)
+            flight.progress_s = now_s
+
+    def _end_jog(self, error: CosmicError | None) -> None:
+        flight = self.flight
+        if flight is None:
+            return
+        flight.jog, flight.rests_seen = None, 0
+        flight.error = flight.error or error
+        if error is not None:
+            logger.warning("%s: jogging ended: %s", self.name, error)
+        self._quietly(lambda: self._context.controller.stop(self._address))
+        self.ask_activity()
+
+    # Stopping
+
+    def halt(self, error: CosmicError) -> None:
+        """Stop the channel; the movement under way will fail with `error`."""
+        self._quietly(lambda: self._context.controller.stop(self._address))
+        if self.flight is not None:
+            self.flight.error = self.flight.error or error
+            self.flight.jog = None
+            self.flight.progress_s = self._context.clock.now_s()
+            self.ask_activity()
+
+    def lose(self, error: CosmicError) -> None:
+        """Give up the movement of a channel that cannot be reached; its interval stays held."""
+        flight, self.flight = self.flight, None
+        if flight is not None:
+            flight.order.movement.fail(error)
+            self._context.on_failed(self.name, error)
+
+    # Following
+
+    def poll(self) -> None:
+        """Ask what is due, renew a jog, and notice a movement that makes no progress."""
+        now_s = self._context.clock.now_s()
+        flight = self.flight
+        if flight is not None and flight.jog is not None and flight.jog.due(now_s):
+            self._next_packet(flight, flight.jog)
+        if now_s < self.next_poll_s:
+            return
+        watch = self._context.settings.watch
+        period_s = watch.idle_poll_s if flight is None else self._context.poll_s
+        self.next_poll_s = now_s + period_s * max(self._context.clock.rate, 1.0)
+        self.ask_position()
+        if flight is None:
+            return
+        self.ask_activity()
+        late = now_s - flight.progress_s
+        patience_s = flight.patience_s(self._context.settings, self._context.clock.rate)
+        if late > patience_s and flight.error is not None:
+            self._conclude(flight.error)  # no answer: it may still move, so its interval stays held
+        elif late > patience_s:
+            text = f"{self.name}: no progress for {late:.1f} s, stopped"
+            self._blame(DeviceTimeout(text, fault=DeviceFault.TIMEOUT))
+
+    def ask_activity(self) -> None:
+        """Ask what the channel is doing."""
+        self._activity.asked(self.flight.order.number if self.flight else 0)
+        self._quietly(lambda: self._context.controller.ask_activity(self._address))
+
+    def ask_position(self) -> None:
+        """Ask for the position, where there is a sensor."""
+        if not self._positioner.has_sensor:
+            return
+        number = self.flight.order.number if self.flight else 0
+        final = self.flight is not None and self.flight.at_rest
+        self._position.asked(-number if final else number)
+        unit = self._positioner.state.unit
+        self._quietly(lambda: self._context.controller.ask_position(self._address, unit))
+
+    def ask_position_known(self) -> None:
+        """Ask whether the position is referenced; old libraries cannot say."""
+        try:
+            self._context.controller.ask_position_known(self._address)
+        except DeviceError as exc:
+            if exc.fault is not DeviceFault.UNSUPPORTED:
+                raise
+            self._on_known(PositionKnownRead(self._address, known=self.flight is not None))
+
+    def take(self, event: Event) -> None:
+        """Follow one event of this channel."""
+        match event:
+            case Completed():
+                self.ask_activity()
+            case ActivityRead():
+                self._on_activity(event)
+            case PositionRead():
+                self._on_position()
+            case PositionKnownRead():
+                self._on_known(event)
+            case Failed():
+                self._on_failed(event.error)
+
+    def _on_activity(self, event: ActivityRead) -> None:
+        number = self._activity.answered()
+        flight = self.flight
+        if flight is None or number != flight.order.number or flight.jog is not None:
+            return
+        if not event.activity.at_rest:
+            flight.rests_seen = 0
+            return
+        flight.rests_seen += 1
+        if not flight.at_rest:
+            self.ask_activity()
+        elif not self._positioner.has_sensor:
+            self._land()
+        elif flight.rests_seen == 2:
+            if flight.known_pending:
+                self.ask_position_known()
+            self.ask_position()
+
+    def _on_position(self) -> None:
+        number = self._position.answered()
+        flight = self.flight
+        if flight is None:
+            return
+        flight.note_position(self._positioner.state.position, self._context.clock.now_s())
+        if flight.at_rest and number == -flight.order.number and not flight.known_pending:
+            self._land()
+
+    def _on_known(self, event: PositionKnownRead) -> None:
+        known = Confidence.KNOWN if event.known else Confidence.UNKNOWN
+        self._context.container.update(self._address.channel, confidence=known)
+        flight = self.flight
+        if flight is not None and flight.known_pending and flight.at_rest:
+            flight.known_pending = False
+            if not event.known and flight.error is None:
+                text = f"{self.name}: it stopped without having found its reference"
+                flight.error = DeviceError(text, fault=DeviceFault.REFERENCE)
+        self._announce()
+
+    def _on_failed(self, error: DeviceError) -> None:
+        if self.flight is not None and error.fault is not DeviceFault.UNSUPPORTED:
+            self._blame(error)
+        elif self._positioner.state.error != str(error):
+            logger.error("%s: %s", self.name, error)
+            self._context.container.update(self._address.channel, error=str(error))
+            self._announce()
+
+    def _blame(self, error: DeviceError) -> None:
+        """Remember why the movement fails, and leave nothing moving unwatched."""
+        logger.error("%s: %s", self.name, error)
+        self._context.container.update(self._address.channel, error=str(error))
+        self.halt(error)
+
+    # Landing
+
+    def _land(self) -> None:
+        flight = self.flight
+        if flight is None:
+            return
+        state, context = self._positioner.state, self._context
+        if not self._positioner.has_sensor:
+            where = counted_position(flight, state, context.settings, context.clock.now_s())
+            context.container.update(self._address.channel, position=where)
+        missed = missed_target(flight, state, context.settings) if flight.error is None else None
+        if missed is not None:
+            context.container.update(self._address.channel, error=str(missed))
+        self._conclude(flight.error or missed)
+
+    def _conclude(self, error: CosmicError | None) -> None:
+        flight, self.flight = self.flight, None
+        if flight is None:
+            return
+        landed = flight.at_rest
+        if landed:
+            self._context.gate.release(self.name)
+        state = self._context.container.update(self._address.channel, in_motion=not landed)
+        position = state.position if state else None
+        self._announce()
+        if error is None:
+            flight.order.movement.finish(position)
+            self._context.on_finished(self.name, position)
+        else:
+            flight.order.movement.fail(error)
+            self._context.on_failed(self.name, error)
+
+    def _announce(self) -> None:
+        self._context.on_state(self._address.channel)
+
+    def _quietly(self, call: Callable[[], None]) -> None:
+        """Make a call that the unreachable-device path reports, not this one."""
+        try:
+            call()
+        except DeviceError as exc:
+            if exc.fault is DeviceFault.COMMUNICATION:
+                raise
+            logger.warning("%s: %s", self.name, exc)
+
+
+def _stopped(name: str) -> MoveVerdict:
+    return refuse(Reason.STOPPED, f"{name}: stopped before it got there", axis=name)
