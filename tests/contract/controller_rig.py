@@ -1,0 +1,75 @@
+"""The controllers under contract, and a rig that waits for their events."""
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+import pytest
+
+from contract.fake_scu3d import LINEAR_TYPE, NO_TYPE, ROTARY_TYPE, FakeScu3d
+from cosmic.frame.clock import ManualClock
+from cosmic.frame.units import AxisUnit
+from cosmic.mico.hw.interface import (
+    Activity,
+    ActivityRead,
+    Channel,
+    Controller,
+    Event,
+    PositionRead,
+)
+from cosmic.mico.hw.scu3d import Scu3dController
+
+E = TypeVar("E", bound=Event)
+
+
+@dataclass
+class Rig:
+    """A controller with four devices of three channels, laid out LLL,LLL,LLN,RNN."""
+
+    controller: Controller
+
+    def __enter__(self) -> "Rig":
+        self.controller.open()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.controller.close()
+
+    def event(self, kind: type[E], at: Channel) -> E:
+        """Return the next event of that kind and channel; skip the others."""
+        for _ in range(400):
+            event = self.controller.receive(at.device, 0.1)
+            if isinstance(event, kind) and event.channel == at:
+                return event
+        raise AssertionError(f"no {kind.__name__} from {at}")
+
+    def position(self, at: Channel, unit: AxisUnit = "um") -> float:
+        self.controller.ask_position(at, unit)
+        return self.event(PositionRead, at).value
+
+    def activity(self, at: Channel) -> Activity:
+        self.controller.ask_activity(at)
+        return self.event(ActivityRead, at).activity
+
+    def come_to_rest(self, at: Channel) -> Activity:
+        for _ in range(2000):
+            activity = self.activity(at)
+            if activity.at_rest:
+                return activity
+        raise AssertionError(f"{at} does not come to rest")
+
+
+def simulated() -> Controller:
+    sim = pytest.importorskip("cosmic.mico.hw.sim_scu3d")
+    library = sim.load_simulated_library(clock=ManualClock(auto_advance=True))
+    return Scu3dController(library, simulated=True)
+
+
+def over_fake() -> Controller:
+    linear = [LINEAR_TYPE] * 3
+    devices = {
+        101: linear,
+        102: linear,
+        103: [LINEAR_TYPE, LINEAR_TYPE, NO_TYPE],
+        104: [ROTARY_TYPE, NO_TYPE, NO_TYPE],
+    }
+    return Scu3dController(FakeScu3d(devices))
