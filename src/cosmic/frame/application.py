@@ -1,5 +1,6 @@
 """The base of every CoSMic application (thesis 5.3.1, appendix D)."""
 
+import logging
 from collections.abc import Callable
 
 from PySide6.QtCore import QObject, Signal
@@ -7,6 +8,8 @@ from typing_extensions import override
 
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.threads import WorkerThread
+
+logger = logging.getLogger(__name__)
 
 GuiFactory = Callable[["CosmicApplicationBase"], QObject]
 
@@ -60,9 +63,10 @@ class CosmicApplicationBase(WorkerThread):
     @override
     def run_body(self) -> None:
         if not self.custom_event_loop():
-            self.exec()
+            super().run_body()
 
     def shut_down(self) -> None:
         """Leave the hardware safe, end every thread and release what was opened; any state."""
         self.request_end()
-        self.join()
+        if not self.join():
+            logger.error("%s does not end: its thread still runs", self.title)

@@ -121,7 +121,7 @@ class ManualClock(Clock):
     def wait(self, condition: threading.Condition, until_s: float) -> None:
         with self._lock:
             left_s = until_s - self._now_s
-            if left_s > 0.0 and self._auto:
+            if left_s > 0.0 and self._auto and until_s < float("inf"):
                 self._now_s = until_s
                 self._lock.notify_all()
                 return

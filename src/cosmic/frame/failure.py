@@ -55,6 +55,13 @@ class _Subscribers(Generic[C]):
         return remove
 
 
+class _Entered(local):
+    """What this thread is doing now, so that a failure of it does not start it again."""
+
+    stopping = False
+    telling = False
+
+
 class FailurePolicy:
     """Receives every failure that nothing else handled; any thread.
 
@@ -65,7 +72,7 @@ class FailurePolicy:
     def __init__(self) -> None:
         self._safe_stops: _Subscribers[Callable[[str], None]] = _Subscribers()
         self._listeners: _Subscribers[Callable[[Failure], None]] = _Subscribers()
-        self._busy = local()
+        self._entered = _Entered()
 
     def on_safe_stop(self, stop: Callable[[str], None]) -> Callable[[], None]:
         """Call `stop(reason)` when motion must end; returns the function that undoes it."""
@@ -82,32 +89,33 @@ class FailurePolicy:
         if defect:
             text = f"{type(error).__name__}: {text}"
         failure = Failure(where=where, text=text, defect=defect)
-        if getattr(self._busy, "flag", False):
-            logger.error("%s: %s (while another failure was reported)", where, text)
-            return failure
-        self._busy.flag = True
-        try:
-            if defect or thread_died:
-                self._stop_everything(f"{where}: {text}")
-            logger.error("%s: %s", where, text, exc_info=error if defect else None)
-            self._tell(failure)
-        finally:
-            self._busy.flag = False
+        if defect or thread_died:
+            self._stop_everything(f"{where}: {text}")
+        logger.error("%s: %s", where, text, exc_info=error if defect else None)
+        self._tell(failure)
         return failure
 
     def _stop_everything(self, reason: str) -> None:
+        if self._entered.stopping:
+            return
+        self._entered.stopping = True
         for stop in self._safe_stops.all:
             try:
                 stop(reason)
             except Exception:
                 logger.exception("a safe stop failed")
+        self._entered.stopping = False
 
     def _tell(self, failure: Failure) -> None:
+        if self._entered.telling:
+            return
+        self._entered.telling = True
         for listener in self._listeners.all:
             try:
                 listener(failure)
             except Exception:
                 logger.exception("a failure listener failed")
+        self._entered.telling = False
 
     def guarded(self, where: str, function: Callable[P, R], fallback: R) -> Callable[P, R]:
         """Wrap a driver callback, out of which no exception may escape into C code."""

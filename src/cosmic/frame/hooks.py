@@ -61,10 +61,11 @@ def install_hooks(policy: FailurePolicy) -> Callable[[], None]:
 
 
 def _place(trace: TracebackType | None) -> str:
-    """Name the innermost function of the program that was running."""
+    """Name the innermost function of CoSMic that was running, or the outermost of all."""
     place = "window"
     while trace is not None:
-        module = trace.tb_frame.f_globals.get("__name__", "?")
-        place = f"{module}.{trace.tb_frame.f_code.co_qualname}"
+        module = str(trace.tb_frame.f_globals.get("__name__", "?"))
+        if module.startswith("cosmic.") or place == "window":
+            place = f"{module}.{trace.tb_frame.f_code.co_qualname}"
         trace = trace.tb_next
     return place

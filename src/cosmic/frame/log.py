@@ -1,5 +1,6 @@
 """Logging: one set-up for the process, and a ring of recent records for the log panel."""
 
+import copy
 import logging
 from collections import deque
 from collections.abc import Callable
@@ -19,7 +20,8 @@ Listener = Callable[[logging.LogRecord], None]
 class RingBufferHandler(logging.Handler):
     """Keeps the newest `capacity` records and tells listeners of each new one; any thread.
 
-    Listeners are called in the thread that logs and must return at once.
+    Listeners are called in the thread that logs and must return at once. A record is kept as
+    text: `message`, and `exc_text` where it carried a traceback.
     """
 
     def __init__(self, capacity: int = 5000, level: int = logging.INFO) -> None:
@@ -30,10 +32,13 @@ class RingBufferHandler(logging.Handler):
 
     @override
     def emit(self, record: logging.LogRecord) -> None:
-        record.message = record.getMessage()
-        self._records.append(record)
-        for listener in self._listeners:
-            listener(record)
+        try:
+            kept = _as_text(record)
+            self._records.append(kept)
+            for listener in self._listeners:
+                listener(kept)
+        except Exception:  # noqa: BLE001 - logging's contract: a handler never raises
+            self.handleError(record)
 
     def records(self) -> list[logging.LogRecord]:
         """Return the records kept, oldest first."""
@@ -49,6 +54,17 @@ class RingBufferHandler(logging.Handler):
                 self._listeners = tuple(each for each in self._listeners if each is not listener)
 
         return unsubscribe
+
+
+def _as_text(record: logging.LogRecord) -> logging.LogRecord:
+    """Return a copy that keeps no object alive: a traceback holds every local of its frames."""
+    kept = copy.copy(record)
+    kept.msg = kept.message = record.getMessage()
+    kept.args = None
+    if record.exc_info and not record.exc_text:
+        kept.exc_text = logging.Formatter().formatException(record.exc_info)
+    kept.exc_info = None
+    return kept
 
 
 def set_up_logging(

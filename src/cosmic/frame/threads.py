@@ -7,6 +7,7 @@ import weakref
 from collections.abc import Callable
 from typing import Final
 
+import shiboken6
 from PySide6.QtCore import QObject, QThread
 from typing_extensions import override
 
@@ -36,7 +37,8 @@ class WorkerThread(QThread):
         self.setObjectName(name)
         self._policy = policy
         self._end_requested = threading.Event()
-        _alive.add(self)
+        with _alive_lock:
+            _alive.add(self)
 
     @property
     def name(self) -> str:
@@ -50,7 +52,8 @@ class WorkerThread(QThread):
 
     def run_body(self) -> None:
         """Run in the new thread; override it."""
-        self.exec()
+        if not self.end_requested:  # a `quit` before the start is forgotten by Qt
+            self.exec()
 
     def request_end(self) -> None:
         """Ask the body to leave; returns at once. Subclasses wake their waits here as well."""
@@ -69,16 +72,19 @@ class WorkerThread(QThread):
         threading.current_thread().name = self.name
         try:
             self.run_body()
-        except Exception as exc:  # noqa: BLE001 - the end of the thread body
+        except BaseException as exc:  # noqa: BLE001 - the end of the thread body, SystemExit too
             self._policy.report(exc, f"thread {self.name!r}", thread_died=True)
 
 
 _alive: "weakref.WeakSet[WorkerThread]" = weakref.WeakSet()
+_alive_lock = threading.Lock()
 
 
 def running_threads() -> list[WorkerThread]:
     """Return the worker threads that run now."""
-    return [thread for thread in list(_alive) if thread.isRunning()]
+    with _alive_lock:
+        threads = list(_alive)
+    return [thread for thread in threads if shiboken6.isValid(thread) and thread.isRunning()]
 
 
 @atexit.register

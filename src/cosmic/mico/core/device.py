@@ -35,6 +35,7 @@ from cosmic.mico.core.messages import (
     PositionChanged,
     SetFrequency,
     StopAll,
+    Tell,
     Wake,
 )
 from cosmic.mico.core.orders import Order
@@ -55,7 +56,7 @@ logger = logging.getLogger(__name__)
 CHANNELS: Final = range(3)
 
 
-_Message = Order | Event | Halt | StopAll | Lost | SetFrequency | Wake
+_Message = Order | Event | Halt | StopAll | Lost | SetFrequency | Tell | Wake
 
 
 class Device(WorkerThread):
@@ -164,6 +165,11 @@ class Device(WorkerThread):
         """Limit the closed-loop speed of one channel, 1 to 18500 Hz."""
         self._inbox.put(SetFrequency(channel, frequency_hz))
 
+    def set_zero(self, channel: int, zero: float) -> None:
+        """Show the positions of one channel relative to `zero`, in gate coordinates."""
+        self.container.update(channel, zero=zero)
+        self._inbox.put(Tell(channel))
+
     def wait_until_introduced(self, timeout_s: float) -> bool:
         """Wait until every channel has told its type; False after `timeout_s` of wall time."""
         return self._introduced.wait(timeout_s)
@@ -231,6 +237,8 @@ class Device(WorkerThread):
                 self._controller.set_closed_loop_frequency(channel, message.frequency_hz)
             case Wake():
                 pass
+            case Tell():
+                self._emit_state(message.channel)
             case _:
                 self._on_event(message)
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from threading import RLock
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QObject, Qt, Signal, SignalInstance
 
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import (
@@ -20,6 +20,7 @@ from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision import CollisionChecker, NoCollisionModel
 from cosmic.mico.core.data_container import DeviceDataContainer
 from cosmic.mico.core.device import CHANNELS, Device
+from cosmic.mico.core.device_commander import CommanderType, DeviceCommander
 from cosmic.mico.core.device_listener import DeviceListener
 from cosmic.mico.core.gate import Gate, Request
 from cosmic.mico.core.lease import Lease
@@ -265,17 +266,42 @@ class DeviceManager(QObject):
 
     # Run time
 
-    def order(self, name: str, motion: Motion, *, source: str, consent: bool = False) -> Order:
-        """Send one order to the axis `name` and return it; raises `UnknownAxisError`."""
-        order = Order(
-            self.address(name).channel,
-            motion,
-            self.lease.holder.token,
-            source=source,
-            consent=consent,
-        )
-        self.device(name).submit(order)
-        return order
+    def connect_device_commander(
+        self,
+        index: int,
+        commander: DeviceCommander,
+        kind: CommanderType = CommanderType.INPUT_OUTPUT,
+    ) -> None:
+        """Join a commander to the device `index`, parting it from any other (Fig. 6.4).
+
+        The connections are direct: a command goes into the device's queue in the caller's
+        thread, so that no event loop is needed to make a move.
+
+        Raises
+        ------
+        NotAvailable
+            There is no such device.
+        """
+        device = self._devices.get(index)
+        if device is None:
+            raise NotAvailable(f"there is no device {index}")
+        direct = Qt.ConnectionType.DirectConnection
+        pairs: list[tuple[SignalInstance, object]] = []
+        if CommanderType.INPUT in kind:
+            pairs += [
+                (commander.order_issued, device.submit),
+                (commander.jog_renewed, device.renew_jog),
+                (commander.halt_requested, device.halt),
+                (commander.frequency_requested, device.set_frequency),
+            ]
+        if CommanderType.OUTPUT in kind:
+            pairs += [
+                (device.position_changed, commander.position_changed),
+                (device.state_changed, commander.state_changed),
+                (device.movement_ended, commander.movement_ended),
+                (device.movement_refused, commander.movement_refused),
+            ]
+        commander.attach([signal.connect(slot, direct) for signal, slot in pairs], kind)
 
     def check(self, motions: Mapping[str, Motion]) -> MoveVerdict:
         """Return what the gate says to all of `motions` together, without moving anything."""

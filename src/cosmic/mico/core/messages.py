@@ -71,3 +71,10 @@ class SetFrequency:
 @dataclass(frozen=True, slots=True)
 class Wake:
     """Nothing but a reason to look whether the thread shall end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tell:
+    """Tell the state of one channel, which somebody else changed."""
+
+    channel: int

@@ -2,11 +2,10 @@
 
 from enum import Flag, auto
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QMetaObject, QObject, Signal
 
 from cosmic.frame.errors import NotConnectedError
 from cosmic.frame.units import AxisUnit
-from cosmic.mico.core.device import Device
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.orders import (
     Calibrate,
@@ -36,9 +35,9 @@ class CommanderType(Flag):
 class DeviceCommander(QObject):
     """Commands the channels of whatever device it is connected to, and hears from it.
 
-    It knows nothing of the device: `connect_device_commander` joins the two. Each command emits
-    `order_issued` and returns at once with the `Movement`; any thread. Positions are in gate
-    coordinates.
+    It knows nothing of the device: `DeviceManager.connect_device_commander` joins the two. Each
+    command emits `order_issued` and returns at once with the `Movement`; any thread. Positions
+    are in gate coordinates.
 
     Parameters
     ----------
@@ -70,10 +69,20 @@ class DeviceCommander(QObject):
         self._token = token
         self._source = source
         self._may_command = False
+        self._connections: list[QMetaObject.Connection] = []
 
-    def allow_commands(self) -> None:
-        """Say that somebody listens to its commands; for `connect_device_commander`."""
-        self._may_command = True
+    def attach(self, connections: list[QMetaObject.Connection], kind: CommanderType) -> None:
+        """Take note of the connections to a device; for `connect_device_commander`."""
+        self.detach()
+        self._connections = connections
+        self._may_command = CommanderType.INPUT in kind
+
+    def detach(self) -> None:
+        """Part from the device."""
+        connections, self._connections = self._connections, []
+        for connection in connections:
+            QObject.disconnect(connection)
+        self._may_command = False
 
     def move_absolute(
         self, channel: int, target: float, unit: AxisUnit, *, consent: bool = False
@@ -143,27 +152,3 @@ class DeviceCommander(QObject):
         order = Order(channel, motion, self._token, self._source, consent, grant=grant)
         self.order_issued.emit(order)
         return order
-
-
-def connect_device_commander(
-    device: Device,
-    commander: DeviceCommander,
-    kind: CommanderType = CommanderType.INPUT_OUTPUT,
-) -> None:
-    """Join a device and a commander (thesis Fig. 6.4).
-
-    The connections are direct: a command goes into the device's queue in the caller's thread, so
-    that no event loop is needed to make a move.
-    """
-    direct = Qt.ConnectionType.DirectConnection
-    if CommanderType.INPUT in kind:
-        commander.order_issued.connect(device.submit, direct)
-        commander.jog_renewed.connect(device.renew_jog, direct)
-        commander.halt_requested.connect(device.halt, direct)
-        commander.frequency_requested.connect(device.set_frequency, direct)
-        commander.allow_commands()
-    if CommanderType.OUTPUT in kind:
-        device.position_changed.connect(commander.position_changed, direct)
-        device.state_changed.connect(commander.state_changed, direct)
-        device.movement_ended.connect(commander.movement_ended, direct)
-        device.movement_refused.connect(commander.movement_refused, direct)

@@ -1,0 +1,77 @@
+"""CoSMic: control software for a microrobotic platform.
+
+``cosmic.connect()`` starts the platform for a script; see docs/reference/api.md. Names are
+loaded when first used, so that ``import cosmic`` opens nothing and stays quick.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cosmic.app.rig import Rig, connect
+    from cosmic.frame.errors import (
+        CollisionError,
+        ConfigError,
+        CosmicError,
+        DeviceError,
+        DeviceTimeout,
+        LimitError,
+        MoveCancelled,
+        MoveRefused,
+        NotAvailable,
+        NotConnectedError,
+        StoppedError,
+        UnknownAxisError,
+    )
+    from cosmic.frame.verdict import MoveVerdict, Reason
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "cosmic.app.rig": ("Rig", "connect"),
+    "cosmic.frame.errors": (
+        "CollisionError",
+        "ConfigError",
+        "CosmicError",
+        "DeviceError",
+        "DeviceTimeout",
+        "LimitError",
+        "MoveCancelled",
+        "MoveRefused",
+        "NotAvailable",
+        "NotConnectedError",
+        "StoppedError",
+        "UnknownAxisError",
+    ),
+    "cosmic.frame.verdict": ("MoveVerdict", "Reason"),
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "CollisionError",
+    "ConfigError",
+    "CosmicError",
+    "DeviceError",
+    "DeviceTimeout",
+    "LimitError",
+    "MoveCancelled",
+    "MoveRefused",
+    "MoveVerdict",
+    "NotAvailable",
+    "NotConnectedError",
+    "Reason",
+    "Rig",
+    "StoppedError",
+    "UnknownAxisError",
+    "connect",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'cosmic' has no attribute {name!r}")
+    return getattr(import_module(_HOME_OF[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

@@ -1,0 +1,130 @@
+"""A platform as its files describe it: configuration in, running applications out."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Final
+
+from pydantic import Field
+
+from cosmic.frame.clock import Clock, RatedClock
+from cosmic.frame.config import StrictModel, load_model, shipped_config_dir
+from cosmic.frame.errors import ConfigError
+from cosmic.frame.failure import FailurePolicy
+from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.core.settings import MicoSettings
+from cosmic.mico.hw.factory import make_controller
+from cosmic.twin.scene import Scene
+from cosmic.twin.settings import TwinSettings
+
+KNOWN_APPLICATIONS: Final = ("mico", "daqco", "vico")
+BUILT_APPLICATIONS: Final = ("mico",)
+
+
+class PlatformSettings(StrictModel):
+    """Section ``[platform]`` of platform.toml."""
+
+    name: str = Field(min_length=1)
+    twin: str = "twin.toml"
+    stop_key: str = "F12"
+    applications: Annotated[tuple[str, ...], Field(strict=False)] = BUILT_APPLICATIONS
+
+
+class PlatformFile(StrictModel):
+    """A whole platform.toml."""
+
+    platform: PlatformSettings
+    mico: MicoSettings
+
+
+@dataclass(frozen=True)
+class Platform:
+    """What one process runs: the applications, their clock, and the policy for failures."""
+
+    file: PlatformFile
+    path: Path
+    clock: Clock
+    policy: FailurePolicy
+    mico: MicoApplication | None
+
+    @property
+    def simulated(self) -> bool:
+        """True when no hardware moves."""
+        return self.file.mico.backend == "simulated"
+
+    def initialize(self) -> None:
+        """Open the hardware of every application."""
+        if self.mico is not None:
+            self.mico.initialize()
+
+    def shut_down(self) -> None:
+        """Stop and close every application; any state."""
+        if self.mico is not None:
+            self.mico.shut_down()
+
+
+def platform_path(config: str | Path | None) -> Path:
+    """Return the platform file that `config` names: a file, a folder with one, or None."""
+    if config is None:
+        return shipped_config_dir() / "platform.toml"
+    path = Path(config)
+    return path / "platform.toml" if path.is_dir() else path
+
+
+def load_platform(config: str | Path | None) -> tuple[PlatformFile, Path]:
+    """Read and check a platform file.
+
+    Raises
+    ------
+    ConfigError
+        A line for every mistake, each with file, key and reason.
+    """
+    path = platform_path(config)
+    file = load_model(path, PlatformFile)
+    unknown = [name for name in file.platform.applications if name not in KNOWN_APPLICATIONS]
+    if unknown:
+        raise ConfigError(
+            f"{path}: platform.applications: unknown application {unknown[0]!r}; "
+            f"known are {', '.join(KNOWN_APPLICATIONS)}"
+        )
+    return file, path
+
+
+def load_twin(file: PlatformFile, path: Path) -> TwinSettings:
+    """Read the twin that a platform file names, from the folder of that file."""
+    return load_model(path.parent / file.platform.twin, TwinSettings)
+
+
+def build_platform(
+    config: str | Path | None = None,
+    *,
+    applications: tuple[str, ...] = KNOWN_APPLICATIONS,
+    rate: float = 1.0,
+    cold: bool = False,
+    seed: int = 0,
+) -> Platform:
+    """Read the configuration and make the applications; opens no hardware yet.
+
+    Raises
+    ------
+    ConfigError
+        The configuration is wrong, or a rate other than 1 was asked for real hardware.
+    NotConnectedError
+        The vendor library is not there.
+    """
+    file, path = load_platform(config)
+    simulated = file.mico.backend == "simulated"
+    if not simulated and (rate != 1.0 or cold):
+        raise ConfigError(f"{path}: mico.backend: only the simulated platform has a rate or --cold")
+    try:
+        clock = RatedClock(rate)
+    except ValueError as exc:
+        raise ConfigError(f"rate: {exc}") from None
+    policy = FailurePolicy()
+    scene = None
+    if simulated:
+        scene = Scene.from_settings(load_twin(file, path), clock, seed=seed, cold=cold)
+    mico = None
+    if "mico" in applications and "mico" in file.platform.applications:
+        controller = make_controller(file.mico.backend, library_path=file.mico.library, scene=scene)
+        mico = MicoApplication(controller, file.mico, clock=clock, policy=policy)
+    return Platform(file=file, path=path, clock=clock, policy=policy, mico=mico)

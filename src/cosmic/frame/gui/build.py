@@ -1,0 +1,35 @@
+"""Small helpers for putting widgets together."""
+
+from typing import TypeVar
+
+from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QPushButton, QWidget
+
+W = TypeVar("W", bound=QWidget)
+
+
+def named(widget: W, name: str) -> W:
+    """Give `widget` the name by which the style sheet and tests know it; returns it."""
+    widget.setObjectName(name)
+    return widget
+
+
+def tipped(widget: W, tip: str) -> W:
+    """Give `widget` a tooltip; a button that shows a sign only is also named by it."""
+    widget.setToolTip(tip)
+    if isinstance(widget, QAbstractButton) and not any(c.isalpha() for c in widget.text()):
+        widget.setAccessibleName(tip)
+    return widget
+
+
+def push_button(text: str, tip: str) -> QPushButton:
+    """Return a button that says what it does."""
+    return tipped(QPushButton(text), tip)
+
+
+def tight_row(spacing_px: int) -> tuple[QWidget, QHBoxLayout]:
+    """Return a widget without margins and the layout that puts things side by side in it."""
+    row = QWidget()
+    layout = QHBoxLayout(row)
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(spacing_px)
+    return row, layout

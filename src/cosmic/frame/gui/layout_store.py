@@ -1,0 +1,75 @@
+"""Remembers where the panels of a main window were, and which theme it had."""
+
+import logging
+from typing import Final
+
+from PySide6.QtCore import QByteArray, QSettings
+from PySide6.QtWidgets import QMainWindow
+
+from cosmic.frame.gui.palette import ThemeName
+from cosmic.frame.gui.theme import is_theme
+
+logger = logging.getLogger(__name__)
+
+_GEOMETRY: Final = "window/geometry"
+_DOCKS: Final = "window/docks"
+_THEME: Final = "window/theme"
+_VERSION: Final = 1
+
+
+class LayoutStore:
+    """Saves and restores geometry, docks and theme; a damaged entry counts as none.
+
+    Parameters
+    ----------
+    settings : QSettings
+        Where they are kept; the owner decides on the place.
+    """
+
+    def __init__(self, settings: QSettings) -> None:
+        self._settings = settings
+        self._default = QByteArray()
+
+    def remember_default(self, window: QMainWindow) -> None:
+        """Take the docks as they are now for what `reset` goes back to."""
+        self._default = window.saveState(_VERSION)
+
+    def save(self, window: QMainWindow, theme: ThemeName) -> None:
+        """Keep the layout of `window` for the next start."""
+        self._settings.setValue(_GEOMETRY, window.saveGeometry())
+        self._settings.setValue(_DOCKS, window.saveState(_VERSION))
+        self._settings.setValue(_THEME, theme)
+        self._settings.sync()
+
+    def restore(self, window: QMainWindow) -> bool:
+        """Lay `window` out as it was saved; False where there was nothing usable."""
+        geometry, docks = self._bytes(_GEOMETRY), self._bytes(_DOCKS)
+        if geometry is not None and not window.restoreGeometry(geometry):
+            logger.warning("the saved size of the window is damaged; the default is used")
+        if docks is None:
+            return False
+        if not window.restoreState(docks, _VERSION):
+            logger.warning("the saved layout of the panels is damaged; the default is used")
+            return False
+        return True
+
+    def reset(self, window: QMainWindow) -> None:
+        """Put the docks back to where they are at a first start."""
+        window.restoreState(self._default, _VERSION)
+
+    def theme(self) -> ThemeName | None:
+        """Return the theme saved, if there is one."""
+        name = self._settings.value(_THEME)
+        return name if is_theme(name) else None
+
+    def save_theme(self, theme: ThemeName) -> None:
+        """Keep `theme` for the next start."""
+        self._settings.setValue(_THEME, theme)
+
+    def _bytes(self, key: str) -> QByteArray | None:
+        value = self._settings.value(key)
+        if isinstance(value, QByteArray) and not value.isEmpty():
+            return value
+        if value is not None:
+            logger.warning("the saved %s is damaged; the default is used", key)
+        return None

@@ -1,0 +1,197 @@
+"""The main window that hosts the GUI components of applications (thesis 5.3.1)."""
+
+from PySide6.QtCore import QSettings, Qt, Signal
+from PySide6.QtGui import QCloseEvent, QShowEvent
+from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
+from typing_extensions import override
+
+from cosmic.frame.gui.dock import PanelDock
+from cosmic.frame.gui.keys_dialog import KeyList, KeysDialog
+from cosmic.frame.gui.layout_store import LayoutStore
+from cosmic.frame.gui.menus import ServerMenus
+from cosmic.frame.gui.palette import ThemeName
+from cosmic.frame.gui.theme import STEP_PX, apply_theme, current_palette
+from cosmic.frame.gui.top_bar import TopBar
+
+Area = Qt.DockWidgetArea
+
+
+class CosmicServerGui(QMainWindow):
+    """Hosts panels in docks under a fixed bar; knows nothing of what they control.
+
+    Add the panels before the first `show`: the layout of the last run is restored then.
+
+    Parameters
+    ----------
+    settings : QSettings
+        Where layout and theme are kept from one start to the next.
+    title : str
+        Name of the program or of the station.
+    stop_key : str
+        The key of STOP as it is written on the keyboard.
+    theme : str
+        The theme of the first start: "dark" or "light".
+    """
+
+    stop_requested = Signal()
+    """STOP was pressed, in this window or in a panel that floats."""
+    rescan_requested = Signal(str)
+    """The operator wants the application with this title started anew."""
+    theme_changed = Signal(str)
+    closing = Signal()
+    """The window is about to close: save, stop and release now."""
+
+    def __init__(
+        self,
+        settings: QSettings,
+        *,
+        title: str = "CoSMic",
+        stop_key: str = "F12",
+        theme: ThemeName = "dark",
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("CosmicServerGui")
+        self.setWindowTitle(title)
+        self.setDockNestingEnabled(True)
+        self.setAnimated(False)
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        self._store = LayoutStore(settings)
+        self._stop_key = stop_key
+        self._docks: dict[str, PanelDock] = {}
+        self._keys: KeyList = ()
+        self._keys_dialog: KeysDialog | None = None
+        self._restored = False
+        self._bar = TopBar(title, stop_key=stop_key)
+        self._menus = ServerMenus(self)
+        self._bar.set_menu_bar(self._menus.bar)
+        self.setMenuWidget(self._bar)
+        self.setCorner(Qt.Corner.BottomLeftCorner, Area.BottomDockWidgetArea)
+        self.setCorner(Qt.Corner.BottomRightCorner, Area.BottomDockWidgetArea)
+        self._connect()
+        self.set_theme(self._store.theme() or theme)
+        self.resize(170 * STEP_PX, 95 * STEP_PX)
+
+    def _connect(self) -> None:
+        self._bar.stop_requested.connect(self.stop_requested)
+        self._bar.theme_requested.connect(self._on_theme_requested)
+        self._menus.quit_requested.connect(self.close)
+        self._menus.keys_requested.connect(self.show_keys)
+        self._menus.theme_requested.connect(self.set_theme)
+        self._menus.reset_layout_requested.connect(self.reset_layout)
+
+    @property
+    def top_bar(self) -> TopBar:
+        """The bar with mode, messages and STOP."""
+        return self._bar
+
+    @property
+    def theme(self) -> ThemeName:
+        """The theme in force."""
+        return current_palette().name
+
+    def dock(self, title: str) -> PanelDock:
+        """Return the dock of the panel `title`."""
+        return self._docks[title]
+
+    def add_panel(
+        self,
+        title: str,
+        panel: QWidget,
+        area: Area = Area.LeftDockWidgetArea,
+        *,
+        scroll: bool = True,
+        beside: str = "",
+        tabbed: bool = False,
+    ) -> PanelDock:
+        """Host `panel` in a dock, and in the View menu.
+
+        Parameters
+        ----------
+        area : Qt.DockWidgetArea
+            Where it stands at a first start.
+        scroll : bool
+            Let the panel scroll where there is too little room.
+        beside : str
+            Title of a panel that it stands beside, or is tabbed with.
+        tabbed : bool
+            Share the place of `beside` instead of dividing it.
+        """
+        dock = PanelDock(title, panel, scroll=scroll, stop_key=self._stop_key, parent=self)
+        dock.stop_requested.connect(self.stop_requested)
+        dock.rescan_requested.connect(self.rescan_requested)
+        self._docks[title] = dock
+        self._menus.add_dock(dock)
+        if not beside:
+            self.addDockWidget(area, dock)
+        elif tabbed:
+            self.tabifyDockWidget(self._docks[beside], dock)
+        else:
+            self.splitDockWidget(self._docks[beside], dock, Qt.Orientation.Horizontal)
+        if self._restored:
+            self.restoreDockWidget(dock)
+        return dock
+
+    def set_failed(self, title: str, reason: str) -> None:
+        """Grey the panel `title`, say why and offer a rescan."""
+        self._docks[title].set_failed(reason)
+
+    def clear_failed(self, title: str) -> None:
+        """Let the panel `title` be used again."""
+        self._docks[title].clear_failed()
+
+    def raise_panel(self, title: str) -> None:
+        """Show the panel `title` and bring it to the front."""
+        dock = self._docks[title]
+        dock.show()
+        dock.raise_()
+
+    def set_keys(self, keys: KeyList) -> None:
+        """Give the list that F1 shows: key and what it does."""
+        self._keys = tuple(keys)
+        if self._keys_dialog is not None:
+            self._keys_dialog.set_keys(self._keys)
+
+    def show_keys(self) -> None:
+        """Show the list of keys."""
+        if self._keys_dialog is None:
+            self._keys_dialog = KeysDialog(self._keys, stop_key=self._stop_key, parent=self)
+            self._keys_dialog.stop_requested.connect(self.stop_requested)
+        self._keys_dialog.show()
+        self._keys_dialog.raise_()
+        self._keys_dialog.activateWindow()
+
+    def set_about(self, text: str) -> None:
+        """Give the text that Help > About shows."""
+        self._menus.set_about(text)
+
+    def set_theme(self, name: str) -> None:
+        """Give all windows the theme `name`, now and at the next start."""
+        app = QApplication.instance()
+        if not isinstance(app, QApplication):
+            return
+        apply_theme(app, "light" if name == "light" else "dark")
+        self._store.save_theme(self.theme)
+        self._menus.show_theme(self.theme)
+        self.theme_changed.emit(self.theme)
+
+    def reset_layout(self) -> None:
+        """Put all panels back to where they are at a first start."""
+        self._store.reset(self)
+
+    def _on_theme_requested(self) -> None:
+        self.set_theme("light" if self.theme == "dark" else "dark")
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        if not self._restored:
+            self._restored = True
+            self._store.remember_default(self)
+            self._store.restore(self)
+        super().showEvent(event)
+
+    @override
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self._store.save(self, self.theme)
+        self.closing.emit()
+        super().closeEvent(event)

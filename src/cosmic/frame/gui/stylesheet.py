@@ -1,0 +1,191 @@
+"""The style sheet of the theme, made from a palette."""
+
+from dataclasses import asdict
+from pathlib import Path
+from string import Template
+from typing import Final
+
+from cosmic.frame.gui.palette import INK, Palette
+
+_ASSETS: Final = Path(__file__).parent / "assets"
+
+_SHEET: Final = """
+QMainWindow, QDialog { background: $window; }
+QMainWindow::separator { background: $window; width: 6px; height: 6px; }
+QMainWindow::separator:hover { background: $accent; }
+QToolTip {
+    background: $raised; color: $text; border: 1px solid $border_strong; padding: 4px 6px;
+}
+
+QPushButton, QToolButton {
+    background: $raised; color: $text; border: 1px solid $border; border-radius: 4px;
+    padding: 3px 11px; min-height: 20px;
+}
+QToolButton { padding: 3px 8px; }
+QPushButton:hover, QToolButton:hover { background: $hover; border-color: $border_strong; }
+QPushButton:pressed, QToolButton:pressed { background: $field; }
+QPushButton:checked, QToolButton:checked {
+    background: $accent; color: $on_accent; border-color: $accent;
+}
+QPushButton:focus, QToolButton:focus { border-color: $accent; }
+QPushButton:disabled, QToolButton:disabled {
+    background: transparent; color: $disabled; border-color: $border;
+}
+QPushButton:default { border-color: $accent; }
+
+QLineEdit, QPlainTextEdit, QTextEdit {
+    background: $field; color: $text; border: 1px solid $border; border-radius: 4px;
+    padding: 3px 7px; selection-background-color: $accent; selection-color: $on_accent;
+}
+QLineEdit { min-height: 20px; }
+QLineEdit:hover { border-color: $border_strong; }
+QLineEdit:focus, QPlainTextEdit:focus, QTextEdit:focus { border-color: $accent; }
+QLineEdit:disabled, QPlainTextEdit:disabled { color: $disabled; background: transparent; }
+QLineEdit[refused="true"] { border: 2px solid $refused; padding: 2px 6px; }
+QComboBox, QAbstractSpinBox {
+    background: $raised; color: $text; border: 1px solid $border; border-radius: 4px;
+    padding: 3px 7px; min-height: 20px; selection-background-color: $accent;
+    selection-color: $on_accent;
+}
+QAbstractSpinBox { background: $field; padding-right: 22px; }
+QComboBox:hover, QAbstractSpinBox:hover { border-color: $border_strong; }
+QComboBox:focus, QAbstractSpinBox:focus { border-color: $accent; }
+QComboBox:disabled, QAbstractSpinBox:disabled { background: transparent; color: $disabled; }
+QComboBox::drop-down { border: none; width: 22px; }
+QComboBox::down-arrow, QAbstractSpinBox::down-arrow {
+    image: url("$assets/down-$name.svg"); width: 10px; height: 10px;
+}
+QAbstractSpinBox::up-arrow { image: url("$assets/up-$name.svg"); width: 10px; height: 10px; }
+QAbstractSpinBox::up-button, QAbstractSpinBox::down-button { border: none; width: 20px; }
+QAbstractSpinBox::up-button:hover, QAbstractSpinBox::down-button:hover { background: $hover; }
+QComboBox QAbstractItemView {
+    background: $raised; color: $text; border: 1px solid $border_strong; outline: none;
+    selection-background-color: $accent; selection-color: $on_accent;
+}
+QCheckBox { spacing: 7px; }
+QCheckBox::indicator, QGroupBox::indicator {
+    width: 14px; height: 14px; background: $field; border: 1px solid $border_strong;
+    border-radius: 3px;
+}
+QCheckBox::indicator:hover { border-color: $accent; }
+QCheckBox::indicator:checked, QGroupBox::indicator:checked {
+    background: $accent; border-color: $accent; image: url("$assets/check-$name.svg");
+}
+QCheckBox::indicator:disabled { background: transparent; border-color: $border; }
+QCheckBox:disabled { color: $disabled; }
+QProgressBar {
+    background: $field; color: $text; border: 1px solid $border; border-radius: 4px;
+    text-align: center; min-height: 16px;
+}
+QProgressBar::chunk { background: $accent; border-radius: 3px; }
+QSlider::groove:horizontal { background: $border; height: 4px; border-radius: 2px; }
+QSlider::sub-page:horizontal { background: $accent; border-radius: 2px; }
+QSlider::handle:horizontal {
+    background: $text; width: 14px; height: 14px; margin: -5px 0px; border-radius: 7px;
+}
+
+QDockWidget { color: $text; }
+QDockWidget > QWidget { background: $panel; }
+#dockTitle { background: $raised; border-bottom: 1px solid $border; }
+#dockTitle QLabel { font-weight: bold; }
+#dockTitle QToolButton {
+    background: transparent; border: none; color: $dim; padding: 0px; min-height: 22px;
+    min-width: 22px; border-radius: 4px;
+}
+#dockTitle QToolButton:hover { background: $hover; color: $text; }
+#dockBody, QScrollArea#dockScroll, QScrollArea#dockScroll > QWidget > QWidget {
+    background: $panel;
+}
+QScrollArea { border: none; }
+#failedBanner { background: $raised; border-bottom: 2px solid $refused; }
+
+QTabBar::tab {
+    background: $window; color: $dim; padding: 5px 14px; border: none;
+    border-bottom: 2px solid transparent;
+}
+QTabBar::tab:selected { background: $raised; color: $text; border-bottom: 2px solid $accent; }
+QTabBar::tab:hover { color: $text; }
+QTabWidget::pane { border: 1px solid $border; }
+
+QGroupBox {
+    border: 1px solid $border; border-radius: 4px; margin-top: 11px; padding: 10px 8px 8px 8px;
+}
+QGroupBox::title { subcontrol-origin: margin; left: 8px; padding: 0px 4px; color: $dim; }
+
+QMenuBar { background: transparent; color: $text; }
+QMenuBar::item { background: transparent; padding: 4px 10px; border-radius: 4px; }
+QMenuBar::item:selected, QMenuBar::item:pressed { background: $hover; }
+QMenu { background: $raised; color: $text; border: 1px solid $border_strong; padding: 4px; }
+QMenu::item { padding: 5px 24px 5px 24px; border-radius: 4px; }
+QMenu::item:selected { background: $accent; color: $on_accent; }
+QMenu::item:disabled { color: $disabled; }
+QMenu::separator { height: 1px; background: $border; margin: 4px 8px; }
+
+QScrollBar { background: transparent; border: none; }
+QScrollBar:vertical { width: 12px; }
+QScrollBar:horizontal { height: 12px; }
+QScrollBar::handle { background: $border_strong; border-radius: 4px; margin: 2px; }
+QScrollBar::handle:vertical { min-height: 32px; }
+QScrollBar::handle:horizontal { min-width: 32px; }
+QScrollBar::handle:hover { background: $dim; }
+QScrollBar::add-line, QScrollBar::sub-line { width: 0px; height: 0px; }
+QScrollBar::add-page, QScrollBar::sub-page { background: transparent; }
+
+QTableView {
+    background: $field; color: $text; border: 1px solid $border; border-radius: 4px;
+    gridline-color: transparent; selection-background-color: $hover; selection-color: $text;
+}
+QTableView::item { padding: 0px 6px; border: none; }
+QHeaderView { background: $panel; border: none; }
+QHeaderView::section {
+    background: $panel; color: $dim; border: none; border-bottom: 1px solid $border;
+    padding: 3px 6px;
+}
+
+[role="dim"] { color: $dim; }
+[role="heading"] { font-weight: bold; }
+
+#topBar { background: $window; border-bottom: 1px solid $border; }
+#topBar[latched="true"] { background: $latched; border-bottom: 1px solid $stop; }
+#topBar[latched="true"] QLabel, #topBar[latched="true"] QMenuBar { color: $on_stop; }
+#topBar[latched="true"] QMenuBar::item:selected { background: $stop; }
+#appTitle { font-size: 17px; font-weight: bold; }
+#latchedText { font-size: 17px; font-weight: bold; }
+#themeButton { background: transparent; border: none; padding: 0px; min-width: 28px; }
+#themeButton:hover { background: $hover; }
+#topBar[latched="true"] #themeButton { color: $on_stop; }
+#modeButton {
+    border-radius: 0px; padding: 3px 9px; margin-left: -1px; min-width: 34px; min-height: 20px;
+}
+#resetButton {
+    background: $on_stop; color: $ink; border: 2px solid $on_stop; font-weight: bold;
+    padding: 3px 19px; min-height: 22px;
+}
+#resetButton:hover, #resetButton:focus { background: $hover_on_stop; }
+#stopButton {
+    background: $stop; color: $on_stop; border: 2px solid $stop; border-radius: 6px;
+    font-size: 17px; font-weight: bold; padding: 0px 22px; min-height: 46px;
+}
+#stopButton:hover, #stopButton:focus { background: $stop_hover; border-color: $on_stop; }
+#stopButton:pressed { background: $latched; }
+#topBar[latched="true"] #stopButton { border-color: $on_stop; }
+#chip { border-radius: 4px; padding: 2px 8px; font-weight: bold; }
+#chip[tone="simulated"] {
+    background: transparent; color: $accent; border: 1px solid $accent; padding: 1px 7px;
+}
+#chip[tone="real"] { background: $raised; color: $text; }
+#chip[tone="warning"] { background: $warning; color: $ink; }
+#chip[tone="quiet"] { background: $raised; color: $text; font-weight: normal; }
+#topBar[latched="true"] #chip[tone="simulated"] { color: $on_stop; border-color: $on_stop; }
+#reasonBubble {
+    background: $raised; color: $text; border: 2px solid $refused; border-radius: 4px;
+    padding: 4px 8px;
+}
+"""
+
+
+def stylesheet(palette: Palette) -> str:
+    """Return the style sheet in the colours of `palette`."""
+    return Template(_SHEET).substitute(
+        asdict(palette), ink=INK, hover_on_stop="#E3E8ED", assets=_ASSETS.as_posix()
+    )

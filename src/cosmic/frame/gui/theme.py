@@ -1,0 +1,169 @@
+"""The one theme: colours, spacing, fonts and the look of a state, for every CoSMic window."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final, TypeGuard
+
+from PySide6.QtCore import QCoreApplication
+from PySide6.QtGui import QColor, QFont, QFontDatabase, QPalette
+from PySide6.QtWidgets import QApplication
+
+from cosmic.frame.gui.palette import DARK, INK, LIGHT, OKABE_ITO, Palette, ThemeName, blend
+from cosmic.frame.gui.stylesheet import stylesheet
+
+STEP_PX: Final = 8
+"""All spacing is a multiple of this, or half of it inside a widget."""
+
+FONT_PX: Final = 13
+
+_FAMILIES: Final[tuple[str, ...]] = (
+    "Inter",
+    "Segoe UI",
+    "Noto Sans",
+    "DejaVu Sans Condensed",
+    "DejaVu Sans",
+)
+
+
+_PALETTES: Final[dict[str, Palette]] = {"dark": DARK, "light": LIGHT}
+_PROPERTY: Final = "cosmic_theme"
+
+
+class State(StrEnum):
+    """The states an operator is shown; the value is the word."""
+
+    OK = "OK"
+    BUSY = "BUSY"
+    ERROR = "ERROR"
+    UNKNOWN = "UNKNOWN"
+    REFUSED = "REFUSED"
+
+
+@dataclass(frozen=True, slots=True)
+class StateLook:
+    """How a state is shown: by colour, by shape and by word, so that one of them is enough.
+
+    Attributes
+    ----------
+    colour : str
+        Okabe-Ito colour of the shape.
+    glyph : str
+        The shape as a character, for plain text.
+    word : str
+        The word.
+    fill, text : str
+        Background and text of a badge; their contrast is at least 4.5:1.
+    """
+
+    colour: str
+    glyph: str
+    word: str
+    fill: str
+    text: str
+
+
+_STATES: Final = {
+    State.OK: ("bluish green", "●"),
+    State.BUSY: ("sky blue", "▶"),
+    State.ERROR: ("vermillion", "■"),
+    State.UNKNOWN: ("reddish purple", "?"),
+    State.REFUSED: ("orange", "◆"),
+}
+_LOUD: Final = (State.ERROR, State.REFUSED)
+
+
+def state_look(state: State, palette: Palette | None = None) -> StateLook:
+    """Return how `state` is shown in `palette`, or in the theme in force."""
+    palette = palette or current_palette()
+    name, glyph = _STATES[state]
+    colour = OKABE_ITO[name]
+    if state in _LOUD:
+        return StateLook(colour=colour, glyph=glyph, word=state.value, fill=colour, text=INK)
+    fill = blend(colour, palette.panel, 0.22)
+    return StateLook(colour=colour, glyph=glyph, word=state.value, fill=fill, text=palette.text)
+
+
+def ui_font(size_px: int = FONT_PX, *, bold: bool = False) -> QFont:
+    """Return the font of the user interface; needs a QApplication."""
+    known = set(QFontDatabase.families())
+    font = QFont([family for family in _FAMILIES if family in known] or ["sans-serif"])
+    font.setPixelSize(size_px)
+    font.setBold(bold)
+    return font
+
+
+def number_font(size_px: int = FONT_PX, *, bold: bool = False) -> QFont:
+    """Return the same font with figures of one width, so that numbers do not dance."""
+    font = ui_font(size_px, bold=bold)
+    font.setFeature(QFont.Tag("tnum"), 1)
+    return font
+
+
+def code_font(size_px: int = FONT_PX) -> QFont:
+    """Return the font of the console and of the log's details."""
+    font = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
+    font.setPixelSize(size_px)
+    return font
+
+
+def is_theme(name: object) -> TypeGuard[ThemeName]:
+    """Tell whether `name` names a theme."""
+    return name in _PALETTES
+
+
+def current_palette() -> Palette:
+    """Return the palette of the theme in force; the dark one before the first is applied."""
+    app = QCoreApplication.instance()
+    name = app.property(_PROPERTY) if app is not None else None
+    return _PALETTES.get(str(name), DARK)
+
+
+def apply_theme(app: QApplication, name: ThemeName) -> None:
+    """Give every window of `app` the theme `name`; GUI thread.
+
+    Raises
+    ------
+    ValueError
+        There is no such theme.
+    """
+    if name not in _PALETTES:
+        raise ValueError(f"there is no theme {name!r}; there are {', '.join(_PALETTES)}")
+    palette = _PALETTES[name]
+    app.setProperty(_PROPERTY, name)
+    if app.style().name().lower() != "fusion":
+        app.setStyle("Fusion")
+    app.setFont(ui_font())
+    app.setPalette(_qt_palette(palette))
+    app.setStyleSheet(stylesheet(palette))
+
+
+def _qt_palette(colours: Palette) -> QPalette:
+    role = QPalette.ColorRole
+    roles = {
+        role.Window: colours.panel,
+        role.WindowText: colours.text,
+        role.Base: colours.field,
+        role.AlternateBase: colours.panel,
+        role.Text: colours.text,
+        role.PlaceholderText: colours.dim,
+        role.Button: colours.raised,
+        role.ButtonText: colours.text,
+        role.BrightText: colours.on_stop,
+        role.Highlight: colours.accent,
+        role.HighlightedText: colours.on_accent,
+        role.Accent: colours.accent,
+        role.Link: colours.accent,
+        role.ToolTipBase: colours.raised,
+        role.ToolTipText: colours.text,
+        role.Light: colours.hover,
+        role.Midlight: colours.raised,
+        role.Mid: colours.border,
+        role.Dark: colours.border,
+        role.Shadow: colours.window,
+    }
+    palette = QPalette()
+    for each, colour in roles.items():
+        palette.setColor(each, QColor(colour))
+    for each in (role.WindowText, role.Text, role.ButtonText):
+        palette.setColor(QPalette.ColorGroup.Disabled, each, QColor(colours.disabled))
+    return palette

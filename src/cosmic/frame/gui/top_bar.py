@@ -1,0 +1,191 @@
+"""The bar on top of every main window: what is in force, what is wrong, and STOP."""
+
+from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QMenuBar,
+    QSizePolicy,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+from typing_extensions import override
+
+from cosmic.frame.gui.build import named, push_button, tight_row
+from cosmic.frame.gui.chip import Chip, set_style_property
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.mode_selector import ModeSelector
+from cosmic.frame.gui.state_badge import StateBadge
+from cosmic.frame.gui.stop_button import StopButton
+from cosmic.frame.gui.theme import STEP_PX, State
+
+NO_COLLISION_MODEL = "no collision model"
+
+
+class TopBar(QWidget):
+    """Shows what it is told and asks for what is clicked; it decides nothing itself.
+
+    Parameters
+    ----------
+    title : str
+        Name of the program or of the station.
+    stop_key : str
+        The key of STOP as it is written on the keyboard.
+    """
+
+    stop_requested = Signal()
+    reset_requested = Signal()
+    mode_requested = Signal(str)
+    theme_requested = Signal()
+    message_clicked = Signal()
+
+    def __init__(
+        self, title: str = "CoSMic", *, stop_key: str = "F12", parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("topBar")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # a click on it ends typing in a field
+        self._latched = False
+        self._make_widgets(title, stop_key)
+        self._arrange()
+        self._stop.stop_requested.connect(self.stop_requested)
+        self._reset.clicked.connect(self.reset_requested)
+        self._modes.mode_requested.connect(self.mode_requested)
+        self._theme.clicked.connect(self.theme_requested)
+        self._message.clicked.connect(self.message_clicked)
+
+    def _make_widgets(self, title: str, stop_key: str) -> None:
+        self._stop = StopButton(stop_key)
+        self._title = named(QLabel(title), "appTitle")
+        self._simulated = Chip("SIMULATED", "simulated", "No hardware is driven: this is the twin")
+        self._modes = ModeSelector()
+        self._controls = Chip("", "quiet")
+        self._collision = ElidedLabel()
+        self._no_model = Chip(f"▲ {NO_COLLISION_MODEL}", "warning")
+        self._no_model.setToolTip(
+            "Movements within the limits are made without a check for collisions"
+        )
+        self._rate = Chip("", "warning", "The platform's clock does not run in real time")
+        self._message = ElidedLabel(hint="Click to open the log")
+        self._message_state = StateBadge(State.ERROR)
+        self._message_state.hide()
+        self._theme = push_button("◐", "Change between the dark and the light theme")
+        self._theme.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._latched_text = named(ElidedLabel(), "latchedText")
+        self._reset = push_button("Reset", "Allow movements again; nothing moves by itself")
+        self._reset.setObjectName("resetButton")
+        self._reset.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.set_controls("this window")
+        self.set_rate(1.0)
+        self.set_collision("")
+
+    def _arrange(self) -> None:
+        normal, row = tight_row(STEP_PX)
+        for widget in (self._modes, self._controls, self._no_model, self._rate):
+            row.addWidget(widget)
+        row.addWidget(self._collision, 1)
+        latched, row = tight_row(STEP_PX)
+        row.addWidget(self._latched_text, 1)
+        row.addWidget(self._reset)
+        self._pages = QStackedWidget()
+        self._pages.addWidget(normal)
+        self._pages.addWidget(latched)
+        self._pages.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+
+        self._first_row = QHBoxLayout()
+        self._first_row.setSpacing(STEP_PX)
+        self._first_row.addWidget(self._message_state)
+        self._first_row.addWidget(self._message, 1)
+        self._first_row.addWidget(self._theme)
+        second = QHBoxLayout()
+        second.setSpacing(2 * STEP_PX)
+        second.addWidget(self._title)
+        second.addWidget(self._simulated)
+        second.addWidget(self._pages, 1)
+        rows = QVBoxLayout()
+        rows.setSpacing(STEP_PX // 2)
+        rows.addLayout(self._first_row)
+        rows.addLayout(second)
+        whole = QHBoxLayout(self)
+        whole.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX)
+        whole.setSpacing(2 * STEP_PX)
+        whole.addLayout(rows, 1)
+        whole.addWidget(self._stop)
+
+    def set_menu_bar(self, menu_bar: QMenuBar) -> None:
+        """Put `menu_bar` into the first row, at the left."""
+        menu_bar.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
+        self._first_row.insertWidget(0, menu_bar)
+
+    @property
+    def latched(self) -> bool:
+        """True while the bar says that the stop is latched."""
+        return self._latched
+
+    @property
+    def message(self) -> str:
+        """The line shown."""
+        return self._message.text()
+
+    def set_title(self, title: str) -> None:
+        """Name the program or the station."""
+        self._title.setText(title)
+
+    def set_simulated(self, simulated: bool) -> None:
+        """Show the SIMULATED sign, or that real hardware is driven."""
+        self._simulated.setText("SIMULATED" if simulated else "HARDWARE")
+        self._simulated.set_tone("simulated" if simulated else "real")
+        self._simulated.setToolTip(
+            "No hardware is driven: this is the twin" if simulated else "Real hardware is driven"
+        )
+
+    def set_mode(self, name: str) -> None:
+        """Show the control mode in force: MCM, SCM, ECM or ACM."""
+        self._modes.set_mode(name)
+
+    def set_mode_available(self, name: str, why_not: str = "") -> None:
+        """Let a mode be chosen, or say why it cannot be."""
+        self._modes.set_available(name, why_not)
+
+    def set_controls(self, who: str) -> None:
+        """Say who holds the control over the movements."""
+        self._controls.setText(f"controls: {who}")
+        self._controls.setToolTip(f"Movements are commanded by {who}")
+
+    def set_collision(self, text: str) -> None:
+        """Show the smallest clearance; an empty `text` says loudly that nothing is checked."""
+        self._no_model.setVisible(not text)
+        self._collision.set_text(text)
+
+    def set_rate(self, rate: float, reached: float | None = None) -> None:
+        """Show how fast the platform's clock runs where it is not real time."""
+        text = f"time ×{rate:g}"
+        if reached is not None:
+            text += f" (reached ×{reached:.1f})"
+        self._rate.setText(text)
+        self._rate.setVisible(rate != 1.0)
+
+    def set_message(self, text: str, state: State = State.ERROR) -> None:
+        """Show one line, such as the last error; empty takes it away."""
+        self._message_state.setVisible(bool(text))
+        self._message_state.set_state(state, text)
+        self._message.set_text(text)
+
+    def set_latched(self, reason: str | None) -> None:
+        """Turn the whole bar into the notice that the stop is latched; None ends that."""
+        self._latched = reason is not None
+        self._latched_text.set_text(f"■ STOPPED: {reason}" if reason else "■ STOPPED")
+        self._pages.setCurrentIndex(1 if self._latched else 0)
+        set_style_property(self, "latched", self._latched)
+
+    def set_stop_key(self, key_text: str) -> None:
+        """Write another key on the STOP button."""
+        self._stop.set_key_text(key_text)
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self.update()

@@ -1,0 +1,157 @@
+"""MiCo as a CoSMic application (thesis 5.4)."""
+
+import logging
+from collections.abc import Callable
+from queue import SimpleQueue
+
+from PySide6.QtCore import QObject, Signal
+from typing_extensions import override
+
+from cosmic.frame.application import CosmicApplicationBase, GuiFactory
+from cosmic.frame.clock import Clock
+from cosmic.frame.errors import CosmicError, DeviceError, NotAvailable
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.task import Task
+from cosmic.mico.api import initialisation
+from cosmic.mico.core.collision import CollisionChecker
+from cosmic.mico.core.device_manager import DeviceManager, Mode
+from cosmic.mico.core.settings import MicoSettings
+from cosmic.mico.hw.interface import Controller
+
+logger = logging.getLogger(__name__)
+
+
+class MicoApplication(CosmicApplicationBase):
+    """Owns the `DeviceManager` and carries out what takes long, in its own thread.
+
+    Signals
+    -------
+    task_started(Task)
+        A long operation began; widgets show its progress.
+    status_changed()
+        Devices came or went, or MiCo failed.
+    """
+
+    task_started = Signal(object)
+    rescanned = Signal()
+
+    def __init__(
+        self,
+        controller: Controller,
+        settings: MicoSettings,
+        *,
+        clock: Clock,
+        policy: FailurePolicy,
+        checker: CollisionChecker | None = None,
+        gui_factory: GuiFactory | None = None,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__("MiCo", policy, gui_factory, parent)
+        self.manager = DeviceManager(
+            controller, settings, clock=clock, policy=policy, checker=checker
+        )
+        self._jobs: SimpleQueue[tuple[Task, Callable[[Task], None]] | None] = SimpleQueue()
+        self._running_task: Task | None = None
+        self._failure = ""
+        self._forget = policy.on_safe_stop(self.manager.stop)
+
+    @property
+    def failure(self) -> str:
+        """Why MiCo cannot work; empty when it can."""
+        return self._failure
+
+    @property
+    def running_task(self) -> Task | None:
+        """The long operation under way."""
+        return self._running_task
+
+    @override
+    def initialize(self) -> None:
+        """Open the hardware and start all threads.
+
+        With no controller to be reached it stays open with `failure` set, and can rescan.
+        """
+        self.start()
+        try:
+            self.manager.initialize_devices()
+            self._failure = ""
+        except DeviceError as exc:
+            self._failure = str(exc)
+            logger.error("MiCo cannot reach its hardware: %s", exc)
+        self.status_changed.emit()
+
+    def initialise_platform(self) -> Task:
+        """Find the reference of every axis in the configured order; returns at once.
+
+        Raises
+        ------
+        NotAvailable
+            Another long operation is under way.
+        """
+        return self._begin("Initialisation", lambda task: initialisation.run(self.manager, task))
+
+    def rescan(self) -> Task:
+        """Look again for the hardware; returns at once.
+
+        Raises
+        ------
+        NotAvailable
+            Another long operation is under way.
+        """
+        return self._begin("Looking for devices", self._rescan)
+
+    def _begin(self, title: str, job: Callable[[Task], None]) -> Task:
+        running = self._running_task
+        if running is not None and not running.done:
+            raise NotAvailable(f"{running.title} is under way; cancel it or wait for its end")
+        if not self.isRunning():
+            raise NotAvailable("MiCo is closed")
+        task = Task(title)
+        self._running_task = task
+        self._jobs.put((task, job))
+        self.task_started.emit(task)
+        return task
+
+    def _rescan(self, task: Task) -> None:
+        task.report(0.1, "closing and opening the library")
+        try:
+            self.manager.rescan()
+            self._failure = ""
+            task.finish()
+        except CosmicError as exc:
+            if self.manager.mode is Mode.FAILED:
+                self._failure = str(exc)
+            task.fail(exc)
+        self.rescanned.emit()
+        self.status_changed.emit()
+
+    @override
+    def custom_event_loop(self) -> bool:
+        while not self.end_requested:
+            item = self._jobs.get()
+            if item is None:
+                continue
+            task, job = item
+            logger.info("%s started", task.title)
+            job(task)
+            error = task.progress.error
+            if error:
+                logger.error("%s ended: %s", task.title, error)
+            else:
+                logger.info("%s finished", task.title)
+        return True
+
+    @override
+    def request_end(self) -> None:
+        super().request_end()
+        if self._running_task is not None:
+            self._running_task.cancel()
+        self._jobs.put(None)
+
+    @override
+    def shut_down(self) -> None:
+        """Stop every movement, release the hold, end all threads; any state."""
+        self.request_end()
+        self.manager.shut_down()
+        self.join()
+        self._forget()

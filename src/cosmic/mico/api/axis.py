@@ -1,0 +1,358 @@
+"""One axis of the scripted API: ``rig.mico["left.x"]``."""
+
+from types import TracebackType
+from typing import Any, Self
+
+from typing_extensions import override
+
+from cosmic.frame.clock import Clock
+from cosmic.frame.errors import MoveRefused, NotAvailable, refusal
+from cosmic.frame.units import AxisUnit
+from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.mico.api.entry import Number, as_number, as_whole
+from cosmic.mico.api.group import waited_for
+from cosmic.mico.core.device_commander import DeviceCommander
+from cosmic.mico.core.device_manager import DeviceManager
+from cosmic.mico.core.movement import Movement
+from cosmic.mico.core.orders import FREQUENCY_HZ, MoveTo, Order
+from cosmic.mico.core.positioner import Confidence, PositionerState, Status
+from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
+
+
+class Jogging:
+    """A continuous movement that goes on while it is renewed; made by `Axis.jog`.
+
+    As a context manager it stops at the end of the block.
+    """
+
+    def __init__(self, order: Order, commander: DeviceCommander) -> None:
+        self._order = order
+        self._commander = commander
+
+    @property
+    def movement(self) -> Movement:
+        """The movement; done when the axis stands."""
+        return self._order.movement
+
+    @property
+    def done(self) -> bool:
+        """True when it has ended: let go, at a limit, stopped or refused."""
+        return self._order.movement.done
+
+    def renew(self) -> None:
+        """Keep it alive; call it at least every 0.1 s. Any thread."""
+        self._commander.renew_jog(self._order)
+
+    def end(self) -> None:
+        """Let go: the axis stops at once."""
+        if not self.done:
+            self._commander.stop(self._order.channel, "jog ended")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.end()
+
+
+class Axis:
+    """One positioner, as scripts and widgets command it; any thread.
+
+    Positions are in `unit` from the user's zero (see `set_zero`). A number may be given as text
+    with a unit of its own: ``axis.move_to("0.2 mm")``. It has the shape of a bluesky device
+    (Movable, Readable, Locatable, Stoppable, Checkable) without importing bluesky.
+    """
+
+    parent: None = None
+
+    def __init__(self, name: str, manager: DeviceManager, commander: DeviceCommander) -> None:
+        self._name = name
+        self._manager = manager
+        self._channel = manager.address(name).channel
+        self.commander = commander
+
+    @override
+    def __repr__(self) -> str:
+        state = self.details
+        shown = state.shown_position
+        where = "position unknown" if shown is None else f"{shown:.4g} {self.unit}"
+        return f"<Axis {self._name}: {where}, {state.status}, position {state.confidence}>"
+
+    # What it is
+
+    @property
+    def name(self) -> str:
+        """Name of the axis, such as "left.x"."""
+        return self._name
+
+    @property
+    def details(self) -> PositionerState:
+        """Everything known of it, frozen; positions in gate coordinates."""
+        return self._manager.state(self._name)
+
+    @property
+    def kind(self) -> PositionerKind:
+        """linear, rotary or open-loop."""
+        return self.details.kind
+
+    @property
+    def unit(self) -> AxisUnit:
+        """Unit of its positions: "um" or "deg"."""
+        return self.details.unit
+
+    @property
+    def state(self) -> Status:
+        """OK, BUSY, ERROR, or UNKNOWN when its device does not answer."""
+        return self.details.status
+
+    @property
+    def activity(self) -> Activity:
+        """What the controller says it is doing."""
+        return self.details.activity
+
+    @property
+    def error(self) -> str:
+        """What is wrong with it; empty when nothing is."""
+        return self.details.error
+
+    @property
+    def confidence(self) -> Confidence:
+        """How well its position is known: known, estimated (counted steps) or unknown."""
+        return self.details.confidence
+
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """Soft limits (low, high) in `unit` from the user's zero; None without a sensor."""
+        return self.details.shown_limits
+
+    @property
+    def position_um(self) -> float | None:
+        """Position in um; counted from steps without a sensor; None before the first reading.
+
+        Raises
+        ------
+        NotAvailable
+            The axis is rotary: use `angle_deg`.
+        """
+        return self._position("um", "angle_deg")
+
+    @property
+    def angle_deg(self) -> float | None:
+        """Angle in degrees; None before the first reading.
+
+        Raises
+        ------
+        NotAvailable
+            The axis is not rotary: use `position_um`.
+        """
+        return self._position("deg", "position_um")
+
+    def _position(self, unit: AxisUnit, other: str) -> float | None:
+        state = self.details
+        if state.unit != unit:
+            raise NotAvailable(f"{self._name} is a {state.kind} axis: use {other}")
+        return state.shown_position
+
+    # Moving
+
+    def move_to(
+        self, position: Number, *, wait: bool = True, consent: bool = False
+    ) -> float | Movement | None:
+        """Move to `position` and return the position reached, or the movement if not `wait`.
+
+        Parameters
+        ----------
+        position : float or str
+            In `unit`, from the user's zero.
+        consent : bool
+            Move although the position is not referenced.
+
+        Raises
+        ------
+        MoveRefused
+            The gate refused it; nothing moved. `LimitError`, `CollisionError`, `StoppedError`.
+        DeviceError
+            It failed at the hardware.
+        MoveCancelled
+            It was cancelled or replaced.
+        """
+        target = self._number(position) + self.details.zero
+        movement = self.commander.move_absolute(self._channel, target, self.unit, consent=consent)
+        return self._result(movement, wait=wait)
+
+    def move_by(
+        self, distance: Number, *, wait: bool = True, consent: bool = False
+    ) -> float | Movement | None:
+        """Move by `distance` from where it stands or is going; otherwise as `move_to`."""
+        movement = self.commander.move_relative(
+            self._channel, self._number(distance), self.unit, consent=consent
+        )
+        return self._result(movement, wait=wait)
+
+    def steps(
+        self,
+        steps: Number,
+        *,
+        amplitude_v: Number | None = None,
+        frequency_hz: Number | None = None,
+        wait: bool = True,
+        consent: bool = False,
+    ) -> float | Movement | None:
+        """Make steps without looking at a sensor, -29999 to 29999; otherwise as `move_to`.
+
+        Parameters
+        ----------
+        amplitude_v : float
+            15 to 100 V; the configured default where it is not given.
+        frequency_hz : int
+            1 to 18500 Hz; the configured default where it is not given.
+        """
+        defaults = self._manager.settings.defaults
+        volts = defaults.amplitude_v if amplitude_v is None else amplitude_v
+        hertz = defaults.frequency_hz if frequency_hz is None else frequency_hz
+        movement = self.commander.move_steps(
+            self._channel,
+            as_whole(steps, "steps", self._name),
+            amplitude_v=as_number(volts, "V", self._name),
+            frequency_hz=as_whole(hertz, "Hz", self._name),
+            consent=consent,
+        )
+        return self._result(movement, wait=wait)
+
+    def jog(self, direction: int, speed: float | None = None, *, consent: bool = False) -> Jogging:
+        """Move on and on until it is let go, not renewed for a quarter second, or at a limit.
+
+        Parameters
+        ----------
+        direction : int
+            1 or -1.
+        speed : float
+            In `unit` per second; in Hz for an axis without sensor; configured default if None.
+
+        Raises
+        ------
+        MoveRefused
+            `direction` or `speed` is no sensible number.
+        """
+        jog = self._manager.settings.jog
+        usual = {"linear": jog.speed_um_s, "rotary": jog.speed_deg_s}
+        fallback = usual.get(self.kind.value, float(jog.frequency_hz))
+        wanted = fallback if speed is None else speed
+        if direction not in (1, -1) or not 0.0 < wanted <= FREQUENCY_HZ[1]:
+            text = f"{self._name}: jog in direction 1 or -1 with a speed above 0"
+            raise refusal(refuse(Reason.NOT_FINITE, text, axis=self._name))
+        order = self.commander.jog(self._channel, direction, wanted, consent=consent)
+        return Jogging(order, self.commander)
+
+    def calibrate(self, *, wait: bool = True, consent: bool = False) -> float | Movement | None:
+        """Calibrate the sensor: moves several millimetres both ways; otherwise as `move_to`."""
+        movement = self.commander.calibrate(self._channel, consent=consent)
+        return self._result(movement, wait=wait)
+
+    def reference(self, *, wait: bool = True, consent: bool = False) -> float | Movement | None:
+        """Find the reference, which may sweep the whole travel; otherwise as `move_to`."""
+        movement = self.commander.reference(self._channel, consent=consent)
+        return self._result(movement, wait=wait)
+
+    def move_to_end_stop(
+        self, direction: Direction | str, *, wait: bool = True, consent: bool = False
+    ) -> float | Movement | None:
+        """Drive "forward" or "backward" until the travel ends; otherwise as `move_to`."""
+        movement = self.commander.move_to_end_stop(
+            self._channel, Direction(direction), consent=consent
+        )
+        return self._result(movement, wait=wait)
+
+    def halt(self) -> None:
+        """Stop this axis; nothing is latched and other axes go on."""
+        self.commander.stop(self._channel)
+
+    @staticmethod
+    def _result(movement: Movement, *, wait: bool) -> float | Movement | None:
+        return waited_for(movement) if wait else movement
+
+    def _number(self, value: Number) -> float:
+        return as_number(value, self.unit, self._name)
+
+    # Settings
+
+    def set_zero(self) -> None:
+        """Show positions from here on relative to where it stands; the gate does not change."""
+        state = self.details
+        if state.position is None:
+            raise NotAvailable(f"{self._name}: no position has been read yet")
+        self._set_zero(state.position)
+
+    def clear_zero(self) -> None:
+        """Show positions as the controller counts them."""
+        self._set_zero(0.0)
+
+    def _set_zero(self, zero: float) -> None:
+        device = self._manager.device(self._name)
+        device.set_zero(self._channel, zero)
+
+    def set_closed_loop_frequency(self, frequency_hz: Number) -> None:
+        """Limit the speed of movements to a position, 1 to 18500 Hz.
+
+        Raises
+        ------
+        MoveRefused
+            `frequency_hz` is outside that range.
+        """
+        hertz = as_whole(frequency_hz, "Hz", self._name)
+        low, high = FREQUENCY_HZ
+        if not low <= hertz <= high:
+            text = f"{self._name}: frequency {hertz} Hz is outside {low} to {high} Hz"
+            limit = float(high if hertz > high else low)
+            raise refusal(
+                refuse(Reason.LIMIT, text, axis=self._name, value=hertz, limit=limit, unit="Hz")
+            )
+        self.commander.set_frequency(self._channel, hertz)
+
+    # The shape of a bluesky device
+
+    def check(self, position: Number) -> MoveVerdict:
+        """Return the gate's answer to `move_to(position)`, without moving."""
+        try:
+            target = self._number(position) + self.details.zero
+        except MoveRefused as exc:
+            return exc.verdict
+        return self._manager.check({self._name: MoveTo(target, self.unit)})
+
+    def check_value(self, value: Number) -> None:
+        """Raise `MoveRefused` where `move_to(value)` would; for bluesky's check_limits."""
+        verdict = self.check(value)
+        if not verdict.allowed:
+            raise refusal(verdict)
+
+    def set(self, value: Number) -> Movement:
+        """Start to move to `value` and return the movement, which is a bluesky status."""
+        movement = self.move_to(value, wait=False)
+        if not isinstance(movement, Movement):
+            raise TypeError("a move that is not waited for returns its movement")
+        return movement
+
+    def stop(self, *, success: bool = False) -> None:  # noqa: ARG002 - bluesky's signature
+        """Stop this axis; bluesky's name for `halt`."""
+        self.halt()
+
+    def locate(self) -> dict[str, float | None]:
+        """Return where it is, as bluesky's Location."""
+        here = self.details.shown_position
+        return {"setpoint": here, "readback": here}
+
+    def read(self) -> dict[str, dict[str, Any]]:
+        """Return the position as a bluesky reading; the time is the platform's."""
+        clock: Clock = self._manager.clock
+        return {self._name: {"value": self.details.shown_position, "timestamp": clock.now_s()}}
+
+    def describe(self) -> dict[str, dict[str, Any]]:
+        """Return what `read` returns, in bluesky's terms."""
+        source = f"{self._manager.controller.name}:{self._name}"
+        key = {"source": source, "dtype": "number", "shape": [], "units": self.unit}
+        return {self._name: key}

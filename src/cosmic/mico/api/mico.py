@@ -1,0 +1,192 @@
+"""The MiCo part of the scripted API: ``rig.mico``."""
+
+from collections.abc import Callable, Iterator, Mapping
+
+from cosmic.frame.errors import MoveRefused, NotAvailable
+from cosmic.frame.task import Progress, Task
+from cosmic.frame.verdict import MoveVerdict
+from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.axis import Axis
+from cosmic.mico.api.entry import Number, as_number
+from cosmic.mico.api.group import GroupMovement, waited_for
+from cosmic.mico.core.collision import NO_MODEL_TEXT
+from cosmic.mico.core.device_commander import DeviceCommander
+from cosmic.mico.core.orders import Motion, MoveBy, MoveTo
+
+
+class Mico:
+    """The axes of the platform, by name; any thread.
+
+    Parameters
+    ----------
+    application : MicoApplication
+        Where the hardware is.
+    source : str
+        Who commands through this object, for the log: "script", "window", "key".
+    """
+
+    def __init__(self, application: MicoApplication, source: str = "script") -> None:
+        self._application = application
+        self._manager = application.manager
+        self._source = source
+        self._commanders: dict[int, DeviceCommander] = {}
+        self._axes: dict[str, Axis] = {}
+        self._connect()
+        application.manager.changed.connect(self._connect)
+
+    def _connect(self) -> None:
+        """Join the commanders to the devices there are now."""
+        token = self._manager.lease.holder.token
+        for index in self._manager.devices:
+            commander = self._commanders.get(index)
+            if commander is None:
+                commander = self._commanders[index] = DeviceCommander(token, self._source)
+            self._manager.connect_device_commander(index, commander)
+
+    @property
+    def application(self) -> MicoApplication:
+        """The application behind it."""
+        return self._application
+
+    @property
+    def simulated(self) -> bool:
+        """True when no hardware moves."""
+        return self._manager.controller.simulated
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all axes, in the order of the configuration."""
+        return self._manager.names()
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """What was configured and is not there, a line each."""
+        return self._manager.missing
+
+    def __getitem__(self, name: str) -> Axis:
+        """Return an axis; raises `UnknownAxisError`, a `CosmicError` and `KeyError`."""
+        address = self._manager.address(name)
+        axis = self._axes.get(name)
+        if axis is None:
+            axis = Axis(name, self._manager, self._commanders[address.device])
+            self._axes[name] = axis
+        return axis
+
+    def __iter__(self) -> Iterator[Axis]:
+        return (self[name] for name in self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def initialise(
+        self, progress: Callable[[Progress], None] | None = None, *, wait: bool = True
+    ) -> Task:
+        """Find the reference of every axis in the configured order, then go to the start pose.
+
+        Parameters
+        ----------
+        progress : callable
+            Called with each `Progress`.
+        wait : bool
+            False returns at once; the task has `progress`, `cancel` and `wait`.
+
+        Raises
+        ------
+        NotAvailable
+            Another long operation is under way.
+        CosmicError
+            An axis failed or was stopped; the others were stopped with it.
+        """
+        return self._follow(self._application.initialise_platform(), progress, wait=wait)
+
+    def rescan(
+        self, progress: Callable[[Progress], None] | None = None, *, wait: bool = True
+    ) -> Task:
+        """Look again for the hardware; the arguments are those of `initialise`."""
+        return self._follow(self._application.rescan(), progress, wait=wait)
+
+    @staticmethod
+    def _follow(task: Task, progress: Callable[[Progress], None] | None, *, wait: bool) -> Task:
+        if progress is not None:
+            task.subscribe(progress)
+        if wait:
+            try:
+                task.wait()
+            except KeyboardInterrupt:
+                task.cancel()
+                raise
+        return task
+
+    def move(
+        self, targets: Mapping[str, Number], *, wait: bool = True, consent: bool = False
+    ) -> dict[str, float | None] | GroupMovement:
+        """Move several axes to positions together; returns the positions reached.
+
+        They are decided together and started back to back; each goes at its own speed, so the
+        path is not a straight line. The failure of one stops the others.
+
+        Parameters
+        ----------
+        targets : mapping
+            Positions by axis name, in the unit of each axis, from the user's zero.
+        wait : bool
+            False returns the `GroupMovement` at once.
+
+        Raises
+        ------
+        MoveRefused
+            The gate refused; nothing moved.
+        UnknownAxisError
+            One axis does not exist; nothing moved.
+        DeviceError, MoveCancelled
+            One of them failed or was stopped.
+        """
+        return self._together(self._targets(targets), wait=wait, consent=consent)
+
+    def move_by(
+        self, distances: Mapping[str, Number], *, wait: bool = True, consent: bool = False
+    ) -> dict[str, float | None] | GroupMovement:
+        """Move several axes by distances together; otherwise as `move`."""
+        motions: dict[str, Motion] = {}
+        for name, value in distances.items():
+            unit = self[name].unit
+            motions[name] = MoveBy(as_number(value, unit, name), unit)
+        return self._together(motions, wait=wait, consent=consent)
+
+    def _targets(self, targets: Mapping[str, Number]) -> dict[str, Motion]:
+        motions: dict[str, Motion] = {}
+        for name, value in targets.items():
+            axis = self[name]
+            target = as_number(value, axis.unit, name) + axis.details.zero
+            motions[name] = MoveTo(target, axis.unit)
+        return motions
+
+    def _together(
+        self, motions: Mapping[str, Motion], *, wait: bool, consent: bool
+    ) -> dict[str, float | None] | GroupMovement:
+        orders = self._manager.order_together(motions, source=self._source, consent=consent)
+        group = GroupMovement({name: order.movement for name, order in orders.items()})
+        return waited_for(group) if wait else group
+
+    def check(self, targets: Mapping[str, Number]) -> MoveVerdict:
+        """Return the gate's answer to absolute targets together, without moving.
+
+        Raises
+        ------
+        UnknownAxisError
+            One axis does not exist.
+        """
+        try:
+            return self._manager.check(self._targets(targets))
+        except MoveRefused as exc:
+            return exc.verdict
+
+    def clearance(self) -> None:
+        """Return the nearest pair of bodies and their distance.
+
+        Raises
+        ------
+        NotAvailable
+            There is no collision model yet.
+        """
+        raise NotAvailable(f"{NO_MODEL_TEXT}: clearance is not known")

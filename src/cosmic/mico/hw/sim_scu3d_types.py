@@ -1,0 +1,55 @@
+"""What the simulated SmarAct controller knows of positioner types, and how it refuses."""
+
+from enum import Enum, IntEnum
+from typing import Final
+
+
+class Movement(IntEnum):
+    """Value of channel property 25."""
+
+    LINEAR = 0
+    ROTARY = 1
+    GONIOMETER = 2
+
+
+class Reference(Enum):
+    """What a type is referenced at."""
+
+    NONE = "-"
+    END_STOP = "E"
+    MARK = "M"
+    CODED_MARKS = "D"
+
+
+class Refusal(Exception):  # noqa: N818 - not an error of the program, an answer of the controller
+    """The library or the controller answers with a status code other than OK."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__(f"status {code}")
+        self.code = code
+
+
+_LINEAR, _ROTARY, _GONIO = Movement.LINEAR, Movement.ROTARY, Movement.GONIOMETER
+_LETTERS: Final = {
+    # no sensor
+    0: (_LINEAR, "-"),
+    # header 1.2; 2 and 3 stand in the header only, their reference is a guess
+    1: (_LINEAR, "E"), 2: (_GONIO, "E"), 3: (_GONIO, "E"), 4: (_ROTARY, "E"),
+    5: (_GONIO, "E"), 6: (_GONIO, "E"), 7: (_ROTARY, "-"), 8: (_ROTARY, "E"),
+    9: (_ROTARY, "-"), 10: (_ROTARY, "-"), 11: (_ROTARY, "E"), 12: (_ROTARY, "-"),
+    13: (_ROTARY, "E"),
+    # later ones; the tip-tilts' reference and which of 30-35 are S or E is a guess
+    14: (_LINEAR, "E"), 15: (_GONIO, "E"), 16: (_LINEAR, "E"), 17: (_ROTARY, "E"),
+    18: (_LINEAR, "D"), 19: (_ROTARY, "M"), 20: (_LINEAR, "D"), 21: (_LINEAR, "M"),
+    22: (_LINEAR, "M"), 23: (_LINEAR, "E"), 24: (_LINEAR, "E"),
+    **dict.fromkeys((25, 26, 27, 28), (_LINEAR, "E")),
+    **dict.fromkeys((29, 37), (_ROTARY, "E")),
+    **dict.fromkeys((30, 32, 34), (_GONIO, "M")),
+    **dict.fromkeys((31, 33, 35), (_GONIO, "E")),
+    **dict.fromkeys((36, 38, 39, 40, 41), (_ROTARY, "M")),
+}
+
+TYPES: Final[dict[int, tuple[Movement, Reference]]] = {
+    code: (movement, Reference(letter)) for code, (movement, letter) in _LETTERS.items()
+}
+"""Movement and reference of every positioner type, by the vendor's number."""

@@ -1,0 +1,185 @@
+"""The scene: one clock, one seed, and the truth about everything on the platform."""
+
+import random
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, Self
+
+from cosmic.frame.clock import Clock
+from cosmic.twin.settings import StageKind, TwinSettings
+from cosmic.twin.stage import Stage
+
+Wiring = tuple[tuple[str | None, ...], ...]
+
+CHANNELS_PER_DEVICE: Final = 3
+_KIND_OF_LETTER: Final = {"L": "linear", "R": "rotary", "N": "gripper"}
+
+
+@dataclass(frozen=True, slots=True)
+class AtPowerUp:
+    """What a controller knows of one stage at the moment it is first looked at.
+
+    Attributes
+    ----------
+    known : bool
+        The position counted is referenced and agrees with the stage's true position. False: the
+        count starts at zero wherever the stage stands.
+    calibrated : bool
+        The sensor was calibrated when the stage was mounted.
+    scale : float
+        Offset in the controller's memory: the position at its reference, in the stage's unit.
+    """
+
+    known: bool
+    calibrated: bool
+    scale: float
+
+
+class Scene:
+    """What is true at this moment; controllers and instruments are views of it.
+
+    Parameters
+    ----------
+    settings : TwinSettings
+        Constants.
+    clock : Clock
+        The platform's time.
+    seed : int
+        Of everything random in the scene and in its views.
+    stages : mapping of str to Stage
+        All stages by name.
+    wiring : tuple of tuples of (str or None)
+        Name of the stage at each device and channel; None where nothing is connected.
+    at_power_up : mapping of str to AtPowerUp
+        What the controllers know of each stage.
+    """
+
+    def __init__(
+        self,
+        settings: TwinSettings,
+        clock: Clock,
+        *,
+        seed: int,
+        stages: Mapping[str, Stage],
+        wiring: Wiring,
+        at_power_up: Mapping[str, AtPowerUp],
+    ) -> None:
+        self.settings = settings
+        self.clock = clock
+        self.seed = seed
+        self.stages = dict(stages)
+        self.wiring = wiring
+        self.at_power_up = dict(at_power_up)
+
+    @classmethod
+    def from_settings(
+        cls, settings: TwinSettings, clock: Clock, seed: int = 0, *, cold: bool = False
+    ) -> Self:
+        """Make the platform that `settings` describes.
+
+        Parameters
+        ----------
+        cold : bool
+            False: powered and referenced, every stage at its configured start, and the
+            controllers' positions are true ones. True: just switched on, every stage somewhere,
+            positions read zero; a reference run brings the true positions back.
+        """
+        stages: dict[str, Stage] = {}
+        at_power_up: dict[str, AtPowerUp] = {}
+        for name, place in settings.stages.items():
+            kind = settings.kinds[place.kind]
+            start = _somewhere(kind, name, seed) if cold else place.start
+            stages[name] = Stage(name, kind, start=start, seed=seed)
+            known = kind.sensor and not cold
+            at_power_up[name] = AtPowerUp(known=known, calibrated=True, scale=kind.low)
+        wiring = tuple(tuple(name or None for name in d.channels) for d in settings.devices)
+        return cls(
+            settings, clock, seed=seed, stages=stages, wiring=wiring, at_power_up=at_power_up
+        )
+
+    @classmethod
+    def from_layout(
+        cls,
+        layout: str,
+        settings: TwinSettings,
+        clock: Clock,
+        seed: int = 0,
+        *,
+        cold: bool = True,
+    ) -> Self:
+        """Make a scene of bare stages, named "device.channel", such as "0.2".
+
+        Parameters
+        ----------
+        layout : str
+            One group of three letters a device, such as "LLL,RNN": L linear with sensor, R rotary
+            with sensor, N no sensor (a gripper).
+        cold : bool
+            True: just switched on for the first time, nothing in the controllers' memory but the
+            sensors' calibration. False: referenced, every stage in the middle of its travel.
+
+        Raises
+        ------
+        ValueError
+            `layout` is not of that form, or a kind of stage is missing in `settings`.
+        """
+        stages: dict[str, Stage] = {}
+        at_power_up: dict[str, AtPowerUp] = {}
+        wiring: list[tuple[str | None, ...]] = []
+        for device, letters in enumerate(parse_layout(layout)):
+            names = tuple(f"{device}.{channel}" for channel in range(len(letters)))
+            wiring.append(names)
+            for name, letter in zip(names, letters, strict=True):
+                kind = _kind(settings, _KIND_OF_LETTER[letter])
+                middle = (kind.low + kind.high) / 2.0
+                start = _somewhere(kind, name, seed) if cold else middle
+                stages[name] = Stage(name, kind, start=start, seed=seed)
+                at_power_up[name] = AtPowerUp(
+                    known=kind.sensor and not cold, calibrated=True, scale=0.0 if cold else kind.low
+                )
+        return cls(
+            settings,
+            clock,
+            seed=seed,
+            stages=stages,
+            wiring=tuple(wiring),
+            at_power_up=at_power_up,
+        )
+
+    def truth(self) -> dict[str, float]:
+        """Return where every stage truly is now, in its unit: for views and logs, not control."""
+        now_s = self.clock.now_s()
+        return {name: stage.position(now_s) for name, stage in self.stages.items()}
+
+
+def parse_layout(layout: str) -> tuple[str, ...]:
+    """Return the letters of each device in `layout`; a comma at the end is no device.
+
+    Raises
+    ------
+    ValueError
+        The text is not groups of three letters L, R, N, separated by commas.
+    """
+    groups = [group.strip() for group in layout.strip().removesuffix(",").split(",")]
+    for number, group in enumerate(groups, start=1):
+        if not re.fullmatch(f"[LRN]{{{CHANNELS_PER_DEVICE}}}", group):
+            raise ValueError(
+                f"layout {layout!r}: device {number} is {group!r}; write three letters a device, "
+                'L, R or N, and a comma between devices, such as "LLL,RNN"'
+            )
+    return tuple(groups)
+
+
+def _kind(settings: TwinSettings, name: str) -> StageKind:
+    if name not in settings.kinds:
+        raise ValueError(f"the twin's settings have no kind of stage {name!r}")
+    return settings.kinds[name]
+
+
+def _somewhere(kind: StageKind, name: str, seed: int) -> float:
+    """Return a place where nobody left the stage on purpose: never the middle."""
+    low, high = kind.power_up_low, kind.power_up_high
+    chance = random.Random(f"power-up {name} {seed}")
+    part = chance.uniform(0.0, 0.4) if chance.random() < 0.5 else chance.uniform(0.6, 1.0)
+    return low + part * (high - low)

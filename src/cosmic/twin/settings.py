@@ -1,0 +1,143 @@
+"""Constants of the twin, as config/twin.toml states them."""
+
+from functools import cache
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from cosmic.frame.config import StrictModel, load_model, shipped_config_dir
+from cosmic.frame.units import AxisUnit
+
+
+class StageKind(StrictModel):
+    """Physics of one kind of stick-slip stage; lengths in `unit`.
+
+    Attributes
+    ----------
+    low, high : float
+        Hard stops.
+    power_up_low, power_up_high : float
+        Where a stage may stand when nobody knows where it stands.
+    step_at_100v : float
+        Size of one forward step at 100 V.
+    threshold_v : float
+        Amplitude at and below which a step has no length.
+    step_noise : float
+        Standard deviation of one step as a part of it.
+    """
+
+    unit: AxisUnit
+    sensor: bool
+    positioner_type: int = Field(ge=0)
+    low: float
+    high: float
+    power_up_low: float
+    power_up_high: float
+    reference_mark: float
+    coded_mark_way: float = Field(gt=0.0)
+    step_at_100v: float = Field(gt=0.0)
+    threshold_v: float = Field(ge=0.0, lt=15.0)
+    backward_factor: float = Field(gt=0.0, le=2.0)
+    step_noise: float = Field(ge=0.0, lt=0.5)
+    slow_zone: float = Field(ge=0.0)
+    slow_factor: float = Field(gt=0.0, le=1.0)
+    target_threshold: float = Field(gt=0.0)
+    reference_repeatability: float = Field(ge=0.0)
+    calibration_span: float = Field(gt=0.0)
+    drift_per_min_low: float = Field(ge=0.0)
+    drift_per_min_high: float = Field(ge=0.0)
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if not self.low <= self.power_up_low <= self.power_up_high <= self.high:
+            raise ValueError("low, power_up_low, power_up_high and high must rise")
+        if not self.drift_per_min_low <= self.drift_per_min_high:
+            raise ValueError("drift_per_min_low lies above drift_per_min_high")
+        return self
+
+
+class StagePlace(StrictModel):
+    """One stage of the platform: its kind and where it stands when found warm."""
+
+    kind: str
+    start: float
+
+
+class ControllerSettings(StrictModel):
+    """How the simulated SmarAct controllers and their library behave.
+
+    `_dv` is 0.1 V, the library's own unit of amplitude.
+    """
+
+    first_serial: int = Field(ge=1, le=4_000_000_000)
+    library_version: str = Field(pattern=r"^\d+\.\d+\.\d+$")
+    firmware_version: str = Field(pattern=r"^\d+\.\d+\.\d+$")
+    hardware_version: int
+    closed_loop_frequency_hz: int = Field(ge=1, le=18500)
+    amplitude_dv: int = Field(ge=150, le=1000)
+    p_gain: int = Field(ge=1, le=127)
+    p_gain_divisor: int = Field(ge=0, le=10)
+    temperature_deg_c: int
+    temperature_hot_deg_c: int
+    rail_dv: int
+    rail_fault_dv: int
+    packet_latency_low_s: float = Field(ge=0.0)
+    packet_latency_high_s: float = Field(ge=0.0)
+    call_latency_low_s: float = Field(ge=0.0)
+    call_latency_high_s: float = Field(ge=0.0)
+    amplitude_setting_s: float = Field(ge=0.0)
+    settle_low_s: float = Field(ge=0.0)
+    settle_high_s: float = Field(ge=0.0)
+    stall_s: float = Field(ge=0.0)
+    stop_finish_s: float = Field(ge=0.0)
+    reference_speed_factor: float = Field(gt=0.0, le=1.0)
+    calibration_speed_factor: float = Field(gt=0.0, le=1.0)
+    double_completed_share: float = Field(ge=0.0, le=1.0)
+    queue_capacity: int = Field(ge=100)
+
+
+class DeviceWiring(StrictModel):
+    """What is plugged into one controller; "" where nothing is."""
+
+    channels: tuple[str, str, str] = Field(strict=False)
+
+
+class TwinSettings(StrictModel):
+    """The whole of twin.toml."""
+
+    kinds: dict[str, StageKind]
+    controller: ControllerSettings
+    devices: tuple[DeviceWiring, ...] = Field(strict=False, min_length=1)
+    stages: dict[str, StagePlace]
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        for name, place in self.stages.items():
+            kind = self.kinds.get(place.kind)
+            if kind is None:
+                known = ", ".join(self.kinds)
+                raise ValueError(f"stage {name} is of unknown kind {place.kind!r}; known: {known}")
+            if not kind.low <= place.start <= kind.high:
+                raise ValueError(
+                    f"stage {name} starts at {place.start} {kind.unit}, "
+                    f"outside its travel {kind.low} to {kind.high}"
+                )
+        wired = [name for device in self.devices for name in device.channels if name]
+        for name in wired:
+            if name not in self.stages:
+                raise ValueError(f"a device is wired to {name!r}, which is no stage")
+            if wired.count(name) > 1:
+                raise ValueError(f"stage {name} is wired twice")
+        return self
+
+
+@cache
+def shipped_settings() -> TwinSettings:
+    """Return the constants that ship with CoSMic.
+
+    Raises
+    ------
+    ConfigError
+        The shipped file was changed and is broken.
+    """
+    return load_model(shipped_config_dir() / "twin.toml", TwinSettings)
