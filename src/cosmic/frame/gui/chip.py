@@ -4,6 +4,8 @@ from typing import Literal
 
 from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
+from cosmic.frame.gui.theme import ui_font
+
 Tone = Literal["simulated", "real", "warning", "quiet"]
 
 
@@ -31,4 +33,5 @@ class Chip(QLabel):
 
     def set_tone(self, tone: Tone) -> None:
         """Change the ground."""
+        self.setFont(ui_font(bold=tone != "quiet"))
         set_style_property(self, "tone", tone)

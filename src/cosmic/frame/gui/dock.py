@@ -16,7 +16,7 @@ from typing_extensions import override
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.stop_button import StopButton
-from cosmic.frame.gui.theme import STEP_PX, State
+from cosmic.frame.gui.theme import STEP_PX, State, ui_font
 
 
 class _TitleBar(QWidget):
@@ -27,6 +27,7 @@ class _TitleBar(QWidget):
         self.setObjectName("dockTitle")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         title = QLabel(dock.windowTitle())
+        title.setFont(ui_font(bold=True))
         title.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self._float = _tool_button("❐", "Take this panel out, or put it back")
         self._float.clicked.connect(self._on_float)

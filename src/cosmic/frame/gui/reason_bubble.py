@@ -7,7 +7,7 @@ from typing_extensions import override
 
 from cosmic.frame.gui.theme import STEP_PX
 
-_WIDTH_PX = 40 * STEP_PX
+_WIDTH_PX = 45 * STEP_PX
 _FOLLOWED = {QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show, QEvent.Type.Hide}
 
 

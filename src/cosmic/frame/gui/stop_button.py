@@ -5,6 +5,8 @@ from typing import Final
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QPushButton, QSizePolicy, QWidget
 
+from cosmic.frame.gui.theme import LARGE_PX, ui_font
+
 STOP_HEIGHT_PX: Final = 50
 
 
@@ -24,6 +26,7 @@ class StopButton(QPushButton):
     def __init__(self, key_text: str = "F12", parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("stopButton")
+        self.setFont(ui_font(LARGE_PX, bold=True))
         self.setMinimumHeight(STOP_HEIGHT_PX)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)

@@ -48,6 +48,9 @@ QComboBox, QAbstractSpinBox {
     selection-color: $on_accent;
 }
 QAbstractSpinBox { background: $field; padding-right: 22px; }
+QAbstractSpinBox QLineEdit {
+    background: transparent; border: none; padding: 0px 0px 0px 5px; min-height: 0px;
+}
 QComboBox:hover, QAbstractSpinBox:hover { border-color: $border_strong; }
 QComboBox:focus, QAbstractSpinBox:focus { border-color: $accent; }
 QComboBox:disabled, QAbstractSpinBox:disabled { background: transparent; color: $disabled; }
@@ -87,7 +90,6 @@ QSlider::handle:horizontal {
 QDockWidget { color: $text; }
 QDockWidget > QWidget { background: $panel; }
 #dockTitle { background: $raised; border-bottom: 1px solid $border; }
-#dockTitle QLabel { font-weight: bold; }
 #dockTitle QToolButton {
     background: transparent; border: none; color: $dim; padding: 0px; min-height: 22px;
     min-width: 22px; border-radius: 4px;
@@ -143,39 +145,36 @@ QHeaderView::section {
 }
 
 [role="dim"] { color: $dim; }
-[role="heading"] { font-weight: bold; }
 
 #topBar { background: $window; border-bottom: 1px solid $border; }
 #topBar[latched="true"] { background: $latched; border-bottom: 1px solid $stop; }
 #topBar[latched="true"] QLabel, #topBar[latched="true"] QMenuBar { color: $on_stop; }
 #topBar[latched="true"] QMenuBar::item:selected { background: $stop; }
-#appTitle { font-size: 17px; font-weight: bold; }
-#latchedText { font-size: 17px; font-weight: bold; }
 #themeButton { background: transparent; border: none; padding: 0px; min-width: 28px; }
 #themeButton:hover { background: $hover; }
 #topBar[latched="true"] #themeButton { color: $on_stop; }
 #modeButton {
-    border-radius: 0px; padding: 3px 9px; margin-left: -1px; min-width: 34px; min-height: 20px;
+    border-radius: 0px; padding: 3px 9px; margin-left: -1px; min-width: 34px; min-height: 22px;
 }
 #resetButton {
-    background: $on_stop; color: $ink; border: 2px solid $on_stop; font-weight: bold;
-    padding: 3px 19px; min-height: 22px;
+    background: $on_stop; color: $ink; border: 1px solid $on_stop; padding: 3px 19px;
+    min-height: 22px;
 }
 #resetButton:hover, #resetButton:focus { background: $hover_on_stop; }
 #stopButton {
     background: $stop; color: $on_stop; border: 2px solid $stop; border-radius: 6px;
-    font-size: 17px; font-weight: bold; padding: 0px 22px; min-height: 46px;
+    padding: 0px 22px; min-height: 46px;
 }
 #stopButton:hover, #stopButton:focus { background: $stop_hover; border-color: $on_stop; }
 #stopButton:pressed { background: $latched; }
 #topBar[latched="true"] #stopButton { border-color: $on_stop; }
-#chip { border-radius: 4px; padding: 2px 8px; font-weight: bold; }
+#chip { border-radius: 4px; padding: 2px 8px; }
 #chip[tone="simulated"] {
     background: transparent; color: $accent; border: 1px solid $accent; padding: 1px 7px;
 }
 #chip[tone="real"] { background: $raised; color: $text; }
 #chip[tone="warning"] { background: $warning; color: $ink; }
-#chip[tone="quiet"] { background: $raised; color: $text; font-weight: normal; }
+#chip[tone="quiet"] { background: $raised; color: $text; }
 #topBar[latched="true"] #chip[tone="simulated"] { color: $on_stop; border-color: $on_stop; }
 #reasonBubble {
     background: $raised; color: $text; border: 2px solid $refused; border-radius: 4px;

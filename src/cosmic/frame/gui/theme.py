@@ -15,6 +15,7 @@ STEP_PX: Final = 8
 """All spacing is a multiple of this, or half of it inside a widget."""
 
 FONT_PX: Final = 13
+LARGE_PX: Final = 17
 
 _FAMILIES: Final[tuple[str, ...]] = (
     "Inter",

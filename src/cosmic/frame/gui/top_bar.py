@@ -18,7 +18,7 @@ from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.mode_selector import ModeSelector
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.stop_button import StopButton
-from cosmic.frame.gui.theme import STEP_PX, State
+from cosmic.frame.gui.theme import LARGE_PX, STEP_PX, State, ui_font
 
 NO_COLLISION_MODEL = "no collision model"
 
@@ -58,7 +58,8 @@ class TopBar(QWidget):
 
     def _make_widgets(self, title: str, stop_key: str) -> None:
         self._stop = StopButton(stop_key)
-        self._title = named(QLabel(title), "appTitle")
+        self._title = QLabel(title)
+        self._title.setFont(ui_font(LARGE_PX, bold=True))
         self._simulated = Chip("SIMULATED", "simulated", "No hardware is driven: this is the twin")
         self._modes = ModeSelector()
         self._controls = Chip("", "quiet")
@@ -71,11 +72,15 @@ class TopBar(QWidget):
         self._message = ElidedLabel(hint="Click to open the log")
         self._message_state = StateBadge(State.ERROR)
         self._message_state.hide()
-        self._theme = push_button("◐", "Change between the dark and the light theme")
+        self._theme = named(
+            push_button("◐", "Change between the dark and the light theme"), "themeButton"
+        )
         self._theme.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._latched_text = named(ElidedLabel(), "latchedText")
-        self._reset = push_button("Reset", "Allow movements again; nothing moves by itself")
-        self._reset.setObjectName("resetButton")
+        self._latched_text = ElidedLabel()
+        self._latched_text.setFont(ui_font(LARGE_PX, bold=True))
+        reset = push_button("Reset", "Allow movements again; nothing moves by itself")
+        self._reset = named(reset, "resetButton")
+        self._reset.setFont(ui_font(bold=True))
         self._reset.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.set_controls("this window")
         self.set_rate(1.0)
@@ -93,6 +98,7 @@ class TopBar(QWidget):
         self._pages.addWidget(normal)
         self._pages.addWidget(latched)
         self._pages.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self._pages.setFixedHeight(4 * STEP_PX)  # the bar keeps its height when it turns
 
         self._first_row = QHBoxLayout()
         self._first_row.setSpacing(STEP_PX)
