@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from cosmic.mico.hw.scu3d_ctypes import (
+    SA_CALIBRATING_STATUS,
     SA_COMMAND_OVERRIDDEN_ERROR,
     SA_COMPLETED_PACKET_TYPE,
     SA_END_STOP_REACHED_ERROR,
@@ -15,6 +16,7 @@ from cosmic.mico.hw.scu3d_ctypes import (
     SA_HOLDING_STATUS,
     SA_HV_RANGE_ERROR,
     SA_MOVING_STATUS,
+    SA_MOVING_TO_REFERENCE_STATUS,
     SA_NO_SENSOR_PRESENT_ERROR,
     SA_STOPPED_STATUS,
     SA_TARGETING_STATUS,
@@ -29,6 +31,12 @@ from cosmic.twin.settings import ControllerSettings
 from cosmic.twin.stage import Route, Stage
 
 AT_REST: Final = (SA_STOPPED_STATUS, SA_HOLDING_STATUS)
+_MOVEMENTS: Final = (
+    SA_MOVING_STATUS,
+    SA_TARGETING_STATUS,
+    SA_CALIBRATING_STATUS,
+    SA_MOVING_TO_REFERENCE_STATUS,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +85,7 @@ class Channel:
         settings: ControllerSettings,
         faults: Faults,
         seed: int,
+        now_s: float,
         post: Callable[[Packet, float], None],
     ) -> None:
         self.device = device
@@ -103,7 +112,7 @@ class Channel:
         self._turns: deque[Turn] = deque()
         self._drive_s = 0.0
         self._frequency_hz = 1
-        self.power_cycle(0.0)
+        self.power_cycle(now_s)
         if memory.known:
             self.scale.read_as(0.0, 0.0)
             self.scale.reference(memory.scale)
@@ -245,7 +254,8 @@ class Channel:
         self._turns.extend(turns)
         self._drive_s = drive_s
         self._frequency_hz = frequency_hz
-        if self.faults.find("overridden", self.device, self.index):
+        moves = any(turn.status in _MOVEMENTS for turn in turns)
+        if moves and self.faults.find("overridden", self.device, self.index):
             end_s = next((t.time_s for t in turns if t.completed or t.error), math.inf)
             self._take_over(min((now_s + end_s) / 2.0, now_s + 0.1))
         self.advance(now_s)

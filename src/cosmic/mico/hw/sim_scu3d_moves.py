@@ -177,7 +177,8 @@ def _find_end_stop(channel: Channel, route: Route, speed: float) -> float | None
     route.wait(channel.settings.stall_s)
     # The stop is soft: each run ends a little before or behind the last one.
     error = channel.random.uniform(0.0, channel.stage.kind.reference_repeatability)
-    route.settle(route.position + (-error if channel.safe_direction else error), 0.0)
+    landing = route.position - error if channel.safe_direction else route.position + error
+    route.settle(landing, channel.settings.settle_low_s)
     return route.position
 
 

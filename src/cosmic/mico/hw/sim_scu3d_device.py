@@ -1,0 +1,170 @@
+"""One simulated controller unit: three channels, one queue, one cable."""
+
+import random
+from threading import Condition, Lock
+
+from cosmic.frame.clock import Clock
+from cosmic.mico.hw.scu3d_ctypes import (
+    SA_COMMAND_OVERRIDDEN_ERROR,
+    SA_HV_RANGE_ERROR,
+    SA_TEMP_OVERHEAT_ERROR,
+)
+from cosmic.mico.hw.sim_scu3d_channel import Channel
+from cosmic.mico.hw.sim_scu3d_faults import Fault, Faults
+from cosmic.mico.hw.sim_scu3d_queue import Packet, PacketQueue
+from cosmic.twin.scene import AtPowerUp, Scene
+from cosmic.twin.settings import StageKind
+from cosmic.twin.stage import Stage
+
+_ENDS_MOVEMENTS = {
+    "overheated": SA_TEMP_OVERHEAT_ERROR,
+    "hv_range": SA_HV_RANGE_ERROR,
+    "overridden": SA_COMMAND_OVERRIDDEN_ERROR,
+}
+
+
+class Device:
+    """One unit as the library sees it; called with the library's lock held.
+
+    Parameters
+    ----------
+    number : int
+        Its place along the scene's wiring.
+    scene : Scene
+        What it drives.
+    lock : Lock
+        The library's; never held while anything waits.
+    """
+
+    def __init__(self, number: int, scene: Scene, faults: Faults, lock: Lock) -> None:
+        settings = scene.settings.controller
+        self.number = number
+        self.serial = settings.first_serial + number
+        self.settings = settings
+        self.faults = faults
+        self.changed = Condition(lock)
+        self.queue = PacketQueue(f"simulated SCU {self.serial}", settings.queue_capacity)
+        self.asynchronous = False
+        self.notification: int | None = None
+        self.random = random.Random(f"device {number} {scene.seed}")
+        self.clock: Clock = scene.clock
+        self.channels = [
+            self._channel(scene, index, name) for index, name in enumerate(scene.wiring[number])
+        ]
+
+    def _channel(self, scene: Scene, index: int, name: str | None) -> Channel:
+        if name is None:
+            stage = Stage(f"nothing at {self.number}.{index}", _NOTHING, start=0.0, seed=0)
+            memory = AtPowerUp(known=False, calibrated=False, scale=0.0)
+        else:
+            stage, memory = scene.stages[name], scene.at_power_up[name]
+        return Channel(
+            self.number,
+            index,
+            stage,
+            memory,
+            settings=self.settings,
+            faults=self.faults,
+            seed=scene.seed,
+            now_s=scene.clock.now_s(),
+            post=self.post,
+        )
+
+    @property
+    def unplugged(self) -> bool:
+        """Whether the cable is out."""
+        return self.faults.find("unplugged", self.number) is not None
+
+    def post(self, packet: Packet, time_s: float) -> None:
+        """Send a packet at `time_s`; a synchronous client has nowhere to read it."""
+        if not self.asynchronous:
+            return
+        settings = self.settings
+        latency_s = self.random.uniform(
+            settings.packet_latency_low_s, settings.packet_latency_high_s
+        )
+        latency_s += self.faults.delay_s(self.number, packet[1])
+        self.queue.push(packet, time_s + latency_s)
+        self.changed.notify_all()
+
+    def advance(self, now_s: float) -> None:
+        """Let everything happen that is due by `now_s`."""
+        for channel in self.channels:
+            channel.advance(now_s)
+
+    def next_event_s(self, now_s: float) -> float:
+        """Return when something will happen by itself next; inf when nothing will."""
+        turn_s = min(channel.next_turn_s for channel in self.channels)
+        return min(turn_s, self.queue.next_s(now_s))
+
+    def open(self, *, asynchronous: bool, reset: bool, now_s: float) -> None:
+        """Start to work for a client."""
+        self.advance(now_s)
+        self.close()
+        self.asynchronous = asynchronous
+        for channel in self.channels:
+            channel.report = 0
+            if reset:
+                channel.power_cycle(now_s)
+
+    def close(self) -> None:
+        """Forget the client; the channels go on with what they do."""
+        self.queue.clear()
+        self.notification = None
+        self.changed.notify_all()
+
+    def on_inject(self, fault: Fault, now_s: float) -> None:
+        """Let a new fault act on what goes on."""
+        self.advance(now_s)
+        for channel in self.channels:
+            if fault.hits(self.number, channel.index):
+                _strike(channel, fault, now_s)
+        self.changed.notify_all()
+
+    def on_clear(self, fault: Fault, now_s: float) -> None:
+        """Undo what a fault left behind."""
+        self.advance(now_s)
+        for channel in self.channels:
+            if not fault.hits(self.number, channel.index):
+                continue
+            if fault.name == "sensor_lost":
+                channel.regain_sensor(now_s)
+            elif fault.name == "end_stop":
+                channel.stage.clear_obstruction()
+        self.changed.notify_all()
+
+
+def _strike(channel: Channel, fault: Fault, now_s: float) -> None:
+    if fault.name == "hv_range":
+        channel.hv_error = True
+    if fault.name in _ENDS_MOVEMENTS and (channel.moving or fault.name == "hv_range"):
+        channel.interrupt(_ENDS_MOVEMENTS[fault.name], now_s)
+    elif fault.name == "sensor_lost":
+        channel.lose_sensor(now_s)
+    elif fault.name == "end_stop":
+        channel.meet_obstacle(now_s)
+
+
+# A connector with nothing in it: commands are taken and nothing moves.
+_NOTHING = StageKind(
+    unit="um",
+    sensor=False,
+    positioner_type=0,
+    low=0.0,
+    high=0.0,
+    power_up_low=0.0,
+    power_up_high=0.0,
+    reference_mark=0.0,
+    coded_mark_way=1.0,
+    step_at_100v=1.0,
+    threshold_v=10.0,
+    backward_factor=1.0,
+    step_noise=0.0,
+    slow_zone=0.0,
+    slow_factor=1.0,
+    target_threshold=1.0,
+    reference_repeatability=0.0,
+    calibration_span=1.0,
+    drift_per_min_low=0.0,
+    drift_per_min_high=0.0,
+)
