@@ -158,6 +158,12 @@ def test_no_device_at_all_says_what_to_check(status: int | None) -> None:
         Scu3dController(library).open()
 
 
+def test_a_library_that_opens_nothing_is_told_as_no_device(library: FakeScu3d) -> None:
+    library.statuses["SA_InitDevices"] = 0
+    with pytest.raises(NotConnectedError, match="USB cable"):
+        Scu3dController(library).open()
+
+
 def test_a_serial_number_that_32_bit_would_wrap_is_refused(library: FakeScu3d) -> None:
     with pytest.raises(DeviceError, match="serial number"):
         Scu3dController(library).open([2**32 + 11])

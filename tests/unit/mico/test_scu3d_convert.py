@@ -83,6 +83,12 @@ def test_an_amplitude_in_range_stays_in_range(amplitude_v: float) -> None:
     assert 150 <= convert.decivolts(amplitude_v) <= 1000
 
 
+@pytest.mark.parametrize("amplitude_v", [14.999, 100.001])
+def test_an_amplitude_just_outside_is_not_rounded_into_the_range(amplitude_v: float) -> None:
+    with pytest.raises(DeviceError):
+        convert.decivolts(amplitude_v)
+
+
 @given(st.floats(0.0, 1000.0))
 def test_a_wait_is_never_shorter_than_asked(timeout_s: float) -> None:
     assert timeout_s * 1000 <= convert.timeout_ms(timeout_s) <= timeout_s * 1000 + 1

@@ -57,6 +57,7 @@ def test_each_command_has_two_forms_but_six() -> None:
         ("SA_MoveToEndStop_A", (c_uint32,) * 5),
         ("SA_GetPosition_S", (c_uint32, c_uint32, ctypes.POINTER(c_int32))),
         ("SA_GetPosition_A", (c_uint32, c_uint32)),
+        ("SA_SetSystemProperty_A", (c_uint32, c_int32, c_int32)),
         ("SA_GetSystemProperty_A", (c_uint32, c_int32)),
         ("SA_GetSystemProperty_S", (c_uint32, c_int32, ctypes.POINTER(c_int32))),
         ("SA_GetChannelProperty_A", (c_uint32, c_uint32, c_int32)),
