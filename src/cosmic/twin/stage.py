@@ -128,10 +128,11 @@ class Stage:
         low, high = self.kind.low, self.kind.high
         if self._wall is not None:
             wall, side = self._wall
-            if side > 0 and position <= wall:
-                high = min(high, wall)
-            elif side < 0 and position >= wall:
-                low = max(low, wall)
+            # Creep does not carry a stage through the wall, even where it seems to have done.
+            if side > 0:
+                high = min(high, max(wall, position))
+            else:
+                low = max(low, min(wall, position))
         return low, high
 
     def obstruct(self, position: float, side: int) -> None:

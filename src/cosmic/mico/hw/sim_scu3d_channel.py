@@ -4,7 +4,6 @@ import math
 import random
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 from cosmic.mico.hw.scu3d_ctypes import (
@@ -25,7 +24,7 @@ from cosmic.mico.hw.scu3d_ctypes import (
 from cosmic.mico.hw.sim_scu3d_faults import Faults
 from cosmic.mico.hw.sim_scu3d_queue import Packet
 from cosmic.mico.hw.sim_scu3d_scale import FINE_PER_UNIT, CountScale
-from cosmic.mico.hw.sim_scu3d_types import TYPES, Movement, Reference, Refusal
+from cosmic.mico.hw.sim_scu3d_types import TYPES, Movement, Reference, Refusal, Turn
 from cosmic.twin.scene import AtPowerUp
 from cosmic.twin.settings import ControllerSettings
 from cosmic.twin.stage import Route, Stage
@@ -37,27 +36,6 @@ _MOVEMENTS: Final = (
     SA_CALIBRATING_STATUS,
     SA_MOVING_TO_REFERENCE_STATUS,
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Turn:
-    """A change of what a channel does, due at `time_s`.
-
-    Attributes
-    ----------
-    completed : bool
-        A movement ends well here.
-    error : int
-        A movement ends with this status code here; 0 for none.
-    then : callable or None
-        What else happens.
-    """
-
-    time_s: float
-    status: int
-    completed: bool = False
-    error: int = 0
-    then: Callable[[], None] | None = None
 
 
 class Channel:

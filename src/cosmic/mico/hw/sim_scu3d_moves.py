@@ -17,8 +17,8 @@ from cosmic.mico.hw.scu3d_ctypes import (
     SA_STOPPED_STATUS,
     SA_TARGETING_STATUS,
 )
-from cosmic.mico.hw.sim_scu3d_channel import Channel, Turn
-from cosmic.mico.hw.sim_scu3d_types import Reference, Refusal
+from cosmic.mico.hw.sim_scu3d_channel import Channel
+from cosmic.mico.hw.sim_scu3d_types import Reference, Refusal, Turn
 from cosmic.twin.stage import ENDLESS_S, Route
 
 ENDLESS_STEPS: Final = 30_000
@@ -78,6 +78,10 @@ def drive(channel: Channel, now_s: float, target: float, hold_ms: int) -> None:
     route = channel.stage.route(now_s)
     kind, settings = channel.stage.kind, channel.settings
     channel.obstruct_if_faulty(route.position, target)
+    low, high = channel.stage.bounds(route.position)
+    if low - channel.threshold <= target <= high + channel.threshold:
+        # A stop within the target window is as good as the target.
+        target = min(max(target, low), high)
     gap = target - route.position
     speed = channel.closed_loop_speed(1 if gap > 0.0 else -1)
     arrived = True
@@ -102,8 +106,6 @@ def to_end_stop(
     """Go on in `direction` (0 backward, 1 forward) until the travel ends."""
     channel.require_sensor()
     limit = channel.stage.kind.high if direction else channel.stage.kind.low
-    if not math.isfinite(limit):
-        raise Refusal(SA_COMMAND_NOT_SUPPORTED_ERROR)
     channel.begin(now_s)
     route = channel.stage.route(now_s)
     route.go(limit, channel.closed_loop_speed(1 if direction else -1))

@@ -4,13 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
+from cosmic.mico.hw import sim_scu3d_commands as commands
 from cosmic.mico.hw import sim_scu3d_moves as moves
 from cosmic.mico.hw.scu3d_ctypes import SA_AMPLITUDE_PACKET_TYPE as SA_AMPLITUDE
 from cosmic.mico.hw.scu3d_ctypes import (
     SA_ANGLE_PACKET_TYPE,
     SA_CHANNEL_PROPERTY_PACKET_TYPE,
     SA_CLOSED_LOOP_FREQUENCY_PACKET_TYPE,
-    SA_NOT_PROCESSABLE_ERROR,
     SA_PHYSICAL_POSITION_KNOWN_PACKET_TYPE,
     SA_POSITION_PACKET_TYPE,
     SA_POSITIONER_ALIGNMENT_PACKET_TYPE,
@@ -19,14 +19,12 @@ from cosmic.mico.hw.scu3d_ctypes import (
     SA_SENSOR_PRESENT_PACKET_TYPE,
     SA_SENSOR_TYPE_PACKET_TYPE,
     SA_STATUS_PACKET_TYPE,
-    SA_WRONG_SENSOR_TYPE_ERROR,
 )
 from cosmic.mico.hw.sim_scu3d_channel import Channel
+from cosmic.mico.hw.sim_scu3d_commands import Values
 from cosmic.mico.hw.sim_scu3d_properties import get_property, property_fits, set_property
-from cosmic.mico.hw.sim_scu3d_scale import folded
-from cosmic.mico.hw.sim_scu3d_types import TYPES, Movement, Reference, Refusal
+from cosmic.mico.hw.sim_scu3d_types import TYPES
 
-Values = tuple[int, ...]
 Data = tuple[int, int, int]
 
 _MAX_ANGLE: Final = 3_599_999
@@ -124,120 +122,6 @@ def _is_hold(value: int) -> bool:
     return 0 <= value <= moves.HOLD_FOR_EVER_MS
 
 
-def _require_linear(channel: Channel) -> None:
-    channel.require_sensor()
-    if channel.movement is not Movement.LINEAR:
-        raise Refusal(SA_WRONG_SENSOR_TYPE_ERROR)
-
-
-def _require_rotary(channel: Channel) -> None:
-    channel.require_sensor()
-    if channel.movement is Movement.LINEAR:
-        raise Refusal(SA_WRONG_SENSOR_TYPE_ERROR)
-
-
-def _require_rest(channel: Channel) -> None:
-    if channel.moving:
-        raise Refusal(SA_NOT_PROCESSABLE_ERROR)
-
-
-def _get_position(channel: Channel, now_s: float) -> Values:
-    _require_linear(channel)
-    return (channel.counts(now_s),)
-
-
-def _get_angle(channel: Channel, now_s: float) -> Values:
-    _require_rotary(channel)
-    return (folded(channel.counts(now_s)), 0)
-
-
-def _move_step(channel: Channel, now_s: float, steps: int, amplitude: int, rate: int) -> Values:
-    moves.step(channel, now_s, steps, amplitude_dv=amplitude, frequency_hz=rate)
-    return ()
-
-
-def _position_absolute(channel: Channel, now_s: float, position: int, hold: int) -> Values:
-    _require_linear(channel)
-    moves.drive(channel, now_s, channel.scale.position(position), hold)
-    return ()
-
-
-def _position_relative(channel: Channel, now_s: float, diff: int, hold: int) -> Values:
-    _require_linear(channel)
-    moves.drive(channel, now_s, channel.stage.position(now_s) + channel.scale.way(diff), hold)
-    return ()
-
-
-def _angle_absolute(
-    channel: Channel, now_s: float, angle: int, _revolution: int, hold: int
-) -> Values:
-    _require_rotary(channel)
-    moves.drive(channel, now_s, channel.scale.position(angle), hold)
-    return ()
-
-
-def _angle_relative(
-    channel: Channel, now_s: float, diff: int, _revolution: int, hold: int
-) -> Values:
-    _require_rotary(channel)
-    moves.drive(channel, now_s, channel.stage.position(now_s) + channel.scale.way(diff), hold)
-    return ()
-
-
-def _stop(channel: Channel, now_s: float) -> Values:
-    channel.stop(now_s)
-    return ()
-
-
-def _set_zero(channel: Channel, now_s: float) -> Values:
-    channel.require_sensor()
-    _require_rest(channel)
-    channel.scale.set_zero(channel.stage.position(now_s))
-    return ()
-
-
-def _set_sensor_type(channel: Channel, _now_s: float, code: int) -> Values:
-    _require_rest(channel)
-    if code != channel.positioner_type:
-        channel.positioner_type = code
-        channel.calibrated = False
-        channel.scale.known = False
-    return ()
-
-
-def _set_safe_direction(channel: Channel, _now_s: float, direction: int) -> Values:
-    if direction != channel.safe_direction:
-        channel.safe_direction = direction
-        channel.calibrated = False
-    return ()
-
-
-def _set_scale(channel: Channel, _now_s: float, scale: int, inverted: int) -> Values:
-    channel.require_sensor()
-    _require_rest(channel)
-    if channel.reference is Reference.END_STOP and bool(inverted) != channel.scale.inverted:
-        channel.calibrated = False
-    channel.scale.store(scale, inverted=bool(inverted))
-    return ()
-
-
-def _get_scale(channel: Channel, _now_s: float) -> Values:
-    return (channel.scale.scale_fine, int(channel.scale.inverted))
-
-
-def _set_alignment(channel: Channel, _now_s: float, *alignment: int) -> Values:
-    channel.alignment = (alignment[0], alignment[1], alignment[2])
-    return ()
-
-
-def _sensor_present(channel: Channel, _now_s: float) -> Values:
-    return (int(channel.sensor_present),)
-
-
-def _known(channel: Channel, _now_s: float) -> Values:
-    return (int(channel.scale.known),)
-
-
 _FREQUENCY = SA_CLOSED_LOOP_FREQUENCY_PACKET_TYPE
 _KNOWN = SA_PHYSICAL_POSITION_KNOWN_PACKET_TYPE
 
@@ -257,7 +141,7 @@ def _movement(run: Callable[..., Values], arguments: int, fits: Callable[..., bo
 
 _ANSWERED: Final[dict[str, Operation]] = {
     "GetClosedLoopMaxFrequency": _ask(_FREQUENCY, _attribute("frequency_hz")),
-    "GetSensorPresent": _ask(SA_SENSOR_PRESENT_PACKET_TYPE, _sensor_present),
+    "GetSensorPresent": _ask(SA_SENSOR_PRESENT_PACKET_TYPE, commands.sensor_present),
     "GetSensorType": _ask(SA_SENSOR_TYPE_PACKET_TYPE, _attribute("positioner_type")),
     "GetPositionerAlignment": _ask(
         SA_POSITIONER_ALIGNMENT_PACKET_TYPE,
@@ -265,7 +149,7 @@ _ANSWERED: Final[dict[str, Operation]] = {
         lambda _args, values: (values[0], values[1], values[2]),
     ),
     "GetSafeDirection": _ask(SA_SAFE_DIRECTION_PACKET_TYPE, _attribute("safe_direction")),
-    "GetScale": _ask(SA_SCALE_PACKET_TYPE, _get_scale, lambda _args, v: (v[1], v[0], 0)),
+    "GetScale": _ask(SA_SCALE_PACKET_TYPE, commands.get_scale, lambda _args, v: (v[1], v[0], 0)),
     "GetChannelProperty": _ask(
         SA_CHANNEL_PROPERTY_PACKET_TYPE,
         get_property,
@@ -275,36 +159,42 @@ _ANSWERED: Final[dict[str, Operation]] = {
     ),
     "GetAmplitude": _ask(SA_AMPLITUDE, _attribute("amplitude_dv")),
     "GetStatus": _ask(SA_STATUS_PACKET_TYPE, _attribute("status")),
-    "GetPosition": _ask(SA_POSITION_PACKET_TYPE, _get_position, lambda _args, v: (0, v[0], 0)),
-    "GetAngle": _ask(
-        SA_ANGLE_PACKET_TYPE, _get_angle, lambda _args, v: (v[0] & 0xFFFF_FFFF, v[1], 0)
+    "GetPosition": _ask(
+        SA_POSITION_PACKET_TYPE, commands.get_position, lambda _args, v: (0, v[0], 0)
     ),
-    "GetPhysicalPositionKnown": _ask(_KNOWN, _known),
+    "GetAngle": _ask(
+        SA_ANGLE_PACKET_TYPE, commands.get_angle, lambda _args, v: (v[0] & 0xFFFF_FFFF, v[1], 0)
+    ),
+    "GetPhysicalPositionKnown": _ask(_KNOWN, commands.known),
 }
 _SETTINGS: Final[dict[str, Operation]] = {
     "SetClosedLoopMaxFrequency": Operation(_store("frequency_hz"), 1, _is_frequency),
-    "SetZero": Operation(_set_zero),
-    "SetSensorType": Operation(_set_sensor_type, 1, lambda code: code in TYPES),
+    "SetZero": Operation(commands.set_zero),
+    "SetSensorType": Operation(commands.set_sensor_type, 1, lambda code: code in TYPES),
     "SetPositionerAlignment": Operation(
-        _set_alignment,
+        commands.set_alignment,
         3,
         lambda alignment, forward, back: (
             _is_bit(alignment) and _is_amplitude(forward) and _is_amplitude(back)
         ),
     ),
-    "SetSafeDirection": Operation(_set_safe_direction, 1, _is_bit),
-    "SetScale": Operation(_set_scale, 2, lambda _scale, inverted: _is_bit(inverted)),
+    "SetSafeDirection": Operation(commands.set_safe_direction, 1, _is_bit),
+    "SetScale": Operation(commands.set_scale, 2, lambda _scale, inverted: _is_bit(inverted)),
     "SetChannelProperty": Operation(set_property, 2, property_fits),
     "SetReportOnComplete": Operation(_store("report"), 1, _is_bit),
     "SetAmplitude": Operation(_start(moves.set_amplitude), 1, _is_amplitude),
-    "Stop": Operation(_stop),
+    "Stop": Operation(commands.stop),
 }
 _MOVEMENTS: Final[dict[str, Operation]] = {
-    "MoveStep": _movement(_move_step, 3, _fits_step),
-    "MovePositionAbsolute": _movement(_position_absolute, 2, lambda _x, hold: _is_hold(hold)),
-    "MovePositionRelative": _movement(_position_relative, 2, lambda _x, hold: _is_hold(hold)),
-    "MoveAngleAbsolute": _movement(_angle_absolute, 3, _fits_angle),
-    "MoveAngleRelative": _movement(_angle_relative, 3, _fits_angle),
+    "MoveStep": _movement(commands.move_step, 3, _fits_step),
+    "MovePositionAbsolute": _movement(
+        commands.position_absolute, 2, lambda _x, hold: _is_hold(hold)
+    ),
+    "MovePositionRelative": _movement(
+        commands.position_relative, 2, lambda _x, hold: _is_hold(hold)
+    ),
+    "MoveAngleAbsolute": _movement(commands.angle_absolute, 3, _fits_angle),
+    "MoveAngleRelative": _movement(commands.angle_relative, 3, _fits_angle),
     "CalibrateSensor": _movement(_start(moves.calibrate), 0, _always),
     "MoveToReference": _movement(
         _start(moves.reference, "hold_ms", "auto_zero"),

@@ -1,5 +1,7 @@
-"""What the simulated SmarAct controller knows of positioner types, and how it refuses."""
+"""Words of the simulated SmarAct controller: positioner types, refusals, turns."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import Final
 
@@ -27,6 +29,27 @@ class Refusal(Exception):  # noqa: N818 - not an error of the program, an answer
     def __init__(self, code: int) -> None:
         super().__init__(f"status {code}")
         self.code = code
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """A change of what a channel does, due at `time_s`.
+
+    Attributes
+    ----------
+    completed : bool
+        A movement ends well here.
+    error : int
+        A movement ends with this status code here; 0 for none.
+    then : callable or None
+        What else happens.
+    """
+
+    time_s: float
+    status: int
+    completed: bool = False
+    error: int = 0
+    then: Callable[[], None] | None = None
 
 
 _LINEAR, _ROTARY, _GONIO = Movement.LINEAR, Movement.ROTARY, Movement.GONIOMETER
