@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import TypeVar
 
-import pytest
-
 from contract.fake_scu3d import LINEAR_TYPE, NO_TYPE, ROTARY_TYPE, FakeScu3d
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.units import AxisUnit
@@ -17,6 +15,7 @@ from cosmic.mico.hw.interface import (
     PositionRead,
 )
 from cosmic.mico.hw.scu3d import Scu3dController
+from cosmic.mico.hw.sim_scu3d import load_simulated_library
 
 E = TypeVar("E", bound=Event)
 
@@ -59,8 +58,7 @@ class Rig:
 
 
 def simulated() -> Controller:
-    sim = pytest.importorskip("cosmic.mico.hw.sim_scu3d")
-    library = sim.load_simulated_library(clock=ManualClock(auto_advance=True))
+    library = load_simulated_library(clock=ManualClock(auto_advance=True))
     return Scu3dController(library, simulated=True)
 
 

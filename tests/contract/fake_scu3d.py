@@ -9,6 +9,7 @@ import ctypes
 from collections import deque
 from collections.abc import Callable
 from ctypes import c_int32, c_uint32, c_void_p
+from dataclasses import dataclass
 
 UINT_OUT = ctypes.POINTER(c_uint32)
 
@@ -28,15 +29,13 @@ class FakePacket(ctypes.Structure):
     )
 
 
+@dataclass
 class FakeChannel:
-    """One channel: an integer for its position and the last activity."""
-
-    def __init__(self, type_code: int) -> None:
-        self.type_code = type_code
-        self.position = 0
-        self.activity = STOPPED
-        self.reports = False
-        self.known = False
+    type_code: int
+    position: int = 0
+    activity: int = STOPPED
+    reports: bool = False
+    known: bool = False
 
 
 class FakeScu3d:

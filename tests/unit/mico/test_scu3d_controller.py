@@ -35,7 +35,7 @@ def test_the_integers_of_each_command_are_the_vendors(
     controller.move_to(LINEAR, -12.34, "um", hold_s=0.25)
     controller.move_by(LINEAR, 0.1, "um", hold_s=math.inf)
     controller.move_to(ROTARY, -1.5, "deg", hold_s=math.inf)
-    controller.move_by(ROTARY, 400.0, "deg", hold_s=0.0)
+    controller.move_by(ROTARY, 359.9999, "deg", hold_s=0.0)
     controller.set_closed_loop_frequency(LINEAR, 5000)
     controller.reference(LINEAR, hold_s=math.inf)
     controller.move_to_end_stop(LINEAR, Direction.FORWARD, hold_s=1.0)
@@ -46,7 +46,7 @@ def test_the_integers_of_each_command_are_the_vendors(
         ("SA_MovePositionAbsolute_A", 0, 0, -123, 250),
         ("SA_MovePositionRelative_A", 0, 0, 1, 60_000),
         ("SA_MoveAngleAbsolute_A", 0, 1, -15_000, 0, 60_000),
-        ("SA_MoveAngleRelative_A", 0, 1, 4_000_000, 0, 0),
+        ("SA_MoveAngleRelative_A", 0, 1, 3_599_999, 0, 0),
         ("SA_SetClosedLoopMaxFrequency_A", 0, 0, 5000),
         ("SA_MoveToReference_A", 0, 0, 60_000, 0),
         ("SA_MoveToEndStop_A", 0, 0, 1, 1000, 0),
@@ -62,6 +62,7 @@ def test_a_refused_value_never_reaches_the_library(
         lambda: controller.step(LINEAR, 30_000, amplitude_v=50.0, frequency_hz=100),
         lambda: controller.move_to(LINEAR, math.nan, "um", hold_s=0.0),
         lambda: controller.move_to(LINEAR, 1.0, "um", hold_s=60.0),
+        lambda: controller.move_to(ROTARY, 370.0, "deg", hold_s=0.0),
         lambda: controller.stop(Channel(2**32, 0)),
     ):
         with pytest.raises(DeviceError):

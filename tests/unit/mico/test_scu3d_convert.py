@@ -10,12 +10,22 @@ from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.mico.hw import scu3d_convert as convert
 from cosmic.mico.hw.interface import Channel
 
-INT32 = st.integers(-(2**31) + 1, 2**31 - 1)
+
+@given(st.integers(-(2**31) + 1, 2**31 - 1))
+def test_counts_survive_the_way_through_micrometres_and_back(counts: int) -> None:
+    assert convert.position_counts(convert.position_from_counts(counts, "um"), "um") == counts
 
 
-@given(INT32, st.sampled_from(["um", "deg"]))
-def test_counts_survive_the_way_through_units_and_back(counts: int, unit: str) -> None:
-    assert convert.position_counts(convert.position_from_counts(counts, unit), unit) == counts
+@given(st.integers(-3_599_999, 3_599_999))
+def test_counts_survive_the_way_through_degrees_and_back(counts: int) -> None:
+    assert convert.position_counts(convert.angle_deg(counts & 0xFFFFFFFF), "deg") == counts
+
+
+@pytest.mark.parametrize("value_deg", [360.0, -360.0, 370.0, 2.1e5])
+def test_a_full_turn_and_more_is_refused(value_deg: float) -> None:
+    with pytest.raises(DeviceError, match=r"within 359\.9999 deg") as caught:
+        convert.position_counts(value_deg, "deg")
+    assert caught.value.fault is DeviceFault.PARAMETER
 
 
 @given(st.floats(-2e8, 2e8))
@@ -24,7 +34,7 @@ def test_a_length_is_kept_to_half_a_count(value_um: float) -> None:
     assert convert.position_from_counts(counts, "um") == pytest.approx(value_um, abs=0.0501)
 
 
-@given(st.floats(-2e5, 2e5))
+@given(st.floats(-359.9999, 359.9999))
 def test_an_angle_is_kept_to_half_a_count(value_deg: float) -> None:
     counts = convert.position_counts(value_deg, "deg")
     assert convert.angle_deg(counts & 0xFFFFFFFF) == pytest.approx(value_deg, abs=0.0000501)

@@ -5,9 +5,9 @@ the library's integers wrap silently and its largest values mean "endless". All 
 called from any thread.
 
 Angles: the library declares a pair (angle, revolution) and calls the second reserved. CoSMic
-sends the whole angle, with its sign, and revolution 0, so two turns are 7 200 000 counts; the
-reading adds 360 degrees for each revolution, in case a firmware does fill it in. How a real SCU
-counts beyond one turn was not seen; keep soft limits inside one turn until it was.
+sends the angle with its sign and revolution 0, and refuses a full turn and more, as another
+client of the library does: what an SCU makes of 370 degrees, a further turn or 10 degrees, is
+written nowhere. A reading is taken as it comes, plus 360 degrees for each revolution told.
 """
 
 import math
@@ -31,7 +31,8 @@ MAX_FREQUENCY_HZ: Final = 18_500
 
 _INT32_MAX: Final = 2**31 - 1
 _UINT32_MAX: Final = 2**32 - 1
-_PER_UNIT: Final[dict[str, int]] = {"um": COUNTS_PER_UM, "deg": COUNTS_PER_DEG}
+_PER_UNIT: Final[dict[AxisUnit, int]] = {"um": COUNTS_PER_UM, "deg": COUNTS_PER_DEG}
+_MOST_COUNTS: Final[dict[AxisUnit, int]] = {"um": _INT32_MAX, "deg": COUNTS_PER_TURN - 1}
 
 
 def position_counts(value: float, unit: AxisUnit, at: Channel | None = None) -> int:
@@ -40,11 +41,13 @@ def position_counts(value: float, unit: AxisUnit, at: Channel | None = None) -> 
     Raises
     ------
     DeviceError
-        `value` is not finite or does not fit 32 bit.
+        `value` is not finite, does not fit 32 bit, or is an angle of a full turn or more.
     """
-    counts = value * _PER_UNIT[unit]
-    if not -_INT32_MAX <= counts <= _INT32_MAX:
-        raise _refused(f"{value!r} {unit} is not a position this controller can take", at)
+    counts, most = value * _PER_UNIT[unit], _MOST_COUNTS[unit]
+    if not -most - 0.5 < counts < most + 0.5:
+        limit = position_from_counts(most, unit)
+        text = f"a target or distance must lie within {limit} {unit}, got {value!r} {unit}"
+        raise _refused(text, at)
     return round(counts)
 
 
