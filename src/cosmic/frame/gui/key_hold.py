@@ -1,0 +1,140 @@
+"""Keys that act as long as they are held, for jogging."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QApplication, QWidget
+from typing_extensions import override
+
+from cosmic.frame.gui.key_focus import takes_text
+from cosmic.frame.gui.stop_key import combination_of
+
+GUARD_MS: Final = 50
+_MODIFIERS: Final = (
+    Qt.KeyboardModifier.ShiftModifier
+    | Qt.KeyboardModifier.ControlModifier
+    | Qt.KeyboardModifier.AltModifier
+    | Qt.KeyboardModifier.MetaModifier
+)
+_KEY_EVENTS: Final = (QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress, QEvent.Type.KeyRelease)
+
+
+@dataclass(frozen=True, slots=True)
+class _Combination:
+    key: Qt.Key
+    modifiers: Qt.KeyboardModifier
+
+
+class HoldKeys(QObject):
+    """Says when a key goes down and when it comes up, whatever happens in between.
+
+    Auto-repeat starts nothing again and ends nothing. Everything held ends as well when its
+    window or the program is no longer the active one, when the focus goes to where text is
+    typed, and when a menu, a dialog or a drag takes the input: no key may stay held unseen.
+
+    Parameters
+    ----------
+    keys : iterable of str
+        The keys as Qt writes them, such as "Left", "PgUp", "Shift+A".
+
+    Raises
+    ------
+    ValueError
+        One of them is no key.
+    """
+
+    hold_started = Signal(str)
+    hold_ended = Signal(str)
+
+    def __init__(
+        self, app: QApplication, keys: Iterable[str] = (), parent: QObject | None = None
+    ) -> None:
+        super().__init__(parent or app)
+        self._names: dict[_Combination, str] = {}
+        self._held: dict[int, str] = {}
+        self._enabled = True
+        self._guard = QTimer(self, interval=GUARD_MS)
+        self._guard.timeout.connect(self._on_guard)
+        self.set_keys(keys)
+        app.installEventFilter(self)
+        app.focusChanged.connect(self._on_focus_changed)
+        app.applicationStateChanged.connect(self._on_guard)
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """The keys held now."""
+        return tuple(self._held.values())
+
+    def set_keys(self, keys: Iterable[str]) -> None:
+        """Act on `keys` from now on; ends what is held."""
+        self.release_all()
+        self._names = {_combination(name): name for name in keys}
+
+    def set_enabled(self, enabled: bool) -> None:
+        """Let keys act or not; ends what is held."""
+        self._enabled = enabled
+        self.release_all()
+
+    def release_all(self) -> None:
+        """End everything held; the keys must come up before they act again."""
+        self._guard.stop()
+        held, self._held = self._held, {}
+        for name in held.values():
+            self.hold_ended.emit(name)
+
+    @override
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        kind = event.type()
+        if kind == QEvent.Type.WindowDeactivate and self._held:
+            self.release_all()
+        if kind not in _KEY_EVENTS or not isinstance(event, QKeyEvent):
+            return False
+        if event.key() in self._held:
+            return self._on_held_key(event)
+        name = self._names.get(_Combination(Qt.Key(event.key()), event.modifiers() & _MODIFIERS))
+        if name is None or not self._enabled or _input_is_elsewhere():
+            return False
+        event.accept()
+        if kind == QEvent.Type.KeyPress and not event.isAutoRepeat():
+            self._held[event.key()] = name
+            self._guard.start()
+            self.hold_started.emit(name)
+        return True
+
+    def _on_held_key(self, event: QKeyEvent) -> bool:
+        """Handle a key that is held, whatever modifier has been pressed since."""
+        event.accept()
+        if event.type() == QEvent.Type.KeyRelease and not event.isAutoRepeat():
+            name = self._held.pop(event.key())
+            if not self._held:
+                self._guard.stop()
+            self.hold_ended.emit(name)
+        return True
+
+    def _on_focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
+        if takes_text(new):
+            self.release_all()
+
+    def _on_guard(self) -> None:
+        """End what is held where no event tells that the keyboard was taken away."""
+        active = QApplication.applicationState() == Qt.ApplicationState.ApplicationActive
+        if self._held and (not active or _input_is_elsewhere()):
+            self.release_all()
+
+
+def _input_is_elsewhere() -> bool:
+    return (
+        takes_text(QApplication.focusWidget())
+        or QApplication.activePopupWidget() is not None
+        or QApplication.activeModalWidget() is not None
+        or QWidget.mouseGrabber() is not None
+        or QWidget.keyboardGrabber() is not None
+    )
+
+
+def _combination(name: str) -> _Combination:
+    combination = combination_of(name)
+    return _Combination(combination.key(), combination.keyboardModifiers() & _MODIFIERS)
