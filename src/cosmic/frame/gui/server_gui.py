@@ -1,5 +1,7 @@
 """The main window that hosts the GUI components of applications (thesis 5.3.1)."""
 
+from typing import Final
+
 from PySide6.QtCore import QSettings, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
@@ -14,6 +16,11 @@ from cosmic.frame.gui.theme import STEP_PX, apply_theme, current_palette
 from cosmic.frame.gui.top_bar import TopBar
 
 Area = Qt.DockWidgetArea
+
+LOG_TITLE: Final = "Log"
+"""A click on the message in the bar brings the panel with this title to the front."""
+
+_BOTTOM_LEAST_PX: Final = 24 * STEP_PX
 
 
 class CosmicServerGui(QMainWindow):
@@ -75,6 +82,7 @@ class CosmicServerGui(QMainWindow):
     def _connect(self) -> None:
         self._bar.stop_requested.connect(self.stop_requested)
         self._bar.theme_requested.connect(self._on_theme_requested)
+        self._bar.message_clicked.connect(self._on_message_clicked)
         self._menus.quit_requested.connect(self.close)
         self._menus.keys_requested.connect(self.show_keys)
         self._menus.theme_requested.connect(self.set_theme)
@@ -179,6 +187,20 @@ class CosmicServerGui(QMainWindow):
         """Put all panels back to where they are at a first start."""
         self._store.reset(self)
 
+    def _on_message_clicked(self) -> None:
+        if LOG_TITLE in self._docks:
+            self.raise_panel(LOG_TITLE)
+
+    def _size_bottom(self) -> None:
+        """Give log and console a quarter of the height at a first start."""
+        bottom = [
+            dock
+            for dock in self._docks.values()
+            if self.dockWidgetArea(dock) == Area.BottomDockWidgetArea
+        ]
+        height = max(_BOTTOM_LEAST_PX, self.height() // 4)
+        self.resizeDocks(bottom, [height] * len(bottom), Qt.Orientation.Vertical)
+
     def _on_theme_requested(self) -> None:
         self.set_theme("light" if self.theme == "dark" else "dark")
 
@@ -186,6 +208,7 @@ class CosmicServerGui(QMainWindow):
     def showEvent(self, event: QShowEvent) -> None:
         if not self._restored:
             self._restored = True
+            self._size_bottom()
             self._store.remember_default(self)
             self._store.restore(self)
         super().showEvent(event)

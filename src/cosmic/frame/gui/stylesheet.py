@@ -47,9 +47,9 @@ QComboBox, QAbstractSpinBox {
     padding: 3px 7px; min-height: 20px; selection-background-color: $accent;
     selection-color: $on_accent;
 }
-QAbstractSpinBox { background: $field; padding-right: 22px; }
+QAbstractSpinBox { background: $field; padding: 3px 22px 3px 7px; }
 QAbstractSpinBox QLineEdit {
-    background: transparent; border: none; padding: 0px 0px 0px 5px; min-height: 0px;
+    background: transparent; border: none; padding: 0px; margin: 0px; min-height: 0px;
 }
 QComboBox:hover, QAbstractSpinBox:hover { border-color: $border_strong; }
 QComboBox:focus, QAbstractSpinBox:focus { border-color: $accent; }
@@ -137,7 +137,6 @@ QTableView {
     background: $field; color: $text; border: 1px solid $border; border-radius: 4px;
     gridline-color: transparent; selection-background-color: $hover; selection-color: $text;
 }
-QTableView::item { padding: 0px 6px; border: none; }
 QHeaderView { background: $panel; border: none; }
 QHeaderView::section {
     background: $panel; color: $dim; border: none; border-bottom: 1px solid $border;

@@ -1,0 +1,243 @@
+"""The Python interpreter of the console, in a thread of its own."""
+
+import code
+import logging
+import sys
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum, auto
+from queue import SimpleQueue
+from types import CodeType
+from typing import Final
+
+from PySide6.QtCore import QObject, Signal
+from typing_extensions import override
+
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.gui.console_interrupt import CONSOLE_FILE, Interrupter
+from cosmic.frame.gui.console_streams import OutputBuffer, ThreadStreams
+from cosmic.frame.threads import WorkerThread
+
+logger = logging.getLogger(__name__)
+
+PROMPT: Final = ">>> "
+MORE: Final = "... "
+READING: Final = "in> "
+BUSY: Final = ""
+CLOSE_TIMEOUT_S: Final = 2.0
+
+_given_up: "list[ConsoleThread]" = []
+"""Threads that did not end in time: destroying a running QThread would abort the process."""
+
+
+class _Kind(Enum):
+    RUN = auto()
+    COMPLETE = auto()
+    WAKE = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class _Wish:
+    kind: _Kind
+    text: str = ""
+
+
+class ConsoleThread(WorkerThread):
+    """Runs what is typed into the console; everything public is thread-safe and returns at once.
+
+    Parameters
+    ----------
+    policy : FailurePolicy
+        Told of defects of the console itself; what the user's code raises is shown to the user.
+    namespace : mapping
+        The names that the user finds, such as ``rig`` and ``cosmic``.
+    on_interrupt : callable or None
+        Ends what the user's code waits for, such as a movement; called by `interrupt`.
+    """
+
+    output_ready = Signal()
+    """There is text to take; emitted once until it is taken."""
+    prompt_changed = Signal(str)
+    """PROMPT, MORE or READING while it waits for a line, BUSY while something runs."""
+    completed = Signal(str, object)
+    """The text asked for, and a tuple of what it could become."""
+
+    def __init__(
+        self,
+        policy: FailurePolicy,
+        namespace: Mapping[str, object] | None = None,
+        on_interrupt: Callable[[], None] | None = None,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__("console", policy, parent)
+        self._on_interrupt = on_interrupt
+        self._interrupter = Interrupter()
+        self._output = OutputBuffer()
+        self._inbox: SimpleQueue[_Wish] = SimpleQueue()
+        self._namespace: dict[str, object] = {
+            "__name__": "__console__",
+            "sleep": self._interrupter.sleep,
+            **(namespace or {}),
+        }
+        self._interpreter = _Interpreter(self._namespace, self._interrupter, self._write)
+        self._streams: ThreadStreams | None = None
+        self._prompt = BUSY
+
+    @property
+    def busy(self) -> bool:
+        """True while the user's code runs."""
+        return self._prompt in (BUSY, READING)
+
+    def submit(self, text: str) -> None:
+        """Run `text`, one line or a whole block, after what was submitted before."""
+        self._inbox.put(_Wish(_Kind.RUN, text))
+
+    def complete(self, text: str) -> None:
+        """Ask for what `text` could become; answered by `completed` unless code runs."""
+        if not self.busy:
+            self._inbox.put(_Wish(_Kind.COMPLETE, text))
+
+    def take_output(self) -> str:
+        """Remove and return what was printed."""
+        return self._output.take()
+
+    def interrupt(self) -> None:
+        """Break what runs, as Ctrl-C does, and what it waits for."""
+        self._interrupter.request()
+        self._inbox.put(_Wish(_Kind.WAKE))
+        if self.busy and self._on_interrupt is not None:
+            self._on_interrupt()
+
+    @override
+    def request_end(self) -> None:
+        self._output.close()
+        super().request_end()
+        if self.isRunning():
+            self.interrupt()  # wakes it as well
+
+    def shut_down(self, timeout_s: float = CLOSE_TIMEOUT_S) -> bool:
+        """End the thread, breaking what runs; False where it could not be ended in time."""
+        self.request_end()
+        if self.join(timeout_s):
+            return True
+        logger.warning("what runs in the console does not end; it is left behind")
+        if self._streams is not None:
+            self._streams.restore()
+        _given_up.append(self)
+        return False
+
+    @override
+    def run_body(self) -> None:
+        self._streams = ThreadStreams(self._write, self._read_for_input)
+        try:
+            self._tell(PROMPT)
+            while not self.end_requested:
+                self._obey(self._inbox.get())
+        finally:
+            self._streams.restore()
+
+    def _obey(self, wish: "_Wish") -> None:
+        if wish.kind is _Kind.RUN and not self.end_requested:
+            self._run(wish.text)
+        elif wish.kind is _Kind.COMPLETE:
+            self._complete(wish.text)
+        elif wish.kind is _Kind.WAKE and self._prompt == MORE and self._interrupter.wanted:
+            self._interpreter.resetbuffer()
+            self._write("KeyboardInterrupt\n")
+            self._tell(PROMPT)
+
+    def _run(self, text: str) -> None:
+        self._interrupter.clear()
+        self._write(f"{self._prompt}{text}\n")
+        self._tell(BUSY)
+        more = self._interpreter.run(text)
+        if not self.end_requested:
+            self._tell(MORE if more else PROMPT)
+
+    def _read_for_input(self) -> str:
+        """Return the next line for the user's own ``input()``."""
+        self._tell(READING)
+        try:
+            while not self._interrupter.wanted:
+                wish = self._inbox.get()
+                if wish.kind is _Kind.RUN:
+                    self._write(f"{wish.text}\n")
+                    return f"{wish.text}\n"
+            self._interrupter.clear()
+            raise KeyboardInterrupt
+        finally:
+            self._tell(BUSY)
+
+    def _complete(self, text: str) -> None:
+        import rlcompleter  # loads readline, which only a console needs
+
+        completer = rlcompleter.Completer(self._namespace)
+        matches: list[str] = []
+        while (match := completer.complete(text, len(matches))) is not None:
+            matches.append(match)
+        self.completed.emit(text, tuple(dict.fromkeys(matches)))
+
+    def _tell(self, prompt: str) -> None:
+        self._prompt = prompt
+        self.prompt_changed.emit(prompt)
+
+    def _write(self, text: str) -> None:
+        if self._output.put(text):
+            self.output_ready.emit()
+
+
+class _Interpreter(code.InteractiveConsole):
+    """Runs source text and shows failures where it was typed."""
+
+    def __init__(
+        self,
+        namespace: dict[str, object],
+        interrupter: Interrupter,
+        write: Callable[[str], None],
+    ) -> None:
+        super().__init__(namespace, CONSOLE_FILE)
+        self._interrupter = interrupter
+        self._write = write
+
+    def run(self, text: str) -> bool:
+        """Run a line or a block; True when more lines are needed."""
+        try:
+            if "\n" not in text:
+                return self.push(text)
+            more = self.runsource(f"{text}\n", CONSOLE_FILE, "exec")
+        except KeyboardInterrupt:
+            self._write("KeyboardInterrupt\n")
+            more = False
+        except SystemExit:
+            self._write("The console stays open; File > Quit closes the program.\n")
+            more = False
+        self.buffer = text.split("\n") if more else []
+        return more
+
+    @override
+    def runcode(self, code: CodeType) -> None:
+        with self._interrupter.watching():
+            super().runcode(code)
+
+    @override
+    def write(self, data: str) -> None:
+        self._write(data)
+
+    @override
+    def showtraceback(self) -> None:
+        """Show what went wrong here: for the hook of the process it would be a defect."""
+        kind, error, trace = sys.exc_info()
+        if isinstance(error, KeyboardInterrupt):
+            self._write("KeyboardInterrupt\n")
+        elif isinstance(error, CosmicError):
+            self._write(f"{type(error).__name__}: {error}\n")
+        else:
+            own = trace.tb_next if trace is not None else None
+            self._write("".join(traceback.format_exception(kind, error, own)))
+
+    @override
+    def showsyntaxerror(self, filename: str | None = None, **_kwargs: object) -> None:
+        kind, error, _trace = sys.exc_info()
+        self._write("".join(traceback.format_exception_only(kind, error)))
