@@ -43,7 +43,9 @@ class LogEntry:
     def of(cls, record: logging.LogRecord) -> "LogEntry":
         """Take what is shown out of `record`."""
         text = record.getMessage()
-        trace = _TRACE.formatException(record.exc_info) if record.exc_info else ""
+        trace = record.exc_text or ""
+        if record.exc_info and not trace:
+            trace = _TRACE.formatException(record.exc_info)
         when = QDateTime.fromMSecsSinceEpoch(int(record.created * 1000))
         return cls(
             time=when.toString("HH:mm:ss.zzz"),
