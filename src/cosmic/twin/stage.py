@@ -103,7 +103,8 @@ class Stage:
 
     def position(self, time_s: float) -> float:
         """Return where the stage truly is at `time_s`."""
-        return min(max(self._path.at(time_s), self.kind.low), self.kind.high)
+        low, high = self.bounds
+        return min(max(self._path.at(time_s), low), high)
 
     def step_size(self, amplitude_v: float, direction: int) -> float:
         """Return the mean length of one step, positive, at `amplitude_v` in `direction` (+-1)."""
@@ -123,20 +124,19 @@ class Stage:
         noise = self.kind.step_noise * self.random.gauss(0.0, 1.0) / math.sqrt(count)
         return direction * count * self.step_size(amplitude_v, direction) * max(1.0 + noise, 0.0)
 
-    def bounds(self, position: float) -> tuple[float, float]:
-        """Return how far the stage can go down and up from `position`."""
-        low, high = self.kind.low, self.kind.high
-        if self._wall is not None:
-            wall, side = self._wall
-            # Creep does not carry a stage through the wall, even where it seems to have done.
-            if side > 0:
-                high = min(high, max(wall, position))
-            else:
-                low = max(low, min(wall, position))
-        return low, high
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """How far the stage can go down and up: its stops, or a wall in front of one."""
+        wall = self._wall
+        if wall is None:
+            return self.kind.low, self.kind.high
+        position, side = wall
+        if side > 0:
+            return self.kind.low, min(self.kind.high, position)
+        return max(self.kind.low, position), self.kind.high
 
     def obstruct(self, position: float, side: int) -> None:
-        """Put a wall at `position` that stops movements towards `side` (+1 up, -1 down)."""
+        """Put a wall on the side of the stage (+1 above, -1 below) at `position`."""
         self._wall = (position, side)
 
     def clear_obstruction(self) -> None:
@@ -206,7 +206,7 @@ class Route:
 
     def go(self, target: float, speed: float) -> bool:
         """Go towards `target` at `speed` per second; False when a wall ended the leg."""
-        low, high = self._stage.bounds(self.position)
+        low, high = self._stage.bounds
         end = min(max(target, low), high)
         way = abs(end - self.position)
         if way > 0.0:
@@ -218,7 +218,7 @@ class Route:
 
     def settle(self, position: float, duration_s: float) -> None:
         """Come to rest at `position`, or at the wall in front of it, within `duration_s`."""
-        low, high = self._stage.bounds(self.position)
+        low, high = self._stage.bounds
         self._add(self.end_s + duration_s, min(max(position, low), high))
 
     def _add(self, time_s: float, position: float) -> None:

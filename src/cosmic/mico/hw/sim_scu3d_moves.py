@@ -78,7 +78,7 @@ def drive(channel: Channel, now_s: float, target: float, hold_ms: int) -> None:
     route = channel.stage.route(now_s)
     kind, settings = channel.stage.kind, channel.settings
     channel.obstruct_if_faulty(route.position, target)
-    low, high = channel.stage.bounds(route.position)
+    low, high = channel.stage.bounds
     if low - channel.threshold <= target <= high + channel.threshold:
         # A stop within the target window is as good as the target.
         target = min(max(target, low), high)
