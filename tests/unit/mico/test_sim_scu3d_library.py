@@ -75,6 +75,19 @@ def test_the_library_of_2010_lacks_the_functions_of_later_versions() -> None:
     assert library.SA_GetDLLVersion(byref(version)) == OK and version.value == 0x01020000
 
 
+def test_the_library_of_2010_has_no_words_for_later_errors() -> None:
+    for mode in (ASYNC, SYNC):
+        clock = ManualClock(auto_advance=True)
+        client = Client(load_simulated_library(clock=clock, version="1.2.0"), mode=mode)
+        client.library.faults.inject("overheated")
+        if mode == SYNC:
+            assert client.call("MoveStep_S", 0, 0, 1, 1000, 1000) == 255
+            assert client.call("MovePositionAbsolute_S", 3, 0, 0, 0) == 131
+        else:
+            client.ok("MoveStep_A", 0, 0, 1, 1000, 1000)
+            assert client.receive().data1 == 255
+
+
 @section_two
 def test_section_two_answers_2_before_initialisation_and_after_release(name: str) -> None:
     client = Client(mode=None)

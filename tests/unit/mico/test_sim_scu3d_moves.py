@@ -168,6 +168,17 @@ def test_setting_an_amplitude_stops_the_channel() -> None:
     assert client.status() == STOPPED
 
 
+def test_setting_an_amplitude_is_never_completed() -> None:
+    client = in_the_middle()
+    for amplitude in range(200, 210):
+        client.ok("SetAmplitude_A", 0, 0, amplitude)
+        client.ok("MovePositionAbsolute_A", 0, 0, 500, 0)
+        assert client.settle() == [DONE]
+        client.ok("SetAmplitude_A", 0, 0, 1000)
+        client.ok("Stop_A", 0, 0)
+        assert client.settle() == []
+
+
 def test_the_noise_of_many_steps_is_that_of_their_sum() -> None:
     ways = []
     for seed in range(40):
@@ -344,6 +355,19 @@ def test_reference_goes_in_the_safe_direction_after_a_new_calibration() -> None:
     client.until(COMPLETED)
     referenced(client)
     assert client.truth() == pytest.approx(6000.0, abs=0.5)
+
+
+def test_every_stage_can_be_calibrated_and_referenced_right_after_power_up() -> None:
+    for seed in range(6):
+        clock = ManualClock(auto_advance=True)
+        client = Client(load_simulated_library("LRN", seed=seed, clock=clock))
+        for channel in (0, 1):
+            client.ok("SetReportOnComplete_A", 0, channel, 1)
+            client.ok("CalibrateSensor_A", 0, channel)
+            assert client.until(COMPLETED).channel == channel
+            client.ok("MoveToReference_A", 0, channel, 0, 0)
+            assert client.until(COMPLETED).channel == channel
+        assert client.skipped == []
 
 
 def test_calibration_moves_both_ways() -> None:

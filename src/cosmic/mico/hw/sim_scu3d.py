@@ -13,6 +13,7 @@ from cosmic.mico.hw.scu3d_ctypes import (
     FUNCTIONS_V12,
     PROTOTYPES,
     SA_ASYNCHRONOUS_COMMUNICATION,
+    SA_COMMAND_OVERRIDDEN_ERROR,
     SA_DEVICE_ALREADY_ADDED_ERROR,
     SA_DEVICE_NOT_FOUND_ERROR,
     SA_HARDWARE_RESET,
@@ -22,6 +23,7 @@ from cosmic.mico.hw.scu3d_ctypes import (
     SA_NO_DEVICES_FOUND_ERROR,
     SA_NOT_INITIALIZED_ERROR,
     SA_OK,
+    SA_OTHER_ERROR,
     SA_WRONG_MODE_ERROR,
 )
 from cosmic.mico.hw.sim_scu3d_calls import Body, c_function, section_two
@@ -97,14 +99,17 @@ class SimulatedLibrary:
     """
 
     def __init__(self, scene: Scene, version: str) -> None:
-        names = FUNCTIONS_V12 if version.startswith("1.2.") else PROTOTYPES.keys()
+        old = version.startswith("1.2.")
+        names = FUNCTIONS_V12 if old else PROTOTYPES.keys()
+        newest_error = SA_COMMAND_OVERRIDDEN_ERROR if old else SA_OTHER_ERROR
         self._version = _packed(version)
         self.scene = scene
         self.clock = scene.clock
         self.faults = Faults(self._on_inject, self._on_clear)
         self._lock = Lock()
         self._wired = [
-            Device(number, scene, self.faults, self._lock) for number in range(len(scene.wiring))
+            Device(number, scene, self.faults, self._lock, newest_error=newest_error)
+            for number in range(len(scene.wiring))
         ]
         self._to_open: list[int] = []
         self._opened: list[Device] = []

@@ -1,7 +1,7 @@
 """The C functions of the simulated library, as Python bodies behind ctypes function pointers."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 from cosmic.frame.clock import WALL, Clock
@@ -79,6 +79,11 @@ def _channel(device: Device, index: int) -> Channel:
     return device.channels[index]
 
 
+def _stops(base: str, args: Sequence[int]) -> bool:
+    """Return whether a call stops a channel; no step is another way to say so."""
+    return base == "Stop" or (base == "MoveStep" and args[0] == 0)
+
+
 def _sync_latency_s(device: Device, channel: int | None) -> float:
     """Return how long a synchronous call takes; call with the lock held."""
     settings = device.settings
@@ -99,7 +104,7 @@ def _synchronous(session: Session, base: str, operation: Operation) -> Body:
     unplugged_code = SA_TIMEOUT_ERROR if operation.packet else SA_TRANSMIT_ERROR
 
     def body(device_index: int, channel_index: int, *rest: Any) -> int:
-        if operation.moves:
+        if operation.moves and not _stops(base, rest):
             _block(session, device_index, channel_index, asynchronous=False)
         device = session.device(device_index, asynchronous=False)
         with device.changed:
@@ -110,10 +115,11 @@ def _synchronous(session: Session, base: str, operation: Operation) -> Body:
                 return SA_INVALID_PARAMETER_ERROR
             if device.unplugged:
                 return unplugged_code
-            latency_s = 0.0 if base == "Stop" else _sync_latency_s(device, channel_index)
+            latency_s = 0.0 if _stops(base, args) else _sync_latency_s(device, channel_index)
             now_s = session.clock.now_s()
             device.advance(now_s)
             values, status = _run(operation, channel, now_s, args)
+            status = device.told(status)
         if latency_s:
             session.clock.sleep(latency_s)
         for out, value in zip(outs, values, strict=False):
@@ -133,10 +139,8 @@ def _run(
 
 
 def _asynchronous(session: Session, base: str, operation: Operation) -> Body:
-    stops = base == "Stop"
-
     def body(device_index: int, channel_index: int, *args: int) -> int:
-        if operation.moves:
+        if operation.moves and not _stops(base, args):
             _block(session, device_index, channel_index, asynchronous=True)
         device = session.device(device_index, asynchronous=True)
         with device.changed:
@@ -146,7 +150,7 @@ def _asynchronous(session: Session, base: str, operation: Operation) -> Body:
                 return SA_INVALID_PARAMETER_ERROR
             if device.unplugged:
                 return SA_TRANSMIT_ERROR
-            if device.queue.full and not stops:
+            if device.queue.full and not _stops(base, args):
                 return SA_WRITE_ERROR
             now_s = session.clock.now_s()
             device.advance(now_s)

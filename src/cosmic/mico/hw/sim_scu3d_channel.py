@@ -88,6 +88,7 @@ class Channel:
         self.hv_error = False
         self._lost_at: float | None = None
         self._turns: deque[Turn] = deque()
+        self._movement = False
         self._drive_s = 0.0
         self._frequency_hz = 1
         self.power_cycle(now_s)
@@ -118,6 +119,11 @@ class Channel:
     def moving(self) -> bool:
         """Whether a movement goes on or is about to start."""
         return self.status not in AT_REST
+
+    @property
+    def _interruptible(self) -> bool:
+        # Setting an amplitude alone is no movement, hence never completed.
+        return self.moving and self._movement
 
     @property
     def sensor_present(self) -> bool:
@@ -194,7 +200,7 @@ class Channel:
         if self.faults.find("overheated", self.device, self.index):
             raise Refusal(SA_TEMP_OVERHEAT_ERROR)
         # The race of an overridden movement with its own end: one COMPLETED for both, or two.
-        if self.moving and self.random.random() < self.settings.double_completed_share:
+        if self._interruptible and self.random.random() < self.settings.double_completed_share:
             self._post_completed(now_s)
         self._turns.clear()
 
@@ -232,8 +238,8 @@ class Channel:
         self._turns.extend(turns)
         self._drive_s = drive_s
         self._frequency_hz = frequency_hz
-        moves = any(turn.status in _MOVEMENTS for turn in turns)
-        if moves and self.faults.find("overridden", self.device, self.index):
+        self._movement = any(turn.status in _MOVEMENTS for turn in turns)
+        if self._movement and self.faults.find("overridden", self.device, self.index):
             end_s = next((t.time_s for t in turns if t.completed or t.error), math.inf)
             self._take_over(min((now_s + end_s) / 2.0, now_s + 0.1))
         self.advance(now_s)
@@ -250,9 +256,9 @@ class Channel:
         """Stop; the step in hand is finished."""
         if self.status == SA_STOPPED_STATUS:
             return
-        was_moving = self.moving
+        interrupted = self._interruptible
         end_s = self._halt(now_s)
-        if was_moving:
+        if interrupted:
             self._post_completed(end_s)
 
     def _halt(self, now_s: float) -> float:

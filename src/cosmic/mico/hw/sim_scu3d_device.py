@@ -6,7 +6,9 @@ from threading import Condition, Lock
 from cosmic.frame.clock import Clock
 from cosmic.mico.hw.scu3d_ctypes import (
     SA_COMMAND_OVERRIDDEN_ERROR,
+    SA_ERROR_PACKET_TYPE,
     SA_HV_RANGE_ERROR,
+    SA_OTHER_ERROR,
     SA_TEMP_OVERHEAT_ERROR,
 )
 from cosmic.mico.hw.sim_scu3d_channel import Channel
@@ -34,14 +36,19 @@ class Device:
         What it drives.
     lock : Lock
         The library's; never held while anything waits.
+    newest_error : int
+        The last status code that this version of the library knows a name for.
     """
 
-    def __init__(self, number: int, scene: Scene, faults: Faults, lock: Lock) -> None:
+    def __init__(
+        self, number: int, scene: Scene, faults: Faults, lock: Lock, *, newest_error: int
+    ) -> None:
         settings = scene.settings.controller
         self.number = number
         self.serial = settings.first_serial + number
         self.settings = settings
         self.faults = faults
+        self.newest_error = newest_error
         self.changed = Condition(lock)
         self.queue = PacketQueue(f"simulated SCU {self.serial}", settings.queue_capacity)
         self.asynchronous = False
@@ -75,10 +82,16 @@ class Device:
         """Whether the cable is out."""
         return self.faults.find("unplugged", self.number) is not None
 
+    def told(self, code: int) -> int:
+        """Return a status code as this version of the library tells it."""
+        return code if code <= self.newest_error else SA_OTHER_ERROR
+
     def post(self, packet: Packet, time_s: float) -> None:
         """Send a packet at `time_s`; a synchronous client has nowhere to read it."""
         if not self.asynchronous:
             return
+        if packet[0] == SA_ERROR_PACKET_TYPE:
+            packet = (packet[0], packet[1], self.told(packet[2]), 0, 0)
         settings = self.settings
         latency_s = self.random.uniform(
             settings.packet_latency_low_s, settings.packet_latency_high_s

@@ -95,7 +95,7 @@ class Faults:
         Raises
         ------
         ValueError
-            No such fault, a device number without meaning, or a delay where none belongs.
+            No such fault, or a delay where none belongs.
         """
         _check_name(name)
         if delay_s is not None and name not in _WITH_DELAY:
