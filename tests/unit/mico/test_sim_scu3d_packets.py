@@ -137,6 +137,17 @@ def test_a_waiting_listener_wakes_for_a_completion_nobody_asked_for() -> None:
     assert 0.08 < WALL.now_s() - start_s < 3.0, "5 s of the stage in 0.1 s of the wall"
 
 
+def test_a_listener_that_waits_already_wakes_when_a_new_movement_completes() -> None:
+    client = Client(load_simulated_library(clock=RatedClock(50.0)))
+    client.ok("SetReportOnComplete_A", 0, 0, 1)
+    got: list[Packet] = []
+    thread = started(lambda: got.append(client.receive(0, 20_000)))
+    thread.join(0.05)
+    client.ok("MoveStep_A", 0, 0, 500, 1000, 1000)
+    thread.join(5.0)
+    assert [packet.type for packet in got] == [COMPLETED]
+
+
 def test_the_receive_timeout_counts_on_the_wall() -> None:
     client = Client(load_simulated_library(clock=RatedClock(1000.0)))
     start_s = WALL.now_s()
