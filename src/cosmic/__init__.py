@@ -4,6 +4,7 @@
 loaded when first used, so that ``import cosmic`` opens nothing and stays quick.
 """
 
+import logging
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
     from cosmic.frame.verdict import MoveVerdict, Reason
 
 __version__ = "0.1.0"
+
+# A script decides itself whether it wants to see the log.
+logging.getLogger(__name__).addHandler(logging.NullHandler())
 
 _HOMES = {
     "cosmic.app.rig": ("Rig", "connect"),

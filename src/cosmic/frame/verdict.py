@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NoReturn
 
 from typing_extensions import override
 
@@ -28,7 +29,8 @@ class MoveVerdict:
     Attributes
     ----------
     allowed : bool
-        True when the movement may be made. ``bool(verdict)`` says the same.
+        True when the movement may be made. A verdict itself is neither true nor false, so that
+        ``if verdict:`` and ``verdict or other`` cannot be mistaken for it.
     reason : Reason
         ALLOWED, or why not.
     axis : str
@@ -60,8 +62,8 @@ class MoveVerdict:
     clearance_um: float | None = None
     text: str = ""
 
-    def __bool__(self) -> bool:
-        return self.allowed
+    def __bool__(self) -> NoReturn:
+        raise TypeError("ask verdict.allowed: a verdict is neither true nor false")
 
     @override
     def __str__(self) -> str:

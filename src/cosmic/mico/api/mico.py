@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Iterator, Mapping
 
+from PySide6.QtCore import Qt
+
 from cosmic.frame.errors import MoveRefused, NotAvailable
 from cosmic.frame.task import Progress, Task
 from cosmic.frame.verdict import MoveVerdict
@@ -32,7 +34,8 @@ class Mico:
         self._commanders: dict[int, DeviceCommander] = {}
         self._axes: dict[str, Axis] = {}
         self._connect()
-        application.manager.changed.connect(self._connect)
+        # Direct, because a script has no event loop that a queued call could arrive in.
+        application.manager.changed.connect(self._connect, Qt.ConnectionType.DirectConnection)
 
     def _connect(self) -> None:
         """Join the commanders to the devices there are now."""

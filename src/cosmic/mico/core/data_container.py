@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Callable, Mapping
 from threading import Condition
+from typing import Final
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceFault
@@ -30,7 +31,8 @@ logger = logging.getLogger(__name__)
 
 Observer = Callable[[Event, PositionerState | None], None]
 
-_LOST_POSITION = (DeviceFault.NO_SENSOR,)
+NO_DEVICE: Final = "no device"
+_LOST_POSITION: Final = (DeviceFault.NO_SENSOR,)
 
 
 class DeviceDataContainer:
@@ -102,8 +104,11 @@ class DeviceDataContainer:
         elif kind is not wanted:
             seen = kind.value if kind else reason or "nothing"
             text = f"configured as {wanted}, but the controller finds {seen}"
+            if reason == NO_DEVICE:
+                text = f"device {self.device} was not found"
             positioner.update(present=False, error=text)
-            logger.error("%s: %s", settings.name, text)
+            log = logger.debug if reason == NO_DEVICE else logger.error
+            log("%s: %s", settings.name, text)
         self._positioners[channel] = positioner
 
     def _unconfigured(self, channel: int, kind: PositionerKind | None) -> PositionerSettings | None:

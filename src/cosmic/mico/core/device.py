@@ -54,6 +54,8 @@ from cosmic.mico.hw.interface import (
 logger = logging.getLogger(__name__)
 
 CHANNELS: Final = range(3)
+MOST_AT_ONCE: Final = 100
+"""How many messages are taken before positions are polled again."""
 
 
 _Message = Order | Event | Halt | StopAll | Lost | SetFrequency | Tell | Wake
@@ -171,7 +173,7 @@ class Device(WorkerThread):
         self._inbox.put(Tell(channel))
 
     def wait_until_introduced(self, timeout_s: float) -> bool:
-        """Wait until every channel has told its type; False after `timeout_s` of wall time."""
+        """Wait until types and positions are known; False after `timeout_s` of wall time."""
         return self._introduced.wait(timeout_s)
 
     @override
@@ -193,13 +195,14 @@ class Device(WorkerThread):
 
     def _take_waiting(self) -> None:
         """Wait for a message, then take all there are, so that none waits behind a poll."""
-        try:
-            message = self._inbox.get(timeout=self._pause_s())
-            for _ in range(100):
-                self._guarded(partial(self._take, message))
-                message = self._inbox.get_nowait()
-        except Empty:
-            return
+        timeout_s = self._pause_s()
+        for _ in range(MOST_AT_ONCE):
+            try:
+                message = self._inbox.get(timeout=timeout_s)
+            except Empty:
+                return
+            self._guarded(partial(self._take, message))
+            timeout_s = 0.0
 
     def _pause_s(self) -> float:
         moving = any(pilot.flight is not None for pilot in self._pilots.values())
@@ -250,6 +253,7 @@ class Device(WorkerThread):
             pilot.launch(order)
 
     def _turn_away(self, order: Order, state: PositionerState | None) -> None:
+        state = state or self.container.state(order.channel)
         name = state.name if state else f"device {self.index} channel {order.channel}"
         why = state.error if state and state.error else "it is not connected"
         verdict = refuse(Reason.DEVICE, f"{name}: {why}; check it, then rescan", axis=name)
@@ -285,6 +289,8 @@ class Device(WorkerThread):
             return
         pilot.take(event)
         self._emit_state(channel)
+        if not self._introduced.is_set():
+            self._note_if_introduced()
 
     def _on_introduction(self, event: Event, channel: int) -> None:
         if isinstance(event, SensorPresentRead) and event.present:
@@ -309,7 +315,8 @@ class Device(WorkerThread):
         pilot.ask_position()
 
     def _note_if_introduced(self) -> None:
-        if self.container.clear:
+        located = all(pilot.located for pilot in self._pilots.values())
+        if self.container.clear and located:
             self._introduced.set()
 
     # Trouble and the end

@@ -18,7 +18,7 @@ from cosmic.frame.errors import (
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision import CollisionChecker, NoCollisionModel
-from cosmic.mico.core.data_container import DeviceDataContainer
+from cosmic.mico.core.data_container import NO_DEVICE, DeviceDataContainer
 from cosmic.mico.core.device import CHANNELS, Device
 from cosmic.mico.core.device_commander import CommanderType, DeviceCommander
 from cosmic.mico.core.device_listener import DeviceListener
@@ -187,7 +187,7 @@ class DeviceManager(QObject):
             container = DeviceDataContainer(index, here, hold_s)
             if index not in present:
                 for channel in here:
-                    container.settle(channel, None, "no device")
+                    container.settle(channel, None, NO_DEVICE)
                 if present or self._mode is not Mode.CLOSED:
                     names = ", ".join(each.name for each in here.values())
                     missing.append(f"device {index} was not found ({names})")

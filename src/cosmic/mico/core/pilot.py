@@ -53,6 +53,11 @@ class ChannelPilot:
         """Name of the axis."""
         return self._positioner.state.name
 
+    @property
+    def located(self) -> bool:
+        """True once the position was read, or where there is no sensor to read it."""
+        return not self._positioner.has_sensor or self._positioner.state.position is not None
+
     # Starting
 
     def launch(self, order: Order) -> None:

@@ -142,7 +142,7 @@ class PositionerBase:
         """
         if not isinstance(motion, Step):
             raise DeviceError(
-                f"{self.state.name}: a {self.kind} axis cannot {type(motion).__name__}",
+                f"{self.state.name}: {type(motion).__name__} does not fit; the axis is {self.kind}",
                 fault=DeviceFault.WRONG_KIND,
             )
         controller.step(

@@ -1,6 +1,7 @@
 """The gate's checks of a single axis, as pure functions in the order they are made."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -48,15 +49,17 @@ def check_axis(
     rules: Limits,
 ) -> MoveVerdict | None:
     """Return why this axis must not make `motion`, or None."""
-    return (
-        _not_finite(motion, state)
-        or _wrong_kind(motion, state)
-        or _step_range(motion, state)
-        or _device(state)
-        or _position_unknown(state, consent=consent)
-        or _stale(state, age_s, rules)
-        or _limit(motion, state, planned_target(motion, state, running_target), rules)
+    checks: tuple[Callable[[], MoveVerdict | None], ...] = (
+        lambda: _not_finite(motion, state),
+        lambda: _wrong_kind(motion, state),
+        lambda: _step_range(motion, state),
+        lambda: _device(state),
+        lambda: _position_unknown(state, consent=consent),
+        lambda: _stale(state, age_s, rules),
+        lambda: _limit(motion, state, planned_target(motion, state, running_target), rules),
     )
+    refusals = (check() for check in checks)
+    return next((refusal for refusal in refusals if refusal is not None), None)
 
 
 def planned_target(
@@ -123,7 +126,7 @@ def _wrong_kind(motion: Motion, state: PositionerState) -> MoveVerdict | None:
     asked = f"a movement in {unit}" if unit else type(motion).__name__
     return refuse(
         Reason.WRONG_KIND,
-        f"{state.name}: {asked} does not fit a {state.kind} axis; {cls.advice}",
+        f"{state.name}: {asked} does not fit: the axis is {state.kind}; {cls.advice}",
         axis=state.name,
         unit=state.unit,
     )

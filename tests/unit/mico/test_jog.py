@@ -1,0 +1,94 @@
+from itertools import pairwise
+
+import pytest
+
+import cosmic
+from cosmic.frame.clock import WALL
+from cosmic.mico.hw.interface import Channel
+from unit.mico.rigs import mico, wait_until
+
+X = Channel(0, 0)
+
+
+def keep_alive(jog, duration_s):
+    end = WALL.now_s() + duration_s
+    while WALL.now_s() < end and not jog.done:
+        jog.renew()
+        WALL.sleep(0.01)
+
+
+def test_a_jog_is_made_of_packets_of_at_most_a_tenth_of_a_second():
+    with mico() as (rig, controller):
+        with rig["d0.c0"].jog(1, speed=1000.0) as jog:
+            keep_alive(jog, 0.4)
+        with pytest.raises(cosmic.MoveCancelled):
+            jog.movement.wait(2)
+        targets = [0.0, *(call[2] for call in controller.of("move_to"))]
+        ways = [after - before for before, after in pairwise(targets)]
+        assert len(ways) > 4
+        assert max(ways) <= 100.0 + 1e-6
+        assert min(ways) >= 0.0
+        assert 250.0 < targets[-1] < 700.0
+        assert ("stop", X) in controller.calls
+
+
+def test_a_jog_that_nobody_renews_stops_by_itself():
+    with mico() as (rig, controller):
+        jog = rig["d0.c0"].jog(-1, speed=1000.0)
+        began = WALL.now_s()
+        jog.movement.wait(3)
+        assert 0.2 < WALL.now_s() - began < 1.0
+        assert ("stop", X) in controller.calls
+        assert -500.0 < rig["d0.c0"].position_um < -100.0
+
+
+def test_letting_go_stops_at_once():
+    with mico() as (rig, controller):
+        jog = rig["d0.c0"].jog(1)
+        wait_until(lambda: bool(controller.of("move_to")))
+        jog.end()
+        assert ("stop", X) in controller.calls
+        with pytest.raises(cosmic.MoveCancelled):
+            jog.movement.wait(2)
+
+
+def test_a_jog_ends_at_the_soft_limit_and_not_beyond():
+    with mico() as (rig, controller):
+        rig["d0.c0"].move_to(4950.0)
+        jog = rig["d0.c0"].jog(1, speed=1000.0)
+        keep_alive(jog, 1.0)
+        assert jog.movement.wait(2) == 5000.0
+        assert max(call[2] for call in controller.of("move_to")) == 5000.0
+        with pytest.raises(cosmic.LimitError):
+            rig["d0.c0"].jog(1, speed=1000.0).movement.wait(2)
+
+
+def test_a_stop_ends_a_jog_and_none_begins_while_it_is_latched():
+    with mico() as (rig, controller):
+        jog = rig["d0.c0"].jog(1)
+        wait_until(lambda: bool(controller.of("move_to")))
+        rig.application.manager.stop("test")
+        with pytest.raises(cosmic.StoppedError):
+            jog.movement.wait(2)
+        sent = len(controller.of("move_to"))
+        jog.renew()
+        with pytest.raises(cosmic.StoppedError):
+            rig["d0.c0"].jog(1).movement.wait(2)
+        assert len(controller.of("move_to")) == sent
+
+
+def test_an_axis_without_sensor_jogs_by_short_bursts_of_steps():
+    with mico() as (rig, controller):
+        with rig["d0.c2"].jog(-1, speed=300) as jog:
+            keep_alive(jog, 0.3)
+        jog.movement.exception(2)
+        bursts = controller.of("step")
+        assert len(bursts) > 3
+        assert all(call[2] == -30 and call[4] == 300 for call in bursts)
+
+
+@pytest.mark.parametrize(("direction", "speed"), [(0, 1.0), (2, 1.0), (1, 0.0), (1, float("nan"))])
+def test_a_senseless_jog_is_refused(direction, speed):
+    with mico() as (rig, controller), pytest.raises(cosmic.MoveRefused):
+        rig["d0.c0"].jog(direction, speed)
+    assert not controller.of("move_to")

@@ -1,0 +1,126 @@
+import threading
+
+import pytest
+
+import cosmic
+from cosmic.frame.clock import WALL
+from cosmic.mico.hw.interface import Channel
+from unit.mico.rigs import mico, wait_until
+
+X = Channel(0, 0)
+
+
+def stops(controller):
+    return {call[1] for call in controller.of("stop")}
+
+
+def test_stop_reaches_every_channel_and_stays():
+    with mico(("LLN", "RLx"), instant=False) as (rig, controller):
+        movement = rig["d0.c0"].move_to(100.0, wait=False)
+        wait_until(lambda: bool(controller.of("move_to")))
+        manager = rig.application.manager
+        manager.stop("test")
+        assert stops(controller) == {axis.details.address for axis in rig}
+        with pytest.raises(cosmic.StoppedError):
+            movement.wait(2)
+        with pytest.raises(cosmic.StoppedError, match="test") as refused:
+            rig["d0.c1"].move_to(1.0)
+        assert refused.value.verdict.reason == "STOPPED"
+        with pytest.raises(cosmic.StoppedError):
+            rig.move({"d0.c1": 1.0})
+        manager.reset_stop()
+        controller.instant = True
+        assert rig["d0.c1"].move_to(1.0) == 1.0
+
+
+def test_the_first_reason_stays_until_the_reset():
+    with mico() as (rig, _):
+        manager = rig.application.manager
+        manager.stop("force too high")
+        manager.stop("again")
+        assert manager.latch.state.reason == "force too high"
+
+
+def test_stop_does_not_wait_for_a_device_thread_stuck_in_the_library_and_is_repeated():
+    with mico(instant=False) as (rig, controller):
+        controller.block.clear()
+        movement = rig["d0.c0"].move_to(100.0, wait=False)
+        wait_until(lambda: bool(controller.of("move_to")))
+        queued = rig["d0.c1"].move_to(100.0, wait=False)
+        before = WALL.now_s()
+        rig.application.manager.stop("test")
+        assert WALL.now_s() - before < 0.5
+        assert X in stops(controller)
+        controller.calls.clear()
+        controller.block.set()
+        with pytest.raises(cosmic.StoppedError):
+            movement.wait(2)
+        with pytest.raises(cosmic.StoppedError):
+            queued.wait(2)
+        assert X in stops(controller), "the stop must be repeated after the call in flight"
+        assert not controller.of("move_to")
+
+
+def test_one_channel_that_cannot_be_stopped_does_not_keep_the_others_from_it():
+    with mico(("LLN", "LLN")) as (rig, controller):
+        from cosmic.frame.errors import DeviceError
+
+        real, failing = controller.stop, Channel(0, 0)
+
+        def stop(channel):
+            real(channel)
+            if channel == failing:
+                raise DeviceError("usb is gone")
+
+        controller.stop = stop
+        rig.application.manager.stop("test")
+        assert len(stops(controller)) == 6
+
+
+def test_a_stop_between_grant_and_start_still_counts():
+    with mico() as (rig, controller):
+        manager = rig.application.manager
+        orders = {}
+        real = manager.gate.decide
+
+        def decide(requests):
+            answer = real(requests)
+            manager.stop("in between")
+            manager.reset_stop()
+            return answer
+
+        manager.gate.decide = decide
+        with pytest.raises(cosmic.StoppedError):
+            rig.move({"d0.c0": 5.0})
+        assert not controller.of("move_to")
+        assert not orders
+
+
+def test_stop_from_many_threads_while_all_axes_are_commanded():
+    with mico(("LLL", "LLL")) as (rig, controller):
+        manager = rig.application.manager
+        go_on = threading.Event()
+        go_on.set()
+
+        def command(name):
+            while go_on.is_set():
+                try:
+                    rig[name].move_by(1.0)
+                    rig[name].move_by(-1.0)
+                except cosmic.CosmicError:
+                    pass
+
+        threads = [threading.Thread(target=command, args=(name,)) for name in rig.names]
+        for thread in threads:
+            thread.start()
+        for _ in range(20):
+            manager.stop("test")
+            settled = len(controller.of("move_to"))
+            WALL.sleep(0.01)
+            assert len(controller.of("move_to")) <= settled + len(rig.names)
+            manager.reset_stop()
+        manager.stop("end")
+        go_on.clear()
+        for thread in threads:
+            thread.join(5)
+        assert not any(thread.is_alive() for thread in threads)
