@@ -5,6 +5,8 @@ import logging
 from ctypes import byref, c_uint32
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from cosmic.frame.clock import ManualClock
 from cosmic.mico.hw.scu3d_ctypes import FUNCTIONS_V12, PROTOTYPES, SA_PACKET
@@ -238,6 +240,13 @@ def test_an_unknown_device_in_the_list_fails_the_initialisation() -> None:
     assert client.call("ReleaseDevices") == 2
 
 
+def test_a_failed_initialisation_leaves_the_library_released() -> None:
+    client = Client()
+    client.ok("AddDeviceToInitDevicesList", 4711)
+    assert client.call("InitDevices", ASYNC) == 19
+    assert client.call("GetStatus_A", 0, 0) == 2
+
+
 def test_no_device_plugged_in_answers_3() -> None:
     client = Client(mode=None)
     client.library.faults.inject("unplugged")
@@ -276,6 +285,36 @@ def test_sixteen_devices_work() -> None:
 def test_a_clock_that_does_not_run_is_refused(rate: float) -> None:
     with pytest.raises(ValueError):
         load_simulated_library(rate=rate)
+
+
+KNOWN_CODES = {*range(11), *range(12, 20), *range(128, 139)}
+_numbers = st.one_of(
+    st.integers(0, 3), st.integers(-(2**31), 2**32 - 1), st.sampled_from([150, 1000, 60_000])
+)
+
+
+@settings(max_examples=60)
+@given(
+    st.sampled_from([ASYNC, SYNC]),
+    st.lists(
+        st.tuples(st.sampled_from(sorted(PROTOTYPES)), st.lists(_numbers, min_size=5, max_size=5)),
+        max_size=25,
+    ),
+)
+def test_no_sequence_of_calls_is_answered_with_an_unknown_code_or_a_defect(
+    mode: int, calls: list[tuple[str, list[int]]]
+) -> None:
+    client = Client(mode=mode)
+    for name, numbers in calls:
+        room = (c_uint32 * 16)(*([16] * 16))
+        args: list[object] = []
+        for kind, number in zip(PROTOTYPES[name], numbers, strict=False):
+            pointer = ctypes.cast(room, kind) if kind in POINTERS else number
+            args.append(None if kind in POINTERS and number % 7 == 0 else pointer)
+        # A wait of weeks is a fair wish, but not in a test.
+        if "Packet" in name and len(args) > 1:
+            args[-2] = int(numbers[0]) % 100
+        assert client.call(name[3:], *args) in KNOWN_CODES, name
 
 
 def test_a_defect_inside_answers_255_and_is_logged(

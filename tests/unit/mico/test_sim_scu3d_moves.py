@@ -410,9 +410,63 @@ def test_types_with_a_mark_find_it_from_both_sides(safe_direction: int, start: i
     client.ok("CalibrateSensor_A", 0, 0)
     client.until(COMPLETED)
     client.ok("MoveToReference_A", 0, 0, 0, 0)
-    assert client.until(COMPLETED) == DONE
+    seen = []
+    while client.status() == REFERENCING:
+        seen.append(client.truth())
+        client.advance(0.01)
+    assert client.skipped[-1] == DONE
     assert known(client) == 1
     assert client.truth() == pytest.approx(0.0, abs=0.5)
+    if safe_direction:
+        assert (max(seen) == 6000.0) == (start > 0), "it turns round at the stop, if it must"
+    else:
+        assert (min(seen) == -6000.0) == (start < 0)
+
+
+def test_a_mark_that_cannot_be_reached_fails_the_reference() -> None:
+    client = in_the_middle()
+    client.ok("MovePositionAbsolute_A", 0, 0, -30_000, 0)
+    client.until(COMPLETED)
+    client.ok("SetSensorType_A", 0, 0, 21)
+    client.ok("CalibrateSensor_A", 0, 0)
+    client.until(COMPLETED)
+    client.library.scene.stages["0.0"].obstruct(-1000.0, 1)
+    client.ok("MoveToReference_A", 0, 0, 0, 0)
+    assert client.until(ERROR) == Packet(ERROR, 0, 137, 0, 0)
+    assert client.status() == STOPPED
+    assert known(client) == 0
+
+
+def test_another_type_has_to_be_calibrated_first() -> None:
+    client = in_the_middle()
+    client.ok("SetSensorType_A", 0, 0, 21)
+    assert client.ask("MoveToReference", 0, 0, 0, 0) == Packet(ERROR, 0, 137, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "args", "status"),
+    [
+        ("MoveStep", (10_000, 500, 1000), MOVING),
+        ("MovePositionAbsolute", (15_000, FOR_EVER), TARGETING),
+        ("MoveToEndStop", (1, FOR_EVER, 0), TARGETING),
+        ("MoveToReference", (FOR_EVER, 0), REFERENCING),
+        ("CalibrateSensor", (), CALIBRATING),
+    ],
+)
+def test_stop_ends_every_kind_of_movement_at_once(
+    name: str, args: tuple[int, ...], status: int
+) -> None:
+    client = in_the_middle()
+    client.ok(f"{name}_A", 0, 0, *args)
+    client.advance(0.02)
+    assert client.status() == status
+    client.ok("Stop_A", 0, 0)
+    assert client.until(COMPLETED) == DONE
+    assert client.status() == STOPPED
+    there = client.truth()
+    client.advance(10.0)
+    assert client.truth() == pytest.approx(there, abs=0.01)
+    assert client.drain(timeout_ms=10) == []
 
 
 def test_types_with_coded_marks_need_only_a_few_millimetres() -> None:
@@ -557,6 +611,13 @@ def test_release_and_init_keep_position_and_knowledge() -> None:
     assert (client.position(), known(client)) == (there, 1)
     client.ok("InitDevices", 1 | RESET)
     assert (client.position(), known(client)) == (0, 0)
+
+
+def test_each_session_starts_without_reports() -> None:
+    client = in_the_middle()
+    client.ok("InitDevices", 1)
+    client.ok("MoveStep_A", 0, 0, 10, 1000, 1000)
+    assert client.settle() == []
 
 
 def test_a_hardware_reset_stops_everything() -> None:
