@@ -50,16 +50,19 @@ class ScriptedController(Controller):
         self.block = threading.Event()
         self.block.set()
         self.muted = False
+        self.unplugged: set[int] = set()
+        self.opened: list[int] = []
 
     def of(self, name: str) -> list[tuple[object, ...]]:
         return [call for call in self.calls if call[0] == name]
 
     def find_devices(self) -> tuple[int, ...]:
-        return tuple(range(100, 100 + len(self.layout)))
+        return tuple(100 + i for i in range(len(self.layout)) if i not in self.unplugged)
 
     def open(self, serials: Sequence[int] = ()) -> tuple[DeviceIdentity, ...]:
-        self.queues = {index: queue.SimpleQueue() for index in range(len(self.layout))}
-        return tuple(DeviceIdentity(i, 100 + i, "1.0") for i in range(len(self.layout)))
+        self.opened = sorted(serials or self.find_devices())
+        self.queues = {index: queue.SimpleQueue() for index in range(len(self.opened))}
+        return tuple(DeviceIdentity(i, serial, "1.0") for i, serial in enumerate(self.opened))
 
     def close(self) -> None:
         self.calls.append(("close",))
@@ -78,7 +81,8 @@ class ScriptedController(Controller):
             self.queues[event.channel.device].put(event)
 
     def _kind(self, channel: Channel) -> str:
-        letter = f"{self.layout[channel.device]}xxx"[channel.channel]
+        letters = self.layout[self.opened[channel.device] - 100]
+        letter = f"{letters}xxx"[channel.channel]
         if letter == "x":
             raise DeviceError("no such channel", fault=DeviceFault.NO_CHANNEL)
         return letter

@@ -48,6 +48,30 @@ def test_a_missing_device_is_named_and_the_others_work():
         assert rig["d0.c0"].move_to(1.0) == 1.0
 
 
+def test_a_missing_device_never_shifts_the_others_onto_foreign_axes():
+    def unplug(controller):
+        controller.unplugged = {0}
+
+    found, configured = ("LLN", "LRN", "RLN"), ("LLN", "RLN", "LRN")
+    with mico(found, prepare=unplug, configured=configured, serials=(100, 102, 101)) as opened:
+        rig, controller = opened
+        assert rig.missing == ("device 0 was not found (d0.c0, d0.c1, d0.c2)",)
+        assert rig["d1.c1"].move_to(7.0) == 7.0
+        assert rig["d2.c0"].move_to(8.0) == 8.0
+        sent = {call[2]: controller.opened[call[1].device] for call in controller.of("move_to")}
+        assert sent == {7.0: 102, 8.0: 101}
+
+
+def test_none_of_the_configured_devices_opens_no_foreign_one():
+    def unplug(controller):
+        controller.unplugged = {0}
+
+    with mico(("L", "L"), prepare=unplug, configured=("L",), serials=(100,)) as (rig, controller):
+        assert "none of the configured devices" in rig.application.failure
+        assert "100" in rig.application.failure
+        assert controller.opened == []
+
+
 def test_a_rescan_adds_what_was_missing():
     with mico(("L",), configured=("L", "LN")) as (rig, controller):
         axis = rig["d1.c0"]

@@ -45,17 +45,24 @@ class DeviceDataContainer:
     Parameters
     ----------
     device : int
-        Index of the device.
+        Number of the device in the configuration.
     configured : mapping of PositionerSettings
         The positioners that the configuration expects here, by channel.
     hold_s : float
         How long closed-loop positions are held; inf for ever.
+    library_index : int
+        Index under which the library knows the device, which depends on what else is connected.
     """
 
     def __init__(
-        self, device: int, configured: Mapping[int, PositionerSettings], hold_s: float
+        self,
+        device: int,
+        configured: Mapping[int, PositionerSettings],
+        hold_s: float,
+        library_index: int,
     ) -> None:
         self.device = device
+        self.library_index = library_index
         self._configured = dict(configured)
         self._hold_s = hold_s
         self._changed = Condition()
@@ -98,7 +105,9 @@ class DeviceDataContainer:
         if settings is None:
             return
         wanted = settings.positioner_kind
-        positioner = POSITIONER_CLASSES[wanted](settings, found, self._hold_s)
+        positioner = POSITIONER_CLASSES[wanted](
+            settings, self.address(channel), found, self._hold_s
+        )
         if channel not in self._configured:
             positioner.update(present=False, error="not in the configuration: add it there")
         elif kind is not wanted:
@@ -189,8 +198,8 @@ class DeviceDataContainer:
         return None if positioner is None else _reflect(event, positioner)
 
     def address(self, channel: int) -> Channel:
-        """Return the full address of `channel`."""
-        return Channel(self.device, channel)
+        """Return the address of `channel` for calls to the controller."""
+        return Channel(self.library_index, channel)
 
 
 def _reflect(event: Event, positioner: PositionerBase) -> PositionerState:

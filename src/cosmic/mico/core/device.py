@@ -43,7 +43,6 @@ from cosmic.mico.core.pilot import ChannelPilot
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import (
-    Channel,
     Controller,
     Event,
     PositionerKind,
@@ -114,7 +113,7 @@ class Device(WorkerThread):
 
     @property
     def index(self) -> int:
-        """Index of the device."""
+        """Number of the device in the configuration."""
         return self.container.device
 
     # For any thread
@@ -150,7 +149,7 @@ class Device(WorkerThread):
         state = self.container.state(channel)
         name = state.name if state else f"device {self.index} channel {channel}"
         try:
-            self._controller.stop(Channel(self.index, channel))
+            self._controller.stop(self.container.address(channel))
         except DeviceError as exc:
             logger.warning("%s: %s", name, exc)
         self._inbox.put(Halt(channel, MoveCancelled(f"{name}: {why}")))
@@ -236,7 +235,7 @@ class Device(WorkerThread):
             case Lost():
                 self._on_lost(message.error)
             case SetFrequency():
-                channel = Channel(self.index, message.channel)
+                channel = self.container.address(message.channel)
                 self._controller.set_closed_loop_frequency(channel, message.frequency_hz)
             case Wake():
                 pass
@@ -271,7 +270,7 @@ class Device(WorkerThread):
         for channel in CHANNELS:
             self.container.expect(channel)
         for channel in CHANNELS:
-            address = Channel(self.index, channel)
+            address = self.container.address(channel)
             try:
                 self._controller.report_completion(address)
                 self._controller.ask_sensor_present(address)
@@ -341,7 +340,7 @@ class Device(WorkerThread):
         error = MoveCancelled(f"device {self.index} was closed")
         for channel, pilot in self._pilots.items():
             try:
-                self._controller.stop(Channel(self.index, channel))
+                self._controller.stop(self.container.address(channel))
             except DeviceError as exc:
                 logger.warning("%s: %s", pilot.name, exc)
             pilot.lose(error)

@@ -43,7 +43,7 @@ class DeviceListener(WorkerThread):
     def run_body(self) -> None:
         while not self.end_requested:
             try:
-                event = self._controller.receive(self._container.device, RECEIVE_S)
+                event = self._controller.receive(self._container.library_index, RECEIVE_S)
             except DeviceError as exc:
                 self._on_lost(exc)
                 return

@@ -1,7 +1,7 @@
 """`DeviceManager`: finds the devices, owns their threads, and stops them all (thesis 6.1)."""
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from enum import StrEnum
 from threading import RLock
 
@@ -12,6 +12,7 @@ from cosmic.frame.errors import (
     CosmicError,
     DeviceError,
     NotAvailable,
+    NotConnectedError,
     UnknownAxisError,
     refusal,
 )
@@ -92,7 +93,7 @@ class DeviceManager(QObject):
             rules=Limits(largest_step=steps, stale_s=settings.watch.stale_s),
             states=self.states,
         )
-        self._arrange(())
+        self._arrange({})
 
     # What there is
 
@@ -162,36 +163,62 @@ class DeviceManager(QObject):
         with self._busy:
             self._set_mode(Mode.INITIALISATION)
             try:
-                found = self.controller.find_devices()
-                wanted = self.settings.serials
-                present = tuple(serial for serial in wanted if serial in found)
-                identities = self.controller.open(present if wanted else ())
+                identities = self.controller.open(self._serials_to_open())
             except DeviceError:
                 self.controller.close()
                 self._set_mode(Mode.FAILED)
                 raise
-            self._arrange(self._in_configured_order(identities))
-            self._start(identities)
+            library_index = self._numbered(identities)
+            self._arrange(library_index)
+            self._start(library_index)
             self._set_mode(Mode.RUN_TIME)
 
-    def _in_configured_order(self, identities: Sequence[DeviceIdentity]) -> list[int]:
-        return [each.index for each in identities]
+    def _serials_to_open(self) -> tuple[int, ...]:
+        wanted = self.settings.serials
+        if not wanted:
+            return ()
+        found = self.controller.find_devices()
+        present = tuple(serial for serial in wanted if serial in found)
+        if not present:
+            raise NotConnectedError(
+                f"none of the configured devices is connected (serial numbers "
+                f"{_listed(wanted)}; found {_listed(found)}); check power and USB, or the "
+                f"serials in the platform file"
+            )
+        return present
 
-    def _arrange(self, present: Sequence[int]) -> None:
+    def _numbered(self, identities: Sequence[DeviceIdentity]) -> dict[int, int]:
+        """Return the library's index of each device by its number in the configuration.
+
+        The library numbers whatever is connected, so that one device missing would shift the
+        others onto foreign axes: only the serial numbers tell which is which.
+        """
+        serials = self.settings.serials
+        if serials:
+            return {serials.index(each.serial): each.index for each in identities}
+        if len(identities) > 1 and not self.controller.simulated:
+            logger.warning("no serials are configured: devices are numbered as the library does")
+        return {each.index: each.index for each in identities}
+
+    def _arrange(self, library_index: Mapping[int, int]) -> None:
         """Make containers and devices for what is present and for what is only configured."""
         configured = {each.device for each in self.settings.positioner}
         hold_s = self.settings.defaults.hold
         self._devices, self._addresses, missing = {}, {}, []
-        for index in sorted(configured | set(present)):
-            here = {each.channel: each for each in self.settings.positioner if each.device == index}
-            container = DeviceDataContainer(index, here, hold_s)
-            if index not in present:
+        for number in sorted(configured | set(library_index)):
+            here = {
+                each.channel: each for each in self.settings.positioner if each.device == number
+            }
+            present = number in library_index
+            at = library_index.get(number, number)
+            container = DeviceDataContainer(number, here, hold_s, library_index=at)
+            if not present:
                 for channel in here:
                     container.settle(channel, None, NO_DEVICE)
-                if present or self._mode is not Mode.CLOSED:
+                if self._mode is not Mode.CLOSED:
                     names = ", ".join(each.name for each in here.values())
-                    missing.append(f"device {index} was not found ({names})")
-            self._devices[index] = self._make_device(container)
+                    missing.append(f"device {number} was not found ({names})")
+            self._devices[number] = self._make_device(container)
             for positioner in here.values():
                 self._addresses[positioner.name] = positioner.address
         self._missing = tuple(missing)
@@ -208,28 +235,32 @@ class DeviceManager(QObject):
         device.lost.connect(self._on_device_lost, Qt.ConnectionType.DirectConnection)
         return device
 
-    def _start(self, identities: Sequence[DeviceIdentity]) -> None:
-        channels = len(identities) * len(CHANNELS)
+    def _start(self, numbers: Collection[int]) -> None:
+        channels = len(numbers) * len(CHANNELS)
         watch = self.settings.watch
-        for identity in identities:
-            device = self._devices[identity.index]
+        for number in numbers:
+            device = self._devices[number]
             device.set_poll_period(max(1 / watch.poll_hz, channels / watch.poll_total_hz))
             listener = DeviceListener(
                 self.controller, device.container, self._policy, on_lost=device.lose
             )
-            self._listeners[identity.index] = listener
+            self._listeners[number] = listener
             listener.start()
             device.begin()
-        for identity in identities:
-            self._await_introduction(self._devices[identity.index])
+        for number in numbers:
+            self._await_introduction(self._devices[number])
+        for name in self._addresses:
+            self.gate.release(name)  # positions have just been read, and nothing moves
 
     def _await_introduction(self, device: Device) -> None:
         if not device.wait_until_introduced(self.settings.watch.answer_s):
             reason = f"device {device.index} did not tell what is connected to it"
             logger.error("%s", reason)
             self._missing = (*self._missing, reason)
-        for state in device.container.states():
-            self._addresses.setdefault(state.name, state.address)
+        for channel in device.container.channels():
+            state = device.container.state(channel)
+            if state is not None:
+                self._addresses.setdefault(state.name, Channel(device.index, channel))
 
     def shut_down(self) -> None:
         """Stop everything, release the hold, end the threads, close the library; any mode."""
@@ -363,7 +394,7 @@ class DeviceManager(QObject):
     def _stop_channels(self, device: Device) -> None:
         for channel in device.container.channels():
             try:
-                self.controller.stop(Channel(device.index, channel))
+                self.controller.stop(device.container.address(channel))
             except DeviceError as exc:
                 logger.error("device %d channel %d: stop failed: %s", device.index, channel, exc)
 
@@ -379,6 +410,10 @@ class DeviceManager(QObject):
         self._policy.report(_LostError(lost.reason), f"device {lost.index}")
         self.device_lost.emit(lost)
         self.changed.emit()
+
+
+def _listed(serials: Collection[int]) -> str:
+    return ", ".join(map(str, serials)) or "none"
 
 
 class _LostError(CosmicError):

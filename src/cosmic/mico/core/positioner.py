@@ -45,6 +45,8 @@ class PositionerState:
 
     Attributes
     ----------
+    address : Channel
+        Where the controller library finds it.
     position : float or None
         In gate coordinates and `unit`; None before the first reading. Never NaN.
     read_wall_s : float
@@ -113,6 +115,7 @@ class PositionerBase:
     def __init__(
         self,
         settings: PositionerSettings,
+        address: Channel,
         positioner: PositionerType | None = None,
         hold_s: float = math.inf,
     ) -> None:
@@ -120,7 +123,7 @@ class PositionerBase:
         self.hold_s = hold_s
         self.state = PositionerState(
             name=settings.name,
-            address=settings.address,
+            address=address,
             kind=self.kind,
             unit=settings.unit,
             limits=settings.limits,
@@ -162,10 +165,11 @@ class PositionerOL(PositionerBase):
     def __init__(
         self,
         settings: PositionerSettings,
+        address: Channel,
         positioner: PositionerType | None = None,
         hold_s: float = math.inf,
     ) -> None:
-        super().__init__(settings, positioner, hold_s)
+        super().__init__(settings, address, positioner, hold_s)
         self.update(position=settings.start_um or 0.0, confidence=Confidence.ESTIMATED)
 
 
