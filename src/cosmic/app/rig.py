@@ -10,7 +10,7 @@ from typing import NoReturn, Self
 from typing_extensions import override
 
 from cosmic.app.platform import KNOWN_APPLICATIONS, Platform, build_platform
-from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.frame.errors import ConfigError, NotAvailable, NotConnectedError
 from cosmic.mico.api.mico import Mico
 
 logger = logging.getLogger(__name__)
@@ -139,4 +139,7 @@ def connect(
     rig = Rig(platform)
     atexit.register(rig.close)
     platform.initialize()
+    if platform.mico is not None and platform.mico.failure:
+        rig.close()
+        raise NotConnectedError(platform.mico.failure)
     return rig
