@@ -1,0 +1,136 @@
+"""From a click to a movement, and from its end back to the field it came from."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QWidget
+
+from cosmic.frame.errors import CosmicError, MoveCancelled, MoveRefused
+from cosmic.frame.verdict import Reason
+from cosmic.mico.api.stepwise import StepwiseMove
+from cosmic.mico.core.movement import Movement
+from cosmic.mico.gui.movement_relay import MovementRelay
+
+Make = Callable[[bool], Movement | StepwiseMove]
+"""Makes a movement; the argument is the operator's consent to an unknown position."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConsentRequest:
+    """A movement that waits for a decision, because the position of its axis is unknown.
+
+    Attributes
+    ----------
+    what : str
+        What was asked for, such as "move to a position".
+    reason : str
+        Why it was refused.
+    go : callable
+        Makes the movement after all.
+    """
+
+    axis: str
+    what: str
+    reason: str
+    go: Callable[[], None]
+
+
+@dataclass(frozen=True, slots=True)
+class _Command:
+    what: str
+    make: Make
+    field: QWidget | None
+    movement: Movement
+    consented: bool
+
+
+class AxisCommands(QObject):
+    """Issues the commands of one card and tells how the newest of them ended; GUI thread.
+
+    Signals
+    -------
+    begun()
+        A command was given.
+    refused(QWidget or None, str)
+        It was refused, with the field it came from and the reason.
+    ended(str)
+        It ended; the text says why, and is empty at its target.
+    consent_wanted(ConsentRequest)
+        It was refused for an unknown position only.
+    """
+
+    begun = Signal()
+    refused = Signal(object, str)
+    ended = Signal(str)
+    consent_wanted = Signal(object)
+
+    def __init__(self, axis_name: str, parent: QObject) -> None:
+        super().__init__(parent)
+        self._axis_name = axis_name
+        self._relay = MovementRelay()
+        self._relay.ended.connect(self._on_ended)
+        self._newest: _Command | None = None
+        self._series: StepwiseMove | None = None
+
+    @property
+    def series(self) -> StepwiseMove | None:
+        """The series of parts under way."""
+        series = self._series
+        return series if series is not None and not series.done else None
+
+    def issue(self, what: str, make: Make, field: QWidget | None = None) -> None:
+        """Give a command; how it goes is told by the signals."""
+        self._issue(what, make, field, consent=False)
+
+    def _issue(self, what: str, make: Make, field: QWidget | None, *, consent: bool) -> None:
+        self.abandon_series()
+        self._newest = None
+        try:
+            made = make(consent)
+        except CosmicError as exc:
+            self._fail(_Command(what, make, field, Movement(), consent), exc)
+            return
+        if isinstance(made, StepwiseMove):
+            self._series = made
+        movement = made.movement if isinstance(made, StepwiseMove) else made
+        self._newest = _Command(what, make, field, movement, consent)
+        self.begun.emit()
+        self._relay.follow(movement)
+
+    def abandon_series(self) -> None:
+        """Let a series begin no further part: something newer is about to come."""
+        if self._series is not None:
+            self._series.abandon()
+            self._series = None
+
+    def follow(self, what: str, movement: Movement) -> None:
+        """Tell how a movement ends that was begun elsewhere, such as a jog."""
+        self._newest = _Command(what, lambda _consent: movement, None, movement, consented=True)
+        self.begun.emit()
+        self._relay.follow(movement)
+
+    def _on_ended(self, movement: Movement) -> None:
+        command = self._newest
+        if command is None or command.movement is not movement:
+            return
+        error = movement.exception()
+        if isinstance(error, CosmicError):
+            self._fail(command, error)
+        else:
+            self.ended.emit("" if error is None else str(error))
+
+    def _fail(self, command: _Command, error: CosmicError) -> None:
+        if not isinstance(error, MoveRefused):
+            self.ended.emit("" if isinstance(error, MoveCancelled) else str(error))
+            return
+        unknown = error.verdict.reason is Reason.POSITION_UNKNOWN
+        if not unknown or command.consented:
+            self.refused.emit(command.field, str(error))
+            return
+        self.consent_wanted.emit(
+            ConsentRequest(self._axis_name, command.what, str(error), lambda: self._agree(command))
+        )
+
+    def _agree(self, command: _Command) -> None:
+        self._issue(command.what, command.make, command.field, consent=True)

@@ -1,0 +1,132 @@
+"""What every card of a positioner is drawn on, and the small parts it is put together from."""
+
+from typing import Final
+
+from PySide6.QtCore import QEvent, QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
+from typing_extensions import override
+
+from cosmic.frame.gui.build import named
+from cosmic.frame.gui.chip import Chip, Tone
+from cosmic.frame.gui.palette import blend
+from cosmic.frame.gui.theme import (
+    LARGE_PX,
+    STEP_PX,
+    State,
+    current_palette,
+    number_font,
+    state_look,
+)
+from cosmic.frame.units import DISPLAY, format_quantity
+from cosmic.mico.core.positioner import Confidence
+
+_EDGE_PX: Final = 3
+_CALM: Final = (State.OK,)
+
+CONFIDENCE: Final[dict[Confidence, tuple[str, Tone, str]]] = {
+    Confidence.KNOWN: ("✓ known", "quiet", "The position was referenced: it is where it says"),
+    Confidence.ESTIMATED: ("≈ estimated", "quiet", "No sensor: the position is counted from steps"),
+    Confidence.UNKNOWN: (
+        "? unknown",
+        "warning",
+        "The position has no reference yet: initialise, or reference this axis",
+    ),
+}
+
+
+class Card(QWidget):
+    """A rounded ground whose left edge takes the colour of the state."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._edge = State.OK
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+
+    def set_edge(self, state: State) -> None:
+        """Colour the edge."""
+        if state is not self._edge:
+            self._edge = state
+            self.update()
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        palette = current_palette()
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        box = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
+        painter.setPen(QColor(palette.border))
+        painter.setBrush(QColor(blend(palette.raised, palette.panel, 0.45)))
+        painter.drawRoundedRect(box, 5.0, 5.0)
+        if self._edge in _CALM:
+            return
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(state_look(self._edge, palette).colour))
+        painter.drawRoundedRect(QRectF(0.0, 4.0, _EDGE_PX, self.height() - 8.0), 1.5, 1.5)
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self.update()
+
+
+class PositionDisplay(QWidget):
+    """A position in figures of one width, its unit dimmed beside it; it never changes its size.
+
+    Parameters
+    ----------
+    unit : str
+        "um" or "deg".
+    name : str
+        Object name of the label with the figures.
+    """
+
+    def __init__(self, unit: str, name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._unit = unit
+        self._figures = named(QLabel("–"), name)
+        self._figures.setFont(number_font(LARGE_PX, bold=True))
+        self._figures.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        widest = format_quantity(-99999.9 if unit == "um" else -359.9999, unit).split(" ")[0]
+        self._figures.setFixedWidth(self._figures.fontMetrics().horizontalAdvance(widest) + 2)
+        sign = QLabel(DISPLAY[unit])
+        sign.setProperty("role", "dim")
+        sign.setFixedWidth(sign.fontMetrics().horizontalAdvance("µm") + 2)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(STEP_PX // 2)
+        row.addWidget(self._figures)
+        row.addWidget(sign)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Preferred)
+
+    @property
+    def text(self) -> str:
+        """The figures shown."""
+        return self._figures.text()
+
+    def show_position(self, position: float | None) -> None:
+        """Show `position`, from the user's zero; a dash while there is none."""
+        text = "–" if position is None else format_quantity(position, self._unit).split(" ")[0]
+        if text != self._figures.text():
+            self._figures.setText(text)
+
+
+class ConfidenceMark(Chip):
+    """Says by shape and word how well a position is known; as wide as its longest word."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("≈ estimated", "warning", parent=parent)
+        self.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.setFixedWidth(self.fontMetrics().horizontalAdvance("≈ estimated") + 3 * STEP_PX)
+        self.set_confidence(Confidence.UNKNOWN)
+
+    def set_confidence(self, confidence: Confidence) -> None:
+        """Show `confidence`."""
+        text, tone, tip = CONFIDENCE[confidence]
+        if text == self.text():
+            return
+        self.setText(text)
+        self.setToolTip(tip)
+        self.setAccessibleName(f"position {confidence}")
+        self.set_tone(tone)

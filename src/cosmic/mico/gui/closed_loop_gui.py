@@ -1,0 +1,206 @@
+"""`ClosedLoopGUI`: the card of a positioner with sensor (fields MiCoCL.1 to MiCoCL.13)."""
+
+from collections.abc import Sequence
+from typing import ClassVar, Final
+
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QWidget
+from typing_extensions import override
+
+from cosmic.frame.errors import CosmicError, MoveRefused
+from cosmic.frame.gui.build import named, push_button, tipped
+from cosmic.frame.gui.quantity_field import QuantityField
+from cosmic.frame.gui.theme import STEP_PX
+from cosmic.frame.units import format_quantity
+from cosmic.mico.api.stepwise import issued
+from cosmic.mico.core.orders import FREQUENCY_HZ
+from cosmic.mico.core.positioner import PositionerState
+from cosmic.mico.gui.axis_menu import AxisMenu
+from cosmic.mico.gui.move_row import MoveFields
+from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
+from cosmic.mico.hw.interface import Direction
+
+NO_MODEL_TIP: Final = (
+    "No collision model: movements within the limits are made without a check for collisions"
+)
+NO_LINK_TIP: Final = "Not available: linking axes comes with synchronous movement"
+
+
+class ClosedLoopGUI(PositionerBaseGUI):
+    """Adds moves to and by a position, in one or in parts, and what belongs to the sensor."""
+
+    state_name: ClassVar[str] = "MiCoCL_1"
+    title_name: ClassVar[str] = "MiCoCL_4"
+    position_name: ClassVar[str] = "MiCoCL_5"
+    forward_name: ClassVar[str] = "MiCoCL_6"
+    backward_name: ClassVar[str] = "MiCoCL_7"
+
+    # Putting it together
+
+    @override
+    def _make_common(self) -> None:
+        super()._make_common()
+        self._move = MoveFields(self.axis, self._defaults)
+        self._move.go_to.clicked.connect(self._on_go_to)
+        self._make_indicators()
+        self._make_menu()
+        self._make_speed()
+
+    def _make_indicators(self) -> None:
+        self._collision = tipped(named(QLabel("▲"), "MiCoCL_2"), NO_MODEL_TIP)
+        self._collision.setAccessibleName("no collision model")
+        self._rules = _switch("CD off", "MiCoCL_13", f"Not available: {NO_MODEL_TIP.lower()}")
+        self._linked = tipped(named(QLabel("○"), "MiCoCL_3"), "Moves on its own, linked to none")
+        self._linked.setAccessibleName("not linked")
+        self._link = _switch("Link off", "MiCoCL_12", NO_LINK_TIP)
+
+    def _make_menu(self) -> None:
+        name, settings = self.settings.name, self.settings
+        self._menu = AxisMenu(name, settings.forward_text, settings.backward_text, self)
+        self._menu.zero_set.connect(self._on_zero_set)
+        self._menu.zero_cleared.connect(self._on_zero_cleared)
+        self._menu.reference_requested.connect(self._on_reference)
+        self._menu.calibrate_requested.connect(self._on_calibrate)
+        self._menu.end_stop_requested.connect(self._on_end_stop)
+        self._menu.more_toggled.connect(self._on_more)
+
+    def _make_speed(self) -> None:
+        low, high = FREQUENCY_HZ
+        usual = float(self._defaults.closed_loop_frequency_hz)
+        self._speed = named(
+            QuantityField(
+                "Hz", low=low, high=high, value=usual, integers=True, name="Speed limit of moves"
+            ),
+            "speed",
+        )
+        self._speed.setMaximumWidth(14 * STEP_PX)
+        self._speed.value_committed.connect(self._on_speed)
+
+    @override
+    def _first_row(self) -> Sequence[QWidget]:
+        signs = (self._collision, self._rules, self._linked, self._link)
+        return *super()._first_row()[:-1], *signs, self._menu.button, self._stop
+
+    @override
+    def _second_row(self) -> Sequence[QWidget]:
+        move = self._move
+        buttons = (self._backward, move.distance, self._forward, move.go_to)
+        return *buttons, _gap(), move.split, move.largest
+
+    @override
+    def _more_row(self) -> QWidget:
+        name = self.settings.name
+        back = named(push_button("− steps", f"Step {name} backwards, without sensor"), "MiCoOL_4")
+        ahead = named(push_button("+ steps", f"Step {name} forwards, without sensor"), "MiCoOL_3")
+        back.clicked.connect(self._on_steps_backward)
+        ahead.clicked.connect(self._on_steps_forward)
+        self._step_buttons = (back, ahead)
+        self._more = named(QWidget(), "more")
+        row = QHBoxLayout(self._more)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(STEP_PX // 2)
+        caption = QLabel("speed")
+        caption.setProperty("role", "dim")
+        for widget in (back, self._steps, ahead, _gap(), caption, self._speed):
+            row.addWidget(widget)
+        row.addStretch(1)
+        self._more.hide()
+        return self._more
+
+    @override
+    def _list_inputs(self) -> Sequence[QWidget]:
+        move = self._move
+        own = (move.distance, move.go_to, move.split, self._menu.button, self._speed)
+        return *super()._list_inputs(), *own, *self._step_buttons
+
+    # Showing
+
+    @override
+    def show_state(self, state: PositionerState) -> None:
+        series = self.commands.series
+        if series is not None and series.planned > 1:
+            self._note = f"part {series.begun} of {series.planned}"
+        super().show_state(state)
+
+    @override
+    def _usual_line(self, state: PositionerState) -> str:
+        limits = state.shown_limits
+        if limits is None:
+            return ""
+        low, high = (format_quantity(limit, state.unit) for limit in limits)
+        zero = f", zero at {format_quantity(state.zero, state.unit)}" if state.zero else ""
+        return f"travel {low.split(' ')[0]} to {high}{zero}"
+
+    # Commanding
+
+    @override
+    def move_once(self, direction: int) -> None:
+        if self._move.commit():
+            self.commands.issue(
+                "move by a distance",
+                lambda consent: self._move.move_by(direction, consent=consent),
+                self._move.distance,
+            )
+
+    def _on_go_to(self) -> None:
+        if self._move.commit():
+            self.commands.issue(
+                "move to a position",
+                lambda consent: self._move.move_to(consent=consent),
+                self._move.distance,
+            )
+
+    def _on_steps_forward(self) -> None:
+        self.make_steps(1)
+
+    def _on_steps_backward(self) -> None:
+        self.make_steps(-1)
+
+    def _on_reference(self) -> None:
+        self.commands.issue(
+            "find the reference",
+            lambda consent: issued(self.axis.reference(wait=False, consent=consent)),
+        )
+
+    def _on_calibrate(self) -> None:
+        self.commands.issue(
+            "calibrate the sensor",
+            lambda consent: issued(self.axis.calibrate(wait=False, consent=consent)),
+        )
+
+    def _on_end_stop(self, direction: str) -> None:
+        self.commands.issue(
+            f"drive {direction} to the end stop",
+            lambda consent: issued(
+                self.axis.move_to_end_stop(Direction(direction), wait=False, consent=consent)
+            ),
+        )
+
+    def _on_zero_set(self) -> None:
+        try:
+            self.axis.set_zero()
+        except CosmicError as exc:
+            self._on_refused(None, str(exc))
+
+    def _on_zero_cleared(self) -> None:
+        self.axis.clear_zero()
+
+    def _on_speed(self, hertz: float) -> None:
+        try:
+            self.axis.set_closed_loop_frequency(hertz)
+        except MoveRefused as exc:
+            self._speed.refuse(str(exc))
+
+    def _on_more(self, shown: bool) -> None:
+        self._more.setVisible(shown)
+
+
+def _switch(text: str, name: str, why_not: str) -> QPushButton:
+    button = named(push_button(text, why_not), name)
+    button.setEnabled(False)
+    return button
+
+
+def _gap() -> QWidget:
+    gap = QWidget()
+    gap.setFixedWidth(STEP_PX // 2)
+    return gap

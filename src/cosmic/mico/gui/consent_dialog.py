@@ -1,0 +1,46 @@
+"""The one question that MiCo asks: whether to move an axis whose position is unknown."""
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QMessageBox, QWidget
+
+from cosmic.mico.gui.axis_commands import ConsentRequest
+
+
+class ConsentDialog(QMessageBox):
+    """Offers to move anyway or to initialise first; never blocks, STOP can be reached meanwhile.
+
+    Signals
+    -------
+    initialise_requested()
+        The operator prefers to find the references.
+    """
+
+    initialise_requested = Signal()
+
+    def __init__(self, request: ConsentRequest, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._request = request
+        self.setObjectName("consentDialog")
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.setIcon(QMessageBox.Icon.NoIcon)
+        self.setWindowTitle(f"{request.axis}: position unknown")
+        self.setText(
+            f"Nobody knows where {request.axis} stands, so its limits cannot be checked.\n"
+            f"You asked it to {request.what}."
+        )
+        self.setInformativeText("Make sure that nothing is in its way.")
+        role = QMessageBox.ButtonRole
+        self.move_anyway = self.addButton("Move anyway", role.DestructiveRole)
+        self.move_anyway.setToolTip("Make this one movement; you answer for the way being free")
+        self.initialise_first = self.addButton("Initialise first", role.AcceptRole)
+        self.initialise_first.setToolTip("Find the reference of every axis in the safe order")
+        cancel = self.addButton("Cancel", role.RejectRole)
+        cancel.setToolTip("Do nothing")
+        self.setDefaultButton(self.initialise_first)
+        self.setEscapeButton(cancel)
+        self.setModal(False)
+        self.move_anyway.clicked.connect(self._on_move_anyway)
+        self.initialise_first.clicked.connect(self.initialise_requested)
+
+    def _on_move_anyway(self) -> None:
+        self._request.go()

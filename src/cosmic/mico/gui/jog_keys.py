@@ -1,0 +1,89 @@
+"""Moves axes as long as their keys are held."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from PySide6.QtCore import QObject, QTimer
+from PySide6.QtWidgets import QApplication
+
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.key_hold import HoldKeys
+from cosmic.mico.api.axis import Jogging
+from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
+from cosmic.mico.hw.interface import PositionerKind
+
+RENEW_MS: Final = 40
+
+
+@dataclass(frozen=True, slots=True)
+class JogKey:
+    """What a key moves, and where: direction 1 or -1."""
+
+    card: PositionerBaseGUI
+    direction: int
+
+
+class JogKeys(QObject):
+    """Begins a jog when a key goes down, renews it by a timer, and lets go when it comes up.
+
+    A window that hangs renews nothing, so the dead-man of the core stops the axis; a widget that
+    takes text, another window or a stop ends all of them (see `HoldKeys`).
+
+    Parameters
+    ----------
+    speed : callable
+        Gives the speed for a kind of positioner, in its unit per second, or in Hz.
+    """
+
+    def __init__(
+        self, app: QApplication, speed: Callable[[PositionerKind], float], parent: QObject
+    ) -> None:
+        super().__init__(parent)
+        self._speed = speed
+        self._keys: dict[str, JogKey] = {}
+        self._running: dict[str, Jogging] = {}
+        self._hold = HoldKeys(app, (), self)
+        self._hold.hold_started.connect(self._on_hold_started)
+        self._hold.hold_ended.connect(self._on_hold_ended)
+        self._timer = QTimer(self, interval=RENEW_MS)
+        self._timer.timeout.connect(self._on_timer)
+
+    @property
+    def running(self) -> tuple[str, ...]:
+        """The keys whose axes are being moved."""
+        return tuple(self._running)
+
+    def set_keys(self, keys: Mapping[str, JogKey]) -> None:
+        """Listen to `keys`, as Qt writes them, from now on."""
+        self._hold.set_keys(keys)
+        self._keys = dict(keys)
+
+    def release_all(self) -> None:
+        """Let go of everything; the keys must come up before they move again."""
+        self._hold.release_all()
+
+    def _on_hold_started(self, key: str) -> None:
+        jog = self._keys[key]
+        axis, commands = jog.card.axis, jog.card.commands
+        commands.abandon_series()
+        try:
+            running = axis.jog(jog.direction, self._speed(axis.kind))
+        except CosmicError as exc:
+            commands.refused.emit(None, str(exc))
+            return
+        self._running[key] = running
+        commands.follow("jog", running.movement)
+        self._timer.start()
+
+    def _on_hold_ended(self, key: str) -> None:
+        running = self._running.pop(key, None)
+        if running is not None:
+            running.end()
+        if not self._running:
+            self._timer.stop()
+
+    def _on_timer(self) -> None:
+        for running in self._running.values():
+            if not running.done:
+                running.renew()

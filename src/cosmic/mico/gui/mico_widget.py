@@ -1,0 +1,228 @@
+"""`MicoWidget`: the MiCo panel, all positioners in their groups (thesis 6.1.4)."""
+
+import logging
+
+from PySide6.QtCore import QCoreApplication, Signal
+from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
+
+from cosmic.frame.application import CosmicApplicationBase
+from cosmic.frame.errors import NotAvailable
+from cosmic.frame.gui.theme import State
+from cosmic.frame.task import Task
+from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.mico import Mico
+from cosmic.mico.core.settings import GroupSettings, PositionerSettings
+from cosmic.mico.gui.axis_commands import ConsentRequest
+from cosmic.mico.gui.columns import GroupColumns
+from cosmic.mico.gui.consent_dialog import ConsentDialog
+from cosmic.mico.gui.device_gui import DeviceGUI
+from cosmic.mico.gui.jog_keys import JogKey, JogKeys
+from cosmic.mico.gui.key_names import key_text
+from cosmic.mico.gui.mico_header import MicoHeader
+from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
+from cosmic.mico.gui.registry import gui_class
+from cosmic.mico.gui.state_feed import StateFeed
+
+logger = logging.getLogger(__name__)
+
+
+class MicoWidget(QWidget):
+    """Everything an operator needs to move the positioners; GUI thread.
+
+    Parameters
+    ----------
+    mico : Mico
+        What it commands; its source should be "window".
+
+    Signals
+    -------
+    failure_changed(str)
+        Why MiCo cannot work; empty when it can.
+    """
+
+    failure_changed = Signal(str)
+
+    def __init__(self, mico: Mico, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("MicoWidget")
+        self._mico = mico
+        self._application = mico.application
+        self._manager = mico.application.manager
+        self._settings = self._manager.settings
+        self._cards: dict[str, PositionerBaseGUI] = {}
+        self._shape: list[tuple[str, str]] = []
+        self._dialog: ConsentDialog | None = None
+        self._header = MicoHeader(self._settings.jog)
+        self._columns = GroupColumns()
+        self._feed = StateFeed(mico, self)
+        self._keys = JogKeys(_application(), self._header.speed, self)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self._header)
+        column.addWidget(self._columns, 1)
+        self._connect()
+        self.refresh()
+
+    def _connect(self) -> None:
+        self._header.initialise_requested.connect(self.initialise)
+        self._header.rescan_requested.connect(self.rescan)
+        application = self._application
+        application.task_started.connect(self._on_task_started)
+        application.status_changed.connect(self._on_status_changed)
+        application.rescanned.connect(self._on_status_changed)
+        self._manager.device_lost.connect(self._on_status_changed)
+
+    @property
+    def mico(self) -> Mico:
+        """What it commands."""
+        return self._mico
+
+    @property
+    def cards(self) -> dict[str, PositionerBaseGUI]:
+        """The cards by the name of their axis."""
+        return dict(self._cards)
+
+    @property
+    def groups(self) -> list[DeviceGUI]:
+        """The groups in the order shown."""
+        return self._columns.groups
+
+    @property
+    def dialog(self) -> ConsentDialog | None:
+        """The question that waits for an answer."""
+        return self._dialog
+
+    def keys(self) -> list[tuple[str, str]]:
+        """Return the keys that jog, and what each moves."""
+        return [
+            (key, f"{each.name}: {text} while held")
+            for each in self._settings.positioner
+            for key, text in (
+                (key_text(each.backward_key), each.backward_text),
+                (key_text(each.forward_key), each.forward_text),
+            )
+            if key
+        ]
+
+    def release_keys(self) -> None:
+        """Let go of every key that jogs."""
+        self._keys.release_all()
+
+    # What there is
+
+    def refresh(self) -> None:
+        """Show what there is now; makes the cards anew where axes or their kinds changed."""
+        shape = [(name, self._mico[name].kind.value) for name in self._mico.names]
+        if shape != self._shape:
+            self._rebuild()
+            self._shape = shape
+        self._feed.clear()
+        for group in self._columns.groups:
+            for name, card in group.cards.items():
+                self._feed.add(name, card)
+                self._feed.add(name, group)
+        self._header.set_missing(self._mico.missing)
+        self.failure_changed.emit(self._application.failure)
+
+    def _rebuild(self) -> None:
+        self._keys.set_keys({})
+        self._cards = {}
+        groups = [self._make_group(each) for each in self._arrangement()]
+        self._columns.set_groups(groups)
+        self._keys.set_keys(self._jog_keys())
+
+    def _arrangement(self) -> list[GroupSettings]:
+        """Return the groups of the configuration, and one a device for what they leave out."""
+        groups = list(self._settings.group)
+        named = {name for group in groups for name in group.positioners}
+        rest: dict[int, list[str]] = {}
+        for name in self._mico.names:
+            if name not in named:
+                rest.setdefault(self._manager.address(name).device, []).append(name)
+        groups += [
+            GroupSettings(title=f"Device {index}", positioners=tuple(names))
+            for index, names in sorted(rest.items())
+        ]
+        return groups
+
+    def _make_group(self, arranged: GroupSettings) -> DeviceGUI:
+        group = DeviceGUI(arranged.title)
+        for name in arranged.positioners:
+            axis = self._mico[name]
+            card = gui_class(axis.kind)(axis, self._settings_of(name), self._settings.defaults)
+            card.consent_wanted.connect(self._on_consent_wanted)
+            self._cards[name] = card
+            group.add(card)
+        return group
+
+    def _settings_of(self, name: str) -> PositionerSettings:
+        for each in self._settings.positioner:
+            if each.name == name:
+                return each
+        container = self._manager.device(name).container
+        positioner = container.positioner(self._manager.address(name).channel)
+        if positioner is None:
+            raise NotAvailable(f"{name}: it went away just now; rescan")
+        return positioner.settings
+
+    def _jog_keys(self) -> dict[str, JogKey]:
+        keys: dict[str, JogKey] = {}
+        for card in self._cards.values():
+            for name, direction in (
+                (card.settings.forward_key, 1),
+                (card.settings.backward_key, -1),
+            ):
+                if name:
+                    keys[key_text(name)] = JogKey(card, direction)
+        return keys
+
+    def _on_status_changed(self) -> None:
+        self.refresh()
+
+    # Long operations
+
+    def initialise(self) -> None:
+        """Begin to find all references, as the button does."""
+        try:
+            self._mico.initialise(wait=False)
+        except NotAvailable as exc:
+            self._header.set_message(str(exc), State.REFUSED)
+
+    def rescan(self) -> None:
+        """Begin to look for the devices again, as the button does."""
+        try:
+            self._mico.rescan(wait=False)
+        except NotAvailable as exc:
+            self._header.set_message(str(exc), State.REFUSED)
+
+    def _on_task_started(self, task: Task) -> None:
+        self._header.follow(task)
+
+    # Consent
+
+    def _on_consent_wanted(self, request: ConsentRequest) -> None:
+        if self._dialog is not None:
+            self._dialog.close()
+        dialog = ConsentDialog(request, self)
+        dialog.initialise_requested.connect(self.initialise)
+        dialog.destroyed.connect(self._on_dialog_destroyed)
+        self._dialog = dialog
+        dialog.show()
+
+    def _on_dialog_destroyed(self) -> None:
+        self._dialog = None
+
+
+def make_mico_gui(application: CosmicApplicationBase) -> MicoWidget:
+    """Return the GUI component of a `MicoApplication`; its `gui_factory`."""
+    if not isinstance(application, MicoApplication):
+        raise TypeError(f"{application!r} is no MicoApplication")
+    return MicoWidget(Mico(application, "window"))
+
+
+def _application() -> QApplication:
+    app = QCoreApplication.instance()
+    if not isinstance(app, QApplication):
+        raise TypeError("widgets need a QApplication")
+    return app

@@ -1,0 +1,242 @@
+"""`PositionerBaseGUI`: the card of a positioner without sensor, and the base of all others."""
+
+from collections.abc import Sequence
+from typing import ClassVar, Final
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QToolButton, QVBoxLayout, QWidget
+
+from cosmic.frame.gui.build import named, push_button, tipped
+from cosmic.frame.gui.chip import set_style_property
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.quantity_field import QuantityField
+from cosmic.frame.gui.state_badge import StateBadge
+from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look, ui_font
+from cosmic.mico.api.axis import Axis
+from cosmic.mico.core.positioner import PositionerState, Status
+from cosmic.mico.core.settings import MotionDefaults, PositionerSettings
+from cosmic.mico.gui.axis_commands import AxisCommands
+from cosmic.mico.gui.card import Card, ConfidenceMark, PositionDisplay
+from cosmic.mico.gui.key_names import key_text
+from cosmic.mico.gui.steps_part import StepsPart
+
+STATES: Final = {
+    Status.OK: State.OK,
+    Status.BUSY: State.BUSY,
+    Status.ERROR: State.ERROR,
+    Status.UNKNOWN: State.UNKNOWN,
+}
+_SMALL_PX: Final = 11
+
+
+class PositionerBaseGUI(Card):
+    """Shows and commands one positioner that makes steps (fields MiCoOL.1 to MiCoOL.7).
+
+    A card for another kind derives from it, overrides the `_make_` and `_show_` methods it needs
+    and is entered in `registry.POSITIONER_GUIS`. It decides nothing: each click is one call on
+    `Axis`, and what the gate says comes back to the field it came from.
+
+    Parameters
+    ----------
+    axis : Axis
+        What it commands.
+    settings : PositionerSettings
+        Texts and keys.
+    defaults : MotionDefaults
+        What stands in the fields at first.
+
+    Signals
+    -------
+    consent_wanted(ConsentRequest)
+        A movement waits for the operator's decision.
+    """
+
+    consent_wanted = Signal(object)
+
+    state_name: ClassVar[str] = "MiCoOL_1"
+    title_name: ClassVar[str] = "MiCoOL_2"
+    forward_name: ClassVar[str] = "MiCoOL_3"
+    backward_name: ClassVar[str] = "MiCoOL_4"
+    position_name: ClassVar[str] = "position"
+
+    def __init__(
+        self,
+        axis: Axis,
+        settings: PositionerSettings,
+        defaults: MotionDefaults,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName(f"card {settings.name}")
+        self.axis = axis
+        self.settings = settings
+        self.commands = AxisCommands(settings.name, self)
+        self._defaults = defaults
+        self._note = ""
+        self._inputs: list[QWidget] = []
+        self._usual_tips: dict[QWidget, str] = {}
+        self._make_common()
+        self._steps = StepsPart(axis, defaults)
+        self._arrange()
+        self._inputs += self._list_inputs()
+        self.commands.begun.connect(self._on_begun)
+        self.commands.refused.connect(self._on_refused)
+        self.commands.ended.connect(self._on_ended)
+        self.commands.consent_wanted.connect(self.consent_wanted)
+
+    # Putting it together
+
+    def _make_common(self) -> None:
+        settings = self.settings
+        title = settings.title or settings.name
+        self._badge = named(StateBadge(State.UNKNOWN), self.state_name)
+        self._title = named(ElidedLabel(title, hint=f"Axis {settings.name}"), self.title_name)
+        self._title.setFont(ui_font(bold=True))
+        self._position = PositionDisplay(settings.unit, self.position_name)
+        self._confidence = named(ConfidenceMark(), "confidence")
+        self._stop = named(QToolButton(), "stopAxis")
+        self._stop.setText("■")
+        tipped(self._stop, f"Stop {settings.name}; the other axes go on")
+        self._stop.clicked.connect(self._on_stop_clicked)
+        self._forward = self._direction_button(settings.forward_text, settings.forward_key, "+")
+        self._forward.setObjectName(self.forward_name)
+        self._forward.clicked.connect(self._on_forward)
+        self._backward = self._direction_button(settings.backward_text, settings.backward_key, "-")
+        self._backward.setObjectName(self.backward_name)
+        self._backward.clicked.connect(self._on_backward)
+        self._line = named(ElidedLabel(), "status")
+        self._line.setFont(number_font(_SMALL_PX))
+        self._line.setFixedHeight(2 * STEP_PX)
+
+    def _direction_button(self, text: str, key: str, sign: str) -> QPushButton:
+        key = key_text(key)
+        name = self.settings.name
+        held = f"; hold the key {key} to move on and on" if key else ""
+        way = "forwards" if sign == "+" else "backwards"
+        button = push_button(f"{text} [{key}]" if key else text, f"Move {name} {way} once{held}")
+        button.setAccessibleName(f"{name} {text}")
+        button.setMinimumWidth(12 * STEP_PX)
+        return button
+
+    def _arrange(self) -> None:
+        column = QVBoxLayout(self)
+        column.setContentsMargins(STEP_PX + 2, STEP_PX - 2, STEP_PX, STEP_PX // 2)
+        column.setSpacing(STEP_PX // 2)
+        column.addWidget(_row(self._first_row(), stretch=self._title))
+        column.addWidget(_row(self._second_row()))
+        more = self._more_row()
+        if more is not None:
+            column.addWidget(more)
+        column.addWidget(self._line)
+
+    def _first_row(self) -> Sequence[QWidget]:
+        return self._badge, self._title, self._position, self._confidence, self._stop
+
+    def _second_row(self) -> Sequence[QWidget]:
+        return self._backward, self._steps, self._forward
+
+    def _more_row(self) -> QWidget | None:
+        """Return the part that is hidden at first, or None."""
+        return None
+
+    def _list_inputs(self) -> Sequence[QWidget]:
+        """Return what cannot be used while the axis is absent."""
+        return self._forward, self._backward, self._stop, *self._steps.fields
+
+    # Showing
+
+    def show_state(self, state: PositionerState) -> None:
+        """Show the newest state of the axis."""
+        badge = STATES[state.status]
+        self._badge.set_state(badge, state.error or self._activity_text(state))
+        self.set_edge(badge)
+        self._position.show_position(state.shown_position)
+        self._confidence.set_confidence(state.confidence)
+        self._show_usable(state)
+        self._show_line(state)
+
+    @staticmethod
+    def _activity_text(state: PositionerState) -> str:
+        return str(state.activity) if state.present else ""
+
+    def _show_usable(self, state: PositionerState) -> None:
+        usable = state.present
+        if usable == self._forward.isEnabled():
+            return
+        why = state.error or "its device does not answer"
+        for widget in self._inputs:
+            widget.setEnabled(usable)
+            if usable:
+                widget.setToolTip(self._usual_tips.pop(widget, widget.toolTip()))
+            else:
+                self._usual_tips[widget] = widget.toolTip()
+                widget.setToolTip(f"Not available: {why}")
+        self.setToolTip("" if usable else why)
+
+    def _show_line(self, state: PositionerState) -> None:
+        if state.error:
+            look = state_look(State.UNKNOWN if not state.present else State.ERROR)
+            text = f"{look.glyph} {state.error}"
+        else:
+            text = self._note
+        loud = bool(text)
+        self._line.set_text(text or self._usual_line(state))
+        set_style_property(self._line, "role", "" if loud else "dim")
+
+    def _usual_line(self, state: PositionerState) -> str:  # noqa: ARG002 - other kinds look at it
+        return "no sensor: the position is counted from steps"
+
+    def _set_note(self, note: str) -> None:
+        self._note = note
+        self._show_line(self.axis.details)
+
+    # Commanding
+
+    def _on_forward(self) -> None:
+        self.move_once(1)
+
+    def _on_backward(self) -> None:
+        self.move_once(-1)
+
+    def move_once(self, direction: int) -> None:
+        """Move once forwards (1) or backwards (-1), as the buttons do."""
+        self.make_steps(direction)
+
+    def make_steps(self, direction: int) -> None:
+        """Make the steps that stand in the fields."""
+        if self._steps.commit():
+            self.commands.issue(
+                "make steps",
+                lambda consent: self._steps.make(direction, consent=consent),
+                self._steps.steps,
+            )
+
+    def _on_stop_clicked(self) -> None:
+        self.commands.abandon_series()
+        self.axis.halt()
+
+    def _on_begun(self) -> None:
+        self._set_note("")
+
+    def _on_refused(self, field: object, reason: str) -> None:
+        look = state_look(State.REFUSED)
+        self._set_note(f"{look.glyph} {look.word}: {reason}")
+        if isinstance(field, QuantityField):
+            field.refuse(reason)
+
+    def _on_ended(self, why: str) -> None:
+        self._set_note(f"{state_look(State.ERROR).glyph} {why}" if why else "")
+
+
+def _row(widgets: Sequence[QWidget], stretch: QWidget | None = None) -> QWidget:
+    """Return the widgets side by side; `stretch` takes the room that is left."""
+    row = QWidget()
+    row.setAttribute(Qt.WidgetAttribute.WA_NoSystemBackground)
+    layout = QHBoxLayout(row)
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(STEP_PX // 2)
+    for widget in widgets:
+        layout.addWidget(widget, 1 if widget is stretch else 0)
+    if stretch is None:
+        layout.addStretch(1)
+    return row

@@ -1,0 +1,62 @@
+"""Brings the states of all axes to their cards, no more often than the eye can follow."""
+
+from typing import Final, Protocol
+
+from PySide6.QtCore import QObject, QTimer
+
+from cosmic.mico.api.mico import Mico
+from cosmic.mico.core.device_commander import DeviceCommander
+from cosmic.mico.core.positioner import PositionerState
+
+PERIOD_MS: Final = 33
+
+
+class StateView(Protocol):
+    """What shows the state of one axis."""
+
+    def show_state(self, state: PositionerState) -> None:
+        """Show `state`."""
+
+
+class StateFeed(QObject):
+    """Collects states as they come and shows only the newest of each axis; GUI thread.
+
+    The commanders emit in the device threads; the slot is a method of this object, so Qt queues
+    the call into the GUI thread, where it costs one entry in a dictionary.
+    """
+
+    def __init__(self, mico: Mico, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._mico = mico
+        self._views: dict[str, list[StateView]] = {}
+        self._newest: dict[str, PositionerState] = {}
+        self._commanders: set[DeviceCommander] = set()
+        self._timer = QTimer(self, interval=PERIOD_MS, singleShot=True)
+        self._timer.timeout.connect(self.flush)
+
+    def clear(self) -> None:
+        """Forget all views, before they are made anew."""
+        self._views.clear()
+        self._newest.clear()
+        self._timer.stop()
+
+    def add(self, name: str, view: StateView) -> None:
+        """Show the states of the axis `name` in `view`, beginning now."""
+        self._views.setdefault(name, []).append(view)
+        axis = self._mico[name]
+        if axis.commander not in self._commanders:
+            self._commanders.add(axis.commander)
+            axis.commander.state_changed.connect(self._on_state_changed)
+        view.show_state(axis.details)
+
+    def _on_state_changed(self, state: PositionerState) -> None:
+        self._newest[state.name] = state
+        if not self._timer.isActive():
+            self._timer.start()
+
+    def flush(self) -> None:
+        """Show what has come in."""
+        newest, self._newest = self._newest, {}
+        for name, state in newest.items():
+            for view in self._views.get(name, ()):
+                view.show_state(state)
