@@ -119,10 +119,8 @@ def missed_target(
     return DeviceError(f"{state.name}: stopped at {where} instead of {wanted}")
 
 
-def counted_position(
-    flight: Flight, state: PositionerState, settings: MicoSettings, now_s: float
-) -> float:
-    """Estimate where an axis without sensor is after `flight`, in its unit."""
+def counted_position(flight: Flight, state: PositionerState, step_um: float, now_s: float) -> float:
+    """Estimate where an axis without sensor is after `flight`, in um."""
     motion, made = flight.order.motion, 0.0
     elapsed_s = now_s - flight.started_s
     if isinstance(motion, Step):
@@ -130,4 +128,4 @@ def counted_position(
         made = math.copysign(ran, motion.steps) * motion.amplitude_v / 100.0
     elif isinstance(motion, Jog):
         made = motion.direction * motion.speed * elapsed_s
-    return (state.position or 0.0) + made * settings.defaults.nominal_step(state.unit)
+    return (state.position or 0.0) + made * step_um

@@ -25,6 +25,7 @@ from cosmic.mico.core.jog import JogRun
 from cosmic.mico.core.orders import Grant, Jog, Motion, MoveBy, MoveTo, Order, Reference
 from cosmic.mico.core.positioner import Confidence, PositionerBase
 from cosmic.mico.hw.interface import (
+    Activity,
     ActivityRead,
     Completed,
     Event,
@@ -47,6 +48,7 @@ class ChannelPilot:
         self._position = Questions()
         self.flight: Flight | None = None
         self.next_poll_s = 0.0
+        self.settled = False
 
     @property
     def name(self) -> str:
@@ -55,8 +57,10 @@ class ChannelPilot:
 
     @property
     def located(self) -> bool:
-        """True once the position was read, or where there is no sensor to read it."""
-        return not self._positioner.has_sensor or self._positioner.state.position is not None
+        """True once it stands and its position was read, or there is no sensor to read it."""
+        return self.settled and (
+            not self._positioner.has_sensor or self._positioner.state.position is not None
+        )
 
     # Starting
 
@@ -241,6 +245,8 @@ class ChannelPilot:
     def _on_activity(self, event: ActivityRead) -> None:
         number = self._activity.answered()
         flight = self.flight
+        if not self.settled:
+            self._settle(event.activity)
         if flight is None or number != flight.order.number or flight.jog is not None:
             return
         if not event.activity.at_rest:
@@ -255,6 +261,16 @@ class ChannelPilot:
             if flight.known_pending:
                 self.ask_position_known()
             self.ask_position()
+
+    def _settle(self, activity: Activity) -> None:
+        """Bring to rest what was moving before anybody here could have asked for it."""
+        if activity.at_rest:
+            self.settled = True
+            return
+        logger.warning("%s: was %s when it was found; stopped", self.name, activity)
+        self.halt(MoveCancelled(f"{self.name}: stopped"))
+        self.ask_activity()
+        self.ask_position()
 
     def _on_position(self) -> None:
         number = self._position.answered()
@@ -277,18 +293,26 @@ class ChannelPilot:
         self._announce()
 
     def _on_failed(self, error: DeviceError) -> None:
-        if self.flight is not None and error.fault is not DeviceFault.UNSUPPORTED:
+        flight = self.flight
+        if flight is None or error.fault is DeviceFault.UNSUPPORTED:
+            self._note(error)
+        elif flight.at_rest:
+            self._note(error)
+            self._conclude(flight.error or error)  # it stands, and cannot say where
+        elif flight.error is None:
             self._blame(error)
-        elif self._positioner.state.error != str(error):
-            logger.error("%s: %s", self.name, error)
-            self._context.container.update(self._address.channel, error=str(error))
-            self._announce()
 
     def _blame(self, error: DeviceError) -> None:
         """Remember why the movement fails, and leave nothing moving unwatched."""
-        logger.error("%s: %s", self.name, error)
-        self._context.container.update(self._address.channel, error=str(error))
+        self._note(error)
         self.halt(error)
+
+    def _note(self, error: CosmicError) -> None:
+        """Mark the axis as faulty, and log it once."""
+        if self._positioner.state.error != str(error):
+            logger.error("%s: %s", self.name, error)
+            self._context.container.update(self._address.channel, error=str(error))
+            self._announce()
 
     # Landing
 
@@ -298,21 +322,23 @@ class ChannelPilot:
             return
         state, context = self._positioner.state, self._context
         if not self._positioner.has_sensor:
-            where = counted_position(flight, state, context.settings, context.clock.now_s())
+            nominal_um = context.settings.defaults.nominal_step_um
+            step_um = self._positioner.settings.step_um or nominal_um
+            where = counted_position(flight, state, step_um, context.clock.now_s())
             context.container.update(self._address.channel, position=where)
         missed = missed_target(flight, state, context.settings) if flight.error is None else None
         if missed is not None:
-            context.container.update(self._address.channel, error=str(missed))
+            self._note(missed)
+        self._context.gate.release(self.name)
         self._conclude(flight.error or missed)
 
     def _conclude(self, error: CosmicError | None) -> None:
+        """End the movement under way; its interval stays held unless it has landed."""
         flight, self.flight = self.flight, None
         if flight is None:
             return
-        landed = flight.at_rest
-        if landed:
-            self._context.gate.release(self.name)
-        state = self._context.container.update(self._address.channel, in_motion=not landed)
+        in_motion = not flight.at_rest
+        state = self._context.container.update(self._address.channel, in_motion=in_motion)
         position = state.position if state else None
         self._announce()
         if error is None:

@@ -26,7 +26,6 @@ class MotionDefaults(StrictModel):
     distance_um: float = Field(default=100.0, gt=0)
     distance_deg: float = Field(default=1.0, gt=0)
     nominal_step_um: float = Field(default=1.5, gt=0)
-    nominal_step_deg: float = Field(default=0.025, gt=0)
     largest_step_um: float = Field(default=3.0, gt=0)
     largest_step_deg: float = Field(default=0.05, gt=0)
 
@@ -34,10 +33,6 @@ class MotionDefaults(StrictModel):
     def hold(self) -> float:
         """Hold time in seconds; inf for ever."""
         return math.inf if self.hold_s == "forever" else self.hold_s
-
-    def nominal_step(self, unit: AxisUnit) -> float:
-        """Return the way one step at 100 V is taken to go, in `unit`."""
-        return self.nominal_step_deg if unit == "deg" else self.nominal_step_um
 
 
 class JogSettings(StrictModel):
@@ -75,6 +70,7 @@ class PositionerSettings(StrictModel):
     limits_deg: Range | None = None
     start_um: float | None = None
     start_deg: float | None = None
+    step_um: Annotated[float, Field(gt=0)] | None = None
     forward_text: Text = "+"
     backward_text: Text = "-"
     forward_key: str = ""
@@ -107,13 +103,16 @@ class PositionerSettings(StrictModel):
 
     @model_validator(mode="after")
     def _units_fit(self) -> Self:
-        wrong = {"linear": "deg", "rotary": "um"}.get(self.kind)
-        for key in ("limits", "start"):
-            for unit in (wrong,) if wrong else ("um", "deg"):
-                if getattr(self, f"{key}_{unit}") is not None:
-                    raise ValueError(f"{self.name}: a {self.kind} axis has no {key}_{unit}")
-        if wrong and self.limits is None:
-            raise ValueError(f"{self.name}: a {self.kind} axis needs limits_{self.unit}")
+        allowed = {
+            "linear": {"limits_um", "start_um"},
+            "rotary": {"limits_deg", "start_deg"},
+            "open-loop": {"start_um", "step_um"},
+        }[self.kind]
+        for key in ("limits_um", "limits_deg", "start_um", "start_deg", "step_um"):
+            if getattr(self, key) is not None and key not in allowed:
+                raise ValueError(f"{self.name}: {key} does not fit, the axis is {self.kind}")
+        if self.kind != "open-loop" and self.limits is None:
+            raise ValueError(f"{self.name}: limits_{self.unit} is missing, the axis is {self.kind}")
         if self.limits and not self.limits[0] < self.limits[1]:
             raise ValueError(f"{self.name}: limits must be (low, high) with low < high")
         if self.limits and self.start is not None:
