@@ -1,12 +1,14 @@
 """Breaks Python code that runs in the console, without touching anybody else's."""
 
+import dis
 import sys
 import sysconfig
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
-from types import FrameType
+from types import CodeType, FrameType
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
@@ -61,6 +63,8 @@ class Interrupter:
     def _on_call(self, frame: FrameType, event: str, arg: object) -> "TraceFunction | None":
         if not _is_users(frame.f_code.co_filename):
             return None
+        # A loop on one instruction, as ``while True: pass``, never comes to another line.
+        frame.f_trace_opcodes = _turns_on_itself(frame.f_code)
         return self._on_line(frame, event, arg)
 
     def _on_line(self, frame: FrameType, event: str, arg: object) -> "TraceFunction | None":  # noqa: ARG002
@@ -71,6 +75,14 @@ class Interrupter:
     def _break(self) -> None:
         self._wanted.clear()
         raise KeyboardInterrupt
+
+
+@lru_cache(maxsize=256)
+def _turns_on_itself(code: CodeType) -> bool:
+    return any(
+        each.opname.startswith("JUMP") and each.argval == each.offset
+        for each in dis.get_instructions(code)
+    )
 
 
 def _is_users(file: str) -> bool:

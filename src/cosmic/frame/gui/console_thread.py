@@ -27,6 +27,7 @@ MORE: Final = "... "
 READING: Final = "in> "
 BUSY: Final = ""
 CLOSE_TIMEOUT_S: Final = 2.0
+_TRIES: Final = 10
 
 _given_up: "list[ConsoleThread]" = []
 """Threads that did not end in time: destroying a running QThread would abort the process."""
@@ -120,8 +121,11 @@ class ConsoleThread(WorkerThread):
     def shut_down(self, timeout_s: float = CLOSE_TIMEOUT_S) -> bool:
         """End the thread, breaking what runs; False where it could not be ended in time."""
         self.request_end()
-        if self.join(timeout_s):
-            return True
+        # Code that catches one interrupt, or was about to wait, meets the next.
+        for _ in range(_TRIES):
+            if self.join(timeout_s / _TRIES):
+                return True
+            self.interrupt()
         logger.warning("what runs in the console does not end; it is left behind")
         if self._streams is not None:
             self._streams.restore()
@@ -130,29 +134,35 @@ class ConsoleThread(WorkerThread):
 
     @override
     def run_body(self) -> None:
-        self._streams = ThreadStreams(self._write, self._read_for_input)
-        try:
-            self._tell(PROMPT)
-            while not self.end_requested:
-                self._obey(self._inbox.get())
-        finally:
-            self._streams.restore()
+        self._tell(PROMPT)
+        while not self.end_requested:
+            self._obey(self._inbox.get())
 
     def _obey(self, wish: "_Wish") -> None:
         if wish.kind is _Kind.RUN and not self.end_requested:
             self._run(wish.text)
         elif wish.kind is _Kind.COMPLETE:
             self._complete(wish.text)
-        elif wish.kind is _Kind.WAKE and self._prompt == MORE and self._interrupter.wanted:
+        elif wish.kind is _Kind.WAKE:
+            self._forget_block()
+
+    def _forget_block(self) -> None:
+        """End an interrupt that met no running code: it drops the block being typed."""
+        if self._prompt == MORE and self._interrupter.wanted:
             self._interpreter.resetbuffer()
             self._write("KeyboardInterrupt\n")
             self._tell(PROMPT)
+        self._interrupter.clear()
 
     def _run(self, text: str) -> None:
-        self._interrupter.clear()
-        self._write(f"{self._prompt}{text}\n")
+        prompt = self._prompt
         self._tell(BUSY)
-        more = self._interpreter.run(text)
+        self._write(f"{prompt}{text}\n")
+        self._streams = ThreadStreams(self._write, self._read_for_input)
+        try:
+            more = self._interpreter.run(text)
+        finally:
+            self._streams.restore()
         if not self.end_requested:
             self._tell(MORE if more else PROMPT)
 

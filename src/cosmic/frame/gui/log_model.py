@@ -140,12 +140,12 @@ class LogFilter(QSortFilterProxyModel):
     def set_level(self, level: int) -> None:
         """Show records from `level` up."""
         self._level = level
-        self.invalidateFilter()
+        self.invalidate()
 
     def set_text(self, text: str) -> None:
         """Show records that contain `text`, in any case of letters."""
         self._text = text.casefold()
-        self.invalidateFilter()
+        self.invalidate()
 
     @override
     def filterAcceptsRow(self, source_row: int, source_parent: Index) -> bool:

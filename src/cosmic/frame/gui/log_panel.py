@@ -1,10 +1,11 @@
 """The log as the operator sees it: newest last, by level, searchable."""
 
 import logging
+import weakref
 from collections import deque
 from typing import Final
 
-from PySide6.QtCore import QEvent, Qt, QTimer
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -67,8 +68,7 @@ class LogPanel(QWidget):
         super().__init__(parent)
         self._pending: deque[logging.LogRecord] = deque(maxlen=capacity)
         # The deque outlives the widget: a record that comes late meets no deleted object.
-        self._unsubscribe = ring.subscribe(self._pending.append)
-        self.destroyed.connect(self._unsubscribe)
+        weakref.finalize(self, ring.subscribe(self._pending.append)).atexit = False
         self._model = LogModel(capacity, self)
         self._filter = LogFilter(self)
         self._filter.setSourceModel(self._model)
@@ -185,12 +185,6 @@ class LogPanel(QWidget):
             event.accept()
             return
         super().keyPressEvent(event)
-
-    @override
-    def event(self, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.DeferredDelete:
-            self._unsubscribe()
-        return super().event(event)
 
 
 def _view(model: LogFilter) -> QTableView:

@@ -3,6 +3,7 @@
 from PySide6.QtCore import QEvent, QObject, QPoint, Qt
 from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QLabel, QWidget
+from shiboken6 import isValid
 from typing_extensions import override
 
 from cosmic.frame.gui.theme import STEP_PX
@@ -44,19 +45,26 @@ class ReasonBubble(QLabel):
         width = min(_WIDTH_PX, text_width, field.window().width())
         self.setFixedSize(width, self.heightForWidth(width))
         self._field = field
-        field.destroyed.connect(self.dismiss)
+        field.destroyed.connect(self._on_field_destroyed)
         self._follow(field)
         self._place()
 
-    def dismiss(self, field: QObject | None = None) -> None:
+    def dismiss(self, field: QWidget | None = None) -> None:
         """Take the note away, if it belongs to `field`; None takes away any."""
         if field is not None and self._field is not None and field is not self._field:
             return
+        if self._field is not None and isValid(self._field):
+            self._field.destroyed.disconnect(self._on_field_destroyed)
         for widget in self._followed:
-            widget.removeEventFilter(self)
+            if isValid(widget):
+                widget.removeEventFilter(self)
         self._followed = []
         self._field = None
         self.hide()
+
+    def _on_field_destroyed(self) -> None:
+        self._field = None  # what is left of it can only be forgotten
+        self.dismiss()
 
     def _follow(self, field: QWidget) -> None:
         """Watch the field and what it lies in: scrolling moves an ancestor, not the field."""

@@ -109,7 +109,7 @@ def code_font(size_px: int = FONT_PX) -> QFont:
 
 def is_theme(name: object) -> TypeGuard[ThemeName]:
     """Tell whether `name` names a theme."""
-    return name in _PALETTES
+    return isinstance(name, str) and name in _PALETTES
 
 
 def current_palette() -> Palette:

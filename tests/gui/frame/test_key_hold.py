@@ -1,0 +1,165 @@
+from collections.abc import Iterator
+
+import pytest
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QApplication, QMenu, QWidget
+from pytestqt.qtbot import QtBot
+
+from cosmic.frame.gui.key_hold import HoldKeys
+
+LEFT, UP = Qt.Key.Key_Left, Qt.Key.Key_Up
+NONE, SHIFT = Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier
+
+
+@pytest.fixture
+def keys(qapp: QApplication) -> Iterator[HoldKeys]:
+    keys = HoldKeys(qapp, ["Left", "Up", "Shift+A"])
+    yield keys
+    qapp.removeEventFilter(keys)
+    keys.deleteLater()
+
+
+@pytest.fixture
+def told(keys: HoldKeys) -> list[str]:
+    """What was told, in order: +key and -key."""
+    told: list[str] = []
+    keys.hold_started.connect(lambda key: told.append(f"+{key}"))
+    keys.hold_ended.connect(lambda key: told.append(f"-{key}"))
+    return told
+
+
+@pytest.fixture
+def button(form: QWidget) -> QWidget:
+    button: QWidget = form.findChild(QWidget, "button")
+    button.setFocus()
+    return button
+
+
+def send(
+    widget: QWidget, kind: str, key: Qt.Key, *, repeat: bool = False, modifiers: object = NONE
+) -> None:
+    event = QEvent.Type.KeyPress if kind == "press" else QEvent.Type.KeyRelease
+    QApplication.sendEvent(widget, QKeyEvent(event, key, modifiers, "", repeat))  # type: ignore[arg-type]
+
+
+def test_a_key_starts_when_pressed_and_ends_when_released(button: QWidget, told: list[str]) -> None:
+    send(button, "press", LEFT)
+    assert told == ["+Left"]
+    send(button, "release", LEFT)
+    assert told == ["+Left", "-Left"]
+
+
+def test_auto_repeat_neither_starts_nor_ends(button: QWidget, told: list[str]) -> None:
+    send(button, "press", LEFT)
+    for _ in range(5):  # as X11 sends it: a release before each press
+        send(button, "release", LEFT, repeat=True)
+        send(button, "press", LEFT, repeat=True)
+    assert told == ["+Left"]
+    send(button, "release", LEFT)
+    assert told == ["+Left", "-Left"]
+
+
+def test_a_repeat_without_a_press_starts_nothing(button: QWidget, told: list[str]) -> None:
+    send(button, "press", LEFT, repeat=True)
+    assert told == []
+
+
+def test_two_keys_are_held_at_once(button: QWidget, keys: HoldKeys, told: list[str]) -> None:
+    send(button, "press", LEFT)
+    send(button, "press", UP)
+    send(button, "release", LEFT)
+    assert told == ["+Left", "+Up", "-Left"]
+    assert keys.held == ("Up",)
+
+
+def test_a_modifier_makes_another_key(button: QWidget, told: list[str]) -> None:
+    send(button, "press", Qt.Key.Key_A)
+    send(button, "press", LEFT, modifiers=SHIFT)
+    assert told == []
+    button.setFocus()  # an arrow key had moved it
+    send(button, "press", Qt.Key.Key_A, modifiers=SHIFT)
+    assert told == ["+Shift+A"]
+
+
+def test_a_modifier_pressed_meanwhile_does_not_keep_a_key_held(
+    button: QWidget, told: list[str]
+) -> None:
+    send(button, "press", LEFT)
+    send(button, "release", LEFT, modifiers=SHIFT)
+    assert told == ["+Left", "-Left"]
+
+
+def test_a_text_field_with_the_focus_swallows_the_keys(
+    qtbot: QtBot, form: QWidget, told: list[str]
+) -> None:
+    line = form.findChild(QWidget, "line")
+    line.setFocus()
+    qtbot.keyClick(line, LEFT)
+    assert told == []
+
+
+def test_moving_the_focus_into_a_text_field_ends_the_hold(
+    button: QWidget, form: QWidget, told: list[str]
+) -> None:
+    send(button, "press", LEFT)
+    form.findChild(QWidget, "line").setFocus()
+    assert told == ["+Left", "-Left"]
+
+
+def test_leaving_the_window_ends_the_hold(qtbot: QtBot, button: QWidget, told: list[str]) -> None:
+    send(button, "press", LEFT)
+    other = QWidget()
+    qtbot.addWidget(other)
+    with qtbot.waitActive(other):
+        other.show()
+        other.activateWindow()
+    assert told == ["+Left", "-Left"]
+
+
+def test_a_key_that_was_ended_acts_again_only_when_pressed_anew(
+    button: QWidget, keys: HoldKeys, told: list[str]
+) -> None:
+    send(button, "press", LEFT)
+    keys.release_all()
+    send(button, "press", LEFT, repeat=True)
+    send(button, "release", LEFT)
+    assert told == ["+Left", "-Left"]
+    send(button, "press", LEFT)
+    assert told == ["+Left", "-Left", "+Left"]
+
+
+def test_a_mouse_grab_ends_the_hold(
+    qtbot: QtBot, button: QWidget, form: QWidget, told: list[str]
+) -> None:
+    send(button, "press", LEFT)
+    form.grabMouse()
+    try:
+        qtbot.waitUntil(lambda: told == ["+Left", "-Left"])
+        send(button, "press", UP)
+        assert told == ["+Left", "-Left"]
+    finally:
+        form.releaseMouse()
+
+
+def test_an_open_menu_ends_the_hold(
+    qtbot: QtBot, button: QWidget, form: QWidget, told: list[str]
+) -> None:
+    send(button, "press", LEFT)
+    menu = QMenu(form)
+    menu.addAction("something")
+    menu.popup(form.pos())
+    qtbot.waitUntil(lambda: told == ["+Left", "-Left"])
+    menu.close()
+
+
+def test_switched_off_keys_do_nothing(button: QWidget, keys: HoldKeys, told: list[str]) -> None:
+    send(button, "press", LEFT)
+    keys.set_enabled(False)
+    send(button, "press", UP)
+    assert told == ["+Left", "-Left"]
+
+
+def test_what_is_no_key_is_refused(keys: HoldKeys) -> None:
+    with pytest.raises(ValueError, match="is not the name of a key"):
+        keys.set_keys(["Left", "nonsense"])

@@ -1,0 +1,141 @@
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QPushButton, QToolButton
+from pytestqt.qtbot import QtBot
+
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.state_badge import StateBadge
+from cosmic.frame.gui.stop_button import StopButton
+from cosmic.frame.gui.theme import State
+from cosmic.frame.gui.top_bar import TopBar
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def bar(qtbot: QtBot) -> TopBar:
+    bar = TopBar()
+    bar.resize(1366, 70)
+    qtbot.addWidget(bar)
+    bar.show()
+    return bar
+
+
+def stop_button(bar: TopBar) -> StopButton:
+    return bar.findChildren(StopButton)[0]
+
+
+def reset_button(bar: TopBar) -> QPushButton:
+    return next(each for each in bar.findChildren(QPushButton) if each.text() == "Reset")
+
+
+def texts(bar: TopBar) -> str:
+    return " | ".join(each.text() for each in bar.findChildren(QLabel) if each.isVisible())
+
+
+def test_stop_is_at_the_right_high_and_names_its_key(bar: TopBar) -> None:
+    stop = stop_button(bar)
+    assert stop.height() >= 48
+    assert stop.text() == "STOP  F12"
+    assert bar.width() - stop.geometry().right() < 16
+
+
+def test_stop_acts_when_the_mouse_button_goes_down(qtbot: QtBot, bar: TopBar) -> None:
+    with qtbot.waitSignal(bar.stop_requested):
+        qtbot.mousePress(stop_button(bar), LEFT)
+
+
+def test_the_latched_bar_says_why_and_offers_reset(qtbot: QtBot, bar: TopBar) -> None:
+    height = bar.sizeHint().height()
+    assert not reset_button(bar).isVisible()
+    bar.set_latched("force above 400 µN")
+    assert bar.property("latched") is True
+    assert "STOPPED: force above 400 µN" in texts(bar)
+    assert "SIMULATED" in texts(bar)
+    assert bar.sizeHint().height() == height
+    with qtbot.waitSignal(bar.reset_requested):
+        qtbot.mouseClick(reset_button(bar), LEFT)
+    assert bar.latched  # only the owner resets
+    bar.set_latched(None)
+    assert "STOPPED" not in texts(bar)
+    assert not reset_button(bar).isVisible()
+
+
+def test_the_whole_latched_bar_is_red(bar: TopBar) -> None:
+    bar.set_latched("F12")
+    image = bar.grab().toImage()
+    for x, y in ((2, 2), (2, bar.height() - 6), (bar.width() - 3, 2), (bar.width() // 2, 2)):
+        colour = image.pixelColor(x, y)
+        assert colour.red() > 120
+        assert colour.green() < 40
+
+
+def test_missing_collision_model_is_said_loudly(bar: TopBar) -> None:
+    assert "no collision model" in texts(bar)
+    bar.set_collision("clearance 182 µm  jaw-plate")
+    assert "no collision model" not in texts(bar)
+    assert "clearance 182 µm jaw-plate" in texts(bar)
+
+
+def test_the_rate_is_shown_where_it_is_not_one(bar: TopBar) -> None:
+    assert "time ×" not in texts(bar)
+    bar.set_rate(20.0, 18.66)
+    assert "time ×20 (reached ×18.7)" in texts(bar)
+
+
+def test_only_manual_mode_can_be_chosen_and_the_others_say_why(qtbot: QtBot, bar: TopBar) -> None:
+    buttons = {each.text(): each for each in bar.findChildren(QToolButton)}
+    assert buttons["MCM"].isChecked()
+    for name in ("SCM", "ECM", "ACM"):
+        assert not buttons[name].isEnabled()
+        assert "Not available" in buttons[name].toolTip()
+    bar.set_mode_available("SCM")
+    with qtbot.waitSignal(bar.mode_requested) as told:
+        qtbot.mouseClick(buttons["SCM"], LEFT)
+    assert told.args == ["SCM"]
+    assert buttons["MCM"].isChecked()  # the owner decides
+    bar.set_mode("SCM")
+    assert buttons["SCM"].isChecked()
+
+
+def test_a_long_message_is_elided_has_a_tooltip_and_opens_the_log(
+    qtbot: QtBot, bar: TopBar
+) -> None:
+    story = "device 1 did not answer " * 40
+    width = bar.minimumSizeHint().width()
+    bar.set_message(story)
+    assert bar.minimumSizeHint().width() <= width + StateBadge().sizeHint().width() + 16
+    assert bar.message == story.strip()
+    line = next(each for each in bar.findChildren(ElidedLabel) if "device 1" in each.text())
+    assert story in line.toolTip()
+    with qtbot.waitSignal(bar.message_clicked):
+        qtbot.mouseClick(line, LEFT)
+
+
+def test_the_bar_fits_the_smallest_screen(bar: TopBar) -> None:
+    bar.set_rate(20.0, 18.66)
+    bar.set_collision("")
+    assert bar.minimumSizeHint().width() <= 1280
+
+
+def test_a_badge_keeps_its_width_whatever_it_shows(qtbot: QtBot) -> None:
+    badge = StateBadge()
+    qtbot.addWidget(badge)
+    sizes = set()
+    for state in State:
+        badge.set_state(state, "why")
+        sizes.add(badge.sizeHint().toTuple())
+        assert badge.toolTip() == f"{state.value}: why"
+        assert badge.accessibleName() == f"{state.value}: why"
+    assert len(sizes) == 1
+
+
+def test_badges_of_two_states_look_different(qtbot: QtBot) -> None:
+    badge = StateBadge()
+    qtbot.addWidget(badge)
+    badge.resize(badge.sizeHint())
+    pictures = []
+    for state in State:
+        badge.set_state(state)
+        pictures.append(badge.grab().toImage())
+    assert all(pictures[i] != pictures[j] for i in range(len(pictures)) for j in range(i))
