@@ -1,0 +1,38 @@
+"""A new type of positioner: a rotary table without end stops.
+
+Told to drive to its end stop, it would turn for ever and wind up its cables; so this type does
+not know that movement, and the gate refuses it. See docs/how-to/add-a-positioner-type.md.
+"""
+
+from typing import ClassVar
+
+import cosmic
+from cosmic.mico.core.orders import Calibrate, Motion, MoveBy, MoveTo, Step
+from cosmic.mico.core.positioner import POSITIONER_CLASSES, RotaryPositioner
+from cosmic.mico.hw.interface import PositionerKind
+
+
+class EndlessRotaryPositioner(RotaryPositioner):
+    """A rotary positioner that can turn on and on: it has no end stop and no reference."""
+
+    motions: ClassVar[tuple[type[Motion], ...]] = (Step, MoveTo, MoveBy, Calibrate)
+    advice = "it has no end stop; give degrees"
+
+
+def main() -> None:
+    """Register the class and see what the gate says."""
+    before = POSITIONER_CLASSES[PositionerKind.ROTARY]
+    POSITIONER_CLASSES[PositionerKind.ROTARY] = EndlessRotaryPositioner
+    try:
+        with cosmic.connect(rate=10) as rig:
+            table = rig.mico["table.rotation"]
+            print(f"to 30 degrees: {table.move_to(30.0)}")
+            table.move_to_end_stop("forward")
+    except cosmic.MoveRefused as refused:
+        print(f"{refused.verdict.reason}: {refused}")
+    finally:
+        POSITIONER_CLASSES[PositionerKind.ROTARY] = before
+
+
+if __name__ == "__main__":
+    main()
