@@ -6,6 +6,7 @@ from typing import Annotated, Final
 
 from pydantic import Field
 
+from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import Clock, RatedClock
 from cosmic.frame.config import StrictModel, load_model, shipped_config_dir
 from cosmic.frame.errors import ConfigError
@@ -101,8 +102,20 @@ def build_platform(
     rate: float = 1.0,
     cold: bool = False,
     seed: int = 0,
+    mico_gui: GuiFactory | None = None,
 ) -> Platform:
     """Read the configuration and make the applications; opens no hardware yet.
+
+    Parameters
+    ----------
+    config : path or None
+        A platform.toml or its folder; None is the one that ships with CoSMic.
+    applications : tuple of str
+        Which to make, as far as the platform file names them.
+    rate, cold, seed
+        Of the simulated platform; see `cosmic.connect`.
+    mico_gui : callable or None
+        Makes MiCo's GUI component, where there is a window.
 
     Raises
     ------
@@ -126,5 +139,7 @@ def build_platform(
     mico = None
     if "mico" in applications and "mico" in file.platform.applications:
         controller = make_controller(file.mico.backend, library_path=file.mico.library, scene=scene)
-        mico = MicoApplication(controller, file.mico, clock=clock, policy=policy)
+        mico = MicoApplication(
+            controller, file.mico, clock=clock, policy=policy, gui_factory=mico_gui
+        )
     return Platform(file=file, path=path, clock=clock, policy=policy, mico=mico)

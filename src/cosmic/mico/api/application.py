@@ -80,6 +80,14 @@ class MicoApplication(CosmicApplicationBase):
             logger.error("MiCo cannot reach its hardware: %s", exc)
         self.status_changed.emit()
 
+    def initialize_later(self) -> Task:
+        """Do what `initialize` does in the application's thread; returns at once.
+
+        For windows, which stand before the hardware is there. `rescanned` tells the end.
+        """
+        self.start()
+        return self.rescan()
+
     def initialise_platform(self) -> Task:
         """Find the reference of every axis in the configured order; returns at once.
 

@@ -1,0 +1,176 @@
+"""The command line: ``cosmic``, ``cosmic mico``, ``cosmic check``, ``cosmic init``."""
+
+import argparse
+import os
+import re
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from cosmic.frame.config import shipped_config_dir
+from cosmic.frame.errors import CosmicError
+
+if TYPE_CHECKING:
+    from cosmic.app.run_window import WindowOptions
+
+NOT_BUILT: Final = {
+    "daqco": "data acquisition in a window of its own",
+    "vico": "vision in a window of its own",
+    "serve": "a station without a window",
+    "scene": "checks of scenes",
+    "export": "export of recordings",
+}
+_WINDOW_SIZE: Final = (1600, 1000)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Carry out one command and return the exit code: 0 well, 1 failed, 2 not understood."""
+    parser = _parser()
+    chosen, unknown = parser.parse_known_args(arguments)
+    if chosen.command in NOT_BUILT:
+        return _fail(f"{chosen.command}: {NOT_BUILT[chosen.command]} is not built yet", code=2)
+    if unknown:
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+    try:
+        return _carry_out(chosen, parser)
+    except CosmicError as exc:
+        return _fail(str(exc))
+
+
+def _carry_out(chosen: argparse.Namespace, parser: argparse.ArgumentParser) -> int:
+    if chosen.command == "check":
+        return _check(chosen.platform)
+    if chosen.command == "init":
+        return _init(chosen.folder)
+    return _window(chosen, parser)
+
+
+def _fail(text: str, code: int = 1) -> int:
+    for line in text.splitlines():
+        sys.stderr.write(f"cosmic: {line}\n")
+    return code
+
+
+# The commands
+
+
+def _check(platform: Path) -> int:
+    from cosmic.app.check import find_mistakes
+
+    mistakes = find_mistakes(platform)
+    if mistakes:
+        return _fail("\n".join(mistakes))
+    sys.stdout.write(f"{platform}: ok\n")
+    return 0
+
+
+def _init(folder: Path) -> int:
+    source = shipped_config_dir()
+    files = sorted(path for path in source.rglob("*") if path.is_file())
+    there = [folder / path.relative_to(source) for path in files]
+    taken = [path for path in there if path.exists()]
+    if taken:
+        return _fail("\n".join(f"{path}: is there already; nothing was copied" for path in taken))
+    try:
+        for path, target in zip(files, there, strict=True):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, target)
+    except OSError as exc:
+        return _fail(f"{exc.filename or folder}: {exc.strerror or exc}")
+    sys.stdout.write(f"{folder}: {len(files)} files; start with: cosmic --config {folder}\n")
+    return 0
+
+
+def _window(chosen: argparse.Namespace, parser: argparse.ArgumentParser) -> int:
+    if chosen.screenshot is not None and chosen.offscreen is None:
+        parser.error("--screenshot needs --offscreen SECONDS")
+    if chosen.offscreen is None and not _display_there():
+        return _fail("there is no display; --offscreen SECONDS runs without one")
+    # Imported here: what needs no window starts without loading Qt's widgets.
+    from cosmic.app.run_window import run_window
+
+    return run_window(_options(chosen))
+
+
+def _options(chosen: argparse.Namespace) -> "WindowOptions":
+    from cosmic.app.run_window import WindowOptions
+
+    size = chosen.size or (_WINDOW_SIZE if chosen.offscreen is not None else None)
+    return WindowOptions(
+        config=chosen.config,
+        only=chosen.command or "",
+        rate=chosen.rate,
+        cold=chosen.cold,
+        offscreen_s=chosen.offscreen,
+        screenshot=chosen.screenshot,
+        size=size,
+        theme=chosen.theme,
+    )
+
+
+def _display_there() -> bool:
+    """Tell whether a window can be shown; Qt aborts the process where it cannot."""
+    if sys.platform != "linux" or os.environ.get("QT_QPA_PLATFORM"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+# The words
+
+
+def _parser() -> argparse.ArgumentParser:
+    window = _window_options()
+    parser = argparse.ArgumentParser(
+        prog="cosmic",
+        description="Control software for a microrobotic platform. Without a command: the "
+        "operator's window with all applications of the platform file.",
+        parents=[window],
+    )
+    parser.set_defaults(
+        config=None,
+        rate=1.0,
+        cold=False,
+        offscreen=None,
+        screenshot=None,
+        size=None,
+        theme=None,
+    )
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+    commands.add_parser("mico", help="the window of MiCo alone", parents=[window])
+    check = commands.add_parser("check", help="check a platform file and the twin it names")
+    check.add_argument("platform", type=Path, metavar="PLATFORM.toml")
+    init = commands.add_parser("init", help="copy the shipped configuration out, to change it")
+    init.add_argument("folder", type=Path, metavar="FOLDER")
+    for name, what in NOT_BUILT.items():
+        commands.add_parser(name, help=f"{what} (not built yet)", add_help=False)
+    return parser
+
+
+def _window_options() -> argparse.ArgumentParser:
+    # Suppressed defaults, so that an option before the command is not reset by the command.
+    options = argparse.ArgumentParser(add_help=False, argument_default=argparse.SUPPRESS)
+    add = options.add_argument
+    add("--config", type=Path, metavar="PATH", help="a platform.toml or its folder")
+    add("--rate", type=float, help="how many times faster than the wall the simulation runs")
+    add("--cold", action="store_true", help="start the simulation at power-up, nothing referenced")
+    add("--offscreen", type=_seconds, metavar="SECONDS", help="show nothing, close after SECONDS")
+    add("--screenshot", type=Path, metavar="FILE", help="with --offscreen: save a picture")
+    add("--size", type=_size, metavar="WxH", help="size of the window, such as 1600x1000")
+    add("--theme", choices=("dark", "light"), help="colours of the window")
+    return options
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value <= 86_400.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds up to a day")
+    return value
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d{3,5})x(\d{3,5})", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 1600x1000")
+    return int(match[1]), int(match[2])

@@ -1,0 +1,230 @@
+"""The operator's window: panels, stop, failures and the console around one platform."""
+
+import logging
+from typing import Final
+
+from PySide6.QtCore import QObject, QSettings, Qt, Signal
+from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
+
+import cosmic
+from cosmic.app.hint_bar import HintBar, first_steps
+from cosmic.app.platform import Platform
+from cosmic.app.rig import Rig
+from cosmic.frame.failure import Failure
+from cosmic.frame.gui.console_panel import ConsolePanel
+from cosmic.frame.gui.log_panel import LogPanel
+from cosmic.frame.gui.palette import ThemeName
+from cosmic.frame.gui.server_gui import CosmicServerGui
+from cosmic.frame.gui.stop_key import StopKeyFilter
+from cosmic.frame.gui.theme import STEP_PX, State
+from cosmic.frame.log import RingBufferHandler
+from cosmic.mico.core.stop_latch import StopState
+from cosmic.mico.gui.mico_widget import MicoWidget
+
+logger = logging.getLogger(__name__)
+
+MICO: Final = "MiCo"
+LOG: Final = "Log"
+CONSOLE: Final = "Console"
+
+
+class _Bridge(QObject):
+    """Brings what happens in any thread to the window; outlives it, so no late call is lost."""
+
+    failure_reported = Signal(object)
+    latch_changed = Signal(object)
+
+    def tell_failure(self, failure: Failure) -> None:
+        self.failure_reported.emit(failure)
+
+    def tell_latch(self, state: StopState) -> None:
+        self.latch_changed.emit(state)
+
+
+class OperatorWindow(CosmicServerGui):
+    """Hosts the panels of all applications of a platform; closing it closes the platform.
+
+    The hardware is opened by `open_hardware`, after the window stands.
+
+    Parameters
+    ----------
+    platform : Platform
+        What it shows and commands, not yet initialised.
+    settings : QSettings
+        Where layout, theme and the dismissed hint are kept.
+    ring : RingBufferHandler
+        Where the log panel takes its records from.
+    console : bool
+        Have a Python console.
+    """
+
+    def __init__(
+        self,
+        platform: Platform,
+        settings: QSettings,
+        ring: RingBufferHandler,
+        *,
+        console: bool = True,
+        theme: ThemeName = "dark",
+    ) -> None:
+        stop_key = platform.file.platform.stop_key
+        super().__init__(settings, stop_key=stop_key, theme=theme)
+        self.setWindowTitle(f"CoSMic: {platform.file.platform.name}")
+        self._platform = platform
+        self._console: ConsolePanel | None = None
+        self._mico_gui: MicoWidget | None = None
+        self._bridge = _Bridge()
+        self._forget_policy = platform.policy.subscribe(self._bridge.tell_failure)
+        self._stop_filter = StopKeyFilter(_application(), stop_key, self)
+        self._add_mico(settings)
+        self._add_log(ring, console=console)
+        self._connect_all()
+        self._show_platform()
+
+    # Putting it together
+
+    def _add_mico(self, settings: QSettings) -> None:
+        application = self._platform.mico
+        gui = application.get_gui() if application is not None else None
+        if application is None or not isinstance(gui, MicoWidget):
+            return
+        stop_key = self._platform.file.platform.stop_key
+        panel = QWidget()
+        column = QVBoxLayout(panel)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(HintBar(first_steps(application.manager.settings, stop_key), settings))
+        column.addWidget(gui, 1)
+        self.add_panel(MICO, panel, Qt.DockWidgetArea.LeftDockWidgetArea, scroll=False)
+        self._mico_gui = gui
+        gui.failure_changed.connect(self._on_mico_failure)
+        application.manager.latch.subscribe(self._bridge.tell_latch)
+
+    def _add_log(self, ring: RingBufferHandler, *, console: bool) -> None:
+        below = Qt.DockWidgetArea.BottomDockWidgetArea
+        docks = [self.add_panel(LOG, LogPanel(ring), below, scroll=False)]
+        if console:
+            rig = Rig(self._platform, source="console")
+            self._console = ConsolePanel(
+                self._platform.policy,
+                {"rig": rig, "cosmic": cosmic},
+                on_interrupt=self.halt_all,
+                banner='Python console: try rig.mico["left.x"].move_by("0.2 mm"). '
+                "Ctrl+C or Interrupt breaks what runs.\n",
+            )
+            docks.append(self.add_panel(CONSOLE, self._console, scroll=False, beside=LOG))
+            self.resizeDocks(docks, [3, 2], Qt.Orientation.Horizontal)
+        self.resizeDocks(docks[:1], [22 * STEP_PX], Qt.Orientation.Vertical)
+
+    def _connect_all(self) -> None:
+        self.stop_requested.connect(self._on_stop_button)
+        self._stop_filter.stop_requested.connect(self._on_stop_key)
+        self.top_bar.reset_requested.connect(self._on_reset)
+        self.top_bar.message_clicked.connect(self._on_message_read)
+        self.rescan_requested.connect(self._on_rescan)
+        self.closing.connect(self._on_closing)
+        self._bridge.failure_reported.connect(self._on_failure)
+        self._bridge.latch_changed.connect(self._on_latch)
+
+    def _show_platform(self) -> None:
+        bar, platform = self.top_bar, self._platform
+        bar.set_simulated(platform.simulated)
+        bar.set_rate(platform.clock.rate)
+        stop_key = platform.file.platform.stop_key
+        keys = [
+            (stop_key, "stop every movement and keep it stopped, from anywhere"),
+            ("Esc", "stop as well; in a field being edited: take the entry back"),
+        ]
+        if self._mico_gui is not None:
+            keys += self._mico_gui.keys()
+        keys += [("F1", "this list"), ("Ctrl+Q", "close")]
+        self.set_keys(keys)
+        self.set_about(
+            f"CoSMic {cosmic.__version__}\nControl software for a microrobotic platform.\n"
+            f"Platform file: {platform.path}"
+        )
+
+    @property
+    def platform(self) -> Platform:
+        """What it shows and commands."""
+        return self._platform
+
+    @property
+    def mico_gui(self) -> MicoWidget | None:
+        """The MiCo panel, where MiCo is hosted."""
+        return self._mico_gui
+
+    @property
+    def console(self) -> ConsolePanel | None:
+        """The console, where there is one."""
+        return self._console
+
+    # Running
+
+    def open_hardware(self) -> None:
+        """Begin to open the hardware; the panels show how it goes."""
+        if self._platform.mico is not None:
+            self._platform.mico.initialize_later()
+
+    def stop(self, reason: str) -> None:
+        """Stop everything and keep it stopped."""
+        if self._platform.mico is not None:
+            self._platform.mico.manager.stop(reason)
+
+    def halt_all(self) -> None:
+        """Stop the axes that move, without latching; any thread."""
+        if self._mico_gui is None:
+            return
+        for axis in self._mico_gui.mico:
+            if axis.details.in_motion:
+                axis.halt()
+
+    def _on_stop_button(self) -> None:
+        self.stop("STOP button")
+
+    def _on_stop_key(self, key: str) -> None:
+        self.stop(f"key {key}")
+
+    def _on_reset(self) -> None:
+        if self._platform.mico is not None:
+            self._platform.mico.manager.reset_stop()
+
+    def _on_latch(self, state: StopState) -> None:
+        self.top_bar.set_latched(state.reason)
+        if self._mico_gui is not None:
+            self._mico_gui.release_keys()
+
+    def _on_failure(self, failure: Failure) -> None:
+        self.top_bar.set_message(f"{failure.where}: {failure.text}", State.ERROR)
+
+    def _on_mico_failure(self, reason: str) -> None:
+        if reason:
+            self.set_failed(MICO, reason)
+            self.top_bar.set_message(f"{MICO}: {reason}", State.ERROR)
+        elif self.dock(MICO).failure:
+            self.clear_failed(MICO)
+            self.top_bar.set_message("")
+
+    def _on_message_read(self) -> None:
+        self.raise_panel(LOG)
+        self.top_bar.set_message("")
+
+    def _on_rescan(self, title: str) -> None:
+        if title == MICO and self._mico_gui is not None:
+            self._mico_gui.rescan()
+
+    def _on_closing(self) -> None:
+        """Leave everything safe; motion ends first, the console with what it waits for next."""
+        self._forget_policy()
+        if self._mico_gui is not None:
+            self._mico_gui.release_keys()
+        self._platform.shut_down()
+        if self._console is not None:
+            self._console.shut_down()
+
+
+def _application() -> QApplication:
+    app = QApplication.instance()
+    if not isinstance(app, QApplication):
+        raise TypeError("a window needs a QApplication")
+    return app
