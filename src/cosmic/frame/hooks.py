@@ -8,6 +8,7 @@ from types import TracebackType
 
 from PySide6.QtCore import QMessageLogContext, QtMsgType, qInstallMessageHandler
 
+from cosmic.frame import overrides
 from cosmic.frame.failure import FailurePolicy
 
 qt_logger = logging.getLogger("cosmic.qt")
@@ -62,10 +63,10 @@ def install_hooks(policy: FailurePolicy) -> Callable[[], None]:
 
 def _place(trace: TracebackType | None) -> str:
     """Name the innermost function of CoSMic that was running, or the outermost of all."""
-    place = "window"
+    place = ""
     while trace is not None:
         module = str(trace.tb_frame.f_globals.get("__name__", "?"))
-        if module.startswith("cosmic.") or place == "window":
+        if module != overrides.__name__ and (module.startswith("cosmic.") or not place):
             place = f"{module}.{trace.tb_frame.f_code.co_qualname}"
         trace = trace.tb_next
-    return place
+    return place or "window"
