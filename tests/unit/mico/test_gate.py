@@ -177,15 +177,18 @@ def gate(checker=None, latch=None, states=None):
     )
 
 
-def test_what_is_granted_is_held_until_it_is_released():
+def test_what_is_granted_is_held_until_it_is_given_back():
     one = gate()
     token = one._lease.holder.token
-    verdict, grants = one.decide([Request("x", MoveTo(50.0, "um"), token)])
+    verdict, first = one.decide([Request("x", MoveTo(50.0, "um"), token)])
     assert verdict.allowed
-    assert grants["x"].target == 50.0
-    one.decide([Request("x", MoveTo(-20.0, "um"), token)])
+    assert first["x"].target == 50.0
+    _, second = one.decide([Request("x", MoveTo(-20.0, "um"), token)])
     assert one.held() == {"x": Interval(-20.0, 50.0)}
-    one.release("x")
+    one.release(first["x"])
+    assert one.held() == {"x": Interval(-20.0, 50.0)}, "the newer movement starts anywhere there"
+    one.release(second["x"])
+    one.release(second["x"])
     assert one.held() == {}
 
 

@@ -92,3 +92,17 @@ def test_a_senseless_jog_is_refused(direction, speed):
     with mico() as (rig, controller), pytest.raises(cosmic.MoveRefused):
         rig["d0.c0"].jog(direction, speed)
     assert not controller.of("move_to")
+
+
+def test_a_jog_limits_the_speed_while_it_lasts_and_gives_it_back():
+    with mico() as (rig, controller):
+        rig["d0.c0"].set_closed_loop_frequency(4000)
+        jog = rig["d0.c0"].jog(1, speed=150.0)
+        jog.movement.wait(2)
+        wait_until(lambda: len(controller.of("frequency")) >= 5)
+        assert [call[2] for call in controller.of("frequency") if call[1] == X] == [
+            5000,
+            4000,
+            150,
+            4000,
+        ]

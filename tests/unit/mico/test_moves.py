@@ -315,3 +315,29 @@ def test_moves_from_many_threads_all_end():
         for thread in threads:
             thread.join(20)
         assert not any(thread.is_alive() for thread in threads)
+
+
+def test_every_interval_is_given_back_when_its_movement_has_ended():
+    with mico(instant=False) as (rig, controller):
+        gate = rig.application.manager.gate
+        first = rig["d0.c0"].move_to(10.0, wait=False)
+        group = rig.move({"d0.c0": 20.0, "d0.c1": 5.0}, wait=False)
+        wait_until(lambda: len(controller.of("move_to")) == 3)
+        assert first.done
+        assert gate.held()["d0.c0"].high == 20.0
+        controller.end(Channel(0, 1), 5.0)
+        wait_until(lambda: group.movements["d0.c1"].done)
+        assert list(gate.held()) == ["d0.c0"]
+        controller.end(X, 20.0)
+        group.wait(2)
+        assert gate.held() == {}
+
+
+def test_an_interval_stays_held_while_its_device_is_gone():
+    with mico(instant=False) as (rig, controller):
+        movement = rig["d0.c0"].move_to(10.0, wait=False)
+        wait_until(lambda: bool(controller.of("move_to")))
+        controller.broken = DeviceError("usb gone", fault=DeviceFault.COMMUNICATION)
+        with pytest.raises(cosmic.NotConnectedError):
+            movement.wait(3)
+        assert rig.application.manager.gate.held()["d0.c0"].high == 10.0

@@ -124,3 +124,16 @@ def test_stop_from_many_threads_while_all_axes_are_commanded():
         for thread in threads:
             thread.join(5)
         assert not any(thread.is_alive() for thread in threads)
+
+
+def test_what_was_granted_and_never_started_holds_nothing():
+    with mico(instant=False) as (rig, controller):
+        controller.block.clear()
+        stuck = rig["d0.c0"].move_to(1.0, wait=False)
+        wait_until(lambda: bool(controller.of("move_to")))
+        group = rig.move({"d0.c1": 5.0}, wait=False)
+        rig.application.manager.stop("test")
+        controller.block.set()
+        for movement in (stuck, group.movements["d0.c1"]):
+            assert isinstance(movement.exception(2), cosmic.StoppedError)
+        assert rig.application.manager.gate.held() == {}

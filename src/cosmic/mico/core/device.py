@@ -235,8 +235,9 @@ class Device(WorkerThread):
             case Lost():
                 self._on_lost(message.error)
             case SetFrequency():
-                channel = self.container.address(message.channel)
-                self._controller.set_closed_loop_frequency(channel, message.frequency_hz)
+                pilot = self._pilots.get(message.channel)
+                if pilot is not None:
+                    pilot.set_frequency(message.frequency_hz)
             case Wake():
                 pass
             case Tell():
@@ -256,6 +257,8 @@ class Device(WorkerThread):
         name = state.name if state else f"device {self.index} channel {order.channel}"
         why = state.error if state and state.error else "it is not connected"
         verdict = refuse(Reason.DEVICE, f"{name}: {why}; check it, then rescan", axis=name)
+        if order.grant is not None:
+            self._context.gate.release(order.grant)
         order.movement.fail(refusal(verdict))
         self.movement_refused.emit(verdict)
 
@@ -307,8 +310,7 @@ class Device(WorkerThread):
         pilot = ChannelPilot(positioner, self._context)
         self._pilots[channel] = pilot
         if positioner.state.kind is not PositionerKind.OPEN_LOOP:
-            frequency_hz = self._settings.defaults.closed_loop_frequency_hz
-            self._controller.set_closed_loop_frequency(positioner.state.address, frequency_hz)
+            pilot.set_frequency(self._settings.defaults.closed_loop_frequency_hz)
             pilot.ask_position_known()
         pilot.ask_activity()
         pilot.ask_position()
@@ -347,6 +349,8 @@ class Device(WorkerThread):
         while not self._inbox.empty():
             message = self._inbox.get_nowait()
             if isinstance(message, Order):
+                if message.grant is not None:
+                    self._context.gate.release(message.grant)
                 message.movement.fail(error)
 
     # Telling

@@ -249,8 +249,7 @@ class DeviceManager(QObject):
             device.begin()
         for number in numbers:
             self._await_introduction(self._devices[number])
-        for name in self._addresses:
-            self.gate.release(name)  # positions have just been read, and nothing moves
+        self.gate.release_all()  # positions have just been read, and nothing moves
 
     def _await_introduction(self, device: Device) -> None:
         if not device.wait_until_introduced(self.settings.watch.answer_s):

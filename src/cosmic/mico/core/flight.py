@@ -12,7 +12,7 @@ from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.core.data_container import DeviceDataContainer
 from cosmic.mico.core.gate import Gate
 from cosmic.mico.core.jog import JogRun
-from cosmic.mico.core.orders import Jog, Order, Step
+from cosmic.mico.core.orders import Grant, Jog, Order, Step
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Controller
@@ -24,6 +24,8 @@ class Flight:
 
     Attributes
     ----------
+    grant : Grant
+        The gate's leave, given back when the movement ends; of a jog, that of the last packet.
     rests_seen : int
         How many answers, asked after the start, said that the channel stands.
     known_pending : bool
@@ -37,7 +39,7 @@ class Flight:
     """
 
     order: Order
-    target: float | None
+    grant: Grant
     started_s: float
     progress_s: float
     progress_position: float | None = None
@@ -108,14 +110,14 @@ def missed_target(
     flight: Flight, state: PositionerState, settings: MicoSettings
 ) -> CosmicError | None:
     """Return the failure of a movement that stands somewhere else than asked."""
-    if flight.target is None or state.position is None:
+    if flight.grant.target is None or state.position is None:
         return None
     watch = settings.watch
     tolerance = watch.tolerance_deg if state.unit == "deg" else watch.tolerance_um
-    if abs(state.position - flight.target) <= tolerance:
+    if abs(state.position - flight.grant.target) <= tolerance:
         return None
     where = format_quantity(state.position - state.zero, state.unit)
-    wanted = format_quantity(flight.target - state.zero, state.unit)
+    wanted = format_quantity(flight.grant.target - state.zero, state.unit)
     return DeviceError(f"{state.name}: stopped at {where} instead of {wanted}")
 
 

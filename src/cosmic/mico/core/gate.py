@@ -3,6 +3,8 @@
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from itertools import count
 from threading import Lock
 
 from cosmic.frame.clock import WALL
@@ -113,6 +115,12 @@ def _clear_of_everything(
     return verdict
 
 
+@dataclass(frozen=True, slots=True)
+class _Hold:
+    interval: Interval
+    target: float | None
+
+
 class Gate:
     """Keeps what is in flight and asks `judge`; any thread.
 
@@ -137,8 +145,8 @@ class Gate:
         self._rules = rules
         self._states = states
         self._lock = Lock()
-        self._held: dict[str, Interval] = {}
-        self._targets: dict[str, float] = {}
+        self._numbers = count(1)
+        self._holds: dict[str, dict[int, _Hold]] = {}
 
     @property
     def checker(self) -> CollisionChecker:
@@ -155,13 +163,12 @@ class Gate:
         with self._lock:
             epoch = self._latch.state.epoch
             decision = judge(requests, self._picture(), self._checker)
-            if not decision.verdict.allowed:
-                return decision.verdict, {}
-            self._held.update(decision.intervals)
-            for name in decision.intervals:
-                self._targets.pop(name, None)
-            self._targets.update(decision.targets)
-            grants = {name: Grant(epoch, decision.targets.get(name)) for name in decision.intervals}
+            grants: dict[str, Grant] = {}
+            for axis, interval in decision.intervals.items():
+                target = decision.targets.get(axis)
+                grant = Grant(axis, next(self._numbers), epoch, target)
+                self._holds.setdefault(axis, {})[grant.number] = _Hold(interval, target)
+                grants[axis] = grant
             return decision.verdict, grants
 
     def still_valid(self, grant: Grant) -> bool:
@@ -169,24 +176,42 @@ class Gate:
         state = self._latch.state
         return not state.latched and state.epoch == grant.epoch
 
-    def release(self, axis: str) -> None:
-        """Give up the interval of an axis at rest whose position has been read back."""
+    def release(self, grant: Grant) -> None:
+        """Give back the interval of a movement that has ended, its position read; or replaced.
+
+        The interval of a movement that replaces another holds the other's as well.
+        """
         with self._lock:
-            self._held.pop(axis, None)
-            self._targets.pop(axis, None)
+            self._holds.get(grant.axis, {}).pop(grant.number, None)
+
+    def release_all(self) -> None:
+        """Give back everything, where nothing moves and every position has just been read."""
+        with self._lock:
+            self._holds.clear()
 
     def held(self) -> dict[str, Interval]:
-        """Return the intervals in flight, for windows and tests."""
+        """Return the intervals in flight by axis."""
         with self._lock:
-            return dict(self._held)
+            return self._held()
+
+    def _held(self) -> dict[str, Interval]:
+        return {
+            axis: reduce(Interval.hull, (hold.interval for hold in holds.values()))
+            for axis, holds in self._holds.items()
+            if holds
+        }
+
+    def _targets(self) -> dict[str, float]:
+        newest = {axis: holds[max(holds)] for axis, holds in self._holds.items() if holds}
+        return {axis: hold.target for axis, hold in newest.items() if hold.target is not None}
 
     def _picture(self) -> Picture:
         return Picture(
             stop_reason=self._latch.state.reason,
             token=self._lease.holder.token,
             states=self._states(),
-            held=self._held,
-            targets=self._targets,
+            held=self._held(),
+            targets=self._targets(),
             now_wall_s=WALL.now_s(),
             rules=self._rules,
         )

@@ -24,6 +24,11 @@ class JogRun:
         self._start = 0.0
         self._next_s = 0.0
 
+    @property
+    def speed(self) -> float:
+        """Speed asked for, in the axis' unit per second, or Hz without a sensor."""
+        return self._jog.speed
+
     def renew(self) -> None:
         """Say that the key is still held; any thread."""
         self._renewed_wall_s = WALL.now_s()

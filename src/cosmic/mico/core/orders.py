@@ -82,8 +82,13 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """The gate's leave to make one movement, void after the next stop."""
+    """The gate's leave to make one movement, void after the next stop.
 
+    It holds the interval that the movement may sweep until it is given back (`Gate.release`).
+    """
+
+    axis: str
+    number: int
     epoch: int
     target: float | None
 

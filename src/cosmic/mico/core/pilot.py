@@ -3,6 +3,7 @@
 import logging
 import math
 from collections.abc import Callable
+from typing import Final
 
 from cosmic.frame.errors import (
     CosmicError,
@@ -22,7 +23,16 @@ from cosmic.mico.core.flight import (
 )
 from cosmic.mico.core.gate import Request
 from cosmic.mico.core.jog import JogRun
-from cosmic.mico.core.orders import Grant, Jog, Motion, MoveBy, MoveTo, Order, Reference
+from cosmic.mico.core.orders import (
+    FREQUENCY_HZ,
+    Grant,
+    Jog,
+    Motion,
+    MoveBy,
+    MoveTo,
+    Order,
+    Reference,
+)
 from cosmic.mico.core.positioner import Confidence, PositionerBase
 from cosmic.mico.hw.interface import (
     Activity,
@@ -35,6 +45,9 @@ from cosmic.mico.hw.interface import (
 )
 
 logger = logging.getLogger(__name__)
+
+GLIDE: Final = 1.5
+"""How much faster than the jog an axis may go, to make up for its slow last micrometres."""
 
 
 class ChannelPilot:
@@ -49,6 +62,7 @@ class ChannelPilot:
         self.flight: Flight | None = None
         self.next_poll_s = 0.0
         self.settled = False
+        self._frequency_hz = context.settings.defaults.closed_loop_frequency_hz
 
     @property
     def name(self) -> str:
@@ -67,6 +81,7 @@ class ChannelPilot:
     def launch(self, order: Order) -> None:
         """Ask the gate, send `order` to the library, and begin to follow it."""
         if order.movement.cancelled:
+            self._give_back(order.grant)
             order.movement.fail(MoveCancelled(f"{self.name}: cancelled before it started"))
             return
         if isinstance(order.motion, Jog):
@@ -76,9 +91,10 @@ class ChannelPilot:
         if grant is None:
             return
         if not self._context.gate.still_valid(grant):
+            self._give_back(grant)
             self.turn_away(order, _stopped(self.name))
             return
-        self._begin(order, grant.target)
+        self._begin(order, grant)
         self._send(order.motion, grant)
         self._announce()
         self.ask_activity()
@@ -100,11 +116,16 @@ class ChannelPilot:
         order.movement.fail(refusal(verdict))
         self._context.on_refused(verdict)
 
-    def _begin(self, order: Order, target: float | None, jog: JogRun | None = None) -> None:
+    def _give_back(self, grant: Grant | None) -> None:
+        if grant is not None:
+            self._context.gate.release(grant)
+
+    def _begin(self, order: Order, grant: Grant, jog: JogRun | None = None) -> None:
         if self.flight is not None:
+            self._give_back(self.flight.grant)
             self._conclude(MoveCancelled(f"{self.name}: replaced by a newer command"))
         now_s = self._context.clock.now_s()
-        self.flight = Flight(order, target, started_s=now_s, progress_s=now_s, jog=jog)
+        self.flight = Flight(order, grant, started_s=now_s, progress_s=now_s, jog=jog)
         self.flight.known_pending = isinstance(order.motion, Reference)
         self._context.container.update(self._address.channel, in_motion=True, error="")
         logger.info("%s: %s (%s)", self.name, order.motion, order.source)
@@ -120,7 +141,23 @@ class ChannelPilot:
         if not self._context.gate.still_valid(grant):
             self.halt(refusal(_stopped(self.name)))
 
-    # Jogging
+    # Speed and jogging
+
+    def set_frequency(self, frequency_hz: int) -> None:
+        """Limit the closed-loop speed from now on."""
+        self._frequency_hz = frequency_hz
+        self._limit_speed(frequency_hz)
+
+    def _limit_speed(self, frequency_hz: int) -> None:
+        if self._positioner.has_sensor:
+            self._context.controller.set_closed_loop_frequency(self._address, frequency_hz)
+
+    def _limit_jog_speed(self, speed: float) -> None:
+        """Have the axis glide from packet to packet, not leap and wait."""
+        defaults, unit = self._context.settings.defaults, self._positioner.state.unit
+        step = defaults.nominal_step_deg if unit == "deg" else defaults.nominal_step_um
+        wanted_hz = math.ceil(GLIDE * speed / step)
+        self._limit_speed(max(FREQUENCY_HZ[0], min(wanted_hz, self._frequency_hz)))
 
     def renew(self, order_number: int) -> None:
         """Keep a jog alive; any thread."""
@@ -135,7 +172,8 @@ class ChannelPilot:
             return
         grant = self._grant(order, packet)
         if grant is not None:
-            self._begin(order, target=None, jog=jog)
+            self._begin(order, grant, jog=jog)
+            self._limit_jog_speed(jog.speed)
             self._send(packet, grant)
             self._announce()
 
@@ -147,6 +185,8 @@ class ChannelPilot:
             return
         grant = self._grant(flight.order, packet)
         if grant is not None:
+            before, flight.grant = flight.grant, grant
+            self._give_back(before)
             self._send(packet, grant)
             flight.progress_s = now_s
 
@@ -326,10 +366,13 @@ class ChannelPilot:
             step_um = self._positioner.settings.step_um or nominal_um
             where = counted_position(flight, state, step_um, context.clock.now_s())
             context.container.update(self._address.channel, position=where)
-        missed = missed_target(flight, state, context.settings) if flight.error is None else None
+        jogged = isinstance(flight.order.motion, Jog)
+        missed = None
+        if flight.error is None and not jogged:
+            missed = missed_target(flight, state, context.settings)
         if missed is not None:
             self._note(missed)
-        self._context.gate.release(self.name)
+        self._give_back(flight.grant)
         self._conclude(flight.error or missed)
 
     def _conclude(self, error: CosmicError | None) -> None:
@@ -337,6 +380,8 @@ class ChannelPilot:
         flight, self.flight = self.flight, None
         if flight is None:
             return
+        if isinstance(flight.order.motion, Jog):
+            self._quietly(lambda: self._limit_speed(self._frequency_hz))
         in_motion = not flight.at_rest
         state = self._context.container.update(self._address.channel, in_motion=in_motion)
         position = state.position if state else None

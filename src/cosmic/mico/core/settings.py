@@ -26,6 +26,7 @@ class MotionDefaults(StrictModel):
     distance_um: float = Field(default=100.0, gt=0)
     distance_deg: float = Field(default=1.0, gt=0)
     nominal_step_um: float = Field(default=1.5, gt=0)
+    nominal_step_deg: float = Field(default=0.025, gt=0)
     largest_step_um: float = Field(default=3.0, gt=0)
     largest_step_deg: float = Field(default=0.05, gt=0)
 
