@@ -4,15 +4,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, QTimerEvent, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QWidget
 from typing_extensions import override
 
+from cosmic.frame.clock import WALL
 from cosmic.frame.gui.key_focus import takes_text
 from cosmic.frame.gui.stop_key import combination_of
 
 GUARD_MS: Final = 50
+GRACE_MS: Final = 25
 _MODIFIERS: Final = (
     Qt.KeyboardModifier.ShiftModifier
     | Qt.KeyboardModifier.ControlModifier
@@ -31,9 +33,13 @@ class _Combination:
 class HoldKeys(QObject):
     """Says when a key goes down and when it comes up, whatever happens in between.
 
-    Auto-repeat starts nothing again and ends nothing. Everything held ends as well when its
-    window or the program is no longer the active one, when the focus goes to where text is
-    typed, and when a menu, a dialog or a drag takes the input: no key may stay held unseen.
+    Auto-repeat starts nothing again and ends nothing. X11 repeats a key as releases and presses
+    that Qt does not always mark as such (seen with Qt 6.11 under Xvfb, the pair within one
+    millisecond); so a release counts once no press has followed it for `GRACE_MS`.
+
+    Everything held ends as well when its window or the program is no longer the active one,
+    when the focus goes to where text is typed, and when a menu, a dialog or a drag takes the
+    input: no key may stay held unseen.
 
     Parameters
     ----------
@@ -55,6 +61,8 @@ class HoldKeys(QObject):
         super().__init__(parent or app)
         self._names: dict[_Combination, str] = {}
         self._held: dict[int, str] = {}
+        self._coming_up: dict[int, int] = {}  # timer of each key that may have come up
+        self._up_since_s: dict[int, float] = {}
         self._enabled = True
         self._guard = QTimer(self, interval=GUARD_MS)
         self._guard.timeout.connect(self._on_guard)
@@ -81,9 +89,8 @@ class HoldKeys(QObject):
     def release_all(self) -> None:
         """End everything held; the keys must come up before they act again."""
         self._guard.stop()
-        held, self._held = self._held, {}
-        for name in held.values():
-            self.hold_ended.emit(name)
+        for key in list(self._held):
+            self._end(key)
 
     @override
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -94,11 +101,14 @@ class HoldKeys(QObject):
             return False
         if event.key() in self._held:
             return self._on_held_key(event)
+        if kind == QEvent.Type.KeyRelease:
+            self._up_since_s[event.key()] = WALL.now_s()
+            return False
         name = self._names.get(_Combination(Qt.Key(event.key()), event.modifiers() & _MODIFIERS))
         if name is None or not self._enabled or _input_is_elsewhere():
             return False
         event.accept()
-        if kind == QEvent.Type.KeyPress and not event.isAutoRepeat():
+        if kind == QEvent.Type.KeyPress and not self._is_repeat(event):
             self._held[event.key()] = name
             self._guard.start()
             self.hold_started.emit(name)
@@ -107,12 +117,32 @@ class HoldKeys(QObject):
     def _on_held_key(self, event: QKeyEvent) -> bool:
         """Handle a key that is held, whatever modifier has been pressed since."""
         event.accept()
-        if event.type() == QEvent.Type.KeyRelease and not event.isAutoRepeat():
-            name = self._held.pop(event.key())
-            if not self._held:
-                self._guard.stop()
-            self.hold_ended.emit(name)
+        key = event.key()
+        if event.type() == QEvent.Type.KeyPress and key in self._coming_up:
+            self.killTimer(self._coming_up.pop(key))
+        came_up = event.type() == QEvent.Type.KeyRelease and not event.isAutoRepeat()
+        if came_up and key not in self._coming_up:
+            self._coming_up[key] = self.startTimer(GRACE_MS, Qt.TimerType.PreciseTimer)
         return True
+
+    def _is_repeat(self, event: QKeyEvent) -> bool:
+        """Tell a press that only repeats a key which is down, but no longer held for us."""
+        up_s = WALL.now_s() - self._up_since_s.get(event.key(), float("-inf"))
+        return event.isAutoRepeat() or up_s * 1000.0 < GRACE_MS
+
+    def _end(self, key: int) -> None:
+        name = self._held.pop(key)
+        if key in self._coming_up:
+            self.killTimer(self._coming_up.pop(key))
+        if not self._held:
+            self._guard.stop()
+        self.hold_ended.emit(name)
+
+    @override
+    def timerEvent(self, event: QTimerEvent) -> None:
+        for key, timer in list(self._coming_up.items()):
+            if timer == event.timerId():
+                self._end(key)
 
     def _on_focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
         if takes_text(new):
