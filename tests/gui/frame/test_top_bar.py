@@ -139,3 +139,17 @@ def test_badges_of_two_states_look_different(qtbot: QtBot) -> None:
         badge.set_state(state)
         pictures.append(badge.grab().toImage())
     assert all(pictures[i] != pictures[j] for i in range(len(pictures)) for j in range(i))
+
+
+def test_a_badge_in_a_greyed_panel_claims_nothing_by_colour(qtbot: QtBot) -> None:
+    badge = StateBadge(State.OK)
+    qtbot.addWidget(badge)
+    badge.resize(badge.sizeHint())
+    badge.setEnabled(False)
+    picture = badge.grab().toImage()
+    colours = {
+        picture.pixelColor(x, y).hsvSaturation()
+        for x in range(picture.width())
+        for y in range(picture.height())
+    }
+    assert max(colours) < 80

@@ -1,5 +1,7 @@
 """A small sign that shows a state by colour, by shape and by word."""
 
+from dataclasses import replace
+
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import (
     QColor,
@@ -13,7 +15,14 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
-from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look
+from cosmic.frame.gui.theme import (
+    STEP_PX,
+    State,
+    StateLook,
+    current_palette,
+    number_font,
+    state_look,
+)
 
 _SHAPE_PX = 10.0
 _FONT_PX = 11
@@ -69,9 +78,17 @@ class StateBadge(QWidget):
         width = max(metrics.horizontalAdvance(each.value) for each in State)
         return QSize(int(width + _SHAPE_PX + 2.5 * STEP_PX) + 1, int(metrics.height()) + STEP_PX)
 
+    def _look(self) -> StateLook:
+        """Return the look; grey where the panel is: what a failed part said last may be wrong."""
+        look = state_look(self._state)
+        if self.isEnabled():
+            return look
+        grey = current_palette()
+        return replace(look, colour=grey.disabled, fill=grey.panel, text=grey.disabled)
+
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
-        look = state_look(self._state)
+        look = self._look()
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         box = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)

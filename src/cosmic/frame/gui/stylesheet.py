@@ -75,6 +75,9 @@ QCheckBox::indicator:checked, QGroupBox::indicator:checked {
     background: $accent; border-color: $accent; image: url("$assets/check-$name.svg");
 }
 QCheckBox::indicator:disabled { background: transparent; border-color: $border; }
+QCheckBox::indicator:checked:disabled {
+    background: $disabled; border-color: $disabled;
+}
 QCheckBox:disabled { color: $disabled; }
 QProgressBar {
     background: $field; color: $text; border: 1px solid $border; border-radius: 4px;

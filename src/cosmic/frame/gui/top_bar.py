@@ -1,6 +1,6 @@
 """The bar on top of every main window: what is in force, what is wrong, and STOP."""
 
-from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QVBoxLayout,
     QWidget,
 )
-from typing_extensions import override
 
 from cosmic.frame.gui.build import named, push_button, tight_row
 from cosmic.frame.gui.chip import Chip, set_style_property
@@ -189,9 +188,3 @@ class TopBar(QWidget):
     def set_stop_key(self, key_text: str) -> None:
         """Write another key on the STOP button."""
         self._stop.set_key_text(key_text)
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self.update()
