@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from queue import Empty, SimpleQueue
-from threading import Event as ThreadEvent
 from threading import Lock
 from typing import Final
 
@@ -27,6 +26,7 @@ from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.core.data_container import DeviceDataContainer
 from cosmic.mico.core.flight import PilotContext
 from cosmic.mico.core.gate import Gate
+from cosmic.mico.core.introduction import Introduction
 from cosmic.mico.core.messages import (
     DeviceLost,
     Halt,
@@ -42,17 +42,10 @@ from cosmic.mico.core.orders import Order
 from cosmic.mico.core.pilot import ChannelPilot
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.core.settings import MicoSettings
-from cosmic.mico.hw.interface import (
-    Controller,
-    Event,
-    PositionerKind,
-    SensorPresentRead,
-    TypeRead,
-)
+from cosmic.mico.hw.interface import Controller, Event
 
 logger = logging.getLogger(__name__)
 
-CHANNELS: Final = range(3)
 MOST_AT_ONCE: Final = 100
 """How many messages are taken before positions are polled again."""
 
@@ -95,8 +88,6 @@ class Device(WorkerThread):
         self._inbox: SimpleQueue[_Message] = SimpleQueue()
         self._intake = Lock()
         self._open = False
-        self._introduced = ThreadEvent()
-        self._pilots: dict[int, ChannelPilot] = {}
         self._shown: dict[int, PositionerState] = {}
         self._context = PilotContext(
             controller=controller,
@@ -109,12 +100,17 @@ class Device(WorkerThread):
             on_failed=self._emit_failed,
             on_state=self._emit_state,
         )
+        self._introduction = Introduction(self._context)
         container.observe(lambda event, _state: self._inbox.put(event))
 
     @property
     def index(self) -> int:
         """Number of the device in the configuration."""
         return self.container.device
+
+    @property
+    def _pilots(self) -> dict[int, ChannelPilot]:
+        return self._introduction.pilots
 
     # For any thread
 
@@ -173,7 +169,7 @@ class Device(WorkerThread):
 
     def wait_until_introduced(self, timeout_s: float) -> bool:
         """Wait until types and positions are known; False after `timeout_s` of wall time."""
-        return self._introduced.wait(timeout_s)
+        return self._introduction.wait(timeout_s)
 
     @override
     def request_end(self) -> None:
@@ -185,7 +181,7 @@ class Device(WorkerThread):
     @override
     def run_body(self) -> None:
         try:
-            self._guarded(self._introduce)
+            self._guarded(self._introduction.begin)
             while not self.end_requested:
                 self._take_waiting()
                 self._guarded(self._poll)
@@ -225,25 +221,28 @@ class Device(WorkerThread):
         match message:
             case Order():
                 self._on_order(message)
-            case Halt():
-                pilot = self._pilots.get(message.channel)
-                if pilot is not None:
-                    pilot.halt(message.error)
             case StopAll():
                 for pilot in self._pilots.values():
                     pilot.halt(message.error)
             case Lost():
                 self._on_lost(message.error)
-            case SetFrequency():
-                pilot = self._pilots.get(message.channel)
-                if pilot is not None:
-                    pilot.set_frequency(message.frequency_hz)
+            case Halt() | SetFrequency():
+                self._on_channel_message(message)
             case Wake():
                 pass
             case Tell():
                 self._emit_state(message.channel)
             case _:
                 self._on_event(message)
+
+    def _on_channel_message(self, message: Halt | SetFrequency) -> None:
+        pilot = self._pilots.get(message.channel)
+        if pilot is None:
+            return
+        if isinstance(message, Halt):
+            pilot.halt(message.error)
+        else:
+            pilot.set_frequency(message.frequency_hz)
 
     def _on_order(self, order: Order) -> None:
         pilot = self._pilots.get(order.channel)
@@ -266,73 +265,28 @@ class Device(WorkerThread):
         for pilot in self._pilots.values():
             pilot.poll()
 
-    # Who is there
-
-    def _introduce(self) -> None:
-        """Ask every channel what it has (Fig. 6.7)."""
-        for channel in CHANNELS:
-            self.container.expect(channel)
-        for channel in CHANNELS:
-            address = self.container.address(channel)
-            try:
-                self._controller.report_completion(address)
-                self._controller.ask_sensor_present(address)
-            except DeviceError as exc:
-                if exc.fault is not DeviceFault.NO_CHANNEL:
-                    raise
-                self.container.settle(channel, None, "no such channel")
-        self._note_if_introduced()
-
     def _on_event(self, event: Event) -> None:
         channel = event.channel.channel if event.channel else -1
         pilot = self._pilots.get(channel)
         if pilot is None:
-            self._on_introduction(event, channel)
-            return
-        pilot.take(event)
-        self._emit_state(channel)
-        if not self._introduced.is_set():
-            self._note_if_introduced()
-
-    def _on_introduction(self, event: Event, channel: int) -> None:
-        if isinstance(event, SensorPresentRead) and event.present:
-            self._controller.ask_type(event.channel)
-        elif isinstance(event, (SensorPresentRead, TypeRead)):
-            self._welcome(channel)
+            self._introduction.take(event, channel)
         else:
-            logger.debug("device %d: %s", self.index, event)
-        self._note_if_introduced()
-
-    def _welcome(self, channel: int) -> None:
-        positioner = self.container.positioner(channel)
-        if positioner is None or not positioner.state.present:
-            return
-        pilot = ChannelPilot(positioner, self._context)
-        self._pilots[channel] = pilot
-        if positioner.state.kind is not PositionerKind.OPEN_LOOP:
-            pilot.set_frequency(self._settings.defaults.closed_loop_frequency_hz)
-            pilot.ask_position_known()
-        pilot.ask_activity()
-        pilot.ask_position()
-
-    def _note_if_introduced(self) -> None:
-        located = all(pilot.located for pilot in self._pilots.values())
-        if self.container.clear and located:
-            self._introduced.set()
+            pilot.take(event)
+            self._emit_state(channel)
+        self._introduction.look()
 
     # Trouble and the end
 
     def _on_lost(self, error: DeviceError) -> None:
         self._open = False
         logger.error("device %d is lost: %s", self.index, error)
-        pilots, self._pilots = self._pilots, {}
+        pilots = self._introduction.give_up()
         in_motion = any(pilot.flight is not None for pilot in pilots.values())
         reason = f"device {self.index} does not answer: {error}"
         self.container.lose(reason)
         for channel, pilot in pilots.items():
             pilot.lose(NotConnectedError(f"{pilot.name}: {reason}", fault=error.fault))
             self._emit_state(channel)
-        self._introduced.set()
         self.lost.emit(DeviceLost(self.index, reason, in_motion))
 
     def _close_intake(self) -> None:

@@ -1,11 +1,13 @@
 """`DeviceCommander`: the run-time API of one device, decoupled by signals (thesis 6.1.2)."""
 
+from collections.abc import Callable
 from enum import Flag, auto
 
-from PySide6.QtCore import QMetaObject, QObject, Signal
+from PySide6.QtCore import QMetaObject, QObject, Qt, Signal, SignalInstance
 
 from cosmic.frame.errors import NotConnectedError
 from cosmic.frame.units import AxisUnit
+from cosmic.mico.core.device import Device
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.orders import (
     Calibrate,
@@ -152,3 +154,28 @@ class DeviceCommander(QObject):
         order = Order(channel, motion, self._token, self._source, consent, grant=grant)
         self.order_issued.emit(order)
         return order
+
+
+def join(device: Device, commander: DeviceCommander, kind: CommanderType) -> None:
+    """Connect a commander to a device, parting it from any other.
+
+    The connections are direct: a command goes into the device's queue in the caller's thread, so
+    that no event loop is needed to make a move.
+    """
+    pairs: list[tuple[SignalInstance, Callable[..., object] | SignalInstance]] = []
+    if CommanderType.INPUT in kind:
+        pairs += [
+            (commander.order_issued, device.submit),
+            (commander.jog_renewed, device.renew_jog),
+            (commander.halt_requested, device.halt),
+            (commander.frequency_requested, device.set_frequency),
+        ]
+    if CommanderType.OUTPUT in kind:
+        pairs += [
+            (device.position_changed, commander.position_changed),
+            (device.state_changed, commander.state_changed),
+            (device.movement_ended, commander.movement_ended),
+            (device.movement_refused, commander.movement_refused),
+        ]
+    direct = Qt.ConnectionType.DirectConnection
+    commander.attach([signal.connect(slot, direct) for signal, slot in pairs], kind)

@@ -1,18 +1,17 @@
 """`DeviceManager`: finds the devices, owns their threads, and stops them all (thesis 6.1)."""
 
 import logging
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from enum import StrEnum
 from threading import RLock
 
-from PySide6.QtCore import QObject, Qt, Signal, SignalInstance
+from PySide6.QtCore import QObject, Qt, Signal
 
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import (
     CosmicError,
     DeviceError,
     NotAvailable,
-    NotConnectedError,
     UnknownAxisError,
     refusal,
 )
@@ -20,18 +19,20 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision import CollisionChecker, NoCollisionModel
 from cosmic.mico.core.data_container import NO_DEVICE, DeviceDataContainer
-from cosmic.mico.core.device import CHANNELS, Device
-from cosmic.mico.core.device_commander import CommanderType, DeviceCommander
+from cosmic.mico.core.device import Device
+from cosmic.mico.core.device_commander import CommanderType, DeviceCommander, join
 from cosmic.mico.core.device_listener import DeviceListener
 from cosmic.mico.core.gate import Gate, Request
+from cosmic.mico.core.introduction import CHANNELS
 from cosmic.mico.core.lease import Lease
 from cosmic.mico.core.messages import DeviceLost
+from cosmic.mico.core.numbering import library_indices, serials_to_open
 from cosmic.mico.core.orders import Motion, Order
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.core.rules import Limits
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.stop_latch import StopLatch
-from cosmic.mico.hw.interface import Channel, Controller, DeviceIdentity
+from cosmic.mico.hw.interface import Channel, Controller
 
 logger = logging.getLogger(__name__)
 
@@ -163,42 +164,17 @@ class DeviceManager(QObject):
         with self._busy:
             self._set_mode(Mode.INITIALISATION)
             try:
-                identities = self.controller.open(self._serials_to_open())
+                wanted = self.settings.serials
+                identities = self.controller.open(serials_to_open(self.controller, wanted))
             except DeviceError:
                 self.controller.close()
+                self._arrange({})
                 self._set_mode(Mode.FAILED)
                 raise
-            library_index = self._numbered(identities)
+            library_index = library_indices(self.controller, wanted, identities)
             self._arrange(library_index)
             self._start(library_index)
             self._set_mode(Mode.RUN_TIME)
-
-    def _serials_to_open(self) -> tuple[int, ...]:
-        wanted = self.settings.serials
-        if not wanted:
-            return ()
-        found = self.controller.find_devices()
-        present = tuple(serial for serial in wanted if serial in found)
-        if not present:
-            raise NotConnectedError(
-                f"none of the configured devices is connected (serial numbers "
-                f"{_listed(wanted)}; found {_listed(found)}); check power and USB, or the "
-                f"serials in the platform file"
-            )
-        return present
-
-    def _numbered(self, identities: Sequence[DeviceIdentity]) -> dict[int, int]:
-        """Return the library's index of each device by its number in the configuration.
-
-        The library numbers whatever is connected, so that one device missing would shift the
-        others onto foreign axes: only the serial numbers tell which is which.
-        """
-        serials = self.settings.serials
-        if serials:
-            return {serials.index(each.serial): each.index for each in identities}
-        if len(identities) > 1 and not self.controller.simulated:
-            logger.warning("no serials are configured: devices are numbered as the library does")
-        return {each.index: each.index for each in identities}
 
     def _arrange(self, library_index: Mapping[int, int]) -> None:
         """Make containers and devices for what is present and for what is only configured."""
@@ -315,23 +291,7 @@ class DeviceManager(QObject):
         device = self._devices.get(index)
         if device is None:
             raise NotAvailable(f"there is no device {index}")
-        direct = Qt.ConnectionType.DirectConnection
-        pairs: list[tuple[SignalInstance, object]] = []
-        if CommanderType.INPUT in kind:
-            pairs += [
-                (commander.order_issued, device.submit),
-                (commander.jog_renewed, device.renew_jog),
-                (commander.halt_requested, device.halt),
-                (commander.frequency_requested, device.set_frequency),
-            ]
-        if CommanderType.OUTPUT in kind:
-            pairs += [
-                (device.position_changed, commander.position_changed),
-                (device.state_changed, commander.state_changed),
-                (device.movement_ended, commander.movement_ended),
-                (device.movement_refused, commander.movement_refused),
-            ]
-        commander.attach([signal.connect(slot, direct) for signal, slot in pairs], kind)
+        join(device, commander, kind)
 
     def check(self, motions: Mapping[str, Motion]) -> MoveVerdict:
         """Return what the gate says to all of `motions` together, without moving anything."""
@@ -409,10 +369,6 @@ class DeviceManager(QObject):
         self._policy.report(_LostError(lost.reason), f"device {lost.index}")
         self.device_lost.emit(lost)
         self.changed.emit()
-
-
-def _listed(serials: Collection[int]) -> str:
-    return ", ".join(map(str, serials)) or "none"
 
 
 class _LostError(CosmicError):

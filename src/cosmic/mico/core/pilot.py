@@ -2,25 +2,14 @@
 
 import logging
 import math
-from collections.abc import Callable
 from typing import Final
 
-from cosmic.frame.errors import (
-    CosmicError,
-    DeviceError,
-    DeviceFault,
-    DeviceTimeout,
-    MoveCancelled,
-    refusal,
-)
+from typing_extensions import override
+
+from cosmic.frame.errors import DeviceError, MoveCancelled, refusal
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
-from cosmic.mico.core.flight import (
-    Flight,
-    PilotContext,
-    Questions,
-    counted_position,
-    missed_target,
-)
+from cosmic.mico.core.flight import Flight
+from cosmic.mico.core.follower import ChannelFollower
 from cosmic.mico.core.gate import Request
 from cosmic.mico.core.jog import JogRun
 from cosmic.mico.core.orders import (
@@ -33,16 +22,6 @@ from cosmic.mico.core.orders import (
     Order,
     Reference,
 )
-from cosmic.mico.core.positioner import Confidence, PositionerBase
-from cosmic.mico.hw.interface import (
-    Activity,
-    ActivityRead,
-    Completed,
-    Event,
-    Failed,
-    PositionKnownRead,
-    PositionRead,
-)
 
 logger = logging.getLogger(__name__)
 
@@ -50,31 +29,8 @@ GLIDE: Final = 1.5
 """How much faster than the jog an axis may go, to make up for its slow last micrometres."""
 
 
-class ChannelPilot:
-    """Launches orders for one channel, follows them, and says how they ended."""
-
-    def __init__(self, positioner: PositionerBase, context: PilotContext) -> None:
-        self._positioner = positioner
-        self._context = context
-        self._address = positioner.state.address
-        self._activity = Questions()
-        self._position = Questions()
-        self.flight: Flight | None = None
-        self.next_poll_s = 0.0
-        self.settled = False
-        self._frequency_hz = context.settings.defaults.closed_loop_frequency_hz
-
-    @property
-    def name(self) -> str:
-        """Name of the axis."""
-        return self._positioner.state.name
-
-    @property
-    def located(self) -> bool:
-        """True once it stands and its position was read, or there is no sensor to read it."""
-        return self.settled and (
-            not self._positioner.has_sensor or self._positioner.state.position is not None
-        )
+class ChannelPilot(ChannelFollower):
+    """Launches the orders for one channel; what follows is the follower's."""
 
     # Starting
 
@@ -116,10 +72,6 @@ class ChannelPilot:
         order.movement.fail(refusal(verdict))
         self._context.on_refused(verdict)
 
-    def _give_back(self, grant: Grant | None) -> None:
-        if grant is not None:
-            self._context.gate.release(grant)
-
     def _begin(self, order: Order, grant: Grant, jog: JogRun | None = None) -> None:
         if self.flight is not None:
             self._give_back(self.flight.grant)
@@ -141,16 +93,7 @@ class ChannelPilot:
         if not self._context.gate.still_valid(grant):
             self.halt(refusal(_stopped(self.name)))
 
-    # Speed and jogging
-
-    def set_frequency(self, frequency_hz: int) -> None:
-        """Limit the closed-loop speed from now on."""
-        self._frequency_hz = frequency_hz
-        self._limit_speed(frequency_hz)
-
-    def _limit_speed(self, frequency_hz: int) -> None:
-        if self._positioner.has_sensor:
-            self._context.controller.set_closed_loop_frequency(self._address, frequency_hz)
+    # Jogging
 
     def _limit_jog_speed(self, speed: float) -> None:
         """Have the axis glide from packet to packet, not leap and wait."""
@@ -177,6 +120,14 @@ class ChannelPilot:
             self._send(packet, grant)
             self._announce()
 
+    @override
+    def poll(self) -> None:
+        flight = self.flight
+        jog = flight.jog if flight is not None else None
+        if flight is not None and jog is not None and jog.due(self._context.clock.now_s()):
+            self._next_packet(flight, jog)
+        super().poll()
+
     def _next_packet(self, flight: Flight, jog: JogRun) -> None:
         now_s = self._context.clock.now_s()
         packet = jog.packet(self._positioner.state, now_s)
@@ -189,221 +140,6 @@ class ChannelPilot:
             self._give_back(before)
             self._send(packet, grant)
             flight.progress_s = now_s
-
-    def _end_jog(self, error: CosmicError | None) -> None:
-        flight = self.flight
-        if flight is None:
-            return
-        flight.jog, flight.rests_seen = None, 0
-        flight.error = flight.error or error
-        if error is not None:
-            logger.warning("%s: jogging ended: %s", self.name, error)
-        self._quietly(lambda: self._context.controller.stop(self._address))
-        self.ask_activity()
-
-    # Stopping
-
-    def halt(self, error: CosmicError) -> None:
-        """Stop the channel; the movement under way will fail with `error`."""
-        self._quietly(lambda: self._context.controller.stop(self._address))
-        if self.flight is not None:
-            self.flight.error = self.flight.error or error
-            self.flight.jog = None
-            self.flight.progress_s = self._context.clock.now_s()
-            self.ask_activity()
-
-    def lose(self, error: CosmicError) -> None:
-        """Give up the movement of a channel that cannot be reached; its interval stays held."""
-        flight, self.flight = self.flight, None
-        if flight is not None:
-            flight.order.movement.fail(error)
-            self._context.on_failed(self.name, error)
-
-    # Following
-
-    def poll(self) -> None:
-        """Ask what is due, renew a jog, and notice a movement that makes no progress."""
-        now_s = self._context.clock.now_s()
-        flight = self.flight
-        if flight is not None and flight.jog is not None and flight.jog.due(now_s):
-            self._next_packet(flight, flight.jog)
-        if now_s < self.next_poll_s:
-            return
-        watch = self._context.settings.watch
-        period_s = watch.idle_poll_s if flight is None else self._context.poll_s
-        self.next_poll_s = now_s + period_s * max(self._context.clock.rate, 1.0)
-        self.ask_position()
-        if flight is None:
-            return
-        self.ask_activity()
-        late = now_s - flight.progress_s
-        patience_s = flight.patience_s(self._context.settings, self._context.clock.rate)
-        if late > patience_s and flight.error is not None:
-            self._conclude(flight.error)  # no answer: it may still move, so its interval stays held
-        elif late > patience_s:
-            text = f"{self.name}: no progress for {late:.1f} s, stopped"
-            self._blame(DeviceTimeout(text, fault=DeviceFault.TIMEOUT))
-
-    def ask_activity(self) -> None:
-        """Ask what the channel is doing."""
-        self._activity.asked(self.flight.order.number if self.flight else 0)
-        self._quietly(lambda: self._context.controller.ask_activity(self._address))
-
-    def ask_position(self) -> None:
-        """Ask for the position, where there is a sensor."""
-        if not self._positioner.has_sensor:
-            return
-        number = self.flight.order.number if self.flight else 0
-        final = self.flight is not None and self.flight.at_rest
-        self._position.asked(-number if final else number)
-        unit = self._positioner.state.unit
-        self._quietly(lambda: self._context.controller.ask_position(self._address, unit))
-
-    def ask_position_known(self) -> None:
-        """Ask whether the position is referenced; old libraries cannot say."""
-        try:
-            self._context.controller.ask_position_known(self._address)
-        except DeviceError as exc:
-            if exc.fault is not DeviceFault.UNSUPPORTED:
-                raise
-            self._on_known(PositionKnownRead(self._address, known=self.flight is not None))
-
-    def take(self, event: Event) -> None:
-        """Follow one event of this channel."""
-        match event:
-            case Completed():
-                self.ask_activity()
-            case ActivityRead():
-                self._on_activity(event)
-            case PositionRead():
-                self._on_position()
-            case PositionKnownRead():
-                self._on_known(event)
-            case Failed():
-                self._on_failed(event.error)
-
-    def _on_activity(self, event: ActivityRead) -> None:
-        number = self._activity.answered()
-        flight = self.flight
-        if not self.settled:
-            self._settle(event.activity)
-        if flight is None or number != flight.order.number or flight.jog is not None:
-            return
-        if not event.activity.at_rest:
-            flight.rests_seen = 0
-            return
-        flight.rests_seen += 1
-        if not flight.at_rest:
-            self.ask_activity()
-        elif not self._positioner.has_sensor:
-            self._land()
-        elif flight.rests_seen == 2:
-            if flight.known_pending:
-                self.ask_position_known()
-            self.ask_position()
-
-    def _settle(self, activity: Activity) -> None:
-        """Bring to rest what was moving before anybody here could have asked for it."""
-        if activity.at_rest:
-            self.settled = True
-            return
-        logger.warning("%s: was %s when it was found; stopped", self.name, activity)
-        self.halt(MoveCancelled(f"{self.name}: stopped"))
-        self.ask_activity()
-        self.ask_position()
-
-    def _on_position(self) -> None:
-        number = self._position.answered()
-        flight = self.flight
-        if flight is None:
-            return
-        flight.note_position(self._positioner.state.position, self._context.clock.now_s())
-        if flight.at_rest and number == -flight.order.number and not flight.known_pending:
-            self._land()
-
-    def _on_known(self, event: PositionKnownRead) -> None:
-        known = Confidence.KNOWN if event.known else Confidence.UNKNOWN
-        self._context.container.update(self._address.channel, confidence=known)
-        flight = self.flight
-        if flight is not None and flight.known_pending and flight.at_rest:
-            flight.known_pending = False
-            if not event.known and flight.error is None:
-                text = f"{self.name}: it stopped without having found its reference"
-                flight.error = DeviceError(text, fault=DeviceFault.REFERENCE)
-        self._announce()
-
-    def _on_failed(self, error: DeviceError) -> None:
-        flight = self.flight
-        if flight is None or error.fault is DeviceFault.UNSUPPORTED:
-            self._note(error)
-        elif flight.at_rest:
-            self._note(error)
-            self._conclude(flight.error or error)  # it stands, and cannot say where
-        elif flight.error is None:
-            self._blame(error)
-
-    def _blame(self, error: DeviceError) -> None:
-        """Remember why the movement fails, and leave nothing moving unwatched."""
-        self._note(error)
-        self.halt(error)
-
-    def _note(self, error: CosmicError) -> None:
-        """Mark the axis as faulty, and log it once."""
-        if self._positioner.state.error != str(error):
-            logger.error("%s: %s", self.name, error)
-            self._context.container.update(self._address.channel, error=str(error))
-            self._announce()
-
-    # Landing
-
-    def _land(self) -> None:
-        flight = self.flight
-        if flight is None:
-            return
-        state, context = self._positioner.state, self._context
-        if not self._positioner.has_sensor:
-            nominal_um = context.settings.defaults.nominal_step_um
-            step_um = self._positioner.settings.step_um or nominal_um
-            where = counted_position(flight, state, step_um, context.clock.now_s())
-            context.container.update(self._address.channel, position=where)
-        jogged = isinstance(flight.order.motion, Jog)
-        missed = None
-        if flight.error is None and not jogged:
-            missed = missed_target(flight, state, context.settings)
-        if missed is not None:
-            self._note(missed)
-        self._give_back(flight.grant)
-        self._conclude(flight.error or missed)
-
-    def _conclude(self, error: CosmicError | None) -> None:
-        """End the movement under way; its interval stays held unless it has landed."""
-        flight, self.flight = self.flight, None
-        if flight is None:
-            return
-        if isinstance(flight.order.motion, Jog):
-            self._quietly(lambda: self._limit_speed(self._frequency_hz))
-        in_motion = not flight.at_rest
-        state = self._context.container.update(self._address.channel, in_motion=in_motion)
-        position = state.position if state else None
-        self._announce()
-        if error is None:
-            flight.order.movement.finish(position)
-            self._context.on_finished(self.name, position)
-        else:
-            flight.order.movement.fail(error)
-            self._context.on_failed(self.name, error)
-
-    def _announce(self) -> None:
-        self._context.on_state(self._address.channel)
-
-    def _quietly(self, call: Callable[[], None]) -> None:
-        """Make a call that the unreachable-device path reports, not this one."""
-        try:
-            call()
-        except DeviceError as exc:
-            if exc.fault is DeviceFault.COMMUNICATION:
-                raise
-            logger.warning("%s: %s", self.name, exc)
 
 
 def _stopped(name: str) -> MoveVerdict:
