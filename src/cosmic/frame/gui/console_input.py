@@ -5,9 +5,9 @@ from typing import Final
 from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QTextCursor
 from PySide6.QtWidgets import QPlainTextEdit, QSizePolicy, QWidget
-from typing_extensions import override
 
 from cosmic.frame.gui.theme import STEP_PX, code_font
+from cosmic.frame.overrides import override
 
 _MOST_LINES: Final = 6
 _MOST_HISTORY: Final = 500

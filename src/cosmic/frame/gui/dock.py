@@ -11,12 +11,12 @@ from PySide6.QtWidgets import (
     QVBoxLayout,
     QWidget,
 )
-from typing_extensions import override
 
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.stop_button import StopButton
 from cosmic.frame.gui.theme import STEP_PX, State, ui_font
+from cosmic.frame.overrides import override
 
 
 class _TitleBar(QWidget):

@@ -7,11 +7,11 @@ from typing import Final
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, QTimerEvent, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QWidget
-from typing_extensions import override
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.gui.key_focus import takes_text
 from cosmic.frame.gui.stop_key import combination_of
+from cosmic.frame.overrides import override
 
 GUARD_MS: Final = 50
 GRACE_MS: Final = 25

@@ -15,10 +15,10 @@ from PySide6.QtCore import (
     Qt,
 )
 from PySide6.QtGui import QColor
-from typing_extensions import override
 
 from cosmic.frame.gui.palette import INK
 from cosmic.frame.gui.theme import State, current_palette, state_look
+from cosmic.frame.overrides import override
 
 Index = QModelIndex | QPersistentModelIndex
 Role = Qt.ItemDataRole

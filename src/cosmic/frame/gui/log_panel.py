@@ -20,12 +20,12 @@ from PySide6.QtWidgets import (
     QVBoxLayout,
     QWidget,
 )
-from typing_extensions import override
 
 from cosmic.frame.gui.build import push_button, tipped
 from cosmic.frame.gui.log_model import LEVEL, MESSAGE, TIME, WHERE, LogEntry, LogFilter, LogModel
 from cosmic.frame.gui.theme import STEP_PX, code_font, number_font
 from cosmic.frame.log import RingBufferHandler
+from cosmic.frame.overrides import override
 
 REFRESH_MS: Final = 100
 LEVELS: Final = {"Everything": logging.NOTSET, "Warnings": logging.WARNING, "Errors": logging.ERROR}

@@ -5,11 +5,11 @@ from typing import Final
 from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QEnterEvent, QFocusEvent, QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QWidget
-from typing_extensions import override
 
 from cosmic.frame.errors import QuantityError
 from cosmic.frame.gui.reason_bubble import ReasonBubble
 from cosmic.frame.gui.theme import STEP_PX, State, current_palette, number_font, state_look
+from cosmic.frame.overrides import override
 from cosmic.frame.units import DISPLAY, format_quantity, parse_quantity
 
 _ENTER: Final = (Qt.Key.Key_Return, Qt.Key.Key_Enter)

@@ -4,9 +4,9 @@ from PySide6.QtCore import QEvent, QObject, QPoint, Qt
 from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QLabel, QWidget
 from shiboken6 import isValid
-from typing_extensions import override
 
 from cosmic.frame.gui.theme import STEP_PX
+from cosmic.frame.overrides import override
 
 _WIDTH_PX = 45 * STEP_PX
 _FOLLOWED = {QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show, QEvent.Type.Hide}

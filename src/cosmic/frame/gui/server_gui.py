@@ -5,7 +5,6 @@ from typing import Final
 from PySide6.QtCore import QSettings, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
-from typing_extensions import override
 
 from cosmic.frame.gui.dock import PanelDock
 from cosmic.frame.gui.keys_dialog import KeyList, KeysDialog
@@ -14,6 +13,7 @@ from cosmic.frame.gui.menus import ServerMenus
 from cosmic.frame.gui.palette import ThemeName
 from cosmic.frame.gui.theme import STEP_PX, apply_theme, current_palette
 from cosmic.frame.gui.top_bar import TopBar
+from cosmic.frame.overrides import override
 
 Area = Qt.DockWidgetArea
 

@@ -13,7 +13,6 @@ from PySide6.QtGui import (
     QPolygonF,
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
-from typing_extensions import override
 
 from cosmic.frame.gui.theme import (
     STEP_PX,
@@ -23,6 +22,7 @@ from cosmic.frame.gui.theme import (
     number_font,
     state_look,
 )
+from cosmic.frame.overrides import override
 
 _SHAPE_PX = 10.0
 _FONT_PX = 11

@@ -6,9 +6,9 @@ from typing import Final, cast
 from PySide6.QtCore import QEvent, QKeyCombination, QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QApplication
-from typing_extensions import override
 
 from cosmic.frame.gui.key_focus import is_being_edited
+from cosmic.frame.overrides import override
 
 _KEY_EVENTS: Final = (QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress, QEvent.Type.KeyRelease)
 

@@ -5,7 +5,6 @@ from typing import Final
 from PySide6.QtCore import QEvent, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
-from typing_extensions import override
 
 from cosmic.frame.gui.build import named
 from cosmic.frame.gui.chip import Chip, Tone
@@ -18,6 +17,7 @@ from cosmic.frame.gui.theme import (
     number_font,
     state_look,
 )
+from cosmic.frame.overrides import override
 from cosmic.frame.units import DISPLAY, format_quantity
 from cosmic.mico.core.positioner import Confidence
 

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from typing import ClassVar, Final
 
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QWidget
-from typing_extensions import override
 
 from cosmic.frame.errors import CosmicError, MoveRefused
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import STEP_PX
+from cosmic.frame.overrides import override
 from cosmic.frame.units import format_quantity
 from cosmic.mico.api.stepwise import issued
 from cosmic.mico.core.orders import FREQUENCY_HZ

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
-from typing_extensions import override
 
 from cosmic.frame.gui.build import named
 from cosmic.frame.gui.theme import STEP_PX
+from cosmic.frame.overrides import override
 from cosmic.mico.gui.device_gui import DeviceGUI
 
 
