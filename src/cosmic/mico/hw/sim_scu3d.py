@@ -123,7 +123,10 @@ class SimulatedLibrary:
     def __getattr__(self, name: str) -> Any:
         raise AttributeError(f"the simulated SCU3DControl has no function {name!r}")
 
-    # ------------------------------------------------------------------ for section II
+    def __getitem__(self, name: str) -> Any:
+        return getattr(self, name)
+
+    # For section II
 
     def device(self, index: int, *, asynchronous: bool) -> Device:
         """Return the device at `index`, or refuse as the library does before any command."""
@@ -140,7 +143,7 @@ class SimulatedLibrary:
         """Return a number that changes with every initialisation and release."""
         return self._session
 
-    # ------------------------------------------------------------------ section I
+    # Section I
 
     def _section_one(self) -> dict[str, Body]:
         return {
@@ -244,7 +247,7 @@ class SimulatedLibrary:
         version[0] = _packed(device.settings.firmware_version)
         return SA_OK
 
-    # ------------------------------------------------------------------ faults
+    # Faults
 
     def _on_inject(self, fault: Fault) -> None:
         with self._lock:

@@ -60,7 +60,9 @@ def c_function(name: str, body: Body) -> Any:
             logger.exception("the simulated %s failed", name)
             return SA_OTHER_ERROR
 
-    return function_type(name)(call)
+    pointer = function_type(name)(call)
+    pointer.__name__ = name  # as the functions of a loaded library have; clients read it
+    return pointer
 
 
 def section_two(session: Session) -> dict[str, Body]:

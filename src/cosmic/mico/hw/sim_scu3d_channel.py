@@ -113,7 +113,7 @@ class Channel:
         self.p_gain = self.settings.p_gain
         self.p_gain_divisor = self.settings.p_gain_divisor
 
-    # ------------------------------------------------------------------ what it is
+    # What it is
 
     @property
     def moving(self) -> bool:
@@ -160,7 +160,7 @@ class Channel:
         amplitude_dv = (forward_dv if direction > 0 else backward_dv) if alignment else 1000
         return self.frequency_hz * self.stage.step_size(amplitude_dv / 10.0, direction)
 
-    # ------------------------------------------------------------------ time
+    # Time
 
     @property
     def next_turn_s(self) -> float:
@@ -191,7 +191,7 @@ class Channel:
         for _ in range(2 if doubled else 1):
             self._post((SA_COMPLETED_PACKET_TYPE, self.index, 0, 0, 0), time_s)
 
-    # ------------------------------------------------------------------ movements
+    # Movements
 
     def begin(self, now_s: float) -> None:
         """Make way for a new movement, or refuse it."""
@@ -271,7 +271,7 @@ class Channel:
         self.status = SA_STOPPED_STATUS
         return self.stage.halt(now_s, coast_s=coast_s, within_s=self.settings.stop_finish_s)
 
-    # ------------------------------------------------------------------ trouble
+    # Trouble
 
     def interrupt(self, code: int, now_s: float) -> None:
         """End whatever goes on with an error."""
