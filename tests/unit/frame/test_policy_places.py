@@ -4,6 +4,8 @@ See docs/explanation/errors.md.
 """
 
 import ctypes
+import subprocess
+import sys
 from collections.abc import Iterator
 
 import pytest
@@ -12,10 +14,11 @@ from PySide6.QtGui import QPaintEvent
 from PySide6.QtWidgets import QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
+import cosmic
 from cosmic.frame.failure import Failure, FailurePolicy
 from cosmic.frame.hooks import install_hooks
 from cosmic.frame.overrides import override
-from cosmic.frame.threads import WorkerThread
+from cosmic.frame.threads import WorkerThread, running_threads
 
 pytestmark = pytest.mark.defects
 
@@ -170,3 +173,28 @@ def test_a_driver_callback_that_nobody_guarded(
     callback = ctypes.CFUNCTYPE(ctypes.c_int)(lambda: 1 // 0)
     callback()
     outcome.assert_handled(caplog.text, "ctypes")
+
+
+def test_a_script_leaves_as_python_does_and_its_motion_has_ended() -> None:
+    with pytest.raises(ZeroDivisionError), cosmic.connect(rate=20.0) as rig:
+        move = rig.mico["left.x"].move_to(3000.0, wait=False)
+        _fail()
+    assert move.done
+    assert not running_threads()
+
+
+SCRIPT = """
+import cosmic
+rig = cosmic.connect(rate=20.0)
+rig.mico["left.x"].move_to(3000.0, wait=False)
+1 // 0
+"""
+
+
+def test_a_script_without_a_with_block_ends_with_its_traceback() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[0] == "Traceback (most recent call last):"
+    assert done.stderr.splitlines()[-1].startswith("ZeroDivisionError")
