@@ -1,0 +1,72 @@
+"""The public names of the scripted API, as the program has them and as its page must list them."""
+
+import inspect
+from enum import Enum
+from typing import Any, Final
+
+import cosmic
+from cosmic.frame.errors import DeviceFault
+from cosmic.frame.task import Progress, Task
+from cosmic.mico.api.axis import Axis, Jogging
+from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.mico import Mico
+from cosmic.mico.api.stepwise import StepwiseMove
+from cosmic.mico.core.movement import Movement
+from cosmic.mico.core.positioner import Confidence, PositionerState, Status
+from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
+
+CLASSES: Final[dict[str, type]] = {
+    "Rig": cosmic.Rig,
+    "Mico": Mico,
+    "Axis": Axis,
+    "Movement": Movement,
+    "GroupMovement": GroupMovement,
+    "Jogging": Jogging,
+    "StepwiseMove": StepwiseMove,
+    "Task": Task,
+    "Progress": Progress,
+    "PositionerState": PositionerState,
+    "MoveVerdict": cosmic.MoveVerdict,
+}
+ENUMS: Final[dict[str, type[Enum]]] = {
+    "Reason": cosmic.Reason,
+    "Status": Status,
+    "Confidence": Confidence,
+    "Activity": Activity,
+    "PositionerKind": PositionerKind,
+    "Direction": Direction,
+    "DeviceFault": DeviceFault,
+}
+# Attributes that an object gets when it is made, which the class does not show.
+MADE_LATER: Final = {
+    "Axis": ("commander",),
+    "GroupMovement": ("movements",),
+    "StepwiseMove": ("planned", "movement"),
+}
+
+
+def names(title: str) -> dict[str, str]:
+    """Return the public names of a class with what the first cell of their row must be."""
+    cls = CLASSES[title]
+    found = {name: getattr(cls, name) for name in dir(cls) if not name.startswith("_")}
+    found |= dict.fromkeys(MADE_LATER.get(title, ()))
+    return {name: f"`{name}{signature(value)}`" for name, value in found.items()}
+
+
+def signature(value: Any) -> str:
+    """Return the parameters of a method as a caller writes them; empty for an attribute."""
+    if not (inspect.isfunction(value) or inspect.ismethod(value)):
+        return ""
+    wanted = inspect.signature(value).parameters.values()
+    plain = [each.replace(annotation=each.empty) for each in wanted if each.name != "self"]
+    return str(inspect.Signature(plain))
+
+
+def exceptions() -> dict[str, type[BaseException]]:
+    """Return the exceptions that ``cosmic`` exports."""
+    found = {name: getattr(cosmic, name) for name in cosmic.__all__}
+    return {
+        name: value
+        for name, value in found.items()
+        if isinstance(value, type) and issubclass(value, BaseException)
+    }

@@ -1,0 +1,115 @@
+"""What the tables of docs/reference/configuration.md must say, taken from the models."""
+
+import json
+from collections.abc import Iterator
+from typing import Any, Final
+
+from pydantic import BaseModel
+
+from cosmic.app.platform import PlatformFile, PlatformSettings
+from cosmic.mico.core.settings import (
+    GroupSettings,
+    InitialisationSettings,
+    JogSettings,
+    MicoSettings,
+    MotionDefaults,
+    PositionerSettings,
+    WatchSettings,
+)
+from cosmic.twin.settings import (
+    ControllerSettings,
+    DeviceWiring,
+    StageKind,
+    StagePlace,
+    TwinSettings,
+)
+
+# Heading in the page, and the model whose keys its table lists.
+SECTIONS: Final[dict[str, type[BaseModel]]] = {
+    "[platform]": PlatformSettings,
+    "[mico]": MicoSettings,
+    "[mico.defaults]": MotionDefaults,
+    "[mico.jog]": JogSettings,
+    "[mico.watch]": WatchSettings,
+    "[mico.initialisation]": InitialisationSettings,
+    "[[mico.group]]": GroupSettings,
+    "[[mico.positioner]]": PositionerSettings,
+    "[kinds.NAME]": StageKind,
+    "[controller]": ControllerSettings,
+    "[[devices]]": DeviceWiring,
+    "[stages]": StagePlace,
+}
+WHOLE_FILES: Final = (PlatformFile, TwinSettings)
+
+_UNITS: Final = (
+    ("_um_s", "µm/s"),
+    ("_deg_s", "°/s"),
+    ("_deg_c", "°C"),
+    ("_um", "µm"),
+    ("_deg", "°"),
+    ("_hz", "Hz"),
+    ("_dv", "0.1 V"),
+    ("_v", "V"),
+    ("_s", "s"),
+)
+_TYPES: Final = {
+    "integer": "whole number",
+    "number": "number",
+    "boolean": "true or false",
+    "string": "text",
+}
+
+
+def rows(model: type[BaseModel]) -> Iterator[tuple[str, str, str, str]]:
+    """Yield key, type with range, unit and default of every key that is no table of its own."""
+    schema = model.model_json_schema()
+    required = schema.get("required", [])
+    for key, described in schema["properties"].items():
+        if "$ref" in described or "$ref" in described.get("items", {}):
+            continue
+        default = "required" if key in required else _toml(described.get("default"))
+        yield f"`{key}`", _kind(described, schema.get("$defs", {})), _unit(key), default
+
+
+def _kind(described: dict[str, Any], definitions: dict[str, Any]) -> str:
+    if "anyOf" in described:
+        choices = [each for each in described["anyOf"] if each.get("type") != "null"]
+        return " or ".join(_kind(each, definitions) for each in choices)
+    if "const" in described:
+        return f"`{json.dumps(described['const'])}`"
+    if "enum" in described:
+        return ", ".join(f"`{json.dumps(each)}`" for each in described["enum"])
+    if described["type"] == "array":
+        return _array(described, definitions)
+    return f"{_TYPES[described['type']]}{_range(described)}"
+
+
+def _array(described: dict[str, Any], definitions: dict[str, Any]) -> str:
+    parts = described.get("prefixItems")
+    if parts is not None:
+        return f"list of {len(parts)}: {_kind(parts[0], definitions)}"
+    return f"list: {_kind(described['items'], definitions)}"
+
+
+def _range(described: dict[str, Any]) -> str:
+    low, high = described.get("minimum"), described.get("maximum")
+    if low is not None and high is not None:
+        return f", {low:.10g} to {high:.10g}"
+    texts = [
+        (described.get("exclusiveMinimum"), "above {:g}"),
+        (low, "from {:g}"),
+        (high, "up to {:g}"),
+        (described.get("exclusiveMaximum"), "below {:g}"),
+    ]
+    found = [text.format(value) for value, text in texts if value is not None]
+    if described.get("minLength"):
+        found.append("not empty")
+    return "".join(f", {text}" for text in found)
+
+
+def _unit(key: str) -> str:
+    return next((unit for ending, unit in _UNITS if key.endswith(ending)), "")
+
+
+def _toml(value: Any) -> str:
+    return "none" if value is None else f"`{json.dumps(value)}`"
