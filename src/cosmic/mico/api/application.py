@@ -112,7 +112,7 @@ class MicoApplication(CosmicApplicationBase):
         running = self._running_task
         if running is not None and not running.done:
             raise NotAvailable(f"{running.title} is under way; cancel it or wait for its end")
-        if not self.isRunning():
+        if not self.isRunning() or self.end_requested:
             raise NotAvailable("MiCo is closed")
         task = Task(title)
         self._running_task = task
@@ -141,7 +141,11 @@ class MicoApplication(CosmicApplicationBase):
                 continue
             task, job = item
             logger.info("%s started", task.title)
-            job(task)
+            try:
+                job(task)
+            except Exception as exc:
+                task.fail(exc)  # whoever waits for it must not wait for ever
+                raise
             error = task.progress.error
             if error:
                 logger.error("%s ended: %s", task.title, error)
