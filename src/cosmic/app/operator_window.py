@@ -14,9 +14,9 @@ from cosmic.frame.failure import Failure
 from cosmic.frame.gui.console_panel import ConsolePanel
 from cosmic.frame.gui.log_panel import LogPanel
 from cosmic.frame.gui.palette import ThemeName
-from cosmic.frame.gui.server_gui import CosmicServerGui
+from cosmic.frame.gui.server_gui import LOG_TITLE, CosmicServerGui
 from cosmic.frame.gui.stop_key import StopKeyFilter
-from cosmic.frame.gui.theme import STEP_PX, State
+from cosmic.frame.gui.theme import State
 from cosmic.frame.log import RingBufferHandler
 from cosmic.mico.core.stop_latch import StopState
 from cosmic.mico.gui.mico_widget import MicoWidget
@@ -24,7 +24,6 @@ from cosmic.mico.gui.mico_widget import MicoWidget
 logger = logging.getLogger(__name__)
 
 MICO: Final = "MiCo"
-LOG: Final = "Log"
 CONSOLE: Final = "Console"
 
 
@@ -102,7 +101,7 @@ class OperatorWindow(CosmicServerGui):
 
     def _add_log(self, ring: RingBufferHandler, *, console: bool) -> None:
         below = Qt.DockWidgetArea.BottomDockWidgetArea
-        docks = [self.add_panel(LOG, LogPanel(ring), below, scroll=False)]
+        docks = [self.add_panel(LOG_TITLE, LogPanel(ring), below, scroll=False)]
         if console:
             rig = Rig(self._platform, source="console")
             self._console = ConsolePanel(
@@ -112,9 +111,8 @@ class OperatorWindow(CosmicServerGui):
                 banner='Python console: try rig.mico["left.x"].move_by("0.2 mm"). '
                 "Ctrl+C or Interrupt breaks what runs.\n",
             )
-            docks.append(self.add_panel(CONSOLE, self._console, scroll=False, beside=LOG))
+            docks.append(self.add_panel(CONSOLE, self._console, scroll=False, beside=LOG_TITLE))
             self.resizeDocks(docks, [3, 2], Qt.Orientation.Horizontal)
-        self.resizeDocks(docks[:1], [22 * STEP_PX], Qt.Orientation.Vertical)
 
     def _connect_all(self) -> None:
         self.stop_requested.connect(self._on_stop_button)
@@ -206,7 +204,6 @@ class OperatorWindow(CosmicServerGui):
             self.top_bar.set_message("")
 
     def _on_message_read(self) -> None:
-        self.raise_panel(LOG)
         self.top_bar.set_message("")
 
     def _on_rescan(self, title: str) -> None:

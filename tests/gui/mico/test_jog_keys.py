@@ -1,0 +1,126 @@
+from collections.abc import Iterator
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QPushButton, QWidget
+from pytestqt.qtbot import QtBot
+
+from cosmic.mico.gui.mico_widget import MicoWidget
+from gui.mico.panels import click, enter, field, part, position, show, simulated_panel
+
+
+@pytest.fixture
+def slow(qtbot: QtBot) -> Iterator[MicoWidget]:
+    """Slow enough to be watched while it moves."""
+    with simulated_panel(qtbot, rate=4.0) as panel:
+        part(panel, "initialise", QPushButton).setFocus()
+        yield panel
+
+
+def at_rest(panel: MicoWidget, name: str) -> bool:
+    return not panel.cards[name].axis.details.in_motion
+
+
+def hold(qtbot: QtBot, panel: MicoWidget, key: Qt.Key, name: str) -> None:
+    """Press `key` and wait until its axis has moved far enough to be sure of it."""
+    before = position(panel.cards[name])
+    qtbot.keyPress(panel.focusWidget() or panel, key)
+    qtbot.waitUntil(lambda: abs(position(panel.cards[name]) - before) > 30.0)
+
+
+def test_a_held_key_moves_and_its_release_stops(slow: MicoWidget, qtbot: QtBot) -> None:
+    hold(qtbot, slow, Qt.Key.Key_D, "left.x")
+    qtbot.keyRelease(slow.focusWidget(), Qt.Key.Key_D)
+    qtbot.waitUntil(lambda: at_rest(slow, "left.x"))
+    assert position(slow.cards["left.x"]) > 0.0
+    assert position(slow.cards["left.y"]) == 0.0
+
+
+def test_the_other_key_of_an_axis_moves_it_back(slow: MicoWidget, qtbot: QtBot) -> None:
+    hold(qtbot, slow, Qt.Key.Key_A, "left.x")
+    qtbot.keyRelease(slow.focusWidget(), Qt.Key.Key_A)
+    qtbot.waitUntil(lambda: at_rest(slow, "left.x"))
+    assert position(slow.cards["left.x"]) < 0.0
+
+
+def test_a_sign_on_the_keyboard_can_jog(slow: MicoWidget, qtbot: QtBot) -> None:
+    table = slow.cards["table.rotation"]
+    qtbot.keyPress(slow.focusWidget(), Qt.Key.Key_Comma)
+    qtbot.waitUntil(lambda: position(table) > 0.3)
+    qtbot.keyRelease(slow.focusWidget(), Qt.Key.Key_Comma)
+    qtbot.waitUntil(lambda: at_rest(slow, "table.rotation"))
+
+
+def test_two_axes_jog_at_once(slow: MicoWidget, qtbot: QtBot) -> None:
+    hold(qtbot, slow, Qt.Key.Key_D, "left.x")
+    hold(qtbot, slow, Qt.Key.Key_R, "left.z")
+    assert not at_rest(slow, "left.x")
+    slow.release_keys()
+    qtbot.waitUntil(lambda: at_rest(slow, "left.x") and at_rest(slow, "left.z"))
+
+
+def test_a_stop_ends_the_jog_though_the_key_is_held(slow: MicoWidget, qtbot: QtBot) -> None:
+    hold(qtbot, slow, Qt.Key.Key_D, "left.x")
+    manager = slow.mico.application.manager
+    manager.stop("test")
+    qtbot.waitUntil(lambda: at_rest(slow, "left.x"))
+    manager.reset_stop()
+    stood = position(slow.cards["left.x"])
+    qtbot.wait(300)
+    assert abs(position(slow.cards["left.x"]) - stood) < 1.0
+
+
+def test_a_window_without_the_focus_jogs_nothing(slow: MicoWidget, qtbot: QtBot) -> None:
+    hold(qtbot, slow, Qt.Key.Key_D, "left.x")
+    other = QWidget()
+    qtbot.addWidget(other)
+    show(qtbot, other, 200, 200)
+    qtbot.waitUntil(lambda: at_rest(slow, "left.x"))
+
+
+def test_a_text_field_swallows_the_keys(slow: MicoWidget, qtbot: QtBot) -> None:
+    card = slow.cards["left.x"]
+    enter(qtbot, field(card, "MiCoCL_8"), "d")
+    qtbot.wait(200)
+    assert at_rest(slow, "left.x")
+    assert position(card) == 0.0
+
+
+def test_the_focus_in_a_text_field_ends_the_jog(slow: MicoWidget, qtbot: QtBot) -> None:
+    hold(qtbot, slow, Qt.Key.Key_D, "left.x")
+    field(slow.cards["left.y"], "MiCoCL_8").setFocus()
+    qtbot.waitUntil(lambda: at_rest(slow, "left.x"))
+
+
+def test_the_dead_man_stops_a_window_that_hangs(slow: MicoWidget, qtbot: QtBot) -> None:
+    card = slow.cards["left.x"]
+    with qtbot.waitSignal(card.axis.commander.movement_ended, timeout=5000) as ended:
+        jogging = card.axis.jog(1, 200.0)  # nobody renews it
+    assert jogging.done
+    assert ended.args is not None
+
+
+def test_the_speed_field_says_how_fast(slow: MicoWidget, qtbot: QtBot) -> None:
+    enter(qtbot, field(slow, "jogSpeed_um"), "1 mm", accept=True)
+    part(slow, "initialise", QPushButton).setFocus()
+    with qtbot.waitSignal(slow.cards["left.x"].axis.commander.order_issued) as issued:
+        qtbot.keyPress(slow.focusWidget(), Qt.Key.Key_D)
+    qtbot.keyRelease(slow.focusWidget(), Qt.Key.Key_D)
+    assert issued.args is not None
+    assert issued.args[0].motion.speed == 1000.0
+    qtbot.waitUntil(lambda: at_rest(slow, "left.x"))
+
+
+def test_a_refused_jog_says_why(slow: MicoWidget, qtbot: QtBot) -> None:
+    slow.mico.application.manager.stop("test")
+    qtbot.keyPress(slow.focusWidget(), Qt.Key.Key_D)
+    line = part(slow.cards["left.x"], "status", QLabel)
+    qtbot.waitUntil(lambda: "REFUSED" in line.text())
+    qtbot.keyRelease(slow.focusWidget(), Qt.Key.Key_D)
+    assert position(slow.cards["left.x"]) == 0.0
+
+
+def test_a_click_is_one_move_and_no_jog(slow: MicoWidget, qtbot: QtBot) -> None:
+    card = slow.cards["left.x"]
+    click(qtbot, card, "MiCoCL_6")
+    qtbot.waitUntil(lambda: abs(position(card) - 100.0) < 1.0 and at_rest(slow, "left.x"))
