@@ -56,7 +56,7 @@ class Path:
 
     def cut(self, time_s: float, *, end_s: float, end: float) -> "Path":
         """Return this path up to `time_s` and from there straight to `end` at `end_s`."""
-        kept = [(t, x) for t, x in zip(self.times_s, self.positions, strict=True) if t < time_s]
+        kept = [(t, x) for t, x in zip(self.times_s, self.positions, strict=True) if t <= time_s]
         times_s = (*(t for t, _ in kept), time_s, max(time_s, end_s))
         return Path(times_s, (*(x for _, x in kept), self.at(time_s), end))
 

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cosmic.twin.settings import shipped_settings
@@ -120,6 +120,7 @@ def test_a_wall_stops_one_side_only_and_creep_does_not_pass_it() -> None:
     st.floats(0.0, 200.0),
     st.floats(0.0, 200.0),
 )
+@example(times_s=[1.0, 1.0], cut_s=1.0, look_s=0.0)
 def test_cutting_a_path_keeps_what_was_before(
     times_s: list[float], cut_s: float, look_s: float
 ) -> None:
