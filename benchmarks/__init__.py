@@ -1,0 +1,1 @@
+"""What is measured on the simulated platform; see docs/reference/benchmarks.md."""

@@ -1,0 +1,62 @@
+"""A library object that tells when its functions are called, and passes everything on."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+Hook = Callable[[float, tuple[Any, ...]], None]
+
+
+class TracedLibrary:
+    """Stands in front of a simulated library; hooks may be set and taken away at any time.
+
+    Attributes
+    ----------
+    entered : dict
+        By C name: called with time and arguments before the function.
+    left : dict
+        By C name: called with time and arguments after the function.
+    cpu_s : float
+        CPU time spent in the library's functions, where `count_cpu` is set.
+    """
+
+    def __init__(self, library: Any, *, count_cpu: bool = False) -> None:
+        self._library = library
+        self._count_cpu = count_cpu
+        self._cpu_s: dict[str, float] = {}
+        self.entered: dict[str, Hook] = {}
+        self.left: dict[str, Hook] = {}
+
+    @property
+    def cpu_s(self) -> float:
+        """CPU seconds spent in the functions so far."""
+        return sum(self._cpu_s.copy().values())
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._library, name)
+        if not name.startswith("SA_"):
+            return found
+        return self._counted(name, found) if self._count_cpu else self._timed(name, found)
+
+    def _timed(self, name: str, function: Callable[..., int]) -> Callable[..., int]:
+        def call(*args: Any) -> int:
+            hook = self.entered.get(name)
+            if hook is not None:
+                hook(time.perf_counter(), args)
+            status = function(*args)
+            hook = self.left.get(name)
+            if hook is not None:
+                hook(time.perf_counter(), args)
+            return status
+
+        return call
+
+    def _counted(self, name: str, function: Callable[..., int]) -> Callable[..., int]:
+        def call(*args: Any) -> int:
+            before_s = time.thread_time()
+            status = function(*args)
+            spent_s = time.thread_time() - before_s
+            self._cpu_s[name] = self._cpu_s.get(name, 0.0) + spent_s
+            return status
+
+        return call
