@@ -65,6 +65,7 @@ def run_window(options: WindowOptions) -> int:
     NotConnectedError
         The vendor library is not there.
     """
+    platform = _build(options)
     if options.offscreen_s is not None:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"  # Qt reads nothing else
         logging.getLogger("cosmic.qt").addFilter(_says_something)
@@ -74,7 +75,6 @@ def run_window(options: WindowOptions) -> int:
         ring = RingBufferHandler()
         at_end.callback(_log_to(ring))
         at_end.callback(declare_gui_thread())
-        platform = _build(options)
         at_end.callback(platform.shut_down)
         at_end.callback(install_hooks(platform.policy))
         window = OperatorWindow(platform, settings, ring, console=not options.only)

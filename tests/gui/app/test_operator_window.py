@@ -1,0 +1,285 @@
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QSettings, Qt
+from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPushButton, QWidget
+from pytestqt.qtbot import QtBot
+
+from cosmic.app.hint_bar import HintBar
+from cosmic.app.operator_window import OperatorWindow
+from cosmic.app.platform import Platform, build_platform, load_platform
+from cosmic.frame.clock import WALL, RatedClock
+from cosmic.frame.errors import DeviceError, DeviceFault, MoveCancelled
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.log import RingBufferHandler
+from cosmic.frame.threads import running_threads
+from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.gui.mico_widget import MicoWidget, make_mico_gui
+from gui.mico.panels import click, enter, field, part, position, show, wait_for_position
+from unit.mico.rigs import settings as small_settings
+from unit.mico.scripted_controller import ScriptedController
+
+Make = Callable[..., OperatorWindow]
+
+
+@pytest.fixture
+def stored(tmp_path: Path) -> QSettings:
+    return QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
+
+
+@pytest.fixture
+def make(qtbot: QtBot, stored: QSettings) -> Iterator[Make]:
+    made: list[OperatorWindow] = []
+
+    def make_window(
+        platform: Platform | None = None, *, rate: float = 20.0, console: bool = False
+    ) -> OperatorWindow:
+        platform = platform or build_platform(rate=rate, mico_gui=make_mico_gui)
+        window = OperatorWindow(platform, stored, RingBufferHandler(), console=console)
+        made.append(window)
+        qtbot.addWidget(window)
+        show(qtbot, window)
+        return window
+
+    yield make_window
+    for window in made:
+        window.close()
+
+
+def mico(window: OperatorWindow) -> MicoWidget:
+    panel = window.mico_gui
+    assert panel is not None
+    return panel
+
+
+def ready(window: OperatorWindow, qtbot: QtBot) -> MicoWidget:
+    window.open_hardware()
+    panel = mico(window)
+    forward = part(panel.cards["left.x"], "MiCoCL_6", QPushButton)
+    qtbot.waitUntil(forward.isEnabled)
+    return panel
+
+
+def moving(panel: MicoWidget, qtbot: QtBot) -> None:
+    """Set left.x going on a long way."""
+    card = panel.cards["left.x"]
+    enter(qtbot, field(card, "MiCoCL_8"), "5 mm")
+    click(qtbot, card, "MiCoCL_9")
+    qtbot.waitUntil(lambda: card.axis.details.in_motion and position(card) > 1.0)
+
+
+def test_the_window_stands_before_the_hardware_is_there(make: Make, qtbot: QtBot) -> None:
+    window = make()
+    forward = part(mico(window).cards["left.x"], "MiCoCL_6", QPushButton)
+    assert not forward.isEnabled()
+    ready(window, qtbot)
+
+
+def test_the_bar_says_what_is_in_force(make: Make) -> None:
+    window = make(rate=20.0)
+    texts = [label.text() for label in window.top_bar.findChildren(QLabel) if label.isVisible()]
+    said = " | ".join(texts)
+    for wanted in ("SIMULATED", "no collision model", "controls: this window", "×20"):
+        assert wanted in said
+
+
+def test_stop_latches_with_its_reason_and_reset_lets_go(make: Make, qtbot: QtBot) -> None:
+    window = make(rate=4.0)
+    panel = ready(window, qtbot)
+    moving(panel, qtbot)
+    card = panel.cards["left.x"]
+    qtbot.mousePress(part(window.top_bar, "stopButton", QPushButton), Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: window.top_bar.latched and not card.axis.details.in_motion)
+    stood = position(card)
+    click(qtbot, card, "MiCoCL_9")
+    qtbot.waitUntil(lambda: "stopped" in field(card, "MiCoCL_8").reason)
+    assert abs(position(card) - stood) < 1.0
+
+    click(qtbot, window.top_bar, "resetButton")
+    qtbot.waitUntil(lambda: not window.top_bar.latched)
+    assert not card.axis.details.in_motion
+    enter(qtbot, field(card, "MiCoCL_8"), "0")
+    click(qtbot, card, "MiCoCL_9")
+    wait_for_position(qtbot, card, 0.0)
+
+
+def test_f12_stops_from_a_text_field_and_escape_only_takes_the_entry_back(
+    make: Make, qtbot: QtBot
+) -> None:
+    window = make(rate=4.0)
+    panel = ready(window, qtbot)
+    moving(panel, qtbot)
+    entry = field(panel.cards["right.x"], "MiCoCL_8")
+    enter(qtbot, entry, "12")
+    qtbot.keyClick(entry, Qt.Key.Key_Escape)
+    assert not window.top_bar.latched
+    assert entry.text() == "100.0"
+    enter(qtbot, entry, "12")
+    qtbot.keyClick(entry, Qt.Key.Key_F12)
+    qtbot.waitUntil(lambda: window.top_bar.latched)
+    assert entry.text() == "12"
+    qtbot.waitUntil(lambda: not panel.cards["left.x"].axis.details.in_motion)
+
+
+def test_a_failure_anywhere_stands_in_the_bar(make: Make, qtbot: QtBot) -> None:
+    window = make()
+    window.platform.policy.report(DeviceError("the cable is out"), "device 7")
+    qtbot.waitUntil(lambda: "the cable is out" in window.top_bar.message)
+    assert not window.top_bar.latched
+
+
+@pytest.mark.defects
+def test_a_defect_stops_everything(make: Make, qtbot: QtBot) -> None:
+    window = make(rate=4.0)
+    panel = ready(window, qtbot)
+    moving(panel, qtbot)
+    window.platform.policy.report(ValueError("a mistake"), "somewhere")
+    qtbot.waitUntil(lambda: window.top_bar.latched)
+    qtbot.waitUntil(lambda: not panel.cards["left.x"].axis.details.in_motion)
+
+
+def test_closing_while_something_moves_ends_everything_in_time(
+    make: Make, qtbot: QtBot, stored: QSettings
+) -> None:
+    window = make(rate=1.0, console=True)
+    panel = ready(window, qtbot)
+    moving(panel, qtbot)
+    movement = panel.cards["left.x"].axis.set(5000.0)
+    began_s = WALL.now_s()
+    window.close()
+    assert WALL.now_s() - began_s < 3.0
+    assert isinstance(movement.exception(), MoveCancelled)
+    assert not running_threads()
+    assert stored.value("window/docks") is not None
+
+
+def test_closing_while_initialising_ends_in_time(make: Make, qtbot: QtBot) -> None:
+    window = make(rate=1.0)
+    panel = ready(window, qtbot)
+    panel.initialise()
+    qtbot.waitUntil(lambda: any(axis.details.in_motion for axis in panel.mico))
+    began_s = WALL.now_s()
+    window.close()
+    assert WALL.now_s() - began_s < 3.0
+    assert not running_threads()
+
+
+def test_the_console_moves_the_same_platform(make: Make, qtbot: QtBot) -> None:
+    window = make(console=True)
+    panel = ready(window, qtbot)
+    console = window.console
+    assert console is not None
+    console.run('rig.mico["left.x"].move_to("0.1 mm")')
+    wait_for_position(qtbot, panel.cards["left.x"], 100.0)
+    qtbot.waitUntil(lambda: "100" in console.text() or "99." in console.text())
+    console.run("cosmic.__version__")
+    qtbot.waitUntil(lambda: "0.1" in console.text())
+
+
+def test_interrupting_the_console_halts_what_moves(make: Make, qtbot: QtBot) -> None:
+    window = make(rate=2.0, console=True)
+    panel = ready(window, qtbot)
+    console = window.console
+    assert console is not None
+    console.run('rig.mico["left.x"].move_to(5000)')
+    card = panel.cards["left.x"]
+    qtbot.waitUntil(lambda: card.axis.details.in_motion)
+    console.interrupt()
+    qtbot.waitUntil(lambda: not console.busy and not card.axis.details.in_motion)
+    assert position(card) < 4900.0
+    assert not window.top_bar.latched
+
+
+def test_keys_typed_into_the_console_move_nothing(make: Make, qtbot: QtBot) -> None:
+    window = make(console=True)
+    panel = ready(window, qtbot)
+    console = window.console
+    assert console is not None
+    line = next(each for each in console.findChildren(QWidget) if takes_keys(each))
+    line.setFocus()
+    qtbot.keyClicks(line, "dddd")
+    assert position(panel.cards["left.x"]) == 0.0
+
+
+def takes_keys(widget: QWidget) -> bool:
+    return type(widget).__name__ == "ConsoleInput" or isinstance(widget, QLineEdit)
+
+
+def test_the_hint_is_dismissed_once_and_for_all(
+    make: Make, qtbot: QtBot, stored: QSettings
+) -> None:
+    first = make()
+    hint = first.findChild(HintBar)
+    assert hint is not None
+    assert hint.isVisible()
+    click(qtbot, hint, "gotIt")
+    assert not hint.isVisible()
+    first.close()
+    again = make().findChild(HintBar)
+    assert again is not None
+    assert not again.isVisible()
+
+
+def test_every_key_is_listed(make: Make, qtbot: QtBot) -> None:
+    window = make()
+    window.show_keys()
+    dialog = next(w for w in QApplication.topLevelWidgets() if w.windowTitle() == "Keys")
+    assert dialog.isVisible()
+    dialog.close()
+
+
+# Hardware that is not there
+
+
+class Deaf(ScriptedController):
+    """A controller whose library finds nothing until it is mended."""
+
+    deaf = True
+
+    def find_devices(self) -> tuple[int, ...]:
+        if self.deaf:
+            raise DeviceError("no device answers", fault=DeviceFault.COMMUNICATION)
+        return super().find_devices()
+
+
+def scripted_platform(controller: ScriptedController) -> Platform:
+    policy, clock = FailurePolicy(), RatedClock(1.0)
+    application = MicoApplication(
+        controller, small_settings(), clock=clock, policy=policy, gui_factory=make_mico_gui
+    )
+    file, path = load_platform(None)
+    return Platform(file=file, path=path, clock=clock, policy=policy, mico=application)
+
+
+def test_closing_stops_the_hardware_before_it_lets_go(make: Make, qtbot: QtBot) -> None:
+    controller = ScriptedController(("LLN",), instant=False)
+    window = make(scripted_platform(controller))
+    window.open_hardware()
+    card = mico(window).cards["d0.c0"]
+    qtbot.waitUntil(part(card, "MiCoCL_6", QPushButton).isEnabled)
+    click(qtbot, card, "MiCoCL_6")
+    qtbot.waitUntil(lambda: bool(controller.of("move_to")))
+    window.close()
+    calls = [call[0] for call in controller.calls]
+    assert "stop" in calls[calls.index("move_to") :]
+    assert calls[-1] == "close"
+
+
+def test_a_controller_that_is_not_there_greys_the_panel_until_a_rescan(
+    make: Make, qtbot: QtBot
+) -> None:
+    controller = Deaf(("LLN",))
+    window = make(scripted_platform(controller))
+    dock = window.dock("MiCo")
+    window.open_hardware()
+    qtbot.waitUntil(lambda: "no device answers" in dock.failure)
+    assert "no device answers" in window.top_bar.message
+    controller.deaf = False
+    rescan = next(b for b in dock.findChildren(QPushButton) if b.text() == "Rescan")
+    qtbot.mouseClick(rescan, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: not dock.failure)
+    card = mico(window).cards["d0.c0"]
+    qtbot.waitUntil(part(card, "MiCoCL_6", QPushButton).isEnabled)
+    click(qtbot, card, "MiCoCL_6")
+    wait_for_position(qtbot, card, 100.0)

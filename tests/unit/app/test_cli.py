@@ -1,0 +1,230 @@
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cosmic.app.cli import main
+
+
+@pytest.fixture
+def folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
+    """A copy of the shipped configuration."""
+    folder = tmp_path / "config"
+    assert main(["init", str(folder)]) == 0
+    capsys.readouterr()
+    return folder
+
+
+def edit(file: Path, old: str, new: str) -> None:
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+def complaints(capsys: pytest.CaptureFixture[str]) -> list[str]:
+    said = capsys.readouterr().err.splitlines()
+    assert not [line for line in said if "Traceback" in line]
+    return said
+
+
+# check
+
+
+def test_the_shipped_configuration_is_ok(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(folder / "platform.toml")]) == 0
+    assert capsys.readouterr().out.rstrip().endswith("ok")
+    assert main(["check", str(folder)]) == 0
+
+
+def test_check_names_every_mistake_with_file_key_and_reason(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    platform, twin = folder / "platform.toml", folder / "twin.toml"
+    edit(platform, "closed_loop_frequency_hz = 5000", 'closed_loop_frequency_hz = "fast"')
+    edit(platform, 'stop_key = "F12"', 'stop_kee = "F12"')
+    edit(twin, "step_at_100v = 1.5", "step_at_100v = -1.5")
+    assert main(["check", str(platform)]) == 1
+    said = complaints(capsys)
+    assert len(said) == 3
+    assert f"{platform}: platform.stop_kee: unknown key" in said[0]
+    assert "mico.defaults.closed_loop_frequency_hz: " in said[1]
+    assert f"{twin}: kinds.linear.step_at_100v: " in said[2]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "wanted"),
+    [
+        ("limits_um = [-5500.0", "limits_um = [-6500.0", "limits_um: -6500 to 5500 reaches beyond"),
+        ("limits_deg = [-160.0, 160.0]", "limits_deg = [-160.0, 171.0]", "limits_deg: "),
+        ('forward_key = "D"', 'forward_key = "Dee"', "forward_key: 'Dee' is not the name of a key"),
+        ('forward_key = "D"', 'forward_key = "F12"', "taken by platform.stop_key"),
+        ('stop_key = "F12"', 'stop_key = "Esc"', "platform.stop_key: the key 'Esc' is taken"),
+        ("device = 3\nchannel = 1", "device = 3\nchannel = 2", "has no stage"),
+        ("device = 3\nchannel = 1", "device = 9\nchannel = 1", "has no stage"),
+        ('applications = ["mico"]', 'applications = ["miko"]', "unknown application 'miko'"),
+        ('twin = "twin.toml"', 'twin = "none.toml"', "none.toml: there is no such file"),
+    ],
+)
+def test_check_finds(
+    folder: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, wanted: str
+) -> None:
+    platform = folder / "platform.toml"
+    edit(platform, old, new)
+    assert main(["check", str(platform)]) == 1
+    said = complaints(capsys)
+    assert [line for line in said if wanted in line], said
+
+
+def test_check_finds_a_kind_that_the_twin_does_not_have_there(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    platform = folder / "platform.toml"
+    edit(
+        platform,
+        'name = "left.gripper"\ntitle = "Gripper"\ndevice = 2\nchannel = 2',
+        'name = "left.gripper"\ntitle = "Gripper"\ndevice = 3\nchannel = 2',
+    )
+    edit(
+        platform,
+        'name = "table.rotation"\ntitle = "Table"\ndevice = 3\nchannel = 0',
+        'name = "table.rotation"\ntitle = "Table"\ndevice = 2\nchannel = 2',
+    )
+    assert main(["check", str(platform)]) == 1
+    said = complaints(capsys)
+    assert any("kind: rotary, but the twin's stage" in line for line in said)
+
+
+def test_check_of_what_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(tmp_path / "no.toml")]) == 1
+    assert "there is no such file" in complaints(capsys)[0]
+
+
+# init
+
+
+def test_init_copies_the_configuration_and_never_overwrites(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    platform = folder / "platform.toml"
+    platform.write_text("mine", encoding="utf-8")
+    assert main(["init", str(folder)]) == 1
+    assert any("is there already" in line for line in complaints(capsys))
+    assert platform.read_text(encoding="utf-8") == "mine"
+
+
+def test_init_into_a_file_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    assert main(["init", str(file)]) == 1
+    assert complaints(capsys)
+
+
+# What is not there, or not understood
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["daqco"], ["vico"], ["serve", "--applications", "mico"], ["--rate", "2", "daqco"]],
+)
+def test_what_is_not_built_says_so(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    assert "not built yet" in complaints(capsys)[0]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--nonsense"],
+        ["nonsense"],
+        ["check"],
+        ["--rate", "fast"],
+        ["--size", "big"],
+        ["--offscreen", "-1"],
+        ["--offscreen", "nan"],
+        ["--screenshot", "x.png"],
+        ["--theme", "pink"],
+    ],
+)
+def test_a_wrong_command_line_is_explained(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    assert left.value.code == 2
+    assert "error: " in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        (["--config", "/no/such/place"], "there is no such file"),
+        (["--rate", "0"], "rate: "),
+        (["--rate", "nan"], "rate: "),
+        (["mico", "--rate", "-3"], "rate: "),
+    ],
+)
+def test_a_window_that_cannot_start_says_why(
+    arguments: list[str], wanted: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*arguments, "--offscreen", "1"]) == 1
+    assert wanted in complaints(capsys)[0]
+
+
+def test_a_missing_library_is_named(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    edit(folder / "platform.toml", 'backend = "simulated"', 'backend = "scu3d"')
+    edit(folder / "platform.toml", 'library = ""', 'library = "/no/such/library.so"')
+    assert main(["--config", str(folder), "--offscreen", "1"]) == 1
+    assert "/no/such/library.so" in complaints(capsys)[0]
+
+
+def test_without_a_display_it_says_so_instead_of_crashing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for variable in ("QT_QPA_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(variable, raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    assert main([]) == 1
+    assert "there is no display" in complaints(capsys)[0]
+
+
+# The whole program
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "cosmic", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env=os.environ,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("command", [[], ["mico"]])
+def test_a_picture_of_the_window_is_saved_without_a_display(
+    tmp_path: Path, command: list[str]
+) -> None:
+    picture = tmp_path / "window.png"
+    options = ("--offscreen", "0.5", "--screenshot", str(picture), "--size", "1366x768")
+    done = run(*command, *options, "--theme", "light")
+    assert (done.returncode, done.stderr) == (0, "")
+    head = picture.read_bytes()[:24]
+    assert head[:4] == b"\x89PNG"
+    size = int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")
+    assert size == (1366, 768)
+
+
+def test_a_picture_that_cannot_be_saved_is_an_error(tmp_path: Path) -> None:
+    done = run("--offscreen", "0.2", "--screenshot", str(tmp_path / "no" / "window.png"))
+    assert done.returncode == 1
+    assert "cannot be saved" in done.stderr
+
+
+def test_importing_the_command_line_loads_no_widgets() -> None:
+    code = "import sys, cosmic.app.cli; sys.exit('PySide6.QtWidgets' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0
