@@ -42,6 +42,7 @@ def lose_a_cable(mico: Mico, faults) -> None:
         movement.wait()
     except cosmic.DeviceError as error:
         print(f"the move ended: {error}")
+    Event().wait(0.2)  # the stop of everything else follows right after
     print(f"left.x is {axis.state}; right.x is {mico['right.x'].state}")
     print(f"missing: {'; '.join(mico.missing)}")
     print(f"all motion is stopped: {mico.check({'right.x': 10.0})}")

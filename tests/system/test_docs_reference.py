@@ -10,6 +10,8 @@ from pydantic import BaseModel
 
 import cosmic
 from cosmic.app.platform import load_platform
+from cosmic.mico.core.positioner import Confidence
+from cosmic.mico.hw.sim_scu3d_faults import NAMES as FAULTS
 from system.api_names import CLASSES, ENUMS, exceptions, names, signature
 from system.config_tables import SECTIONS, WHOLE_FILES, rows
 from system.docs_blocks import ROOT, table_rows
@@ -128,3 +130,22 @@ def test_every_thesis_name_leads_to_a_file_that_has_the_name_given(tmp_path: Pat
         last = name.strip("`").split("(")[0].split(".")[-1].split()[-1]
         text = path.read_text(encoding="utf-8")
         assert re.search(rf"\b{re.escape(last)}\b", text), f"{thesis}: {file} has no {name}"
+
+
+def first_cells(rows_of_page: list[list[str]], head: str) -> list[str]:
+    """Return the first column of the rows below the one that begins with `head`."""
+    start = next(index for index, row in enumerate(rows_of_page) if row[0] == head)
+    return [row[0].strip("`") for row in rows_of_page[start + 1 :]]
+
+
+def test_every_fault_of_the_simulated_controller_is_explained() -> None:
+    listed = table_rows(ROOT / "docs" / "explanation" / "simulated-controller.md")
+    assert first_cells(listed, "fault") == list(FAULTS)
+
+
+def test_every_reason_of_a_refusal_and_every_confidence_is_explained(tmp_path: Path) -> None:
+    page = ROOT / "docs" / "explanation" / "gate.md"
+    checks = section(page, "The checks, in their order", tmp_path)
+    said = {row[1].strip("`") for row in checks if len(row) == 3 and row[1] != "reason"}
+    assert said == {each.value for each in cosmic.Reason} - {"ALLOWED"}
+    assert first_cells(table_rows(page), "confidence") == [each.value for each in Confidence]

@@ -1,0 +1,80 @@
+"""Each example shows what its page says it shows."""
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def said(capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest) -> str:
+    """What the example named by the parameter prints."""
+    runpy.run_path(str(ROOT / "examples" / request.param), run_name="__main__")
+    return capsys.readouterr().out
+
+
+def example(name: str) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("said", [name], indirect=True)
+
+
+@example("first_session.py")
+def test_the_first_session_moves_is_refused_stops_and_goes_on(said: str) -> None:
+    lines = said.splitlines()
+    steps = [line for line in lines if "%" in line]
+    assert "referencing left.z, right.z" in steps[0]
+    assert "100%" in steps[-1]
+    assert "may left.x go to 500 um? allowed; no collision model" in lines
+    assert any(line.startswith("refused, LIMIT: left.x: target 9000.0") for line in lines)
+    assert any(line.startswith("refused, STOPPED: left.x") for line in lines)
+    stood = next(line for line in lines if line.startswith("it stands at"))
+    assert 100.0 < float(stood.split()[3]) < 4900.0, "it was not stopped on its way"
+    assert lines[-1] == "closed: everything stopped, the hold released"
+
+
+@example("scan_positions.py")
+def test_the_scan_reaches_every_place(said: str) -> None:
+    head, *rows = said.splitlines()
+    assert head == "x_um,y_um,x_reached_um,y_reached_um"
+    assert len(rows) == 12
+    for row in rows:
+        x_um, y_um, x_reached_um, y_reached_um = map(float, row.split(","))
+        assert (x_reached_um, y_reached_um) == pytest.approx((x_um, y_um), abs=1.0)
+
+
+@example("jog.py")
+def test_jogging_ends_by_letting_go_and_by_the_dead_man(said: str) -> None:
+    held_um, let_go_um, dead_man_um = (float(line.split()[-2]) for line in said.splitlines())
+    assert 50.0 < held_um <= let_go_um < 600.0
+    assert let_go_um - 500.0 < dead_man_um < let_go_um
+
+
+@example("watch_positions.py")
+def test_watching_hears_of_both_axes_on_their_way(said: str) -> None:
+    lines = said.splitlines()
+    for name in ("left.x", "right.y"):
+        ways = [abs(float(line.split()[1])) for line in lines if line.startswith(name)]
+        assert len(ways) > 3
+        assert ways[0] < 400.0 < ways[-1]
+
+
+@example("inject_fault.py")
+def test_a_lost_cable_costs_its_own_axes_until_the_rescan(said: str) -> None:
+    assert "left.x is UNKNOWN; right.x is OK" in said
+    assert "all motion is stopped: right.x: motion is stopped" in said
+    assert said.splitlines()[-1] == "after the rescan left.x is OK"
+
+
+@example("simulated_library.py")
+def test_the_library_is_driven_through_its_c_functions(said: str) -> None:
+    where, refused = said.splitlines()
+    assert float(where.split()[-2]) == pytest.approx(1500.0, abs=0.5)
+    assert "131" in refused
+
+
+@example("positioner_type.py")
+def test_a_new_type_refuses_what_it_does_not_know(said: str) -> None:
+    reached, refused = said.splitlines()
+    assert float(reached.split()[-1]) == pytest.approx(30.0, abs=0.01)
+    assert refused.startswith("WRONG_KIND: table.rotation")
