@@ -49,6 +49,29 @@ def test_a_replaced_movement_says_so():
             first.wait(2)
 
 
+def test_a_movement_is_sent_before_anybody_is_told_that_it_replaces_another():
+    with mico(instant=False) as (rig, controller):
+        first = rig["d0.c0"].move_to(100.0, wait=False)
+        sent: list[int] = []
+        first.add_callback(lambda _: sent.append(len(controller.of("move_to"))))
+        rig["d0.c0"].move_to(50.0, wait=False)
+        wait_until(lambda: bool(sent))
+        assert sent == [2]
+
+
+def test_a_movement_replaced_by_one_that_cannot_be_sent_ends_as_well():
+    def gone(*_args: object, **_more: object) -> None:
+        raise DeviceError("gone", fault=DeviceFault.COMMUNICATION)
+
+    with mico(instant=False) as (rig, controller):
+        first = rig["d0.c0"].move_to(100.0, wait=False)
+        wait_until(lambda: rig["d0.c0"].details.in_motion)
+        controller.move_to = controller.stop = gone
+        second = rig["d0.c0"].move_to(50.0, wait=False)
+        assert isinstance(first.exception(2), cosmic.MoveCancelled)
+        assert isinstance(second.exception(2), cosmic.NotConnectedError)
+
+
 @pytest.mark.parametrize(
     ("value", "reason"),
     [

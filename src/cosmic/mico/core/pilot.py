@@ -50,9 +50,13 @@ class ChannelPilot(ChannelFollower):
             self._give_back(grant)
             self.turn_away(order, _stopped(self.name))
             return
-        self._begin(order, grant)
-        self._send(order.motion, grant)
-        self._announce()
+        replaced = self._begin(order, grant)
+        try:
+            if replaced is not None and isinstance(replaced.order.motion, Jog):
+                self._quietly(lambda: self._limit_speed(self._frequency_hz))
+            self._send(order.motion, grant)
+        finally:
+            self._tell_begun(order, replaced)
         self.ask_activity()
 
     def _grant(self, order: Order, motion: Motion) -> Grant | None:
@@ -72,16 +76,28 @@ class ChannelPilot(ChannelFollower):
         order.movement.fail(refusal(verdict))
         self._context.on_refused(verdict)
 
-    def _begin(self, order: Order, grant: Grant, jog: JogRun | None = None) -> None:
-        if self.flight is not None:
-            self._give_back(self.flight.grant)
-            self._conclude(MoveCancelled(f"{self.name}: replaced by a newer command"))
+    def _begin(self, order: Order, grant: Grant, jog: JogRun | None = None) -> Flight | None:
+        """Make `order` the movement under way and return the one that it replaces.
+
+        Nothing here takes long, for the controller waits: telling and logging come after `_send`.
+        """
         now_s = self._context.clock.now_s()
-        self.flight = Flight(order, grant, started_s=now_s, progress_s=now_s, jog=jog)
-        self.flight.known_pending = isinstance(order.motion, Reference)
+        flight = Flight(order, grant, started_s=now_s, progress_s=now_s, jog=jog)
+        flight.known_pending = isinstance(order.motion, Reference)
+        replaced, self.flight = self.flight, flight
         self._context.container.update(self._address.channel, in_motion=True, error="")
-        logger.info("%s: %s (%s)", self.name, order.motion, order.source)
         self.next_poll_s = now_s + self._context.poll_s * max(self._context.clock.rate, 1.0)
+        return replaced
+
+    def _tell_begun(self, order: Order, replaced: Flight | None) -> None:
+        """Tell everybody that `order` was sent, and that it ended the one before."""
+        if replaced is not None:
+            self._give_back(replaced.grant)
+            error = MoveCancelled(f"{self.name}: replaced by a newer command")
+            replaced.order.movement.fail(error)
+            self._context.on_failed(self.name, error)
+        logger.info("%s: %s (%s)", self.name, order.motion, order.source)
+        self._announce()
 
     def _send(self, motion: Motion, grant: Grant) -> None:
         if isinstance(motion, MoveBy):
@@ -115,10 +131,12 @@ class ChannelPilot(ChannelFollower):
             return
         grant = self._grant(order, packet)
         if grant is not None:
-            self._begin(order, grant, jog=jog)
-            self._limit_jog_speed(jog.speed)
-            self._send(packet, grant)
-            self._announce()
+            replaced = self._begin(order, grant, jog=jog)
+            try:
+                self._limit_jog_speed(jog.speed)
+                self._send(packet, grant)
+            finally:
+                self._tell_begun(order, replaced)
 
     @override
     def poll(self) -> None:
