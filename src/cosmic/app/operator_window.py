@@ -161,6 +161,7 @@ class OperatorWindow(CosmicServerGui):
 
     def open_hardware(self) -> None:
         """Begin to open the hardware; the panels show how it goes."""
+        self.setFocus()  # else the first button has it, and Space would press that
         if self._platform.mico is not None:
             self._platform.mico.initialize_later()
 
@@ -171,11 +172,11 @@ class OperatorWindow(CosmicServerGui):
 
     def halt_all(self) -> None:
         """Stop the axes that move, without latching; any thread."""
-        if self._mico_gui is None:
+        if self._mico_gui is None or self._platform.mico is None:
             return
-        for axis in self._mico_gui.mico:
-            if axis.details.in_motion:
-                axis.halt()
+        for name, state in self._platform.mico.manager.states().items():
+            if state.in_motion:
+                self._mico_gui.mico[name].halt()
 
     def _on_stop_button(self) -> None:
         self.stop("STOP button")

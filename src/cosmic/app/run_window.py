@@ -174,9 +174,11 @@ class _Photographer(QObject):
 def _run(app: QApplication, window: OperatorWindow, options: WindowOptions) -> int:
     if options.theme is not None:
         window.set_theme(options.theme)
+    if options.size is not None:
+        window.resize(*options.size)  # the panels share out this height at a first start
     window.show()
     if options.size is not None:
-        window.resize(*options.size)  # after the show: what was remembered comes with it
+        window.resize(*options.size)  # the show brought back what was remembered
     QTimer.singleShot(0, window.open_hardware)
     photographer = _Photographer(window, options.screenshot)
     if options.offscreen_s is not None:

@@ -5,6 +5,7 @@ from pytestqt.qtbot import QtBot
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import State
+from cosmic.mico.gui.card import ConfidenceMark
 from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
@@ -213,8 +214,8 @@ def test_the_speed_of_moves_is_set_from_the_card(panel: MicoWidget, qtbot: QtBot
 
 
 def test_confidence_is_said_by_word_and_shape(panel: MicoWidget) -> None:
-    assert part(panel.cards["left.x"], "confidence", QLabel).text() == "✓ known"
-    assert part(panel.cards["left.gripper"], "confidence", QLabel).text() == "≈ estimated"
+    assert part(panel.cards["left.x"], "chip", ConfidenceMark).text() == "✓ known"
+    assert part(panel.cards["left.gripper"], "chip", ConfidenceMark).text() == "≈ estimated"
 
 
 def test_what_cannot_be_used_yet_says_why(panel: MicoWidget) -> None:

@@ -11,6 +11,7 @@ from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import State
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.gui import registry
+from cosmic.mico.gui.card import ConfidenceMark
 from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI
 from cosmic.mico.gui.consent_dialog import ConsentDialog
 from cosmic.mico.gui.mico_widget import MicoWidget
@@ -95,7 +96,7 @@ def test_a_part_must_be_above_zero(panel: MicoWidget, qtbot: QtBot) -> None:
 def cold(qtbot: QtBot) -> Iterator[MicoWidget]:
     with simulated_panel(qtbot, cold=True) as panel:
         qtbot.waitUntil(
-            lambda: part(panel.cards["left.x"], "confidence", QLabel).text() == "? unknown"
+            lambda: part(panel.cards["left.x"], "chip", ConfidenceMark).text() == "? unknown"
         )
         yield panel
 
@@ -126,7 +127,7 @@ def test_the_dialog_can_initialise_instead(cold: MicoWidget, qtbot: QtBot) -> No
     asked(cold, qtbot).initialise_first.click()
     message = part(cold, "message", QLabel)
     qtbot.waitUntil(lambda: "Initialisation finished" in message.text(), timeout=20000)
-    assert part(cold.cards["left.x"], "confidence", QLabel).text() == "✓ known"
+    assert part(cold.cards["left.x"], "chip", ConfidenceMark).text() == "✓ known"
 
 
 def test_declining_moves_nothing(cold: MicoWidget, qtbot: QtBot) -> None:

@@ -72,12 +72,17 @@ class AxisCommands(QObject):
         self._relay.ended.connect(self._on_ended)
         self._newest: _Command | None = None
         self._series: StepwiseMove | None = None
+        self._moved = False
 
     @property
     def series(self) -> StepwiseMove | None:
         """The series of parts under way."""
         series = self._series
         return series if series is not None and not series.done else None
+
+    def note_motion(self) -> None:
+        """Say that the axis was seen moving: a stop then interrupts, and refuses nothing."""
+        self._moved = True
 
     def issue(self, what: str, make: Make, field: QWidget | None = None) -> None:
         """Give a command; how it goes is told by the signals."""
@@ -86,6 +91,7 @@ class AxisCommands(QObject):
     def _issue(self, what: str, make: Make, field: QWidget | None, *, consent: bool) -> None:
         self.abandon_series()
         self._newest = None
+        self._moved = False
         try:
             made = make(consent)
         except CosmicError as exc:
@@ -107,6 +113,7 @@ class AxisCommands(QObject):
     def follow(self, what: str, movement: Movement) -> None:
         """Tell how a movement ends that was begun elsewhere, such as a jog."""
         self._newest = _Command(what, lambda _consent: movement, None, movement, consented=True)
+        self._moved = False
         self.begun.emit()
         self._relay.follow(movement)
 
@@ -124,7 +131,11 @@ class AxisCommands(QObject):
         if not isinstance(error, MoveRefused):
             self.ended.emit("" if isinstance(error, MoveCancelled) else str(error))
             return
-        unknown = error.verdict.reason is Reason.POSITION_UNKNOWN
+        reason = error.verdict.reason
+        if reason is Reason.STOPPED and self._moved:
+            self.ended.emit(str(error))
+            return
+        unknown = reason is Reason.POSITION_UNKNOWN
         if not unknown or command.consented:
             self.refused.emit(command.field, str(error))
             return

@@ -1,6 +1,6 @@
 """`ClosedLoopGUI`: the card of a positioner with sensor (fields MiCoCL.1 to MiCoCL.13)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import ClassVar, Final
 
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QWidget
@@ -78,7 +78,7 @@ class ClosedLoopGUI(PositionerBaseGUI):
     @override
     def _first_row(self) -> Sequence[QWidget]:
         signs = (self._collision, self._rules, self._linked, self._link)
-        return *super()._first_row()[:-1], *signs, self._menu.button, self._stop
+        return *super()._first_row()[:-1], _gap(), *signs, self._menu.button, self._stop
 
     @override
     def _second_row(self) -> Sequence[QWidget]:
@@ -176,13 +176,16 @@ class ClosedLoopGUI(PositionerBaseGUI):
         )
 
     def _on_zero_set(self) -> None:
-        try:
-            self.axis.set_zero()
-        except CosmicError as exc:
-            self._on_refused(None, str(exc))
+        self._change_zero(self.axis.set_zero)
 
     def _on_zero_cleared(self) -> None:
-        self.axis.clear_zero()
+        self._change_zero(self.axis.clear_zero)
+
+    def _change_zero(self, change: Callable[[], None]) -> None:
+        try:
+            change()
+        except CosmicError as exc:
+            self._on_refused(None, str(exc))
 
     def _on_speed(self, hertz: float) -> None:
         try:
@@ -197,6 +200,7 @@ class ClosedLoopGUI(PositionerBaseGUI):
 def _switch(text: str, name: str, why_not: str) -> QPushButton:
     button = named(push_button(text, why_not), name)
     button.setEnabled(False)
+    button.setStyleSheet(f"QPushButton {{ padding: 3px {STEP_PX - 2}px; }}")
     return button
 
 

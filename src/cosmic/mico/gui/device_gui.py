@@ -77,7 +77,10 @@ class DeviceGUI(QWidget):
 
     def show_state(self, state: PositionerState) -> None:
         """Take the state of one axis into account for the title."""
-        self._states[state.name] = STATES[state.status]
+        badge = STATES[state.status]
+        if self._states.get(state.name) is badge:
+            return
+        self._states[state.name] = badge
         gravest = max(self._states.values(), key=_GRAVITY.index)
         names = [name for name, each in self._states.items() if each is gravest]
         if gravest is State.OK:

@@ -6,7 +6,7 @@ from PySide6.QtCore import QCoreApplication, Signal
 from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
 from cosmic.frame.application import CosmicApplicationBase
-from cosmic.frame.errors import NotAvailable
+from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.gui.theme import State
 from cosmic.frame.task import Task
 from cosmic.mico.api.application import MicoApplication
@@ -113,6 +113,13 @@ class MicoWidget(QWidget):
 
     def refresh(self) -> None:
         """Show what there is now; makes the cards anew where axes or their kinds changed."""
+        try:
+            self._refresh()
+        except CosmicError as exc:
+            # A rescan takes the devices apart in its own thread; its end brings us here again.
+            logger.debug("the panel waits for the end of a rescan: %s", exc)
+
+    def _refresh(self) -> None:
         shape = [(name, self._mico[name].kind.value) for name in self._mico.names]
         if shape != self._shape:
             self._rebuild()
@@ -127,6 +134,8 @@ class MicoWidget(QWidget):
 
     def _rebuild(self) -> None:
         self._keys.set_keys({})
+        if self._dialog is not None:
+            self._dialog.close()  # its question is about a card that goes
         self._cards = {}
         groups = [self._make_group(each) for each in self._arrangement()]
         self._columns.set_groups(groups)

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QToolButton, QVBoxLayout
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.chip import set_style_property
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.palette import OKABE_ITO
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look, ui_font
@@ -27,6 +28,7 @@ STATES: Final = {
     Status.UNKNOWN: State.UNKNOWN,
 }
 _SMALL_PX: Final = 11
+_TITLE_PX: Final = 10 * STEP_PX
 
 
 class PositionerBaseGUI(Card):
@@ -73,6 +75,8 @@ class PositionerBaseGUI(Card):
         self.commands = AxisCommands(settings.name, self)
         self._defaults = defaults
         self._note = ""
+        self._state: PositionerState | None = None
+        self._shown: tuple[State, str] | None = None
         self._inputs: list[QWidget] = []
         self._usual_tips: dict[QWidget, str] = {}
         self._make_common()
@@ -92,10 +96,13 @@ class PositionerBaseGUI(Card):
         self._badge = named(StateBadge(State.UNKNOWN), self.state_name)
         self._title = named(ElidedLabel(title, hint=f"Axis {settings.name}"), self.title_name)
         self._title.setFont(ui_font(bold=True))
+        wanted = self._title.fontMetrics().horizontalAdvance(title) + 2
+        self._title.setMinimumWidth(min(wanted, _TITLE_PX))
         self._position = PositionDisplay(settings.unit, self.position_name)
-        self._confidence = named(ConfidenceMark(), "confidence")
+        self._confidence = ConfidenceMark()
         self._stop = named(QToolButton(), "stopAxis")
         self._stop.setText("■")
+        self._stop.setStyleSheet(f"QToolButton:enabled {{ color: {OKABE_ITO['vermillion']}; }}")
         tipped(self._stop, f"Stop {settings.name}; the other axes go on")
         self._stop.clicked.connect(self._on_stop_clicked)
         self._forward = self._direction_button(settings.forward_text, settings.forward_key, "+")
@@ -147,13 +154,20 @@ class PositionerBaseGUI(Card):
 
     def show_state(self, state: PositionerState) -> None:
         """Show the newest state of the axis."""
-        badge = STATES[state.status]
-        self._badge.set_state(badge, state.error or self._activity_text(state))
-        self.set_edge(badge)
+        self._state = state
+        if state.in_motion:
+            self.commands.note_motion()
+        self._show_badge(STATES[state.status], state.error or self._activity_text(state))
         self._position.show_position(state.shown_position)
         self._confidence.set_confidence(state.confidence)
         self._show_usable(state)
         self._show_line(state)
+
+    def _show_badge(self, badge: State, detail: str) -> None:
+        if (badge, detail) != self._shown:  # most states differ in the position alone
+            self._shown = (badge, detail)
+            self._badge.set_state(badge, detail)
+            self.set_edge(badge)
 
     @staticmethod
     def _activity_text(state: PositionerState) -> str:
@@ -188,7 +202,8 @@ class PositionerBaseGUI(Card):
 
     def _set_note(self, note: str) -> None:
         self._note = note
-        self._show_line(self.axis.details)
+        if self._state is not None:
+            self._show_line(self._state)
 
     # Commanding
 
