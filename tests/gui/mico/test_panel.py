@@ -223,6 +223,19 @@ def test_an_error_of_the_device_stands_in_the_card(qtbot: QtBot) -> None:
         assert panel.groups[0].state is State.ERROR
 
 
+def test_a_stop_that_ends_a_move_refuses_no_entry(qtbot: QtBot) -> None:
+    with scripted_panel(qtbot, ("LLN",), instant=False) as (panel, _controller):
+        card = panel.cards["d0.c0"]
+        click(qtbot, card, "MiCoCL_6")
+        badge, line = part(card, "MiCoCL_1", StateBadge), part(card, "status", QLabel)
+        qtbot.waitUntil(lambda: badge.state is State.BUSY)
+        panel.mico.application.manager.stop("test")
+        qtbot.waitUntil(lambda: "stopped: test" in line.text())
+        assert not field(card, "MiCoCL_8").reason
+        click(qtbot, card, "MiCoCL_6")
+        qtbot.waitUntil(lambda: "stopped" in field(card, "MiCoCL_8").reason)
+
+
 # Arrangement and cost
 
 
