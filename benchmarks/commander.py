@@ -12,10 +12,9 @@ from dataclasses import dataclass, field
 from queue import SimpleQueue
 from typing import Any
 
-from cosmic.mico.hw.interface import PositionerKind
-
 from benchmarks.figures import Figure, main, percentile
 from benchmarks.stand import Stand, Traffic, stand
+from cosmic.mico.hw.interface import PositionerKind
 
 NAME = "commander"
 CALL = "SA_MovePositionAbsolute_A"

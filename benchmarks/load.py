@@ -44,7 +44,9 @@ def moving(bench: Stand, seconds: float) -> tuple[float, dict[str, float]]:
     percent = share(seconds)
     after = threads()
     traffic.end()
-    kinds = {name: 100.0 * (spent - before.get(name, 0.0)) / seconds for name, spent in after.items()}
+    kinds = {
+        name: 100.0 * (spent - before.get(name, 0.0)) / seconds for name, spent in after.items()
+    }
     return percent, kinds
 
 
@@ -67,7 +69,7 @@ def idle(seconds: float) -> float:
 
 def measure(quick: bool = False) -> list[Figure]:
     """Return the figures of one run."""
-    seconds = 0.2 if quick else 8.0
+    seconds = 0.2 if quick else 6.0
     devices = 2 if quick else 16
     with stand(repaint=False, traced=False) as bench:
         idle_percent = bench.beside(lambda: idle(seconds))

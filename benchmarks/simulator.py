@@ -4,10 +4,9 @@ import time
 from ctypes import byref
 from typing import Any
 
+from benchmarks.figures import Figure, main
 from cosmic.mico.hw import scu3d_ctypes as sa
 from cosmic.mico.hw.sim_scu3d import load_simulated_library
-
-from benchmarks.figures import Figure, main
 
 NAME = "simulator"
 HOLD_MS = 60_000

@@ -16,6 +16,7 @@ os.environ.setdefault("QT_LOGGING_RULES", "qt.qpa.*=false;default.warning=false"
 from PySide6.QtCore import QCoreApplication, QEvent, QMetaObject, QSettings, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
+from benchmarks.traced import TracedLibrary
 from cosmic.app.operator_window import OperatorWindow
 from cosmic.app.platform import Platform, PlatformFile, load_platform, load_twin
 from cosmic.frame.clock import RatedClock
@@ -34,8 +35,6 @@ from cosmic.mico.hw.scu3d import Scu3dController
 from cosmic.mico.hw.sim_scu3d import load_simulated_library
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import DeviceWiring, StagePlace, TwinSettings
-
-from benchmarks.traced import TracedLibrary
 
 R = TypeVar("R")
 

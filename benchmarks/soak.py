@@ -1,0 +1,158 @@
+"""Random movements on all axes for a long time: nothing may grow.
+
+`python -m benchmarks.soak --minutes 10`. The log is filled before the first look, because the
+window keeps the newest 5000 records. tracemalloc counts what Python allocated, at the price of
+some speed; the resident set has what Qt took as well. The first third is warm-up.
+"""
+
+import argparse
+import gc
+import logging
+import random
+import threading
+import time
+import tracemalloc
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from benchmarks.figures import Figure, table
+from benchmarks.stand import Stand, stand, wait_until
+from cosmic.frame.errors import CosmicError
+from cosmic.mico.api.axis import Axis
+
+NAME = "soak"
+LOG_RECORDS = 6000
+_STATUS = Path("/proc/self/status")
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What might grow, at one moment."""
+
+    traced_kb: float
+    resident_kb: float
+    threads: int
+    messages: int
+    packets: int
+    held: int
+    moves: int
+
+
+def resident_kb() -> float:
+    """Return the resident set in kB; 0 outside Linux."""
+    if not _STATUS.exists():
+        return 0.0
+    lines = _STATUS.read_text(encoding="utf-8").splitlines()
+    return next(float(line.split()[1]) for line in lines if line.startswith("VmRSS:"))
+
+
+def command(axis: Axis, rng: random.Random) -> None:
+    """Command something at random; what the gate refuses is part of it."""
+    with suppress(CosmicError):
+        if axis.limits is None:
+            axis.steps(rng.randint(-500, 500), wait=False)
+            return
+        low, high = axis.limits
+        kind = rng.random()
+        if kind < 0.6:
+            axis.move_to(rng.uniform(1.02 * low, 1.02 * high), wait=False)
+        elif kind < 0.9:
+            axis.move_by(rng.uniform(-0.1, 0.1) * (high - low), wait=False)
+        elif kind < 0.95:
+            axis.steps(rng.randint(-20, 20), wait=False)
+        else:
+            axis.halt()
+
+
+def fill_log() -> None:
+    """Log as much as the window keeps, so that it grows no further."""
+    logger = logging.getLogger("cosmic.mico.core.pilot")
+    for number in range(LOG_RECORDS):
+        target = number + 0.123456789
+        logger.info("left.x: MoveTo(target=%s, unit='um') (benchmark)", target)
+
+
+def look(bench: Stand, moves: int) -> Look:
+    """Look at everything; the axes stand, so that what is under way does not count."""
+    with suppress(TimeoutError):
+        wait_until(lambda: not any(axis.details.in_motion for axis in bench.mico), timeout_s=25.0)
+    time.sleep(0.3)
+    gc.collect()
+    return Look(
+        traced_kb=tracemalloc.get_traced_memory()[0] / 1024,
+        resident_kb=resident_kb(),
+        threads=threading.active_count(),
+        messages=sum(device._inbox.qsize() for device in bench.manager.devices.values()),
+        packets=sum(len(device.queue) for device in bench.library._wired),
+        held=len(bench.manager.gate.held()),
+        moves=moves,
+    )
+
+
+def collect(bench: Stand, seconds: float, tell: Callable[[Look], None]) -> list[Look]:
+    """Move at random and look twelve times."""
+    rng = random.Random(1)
+    axes = list(bench.mico)
+    for axis in axes:
+        axis.details  # noqa: B018 - a script's handles are made before the first look
+    fill_log()
+    time.sleep(min(1.0, seconds))
+    tracemalloc.start()
+    looks: list[Look] = []
+    moves = 0
+    began_s = time.perf_counter()
+    for part in range(1, 13):
+        while time.perf_counter() - began_s < part * seconds / 12:
+            command(rng.choice(axes), rng)
+            moves += 1
+            time.sleep(rng.uniform(0.01, 0.09))
+        looks.append(look(bench, moves))
+        tell(looks[-1])
+    tracemalloc.stop()
+    return looks
+
+
+def figures(looks: list[Look]) -> list[Figure]:
+    """Return what grew from the end of the warm-up to the end."""
+    warm, last = looks[len(looks) // 3 - 1], looks[-1]
+    return [
+        Figure(NAME, "moves commanded", last.moves, ""),
+        Figure(NAME, "Python memory, warm", warm.traced_kb, "kB"),
+        Figure(NAME, "Python memory, growth", last.traced_kb - warm.traced_kb, "kB"),
+        Figure(NAME, "resident set, warm", warm.resident_kb / 1024, "MB"),
+        Figure(NAME, "resident set, growth", (last.resident_kb - warm.resident_kb) / 1024, "MB"),
+        Figure(NAME, "threads, growth", last.threads - warm.threads, "", 0),
+        Figure(NAME, "messages waiting at the end", last.messages, "", 0),
+        Figure(NAME, "packets waiting at the end", last.packets, "", 0),
+        Figure(NAME, "intervals held at the end", last.held, "", 0),
+    ]
+
+
+def run(seconds: float, tell: Callable[[Look], None]) -> list[Figure]:
+    """Return the figures of one soak."""
+    with stand(repaint=False, traced=False) as bench:
+        return figures(bench.beside(lambda: collect(bench, seconds, tell)))
+
+
+def measure(quick: bool = False) -> list[Figure]:
+    """Return the figures of a short soak."""
+    return run(1.0 if quick else 60.0, lambda _look: None)
+
+
+def _from_command_line() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--minutes", type=float, default=1.0)
+    minutes = parser.parse_args().minutes
+    print(" ".join(field.name for field in fields(Look)))
+
+    def tell(seen: Look) -> None:
+        values = (getattr(seen, field.name) for field in fields(Look))
+        print(" ".join(f"{value:.0f}" for value in values), flush=True)
+
+    print(table(run(60.0 * minutes, tell)))
+
+
+if __name__ == "__main__":
+    _from_command_line()

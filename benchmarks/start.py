@@ -1,0 +1,87 @@
+"""From the start of the process to a window in which every axis is shown.
+
+A child process opens the operator's window as `python -m cosmic` does, offscreen, and tells when
+the first card was painted after every axis had its position. What `./run` does before it starts
+Python (looking whether anything is to be installed) is measured by itself, without installing.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from benchmarks.figures import Figure, main
+
+NAME = "start"
+ROOT = Path(__file__).resolve().parents[1]
+PRELUDE = 'root=$1; . "$root/tools/setup.sh"; find_missing run; find_venv_version; installation_key'
+
+
+def child_figures(run: list[str]) -> dict[str, float]:
+    """Start the child and return the seconds it reports, counted from its start."""
+    began_s = time.monotonic()
+    done = subprocess.run(
+        [*run, "-m", "benchmarks.start_child", repr(began_s)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+        cwd=ROOT,
+        env=os.environ | {"QT_QPA_PLATFORM": "offscreen"},
+    )
+    found: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+def prelude_s() -> float:
+    """Return how long `./run` takes before it starts Python, in s."""
+    began_s = time.perf_counter()
+    command = ["sh", "-c", PRELUDE, "sh", str(ROOT)]
+    subprocess.run(command, capture_output=True, timeout=60, check=False)
+    return time.perf_counter() - began_s
+
+
+def heaviest_imports(count: int) -> list[tuple[str, float]]:
+    """Return the packages whose import takes longest, with everything they import, in ms."""
+    done = subprocess.run(
+        [sys.executable, "-X", "importtime", "-c", "import cosmic.app.run_window"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+        cwd=ROOT,
+    )
+    own: dict[str, float] = {}
+    for line in done.stderr.splitlines():
+        if not line.startswith("import time:") or "self [us]" in line:
+            continue
+        itself_us, _, module = line.removeprefix("import time:").split("|")
+        package = module.strip().split(".")[0]
+        own[package] = own.get(package, 0.0) + float(itself_us) / 1e3
+    return sorted(own.items(), key=lambda item: -item[1])[:count]
+
+
+def measure(quick: bool = False) -> list[Figure]:
+    """Return the figures of one run."""
+    before_s = 0.0 if quick else prelude_s()
+    child = child_figures([sys.executable])
+    figures = [
+        Figure(NAME, "./run to the axes painted", before_s + child["painted"], "s", 5),
+        Figure(NAME, "of these: ./run before Python", before_s, "s"),
+        Figure(NAME, "of these: start of Python", child["python"], "s"),
+        Figure(NAME, "of these: imports", child["imported"] - child["python"], "s"),
+        Figure(NAME, "of these: to the window shown", child["shown"] - child["imported"], "s"),
+        Figure(NAME, "of these: to the axes painted", child["painted"] - child["shown"], "s"),
+    ]
+    if not quick:
+        figures += [
+            Figure(NAME, f"importing {name} (with -X importtime)", took_ms / 1e3, "s")
+            for name, took_ms in heaviest_imports(4)
+        ]
+    return figures
+
+
+if __name__ == "__main__":
+    main(__doc__, measure)
