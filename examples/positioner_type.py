@@ -8,8 +8,7 @@ from typing import ClassVar
 
 import cosmic
 from cosmic.mico.core.orders import Calibrate, Motion, MoveBy, MoveTo, Step
-from cosmic.mico.core.positioner import POSITIONER_CLASSES, RotaryPositioner
-from cosmic.mico.hw.interface import PositionerKind
+from cosmic.mico.core.positioner import TYPE_CLASSES, RotaryPositioner
 
 
 class EndlessRotaryPositioner(RotaryPositioner):
@@ -19,10 +18,12 @@ class EndlessRotaryPositioner(RotaryPositioner):
     advice = "it has no end stop; give degrees"
 
 
+TYPE_CODE = 4  # what the controller calls the table of the simulated platform
+
+
 def main() -> None:
     """Register the class and see what the gate says."""
-    before = POSITIONER_CLASSES[PositionerKind.ROTARY]
-    POSITIONER_CLASSES[PositionerKind.ROTARY] = EndlessRotaryPositioner
+    TYPE_CLASSES[TYPE_CODE] = EndlessRotaryPositioner
     try:
         with cosmic.connect(rate=10) as rig:
             table = rig.mico["table.rotation"]
@@ -31,7 +32,7 @@ def main() -> None:
     except cosmic.MoveRefused as refused:
         print(f"{refused.verdict.reason}: {refused}")
     finally:
-        POSITIONER_CLASSES[PositionerKind.ROTARY] = before
+        del TYPE_CLASSES[TYPE_CODE]
 
 
 if __name__ == "__main__":

@@ -24,7 +24,12 @@ if TYPE_CHECKING:
         StoppedError,
         UnknownAxisError,
     )
+    from cosmic.frame.task import Progress, Task
     from cosmic.frame.verdict import MoveVerdict, Reason
+    from cosmic.mico.api.axis import Axis, Jogging
+    from cosmic.mico.api.group import GroupMovement
+    from cosmic.mico.api.mico import Mico
+    from cosmic.mico.core.movement import Movement
 
 __version__ = "0.1.0"
 
@@ -47,25 +52,37 @@ _HOMES = {
         "StoppedError",
         "UnknownAxisError",
     ),
+    "cosmic.frame.task": ("Progress", "Task"),
     "cosmic.frame.verdict": ("MoveVerdict", "Reason"),
+    "cosmic.mico.api.axis": ("Axis", "Jogging"),
+    "cosmic.mico.api.group": ("GroupMovement",),
+    "cosmic.mico.api.mico": ("Mico",),
+    "cosmic.mico.core.movement": ("Movement",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "Axis",
     "CollisionError",
     "ConfigError",
     "CosmicError",
     "DeviceError",
     "DeviceTimeout",
+    "GroupMovement",
+    "Jogging",
     "LimitError",
+    "Mico",
     "MoveCancelled",
     "MoveRefused",
     "MoveVerdict",
+    "Movement",
     "NotAvailable",
     "NotConnectedError",
+    "Progress",
     "Reason",
     "Rig",
     "StoppedError",
+    "Task",
     "UnknownAxisError",
     "connect",
 ]

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import Field
 
@@ -13,9 +13,13 @@ from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.core.settings import MicoSettings
-from cosmic.mico.hw.factory import make_controller
+from cosmic.mico.hw.factory import make_controller, make_simulated
+from cosmic.mico.hw.interface import Controller
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import TwinSettings
+
+if TYPE_CHECKING:
+    from cosmic.mico.hw.sim_scu3d_faults import Faults
 
 KNOWN_APPLICATIONS: Final = ("mico", "daqco", "vico")
 BUILT_APPLICATIONS: Final = ("mico",)
@@ -46,6 +50,7 @@ class Platform:
     clock: Clock
     policy: FailurePolicy
     mico: MicoApplication | None
+    faults: "Faults | None" = None
 
     @property
     def simulated(self) -> bool:
@@ -130,16 +135,20 @@ def build_platform(
         raise ConfigError(f"{path}: mico.backend: only the simulated platform has a rate or --cold")
     try:
         clock = RatedClock(rate)
-    except ValueError as exc:
+    except (TypeError, ValueError) as exc:
         raise ConfigError(f"rate: {exc}") from None
     policy = FailurePolicy()
-    scene = None
-    if simulated:
-        scene = Scene.from_settings(load_twin(file, path), clock, seed=seed, cold=cold)
-    mico = None
+    mico, faults = None, None
     if "mico" in applications and "mico" in file.platform.applications:
-        controller = make_controller(file.mico.backend, library_path=file.mico.library, scene=scene)
+        controller: Controller
+        if simulated:
+            twin = load_twin(file, path)
+            controller, faults = make_simulated(
+                Scene.from_settings(twin, clock, seed=seed, cold=cold)
+            )
+        else:
+            controller = make_controller(file.mico.backend, library_path=file.mico.library)
         mico = MicoApplication(
             controller, file.mico, clock=clock, policy=policy, gui_factory=mico_gui
         )
-    return Platform(file=file, path=path, clock=clock, policy=policy, mico=mico)
+    return Platform(file=file, path=path, clock=clock, policy=policy, mico=mico, faults=faults)

@@ -5,13 +5,16 @@ import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import NoReturn, Self
+from typing import TYPE_CHECKING, NoReturn, Self
 
 from typing_extensions import override
 
 from cosmic.app.platform import KNOWN_APPLICATIONS, Platform, build_platform
 from cosmic.frame.errors import ConfigError, NotAvailable, NotConnectedError
 from cosmic.mico.api.mico import Mico
+
+if TYPE_CHECKING:
+    from cosmic.mico.hw.sim_scu3d_faults import Faults
 
 logger = logging.getLogger(__name__)
 
@@ -71,6 +74,22 @@ class Rig:
         if self._platform.mico is not None:
             self._platform.mico.manager.reset_stop()
 
+    @property
+    def faults(self) -> "Faults":
+        """Trouble that can be injected into the simulated platform, by name.
+
+        ``rig.faults.inject("unplugged", device=1)``; docs/explanation/simulated-controller.md
+        lists the names.
+
+        Raises
+        ------
+        NotAvailable
+            The platform is real: it has troubles of its own.
+        """
+        if self._platform.faults is None:
+            raise NotAvailable("faults can be injected into a simulated platform only")
+        return self._platform.faults
+
     def close(self) -> None:
         """Stop everything, release the hold and end all threads; harmless the second time."""
         if not self._closed:
@@ -127,6 +146,8 @@ def connect(
     """
     if stations:
         raise NotAvailable("other stations are not built yet; leave stations out")
+    if isinstance(applications, str):
+        applications = (applications,)
     unknown = [name for name in applications if name not in KNOWN_APPLICATIONS]
     if unknown:
         raise ConfigError(

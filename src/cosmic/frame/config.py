@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
 
 from cosmic.frame.errors import ConfigError
 
@@ -64,7 +65,7 @@ def load_model(path: Path, model: type[M]) -> M:
 
 def _lines(path: Path, error: ValidationError) -> list[str]:
     return [
-        f"{path}: {_key(item['loc'])}: {_reason(item['type'], item['msg'])}"
+        f"{path}: {_key(item['loc'])}: {_reason(item['type'], item['msg'])}{_given(item)}"
         for item in error.errors(include_url=False)
     ]
 
@@ -82,3 +83,12 @@ def _reason(kind: str, message: str) -> str:
     if kind == "missing":
         return "key is missing"
     return message.removeprefix("Value error, ")
+
+
+def _given(item: ErrorDetails) -> str:
+    """Say what the file has there, where that is a plain value."""
+    value = item["input"]
+    told = item["type"] in ("missing", "extra_forbidden", "value_error")
+    if told or not isinstance(value, (str, int, float, bool)):
+        return ""
+    return f"; the file has {value!r}"

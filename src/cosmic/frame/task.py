@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from threading import Condition
+from threading import Condition, RLock
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceTimeout
-from cosmic.frame.threads import forbid_in_gui_thread
+from cosmic.frame.listeners import tell
+from cosmic.frame.threads import forbid_waiting_here
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +45,7 @@ class Task:
     def __init__(self, title: str) -> None:
         self._title = title
         self._changed = Condition()
+        self._telling = RLock()
         self._started_s = WALL.now_s()
         self._text = ""
         self._fraction = 0.0
@@ -84,10 +86,13 @@ class Task:
         )
 
     def subscribe(self, listener: Callable[[Progress], None]) -> None:
-        """Call `listener(progress)` at each step, in the thread that makes it."""
-        with self._changed:
+        """Call `listener(progress)` at each step, one at a time, in the thread that makes it.
+
+        It is called at once with what has been reported so far.
+        """
+        with self._telling:
             self._listeners = (*self._listeners, listener)
-        listener(self.progress)
+            tell([listener], self.progress)
 
     def cancel(self) -> None:
         """Ask it to end; what it has set in motion is stopped."""
@@ -109,7 +114,7 @@ class Task:
             Called in the GUI thread.
         """
         if not self._done:
-            forbid_in_gui_thread(f"waiting for {self._title!r}")
+            forbid_waiting_here(f"waiting for {self._title!r}")
         with self._changed:
             if not self._changed.wait_for(lambda: self._done, timeout_s):
                 raise DeviceTimeout(f"{self._title} had not ended after {timeout_s:g} s")
@@ -147,6 +152,5 @@ class Task:
         self._tell()
 
     def _tell(self) -> None:
-        progress = self.progress
-        for listener in self._listeners:
-            listener(progress)
+        with self._telling:
+            tell(self._listeners, self.progress)

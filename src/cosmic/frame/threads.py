@@ -5,7 +5,7 @@ import sys
 import threading
 import weakref
 from collections.abc import Callable
-from typing import Final
+from typing import ClassVar, Final
 
 import shiboken6
 from PySide6.QtCore import QObject, QThread
@@ -31,6 +31,9 @@ class WorkerThread(QThread):
     policy : FailurePolicy
         Told when the body raises; motion is then stopped.
     """
+
+    may_wait: ClassVar[bool] = True
+    """False for a thread that brings movements about, and so must never wait for one."""
 
     def __init__(self, name: str, policy: FailurePolicy, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -70,10 +73,14 @@ class WorkerThread(QThread):
         if trace is not None:  # coverage does not see threads that Qt started
             sys.settrace(trace)
         threading.current_thread().name = self.name
+        take_back = None if self.may_wait else _declare_never_waiting(self.name)
         try:
             self.run_body()
         except BaseException as exc:  # noqa: BLE001 - the end of the thread body, SystemExit too
             self._policy.report(exc, f"thread {self.name!r}", thread_died=True)
+        finally:
+            if take_back is not None:
+                take_back()
 
 
 _alive: "weakref.WeakSet[WorkerThread]" = weakref.WeakSet()
@@ -97,7 +104,7 @@ def _end_what_still_runs() -> None:
         thread.join(2.0)
 
 
-_gui_threads: set[int] = set()
+_busy_threads: dict[int, str] = {}
 
 
 def declare_gui_thread() -> Callable[[], None]:
@@ -105,20 +112,29 @@ def declare_gui_thread() -> Callable[[], None]:
 
     Returns the function that takes it back.
     """
+    return _declare_never_waiting("the window")
+
+
+def _declare_never_waiting(whom: str) -> Callable[[], None]:
     ident = threading.get_ident()
-    _gui_threads.add(ident)
-    return lambda: _gui_threads.discard(ident)
+    _busy_threads[ident] = whom
+
+    def take_back() -> None:
+        _busy_threads.pop(ident, None)
+
+    return take_back
 
 
-def forbid_in_gui_thread(what: str) -> None:
-    """Raise where `what` would freeze a window.
+def forbid_waiting_here(what: str) -> None:
+    """Raise where `what` would freeze a window, or a thread that has to bring about its end.
 
     Raises
     ------
     WrongThreadError
-        The calling thread was declared a GUI thread.
+        The calling thread must never wait.
     """
-    if threading.get_ident() in _gui_threads:
+    whom = _busy_threads.get(threading.get_ident())
+    if whom is not None:
         raise WrongThreadError(
-            f"{what} would freeze the window; use wait=False, or run it in the console or a thread"
+            f"{what} would freeze {whom}; use wait=False, or do it in the console or a thread"
         )

@@ -68,6 +68,8 @@ def parse_quantity(text: str, unit: str) -> float:
 
 def format_quantity(value: float, unit: str, decimals: int | None = None) -> str:
     """Return `value` as text for the operator, such as "12.5 µm"."""
+    if abs(value) >= 1e9:
+        return f"{value:.3e} {DISPLAY.get(unit, unit)}"
     digits = {"um": 1, "deg": 4, "V": 1}.get(unit, 0) if decimals is None else decimals
     rounded = round(value, digits) + 0.0  # no minus in front of zero
     return f"{rounded:.{digits}f} {DISPLAY.get(unit, unit)}"

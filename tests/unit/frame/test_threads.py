@@ -16,7 +16,7 @@ from cosmic.frame.failure import Failure, FailurePolicy
 from cosmic.frame.threads import (
     WorkerThread,
     declare_gui_thread,
-    forbid_in_gui_thread,
+    forbid_waiting_here,
     running_threads,
 )
 
@@ -217,8 +217,8 @@ def test_a_process_that_forgot_a_thread_ends_it_in_order() -> None:
 def test_waiting_is_forbidden_in_a_declared_gui_thread_only() -> None:
     take_back = declare_gui_thread()
     with pytest.raises(WrongThreadError, match="moving would freeze the window"):
-        forbid_in_gui_thread("moving")
+        forbid_waiting_here("moving")
     with ThreadPoolExecutor() as pool:
-        pool.submit(forbid_in_gui_thread, "moving").result()
+        pool.submit(forbid_waiting_here, "moving").result()
     take_back()
-    forbid_in_gui_thread("moving")
+    forbid_waiting_here("moving")

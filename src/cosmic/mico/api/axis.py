@@ -1,12 +1,15 @@
 """One axis of the scripted API: ``rig.mico["left.x"]``."""
 
+from collections.abc import Callable
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Literal, Self, overload
 
+from PySide6.QtCore import QObject, Qt
 from typing_extensions import override
 
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import MoveRefused, NotAvailable, refusal
+from cosmic.frame.listeners import tell
 from cosmic.frame.units import AxisUnit
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.api.entry import Number, as_number, as_whole
@@ -15,7 +18,7 @@ from cosmic.mico.core.device_commander import DeviceCommander
 from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.orders import FREQUENCY_HZ, MoveTo, Order
-from cosmic.mico.core.positioner import Confidence, PositionerState, Status
+from cosmic.mico.core.positioner import Confidence, PositionerState, Status, class_for
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
 
 
@@ -158,7 +161,36 @@ class Axis:
             raise NotAvailable(f"{self._name} is a {state.kind} axis: use {other}")
         return state.shown_position
 
+    def subscribe(self, callback: Callable[[PositionerState], None]) -> Callable[[], None]:
+        """Call `callback(state)` after each change; returns the function that ends it.
+
+        It is called in the device's thread and must return at once; a position in motion is read
+        about 20 times a second.
+        """
+
+        def on_state(state: PositionerState) -> None:
+            if state.name == self._name:
+                tell([callback], state)
+
+        direct = Qt.ConnectionType.DirectConnection
+        connection = self.commander.state_changed.connect(on_state, direct)
+
+        def unsubscribe() -> None:
+            QObject.disconnect(connection)
+
+        return unsubscribe
+
     # Moving
+
+    @overload
+    def move_to(
+        self, position: Number, *, wait: Literal[True] = True, consent: bool = False
+    ) -> float: ...
+
+    @overload
+    def move_to(
+        self, position: Number, *, wait: Literal[False], consent: bool = False
+    ) -> Movement: ...
 
     def move_to(
         self, position: Number, *, wait: bool = True, consent: bool = False
@@ -184,6 +216,16 @@ class Axis:
         target = self._number(position) + self.details.zero
         movement = self.commander.move_absolute(self._channel, target, self.unit, consent=consent)
         return self._result(movement, wait=wait)
+
+    @overload
+    def move_by(
+        self, distance: Number, *, wait: Literal[True] = True, consent: bool = False
+    ) -> float: ...
+
+    @overload
+    def move_by(
+        self, distance: Number, *, wait: Literal[False], consent: bool = False
+    ) -> Movement: ...
 
     def move_by(
         self, distance: Number, *, wait: bool = True, consent: bool = False
@@ -224,7 +266,7 @@ class Axis:
         )
         return self._result(movement, wait=wait)
 
-    def jog(self, direction: int, speed: float | None = None, *, consent: bool = False) -> Jogging:
+    def jog(self, direction: int, speed: Number | None = None, *, consent: bool = False) -> Jogging:
         """Move on and on until it is let go, not renewed for a quarter second, or at a limit.
 
         Parameters
@@ -240,9 +282,11 @@ class Axis:
             `direction` or `speed` is no sensible number.
         """
         jog = self._manager.settings.jog
-        usual = {"linear": jog.speed_um_s, "rotary": jog.speed_deg_s}
-        fallback = usual.get(self.kind.value, float(jog.frequency_hz))
-        wanted = fallback if speed is None else speed
+        state = self.details
+        by_steps = not class_for(state.kind, state.positioner).has_sensor
+        unit = "Hz" if by_steps else state.unit
+        usual = {"um": jog.speed_um_s, "deg": jog.speed_deg_s, "Hz": float(jog.frequency_hz)}
+        wanted = usual[unit] if speed is None else as_number(speed, unit, self._name)
         if direction not in (1, -1) or not 0.0 < wanted <= FREQUENCY_HZ[1]:
             text = f"{self._name}: jog in direction 1 or -1 with a speed above 0"
             raise refusal(refuse(Reason.NOT_FINITE, text, axis=self._name))
@@ -263,6 +307,9 @@ class Axis:
         self, direction: Direction | str, *, wait: bool = True, consent: bool = False
     ) -> float | Movement | None:
         """Drive "forward" or "backward" until the travel ends; otherwise as `move_to`."""
+        if direction not in list(Direction):
+            text = f"{self._name}: the end stop is 'forward' or 'backward', not {direction!r}"
+            raise refusal(refuse(Reason.WRONG_KIND, text, axis=self._name))
         movement = self.commander.move_to_end_stop(
             self._channel, Direction(direction), consent=consent
         )
@@ -304,6 +351,10 @@ class Axis:
         MoveRefused
             `frequency_hz` is outside that range.
         """
+        state = self.details
+        if not class_for(state.kind, state.positioner).has_sensor:
+            text = f"{self._name}: it has no sensor; give the frequency with the steps"
+            raise refusal(refuse(Reason.WRONG_KIND, text, axis=self._name))
         hertz = as_whole(frequency_hz, "Hz", self._name)
         low, high = FREQUENCY_HZ
         if not low <= hertz <= high:
@@ -332,10 +383,7 @@ class Axis:
 
     def set(self, value: Number) -> Movement:
         """Start to move to `value` and return the movement, which is a bluesky status."""
-        movement = self.move_to(value, wait=False)
-        if not isinstance(movement, Movement):
-            raise TypeError("a move that is not waited for returns its movement")
-        return movement
+        return self.move_to(value, wait=False)
 
     def stop(self, *, success: bool = False) -> None:  # noqa: ARG002 - bluesky's signature
         """Stop this axis; bluesky's name for `halt`."""

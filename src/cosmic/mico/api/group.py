@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Protocol, TypeVar
 
+from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, MoveCancelled
 from cosmic.mico.core.movement import Movement
 
@@ -41,7 +42,7 @@ class GroupMovement:
                 movement.cancel()
 
     def wait(self, timeout_s: float | None = None) -> dict[str, float | None]:
-        """Wait for all and return the positions reached.
+        """Wait at most `timeout_s` of wall time for all and return the positions reached.
 
         Raises
         ------
@@ -49,8 +50,10 @@ class GroupMovement:
             What ended one of them early; as `Movement.wait`.
         """
         failures: list[CosmicError] = []
+        deadline_s = None if timeout_s is None else WALL.now_s() + timeout_s
         for movement in self.movements.values():
-            error = movement.exception(timeout_s)
+            left_s = None if deadline_s is None else max(0.0, deadline_s - WALL.now_s())
+            error = movement.exception(left_s)
             if isinstance(error, CosmicError):
                 failures.append(error)
         if failures:

@@ -1,8 +1,10 @@
 """The MiCo part of the scripted API: ``rig.mico``."""
 
 from collections.abc import Callable, Iterator, Mapping
+from typing import Literal, overload
 
 from PySide6.QtCore import Qt
+from typing_extensions import override
 
 from cosmic.frame.errors import MoveRefused, NotAvailable
 from cosmic.frame.task import Progress, Task
@@ -75,6 +77,13 @@ class Mico:
             self._axes[name] = axis
         return axis
 
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    @override
+    def __repr__(self) -> str:
+        return f"<Mico: {', '.join(self.names)}>"
+
     def __iter__(self) -> Iterator[Axis]:
         return (self[name] for name in self.names)
 
@@ -120,6 +129,20 @@ class Mico:
                 raise
         return task
 
+    @overload
+    def move(
+        self,
+        targets: Mapping[str, Number],
+        *,
+        wait: Literal[True] = True,
+        consent: bool = False,
+    ) -> dict[str, float | None]: ...
+
+    @overload
+    def move(
+        self, targets: Mapping[str, Number], *, wait: Literal[False], consent: bool = False
+    ) -> GroupMovement: ...
+
     def move(
         self, targets: Mapping[str, Number], *, wait: bool = True, consent: bool = False
     ) -> dict[str, float | None] | GroupMovement:
@@ -145,6 +168,20 @@ class Mico:
             One of them failed or was stopped.
         """
         return self._together(self._targets(targets), wait=wait, consent=consent)
+
+    @overload
+    def move_by(
+        self,
+        distances: Mapping[str, Number],
+        *,
+        wait: Literal[True] = True,
+        consent: bool = False,
+    ) -> dict[str, float | None]: ...
+
+    @overload
+    def move_by(
+        self, distances: Mapping[str, Number], *, wait: Literal[False], consent: bool = False
+    ) -> GroupMovement: ...
 
     def move_by(
         self, distances: Mapping[str, Number], *, wait: bool = True, consent: bool = False

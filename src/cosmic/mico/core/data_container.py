@@ -8,10 +8,10 @@ from typing import Final
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceFault
 from cosmic.mico.core.positioner import (
-    POSITIONER_CLASSES,
     Confidence,
     PositionerBase,
     PositionerState,
+    class_for,
 )
 from cosmic.mico.core.settings import PositionerSettings
 from cosmic.mico.hw.interface import (
@@ -105,16 +105,15 @@ class DeviceDataContainer:
         if settings is None:
             return
         wanted = settings.positioner_kind
-        positioner = POSITIONER_CLASSES[wanted](
-            settings, self.address(channel), found, self._hold_s
-        )
+        positioner = class_for(wanted, found)(settings, self.address(channel), found, self._hold_s)
         if channel not in self._configured:
-            positioner.update(present=False, error="not in the configuration: add it there")
+            text = "not in the configuration; add it there, then start again"
+            positioner.update(present=False, error=text)
         elif kind is not wanted:
             seen = kind.value if kind else reason or "nothing"
-            text = f"configured as {wanted}, but the controller finds {seen}"
+            text = f"configured as {wanted}, but the controller finds {seen}; correct one of them"
             if reason == NO_DEVICE:
-                text = f"device {self.device} was not found"
+                text = f"device {self.device} was not found; connect it, then rescan"
             positioner.update(present=False, error=text)
             log = logger.debug if reason == NO_DEVICE else logger.error
             log("%s: %s", settings.name, text)

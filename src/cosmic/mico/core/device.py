@@ -64,6 +64,8 @@ class Device(WorkerThread):
     movement_ended(MovementEnded), movement_refused(MoveVerdict), lost(DeviceLost)
     """
 
+    may_wait = False
+
     position_changed = Signal(object)
     state_changed = Signal(object)
     movement_ended = Signal(object)
@@ -185,6 +187,9 @@ class Device(WorkerThread):
             while not self.end_requested:
                 self._take_waiting()
                 self._guarded(self._poll)
+        except BaseException as exc:
+            self._on_lost(DeviceError(f"its thread failed: {exc!r}"))
+            raise
         finally:
             self._close_intake()
 
@@ -254,8 +259,8 @@ class Device(WorkerThread):
     def _turn_away(self, order: Order, state: PositionerState | None) -> None:
         state = state or self.container.state(order.channel)
         name = state.name if state else f"device {self.index} channel {order.channel}"
-        why = state.error if state and state.error else "it is not connected"
-        verdict = refuse(Reason.DEVICE, f"{name}: {why}; check it, then rescan", axis=name)
+        why = state.error if state and state.error else "it is not connected; check it, then rescan"
+        verdict = refuse(Reason.DEVICE, f"{name}: {why}", axis=name)
         if order.grant is not None:
             self._context.gate.release(order.grant)
         order.movement.fail(refusal(verdict))
@@ -282,12 +287,13 @@ class Device(WorkerThread):
         logger.error("device %d is lost: %s", self.index, error)
         pilots = self._introduction.give_up()
         in_motion = any(pilot.flight is not None for pilot in pilots.values())
-        reason = f"device {self.index} does not answer: {error}"
+        reason = f"device {self.index} does not answer: {error}; rescan when it is back"
         self.container.lose(reason)
+        # Before anybody is woken: who sees the movement fail must find everything stopped.
+        self.lost.emit(DeviceLost(self.index, reason, in_motion))
         for channel, pilot in pilots.items():
             pilot.lose(NotConnectedError(f"{pilot.name}: {reason}", fault=error.fault))
             self._emit_state(channel)
-        self.lost.emit(DeviceLost(self.index, reason, in_motion))
 
     def _close_intake(self) -> None:
         """Leave no order unanswered and nothing moving."""

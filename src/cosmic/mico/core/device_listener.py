@@ -27,6 +27,8 @@ class DeviceListener(WorkerThread):
         Told why when the device cannot be reached any more; called in this thread.
     """
 
+    may_wait = False
+
     def __init__(
         self,
         controller: Controller,

@@ -4,6 +4,7 @@ import logging
 from collections.abc import Collection, Mapping
 from enum import StrEnum
 from threading import RLock
+from typing import Final
 
 from PySide6.QtCore import QObject, Qt, Signal
 
@@ -35,6 +36,8 @@ from cosmic.mico.core.stop_latch import StopLatch
 from cosmic.mico.hw.interface import Channel, Controller
 
 logger = logging.getLogger(__name__)
+
+CLOSED: Final = "MiCo is closed"
 
 
 class Mode(StrEnum):
@@ -180,7 +183,9 @@ class DeviceManager(QObject):
         """Make containers and devices for what is present and for what is only configured."""
         configured = {each.device for each in self.settings.positioner}
         hold_s = self.settings.defaults.hold
-        self._devices, self._addresses, missing = {}, {}, []
+        devices: dict[int, Device] = {}
+        addresses: dict[str, Channel] = {}
+        missing: list[str] = []
         for number in sorted(configured | set(library_index)):
             here = {
                 each.channel: each for each in self.settings.positioner if each.device == number
@@ -194,10 +199,11 @@ class DeviceManager(QObject):
                 if self._mode is not Mode.CLOSED:
                     names = ", ".join(each.name for each in here.values())
                     missing.append(f"device {number} was not found ({names})")
-            self._devices[number] = self._make_device(container)
+            devices[number] = self._make_device(container)
             for positioner in here.values():
-                self._addresses[positioner.name] = positioner.address
-        self._missing = tuple(missing)
+                addresses[positioner.name] = positioner.address
+        # Exchanged whole, for other threads look things up meanwhile.
+        self._devices, self._addresses, self._missing = devices, addresses, tuple(missing)
 
     def _make_device(self, container: DeviceDataContainer) -> Device:
         device = Device(
@@ -249,6 +255,8 @@ class DeviceManager(QObject):
             for listener in self._listeners.values():
                 listener.join()
             self._listeners.clear()
+            for device in self._devices.values():
+                device.container.lose(CLOSED)
             self.controller.close()
             self._set_mode(Mode.CLOSED)
 

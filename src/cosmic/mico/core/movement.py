@@ -3,8 +3,11 @@
 from collections.abc import Callable
 from threading import Condition
 
+from typing_extensions import override
+
 from cosmic.frame.errors import DeviceTimeout
-from cosmic.frame.threads import forbid_in_gui_thread
+from cosmic.frame.listeners import tell
+from cosmic.frame.threads import forbid_waiting_here
 
 
 class Movement:
@@ -21,6 +24,12 @@ class Movement:
         self._callbacks: list[Callable[[Movement], None]] = []
         self._halt: Callable[[], None] | None = None
         self._cancelled = False
+
+    @override
+    def __repr__(self) -> str:
+        if not self._done:
+            return "<Movement under way>"
+        return f"<Movement ended: {self._error or 'at its target'}>"
 
     @property
     def done(self) -> bool:
@@ -71,7 +80,7 @@ class Movement:
 
     def _wait(self, timeout_s: float | None) -> None:
         if not self._done and timeout_s != 0.0:
-            forbid_in_gui_thread("waiting for a movement")
+            forbid_waiting_here("waiting for a movement")
         with self._changed:
             if not self._changed.wait_for(lambda: self._done, timeout_s):
                 raise DeviceTimeout(f"the movement had not ended after {timeout_s:g} s")
@@ -85,12 +94,15 @@ class Movement:
             halt()
 
     def add_callback(self, callback: "Callable[[Movement], None]") -> None:
-        """Call `callback(movement)` at the end, in the thread that ends it, or now."""
+        """Call `callback(movement)` at the end, in the thread that ends it, or now.
+
+        It must return at once: waiting there for a movement raises `WrongThreadError`.
+        """
         with self._changed:
             if not self._done:
                 self._callbacks.append(callback)
                 return
-        callback(self)
+        tell([callback], self)
 
     def on_cancel(self, halt: Callable[[], None]) -> None:
         """Say how it is halted; for whoever carries it out."""
@@ -115,5 +127,4 @@ class Movement:
             self._position, self._error, self._done = position, error, True
             callbacks, self._callbacks = self._callbacks, []
             self._changed.notify_all()
-        for callback in callbacks:
-            callback(self)
+        tell(callbacks, self)

@@ -65,6 +65,17 @@ class ToEndStop:
     direction: Direction
 
 
+MOTION_WORDS: Final[dict[type, str]] = {
+    MoveTo: "a position to go to",
+    MoveBy: "a distance to go",
+    Step: "making steps",
+    Jog: "jogging",
+    Calibrate: "calibrating a sensor",
+    Reference: "finding a reference",
+    ToEndStop: "driving to an end stop",
+}
+"""What each motion is called before the operator."""
+
 Motion = MoveTo | MoveBy | Step | Jog | Calibrate | Reference | ToEndStop
 
 

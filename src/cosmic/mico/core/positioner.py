@@ -10,6 +10,7 @@ from typing_extensions import override
 from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.core.orders import (
+    MOTION_WORDS,
     Calibrate,
     Motion,
     MoveBy,
@@ -145,7 +146,7 @@ class PositionerBase:
         """
         if not isinstance(motion, Step):
             raise DeviceError(
-                f"{self.state.name}: {type(motion).__name__} does not fit; the axis is {self.kind}",
+                f"{self.state.name}: {MOTION_WORDS[type(motion)]} does not fit; {self.advice}",
                 fault=DeviceFault.WRONG_KIND,
             )
         controller.step(
@@ -215,3 +216,12 @@ POSITIONER_CLASSES: Final[dict[PositionerKind, type[PositionerBase]]] = {
     PositionerKind.LINEAR: LinearPositioner,
     PositionerKind.ROTARY: RotaryPositioner,
 }
+
+TYPE_CLASSES: Final[dict[int, type[PositionerBase]]] = {}
+"""Positioner types, by the vendor's number, that need more than the class of their kind."""
+
+
+def class_for(kind: PositionerKind, found: PositionerType | None) -> type[PositionerBase]:
+    """Return the class that drives a positioner: that of its type, or else of its kind."""
+    fallback = POSITIONER_CLASSES[kind]
+    return fallback if found is None else TYPE_CLASSES.get(found.code, fallback)

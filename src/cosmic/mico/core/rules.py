@@ -11,13 +11,14 @@ from cosmic.mico.core.orders import (
     AMPLITUDE_V,
     FREQUENCY_HZ,
     LARGEST_STEPS,
+    MOTION_WORDS,
     Interval,
     Motion,
     MoveBy,
     MoveTo,
     Step,
 )
-from cosmic.mico.core.positioner import POSITIONER_CLASSES, Confidence, PositionerState
+from cosmic.mico.core.positioner import Confidence, PositionerState, class_for
 from cosmic.mico.hw.interface import PositionerKind
 
 EVERYWHERE: Final = Interval(-math.inf, math.inf)
@@ -119,11 +120,11 @@ def _not_finite(motion: Motion, state: PositionerState) -> MoveVerdict | None:
 
 
 def _wrong_kind(motion: Motion, state: PositionerState) -> MoveVerdict | None:
-    cls = POSITIONER_CLASSES[state.kind]
+    cls = class_for(state.kind, state.positioner)
     unit = getattr(motion, "unit", None)
     if isinstance(motion, cls.motions) and unit in (None, state.unit):
         return None
-    asked = f"a movement in {unit}" if unit else type(motion).__name__
+    asked = f"a movement in {unit}" if unit else MOTION_WORDS[type(motion)]
     return refuse(
         Reason.WRONG_KIND,
         f"{state.name}: {asked} does not fit: the axis is {state.kind}; {cls.advice}",
@@ -157,7 +158,7 @@ def _device(state: PositionerState) -> MoveVerdict | None:
     if state.present:
         return None
     why = state.error or "its device does not answer"
-    return refuse(Reason.DEVICE, f"{state.name}: {why}; check it, then rescan", axis=state.name)
+    return refuse(Reason.DEVICE, f"{state.name}: {why}", axis=state.name)
 
 
 def _position_unknown(state: PositionerState, *, consent: bool) -> MoveVerdict | None:

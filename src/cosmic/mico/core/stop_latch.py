@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Lock
 
+from cosmic.frame.listeners import tell
+
 
 @dataclass(frozen=True, slots=True)
 class StopState:
@@ -57,6 +59,4 @@ class StopLatch:
 
     def announce(self) -> None:
         """Tell the listeners; apart from `set`, so that stopping comes before telling."""
-        state = self._state
-        for listener in self._listeners:
-            listener(state)
+        tell(self._listeners, self._state)

@@ -159,7 +159,8 @@ class MicoWidget(QWidget):
         group = DeviceGUI(arranged.title)
         for name in arranged.positioners:
             axis = self._mico[name]
-            card = gui_class(axis.kind)(axis, self._settings_of(name), self._settings.defaults)
+            make_card = gui_class(axis.kind, axis.details.positioner)
+            card = make_card(axis, self._settings_of(name), self._settings.defaults)
             card.consent_wanted.connect(self._on_consent_wanted)
             self._cards[name] = card
             group.add(card)

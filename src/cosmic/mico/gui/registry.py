@@ -1,10 +1,10 @@
-"""Which card shows which kind of positioner; a new kind is one class and one line here."""
+"""Which card shows which positioner; a new type is one class and one line here."""
 
 from typing import Final
 
 from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
-from cosmic.mico.hw.interface import PositionerKind
+from cosmic.mico.hw.interface import PositionerKind, PositionerType
 
 POSITIONER_GUIS: Final[dict[PositionerKind, type[PositionerBaseGUI]]] = {
     PositionerKind.OPEN_LOOP: PositionerBaseGUI,
@@ -13,6 +13,14 @@ POSITIONER_GUIS: Final[dict[PositionerKind, type[PositionerBaseGUI]]] = {
 }
 
 
-def gui_class(kind: PositionerKind) -> type[PositionerBaseGUI]:
-    """Return the class for `kind`; what nobody knows better is shown as open-loop."""
-    return POSITIONER_GUIS.get(kind, PositionerBaseGUI)
+TYPE_GUIS: Final[dict[int, type[PositionerBaseGUI]]] = {}
+"""Cards of positioner types, by the vendor's number, that need more than that of their kind."""
+
+
+def gui_class(kind: PositionerKind, found: PositionerType | None = None) -> type[PositionerBaseGUI]:
+    """Return the class for the type that was found, or else for `kind`.
+
+    What nobody knows better is shown as open-loop.
+    """
+    fallback = POSITIONER_GUIS.get(kind, PositionerBaseGUI)
+    return fallback if found is None else TYPE_GUIS.get(found.code, fallback)

@@ -1,11 +1,14 @@
 """Makes the controller that the configuration names."""
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from cosmic.mico.hw.interface import Controller
 from cosmic.mico.hw.scu3d import Scu3dController
 from cosmic.mico.hw.scu3d_load import load_library
 from cosmic.twin.scene import Scene
+
+if TYPE_CHECKING:
+    from cosmic.mico.hw.sim_scu3d_faults import Faults
 
 Backend = Literal["simulated", "scu3d"]
 
@@ -32,7 +35,13 @@ def make_controller(
     """
     if backend == "scu3d":
         return Scu3dController(load_library(library_path))
+    return make_simulated(scene)[0]
+
+
+def make_simulated(scene: Scene | None = None) -> tuple[Controller, "Faults"]:
+    """Return the simulated controller, and the trouble that can be injected into it."""
     # Imported here, so that a real rig does not load the simulation.
     from cosmic.mico.hw.sim_scu3d import load_simulated_library
 
-    return Scu3dController(load_simulated_library(scene=scene), simulated=True)
+    library = load_simulated_library(scene=scene)
+    return Scu3dController(library, simulated=True), library.faults
