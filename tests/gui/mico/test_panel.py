@@ -77,7 +77,7 @@ def test_the_card_says_which_part_it_is_at_and_its_stop_ends_the_series(qtbot: Q
         click(qtbot, card, "stopAxis")
         qtbot.waitUntil(lambda: not card.axis.details.in_motion)
         assert len(controller.of("move_to")) == 2
-        qtbot.waitUntil(lambda: "travel" in line.text())
+        qtbot.waitUntil(lambda: "part" not in line.text())
 
 
 def test_a_part_must_be_above_zero(panel: MicoWidget, qtbot: QtBot) -> None:
