@@ -118,7 +118,7 @@ def collect(bench: Stand, count: int) -> Samples:
 def measure(quick: bool = False) -> list[Figure]:
     """Return the figures of one run."""
     with stand() as bench:
-        samples = bench.beside(lambda: collect(bench, 10 if quick else 600))
+        samples = bench.beside(lambda: collect(bench, 4 if quick else 600))
     bare_us = 1e6 * percentile(samples.bare, 50)
     net, total = samples.without_gate, samples.total
     return [

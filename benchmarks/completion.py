@@ -59,6 +59,9 @@ class Receiver(QObject):
 def collect(bench: Stand, receiver: Receiver, count: int) -> list[Watched]:
     """Follow `count` short movements while all other axes keep moving."""
     rng = random.Random(1)
+    for commander in {axis.commander for axis in bench.mico}:
+        commander.position_changed.connect(receiver.on_position)
+        commander.movement_ended.connect(receiver.on_ended)
     axes = [axis for axis in bench.mico if axis.unit == "um" and axis.limits is not None]
     places = {axis.name: bench.manager.address(axis.name) for axis in axes}
     names = {(place.device, place.channel): name for name, place in places.items()}
@@ -103,9 +106,6 @@ def follow(count: int, *, repaint: bool) -> list[Watched]:
     """Follow `count` movements on a stand of their own."""
     with stand(repaint=repaint) as bench:
         receiver = Receiver()
-        for commander in {axis.commander for axis in bench.mico}:
-            commander.position_changed.connect(receiver.on_position)
-            commander.movement_ended.connect(receiver.on_ended)
         return bench.beside(lambda: collect(bench, receiver, count))
 
 
@@ -130,7 +130,7 @@ def measure(quick: bool = False) -> list[Figure]:
     """Return the figures of one run."""
     found: list[Figure] = []
     for repaint, window in ((True, "panel painted at 30 Hz"), (False, "only changes painted")):
-        told, ended = times_s(follow(6 if quick else 200, repaint=repaint))
+        told, ended = times_s(follow(2 if quick else 200, repaint=repaint))
         limit = 20 if repaint else None
         found += [
             Figure(NAME, f"{window}: movements", len(ended), ""),

@@ -69,8 +69,8 @@ def idle(seconds: float) -> float:
 
 def measure(quick: bool = False) -> list[Figure]:
     """Return the figures of one run."""
-    seconds = 0.2 if quick else 6.0
-    devices = 2 if quick else 16
+    seconds = 0.05 if quick else 6.0
+    devices = 1 if quick else 16
     with stand(repaint=False, traced=False) as bench:
         idle_percent = bench.beside(lambda: idle(seconds))
     with stand(repaint=False, traced=False) as bench:

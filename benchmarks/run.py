@@ -10,6 +10,7 @@ import platform
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import PySide6
@@ -17,13 +18,14 @@ import PySide6
 from benchmarks.figures import Figure, from_json, medians, table
 
 NAMES = ("commander", "stop", "completion", "load", "start", "simulator")
+ALL = (*NAMES, "soak")
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def quick_figures() -> list[Figure]:
+def quick_figures(names: Sequence[str]) -> list[Figure]:
     """Return figures of a few samples each, all in this process; they say nothing."""
     found: list[Figure] = []
-    for name in (*NAMES, "soak"):
+    for name in names:
         found += importlib.import_module(f"benchmarks.{name}").measure(quick=True)
     return found
 
@@ -41,19 +43,19 @@ def main() -> None:
     """Read the command line and run."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeat", type=int, default=3, help="runs of each benchmark")
-    parser.add_argument("--only", nargs="+", choices=NAMES, default=NAMES)
+    parser.add_argument("--only", nargs="+", choices=ALL)
     parser.add_argument("--quick", action="store_true", help="see that everything works")
     parser.add_argument("--output", type=Path, metavar="FILE", help="write the table there")
     chosen = parser.parse_args()
     if chosen.quick:
-        text = table(quick_figures())
+        text = table(quick_figures(chosen.only or ALL))
     else:
         runs: list[list[Figure]] = []
         for _ in range(chosen.repeat):
-            for name in chosen.only:
+            for name in chosen.only or NAMES:
                 print(f"{name} ...", file=sys.stderr, flush=True)
                 runs.append(one_run(name))
-        order = {name: place for place, name in enumerate(NAMES)}
+        order = {name: place for place, name in enumerate(ALL)}
         found = sorted(medians(runs), key=lambda figure: order[figure.benchmark])
         text = table(found)
     versions = f"Python {platform.python_version()}, PySide6 {PySide6.__version__}"

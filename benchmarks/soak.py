@@ -91,8 +91,10 @@ def look(bench: Stand, moves: int) -> Look:
     )
 
 
-def collect(bench: Stand, seconds: float, tell: Callable[[Look], None]) -> list[Look]:
-    """Move at random and look twelve times."""
+def collect(
+    bench: Stand, seconds: float, tell: Callable[[Look], None], *, parts: int
+) -> list[Look]:
+    """Move at random and look `parts` times."""
     rng = random.Random(1)
     axes = list(bench.mico)
     for axis in axes:
@@ -103,8 +105,8 @@ def collect(bench: Stand, seconds: float, tell: Callable[[Look], None]) -> list[
     looks: list[Look] = []
     moves = 0
     began_s = time.perf_counter()
-    for part in range(1, 13):
-        while time.perf_counter() - began_s < part * seconds / 12:
+    for part in range(1, parts + 1):
+        while time.perf_counter() - began_s < part * seconds / parts:
             command(rng.choice(axes), rng)
             moves += 1
             time.sleep(rng.uniform(0.01, 0.09))
@@ -116,7 +118,7 @@ def collect(bench: Stand, seconds: float, tell: Callable[[Look], None]) -> list[
 
 def figures(looks: list[Look]) -> list[Figure]:
     """Return what grew from the end of the warm-up to the end."""
-    warm, last = looks[len(looks) // 3 - 1], looks[-1]
+    warm, last = looks[max(len(looks) // 3 - 1, 0)], looks[-1]
     return [
         Figure(NAME, "moves commanded", last.moves, ""),
         Figure(NAME, "Python memory, warm", warm.traced_kb, "kB"),
@@ -130,15 +132,15 @@ def figures(looks: list[Look]) -> list[Figure]:
     ]
 
 
-def run(seconds: float, tell: Callable[[Look], None]) -> list[Figure]:
+def run(seconds: float, tell: Callable[[Look], None], *, parts: int = 12) -> list[Figure]:
     """Return the figures of one soak."""
     with stand(repaint=False, traced=False) as bench:
-        return figures(bench.beside(lambda: collect(bench, seconds, tell)))
+        return figures(bench.beside(lambda: collect(bench, seconds, tell, parts=parts)))
 
 
 def measure(quick: bool = False) -> list[Figure]:
     """Return the figures of a short soak."""
-    return run(1.0 if quick else 60.0, lambda _look: None)
+    return run(0.1 if quick else 60.0, lambda _look: None, parts=1 if quick else 12)
 
 
 def _from_command_line() -> None:

@@ -90,14 +90,15 @@ class Stand:
         """Wait until every axis is there and stands; in a thread of its own."""
         wait_until(
             lambda: (
-                self.manager.mode == "run-time"
+                (task := self.mico.application.running_task) is not None
+                and task.done
                 and all(axis.state is Status.OK for axis in self.mico)
             ),
             timeout_s=20.0,
         )
 
 
-def wait_until(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
+def wait_until(condition: Callable[[], object], timeout_s: float = 5.0) -> None:
     """Wait for `condition`; raises `TimeoutError`."""
     end_s = time.perf_counter() + timeout_s
     while not condition():
@@ -219,7 +220,9 @@ class Traffic:
             if axis.limits is not None:
                 axis.set_closed_loop_frequency(self._speed_hz)
             self._next(axis)
-        wait_until(lambda: all(axis.details.in_motion for axis in self._axes))
+        wait_until(lambda: self.failures or all(axis.details.in_motion for axis in self._axes))
+        if self.failures:
+            raise RuntimeError(f"the load does not start: {self.failures[0]}")
 
     def end(self) -> None:
         """Begin no further movement."""

@@ -59,7 +59,7 @@ def collect(bench: Stand, count: int) -> tuple[list[float], list[float]]:
 def measure(quick: bool = False) -> list[Figure]:
     """Return the figures of one run."""
     with stand() as bench:
-        free, blocked = bench.beside(lambda: collect(bench, 2 if quick else 60))
+        free, blocked = bench.beside(lambda: collect(bench, 1 if quick else 60))
     return [
         Figure(NAME, "11 channels, p50", 1e3 * percentile(free, 50), "ms"),
         Figure(NAME, "11 channels, p99", 1e3 * percentile(free, 99), "ms", 10),
