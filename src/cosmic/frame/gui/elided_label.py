@@ -21,12 +21,16 @@ class ElidedLabel(QLabel):
     def __init__(self, text: str = "", *, hint: str = "", parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._hint = hint
+        self._whole: str | None = None
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.set_text(text)
 
     def set_text(self, text: str) -> None:
         """Show `text`; line ends become spaces, the tooltip has them all."""
+        if text == self._whole:  # cards repeat their line at every state that comes
+            return
+        self._whole = text
         line = " ".join(text.split())
         self.setToolTip("\n".join(part for part in (text, self._hint) if part))
         self.setAccessibleName(line)

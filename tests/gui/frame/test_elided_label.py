@@ -1,0 +1,27 @@
+"""The one-line label."""
+
+from PySide6.QtCore import QEvent, QObject
+
+from cosmic.frame.gui.elided_label import ElidedLabel
+
+
+class Counter(QObject):
+    def __init__(self) -> None:
+        super().__init__()
+        self.tips = 0
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        self.tips += event.type() == QEvent.Type.ToolTipChange
+        return False
+
+
+def test_the_same_text_again_changes_nothing_and_another_does(qtbot):
+    label = ElidedLabel("", hint="Axis left.x")
+    qtbot.addWidget(label)
+    counter = Counter()
+    label.installEventFilter(counter)
+    label.set_text("one\ntwo")
+    label.set_text("one\ntwo")
+    assert (label.text(), label.toolTip(), counter.tips) == ("one two", "one\ntwo\nAxis left.x", 1)
+    label.set_text("three")
+    assert (label.text(), label.toolTip(), counter.tips) == ("three", "three\nAxis left.x", 2)
