@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     )
     from cosmic.frame.task import Progress, Task
     from cosmic.frame.verdict import MoveVerdict, Reason
-    from cosmic.mico.api.axis import Axis, Jogging
+    from cosmic.mico.api.axis import Axis
     from cosmic.mico.api.group import GroupMovement
+    from cosmic.mico.api.jogging import Jogging
     from cosmic.mico.api.mico import Mico
     from cosmic.mico.core.movement import Movement
 
@@ -54,8 +55,9 @@ _HOMES = {
     ),
     "cosmic.frame.task": ("Progress", "Task"),
     "cosmic.frame.verdict": ("MoveVerdict", "Reason"),
-    "cosmic.mico.api.axis": ("Axis", "Jogging"),
+    "cosmic.mico.api.axis": ("Axis",),
     "cosmic.mico.api.group": ("GroupMovement",),
+    "cosmic.mico.api.jogging": ("Jogging",),
     "cosmic.mico.api.mico": ("Mico",),
     "cosmic.mico.core.movement": ("Movement",),
 }

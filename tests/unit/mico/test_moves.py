@@ -364,3 +364,23 @@ def test_an_interval_stays_held_while_its_device_is_gone():
         with pytest.raises(cosmic.NotConnectedError):
             movement.wait(3)
         assert rig.application.manager.gate.held()["d0.c0"].high == 10.0
+
+
+def test_a_part_that_follows_another_gives_way_to_any_newer_command():
+    with mico(instant=False) as (rig, controller):
+        axis = rig["d0.c0"]
+        first = axis.move_to(10.0, wait=False)
+        wait_until(lambda: len(controller.of("move_to")) == 1)
+        controller.end(X, 10.0)
+        first.wait(2)
+        second = axis.continue_to(20.0, first)
+        wait_until(lambda: len(controller.of("move_to")) == 2)
+        newer = axis.move_to(-5.0, wait=False)
+        with pytest.raises(cosmic.MoveCancelled, match="newer"):
+            axis.continue_to(30.0, second).wait(2)
+        controller.end(X, -5.0)
+        assert newer.wait(2) == -5.0
+        axis.halt()
+        with pytest.raises(cosmic.MoveCancelled, match="newer"):
+            axis.continue_to(30.0, newer).wait(2)
+        assert len(controller.of("move_to")) == 3

@@ -1,8 +1,7 @@
 """One axis of the scripted API: ``rig.mico["left.x"]``."""
 
 from collections.abc import Callable
-from types import TracebackType
-from typing import Any, Literal, Self, overload
+from typing import Any, Literal, overload
 
 from PySide6.QtCore import QObject, Qt
 from typing_extensions import override
@@ -14,53 +13,13 @@ from cosmic.frame.units import AxisUnit
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.api.entry import Number, as_number, as_whole
 from cosmic.mico.api.group import waited_for
+from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.core.device_commander import DeviceCommander
 from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import FREQUENCY_HZ, MoveTo, Order
+from cosmic.mico.core.orders import FREQUENCY_HZ, MoveTo
 from cosmic.mico.core.positioner import Confidence, PositionerState, Status, class_for
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
-
-
-class Jogging:
-    """A continuous movement that goes on while it is renewed; made by `Axis.jog`.
-
-    As a context manager it stops at the end of the block.
-    """
-
-    def __init__(self, order: Order, commander: DeviceCommander) -> None:
-        self._order = order
-        self._commander = commander
-
-    @property
-    def movement(self) -> Movement:
-        """The movement; done when the axis stands."""
-        return self._order.movement
-
-    @property
-    def done(self) -> bool:
-        """True when it has ended: let go, at a limit, stopped or refused."""
-        return self._order.movement.done
-
-    def renew(self) -> None:
-        """Keep it alive; call it at least every 0.1 s. Any thread."""
-        self._commander.renew_jog(self._order)
-
-    def end(self) -> None:
-        """Let go: the axis stops at once."""
-        if not self.done:
-            self._commander.stop(self._order.channel, "jog ended")
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.end()
 
 
 class Axis:
@@ -217,6 +176,16 @@ class Axis:
         movement = self.commander.move_absolute(self._channel, target, self.unit, consent=consent)
         return self._result(movement, wait=wait)
 
+    def continue_to(self, position: Number, after: Movement, *, consent: bool = False) -> Movement:
+        """Move to `position` unless another command, or a halt, came since `after`.
+
+        For whoever makes a movement of several parts; returns at once. Where something came, the
+        movement fails with `MoveCancelled`.
+        """
+        target = self._number(position) + self.details.zero
+        motion = MoveTo(target, self.unit)
+        return self.commander.send(self._channel, motion, consent=consent, follows=after)
+
     @overload
     def move_by(
         self, distance: Number, *, wait: Literal[True] = True, consent: bool = False
@@ -235,6 +204,28 @@ class Axis:
             self._channel, self._number(distance), self.unit, consent=consent
         )
         return self._result(movement, wait=wait)
+
+    @overload
+    def steps(
+        self,
+        steps: Number,
+        *,
+        amplitude_v: Number | None = None,
+        frequency_hz: Number | None = None,
+        wait: Literal[True] = True,
+        consent: bool = False,
+    ) -> float | None: ...
+
+    @overload
+    def steps(
+        self,
+        steps: Number,
+        *,
+        amplitude_v: Number | None = None,
+        frequency_hz: Number | None = None,
+        wait: Literal[False],
+        consent: bool = False,
+    ) -> Movement: ...
 
     def steps(
         self,
@@ -293,15 +284,37 @@ class Axis:
         order = self.commander.jog(self._channel, direction, wanted, consent=consent)
         return Jogging(order, self.commander)
 
+    @overload
+    def calibrate(self, *, wait: Literal[True] = True, consent: bool = False) -> float | None: ...
+
+    @overload
+    def calibrate(self, *, wait: Literal[False], consent: bool = False) -> Movement: ...
+
     def calibrate(self, *, wait: bool = True, consent: bool = False) -> float | Movement | None:
         """Calibrate the sensor: moves several millimetres both ways; otherwise as `move_to`."""
         movement = self.commander.calibrate(self._channel, consent=consent)
         return self._result(movement, wait=wait)
 
+    @overload
+    def reference(self, *, wait: Literal[True] = True, consent: bool = False) -> float | None: ...
+
+    @overload
+    def reference(self, *, wait: Literal[False], consent: bool = False) -> Movement: ...
+
     def reference(self, *, wait: bool = True, consent: bool = False) -> float | Movement | None:
         """Find the reference, which may sweep the whole travel; otherwise as `move_to`."""
         movement = self.commander.reference(self._channel, consent=consent)
         return self._result(movement, wait=wait)
+
+    @overload
+    def move_to_end_stop(
+        self, direction: Direction | str, *, wait: Literal[True] = True, consent: bool = False
+    ) -> float | None: ...
+
+    @overload
+    def move_to_end_stop(
+        self, direction: Direction | str, *, wait: Literal[False], consent: bool = False
+    ) -> Movement: ...
 
     def move_to_end_stop(
         self, direction: Direction | str, *, wait: bool = True, consent: bool = False

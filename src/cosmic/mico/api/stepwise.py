@@ -92,8 +92,12 @@ class StepwiseMove:
                 return
             self._begun += 1
             way = min(self._begun * self._largest, abs(self._way))
-            target = self._start + math.copysign(way, self._way)
-            part = issued(self._axis.move_to(target, wait=False, consent=self._consent))
+            # From where it began, even if the user has set another zero meanwhile.
+            target = self._start + math.copysign(way, self._way) - self._axis.details.zero
+            if self._part is None:
+                part = self._axis.move_to(target, wait=False, consent=self._consent)
+            else:
+                part = self._axis.continue_to(target, self._part, consent=self._consent)
             self._part = part
         part.add_callback(self._on_part_ended)
 
@@ -114,13 +118,6 @@ class StepwiseMove:
             self.movement.fail(exc)
 
 
-def issued(result: float | Movement | None) -> Movement:
-    """Return `result` of a call with ``wait=False`` as what it then is: the movement."""
-    if not isinstance(result, Movement):
-        raise TypeError("a move that is not waited for returns its movement")
-    return result
-
-
 def _position(axis: Axis) -> float:
     position = axis.details.shown_position
     if position is None:
@@ -137,10 +134,14 @@ def _above_zero(largest: Number, axis: Axis) -> float:
 
 
 def _way(axis: Axis, target: Number, *, consent: bool) -> tuple[float, float]:
-    """Return where it starts and how far it goes, once the gate has seen the whole of it."""
+    """Return where it starts, in gate coordinates, and how far it goes.
+
+    The gate has then seen the whole of it.
+    """
     verdict = axis.check(target)
     unknown = verdict.reason is Reason.POSITION_UNKNOWN
     if not verdict.allowed and not (unknown and consent):
         raise refusal(verdict)
     start = _position(axis)
-    return start, as_number(target, axis.unit, axis.name) - start
+    way = as_number(target, axis.unit, axis.name) - start
+    return start + axis.details.zero, way

@@ -146,11 +146,12 @@ class Device(WorkerThread):
         """Stop one channel past every queue; its movement fails with `MoveCancelled`."""
         state = self.container.state(channel)
         name = state.name if state else f"device {self.index} channel {channel}"
+        # First, so that the device thread knows of the halt before it sees the axis at rest.
+        self._inbox.put(Halt(channel, MoveCancelled(f"{name}: {why}")))
         try:
             self._controller.stop(self.container.address(channel))
         except DeviceError as exc:
             logger.warning("%s: %s", name, exc)
-        self._inbox.put(Halt(channel, MoveCancelled(f"{name}: {why}")))
 
     def stop_later(self, error: CosmicError) -> None:
         """Have the device thread repeat the stop of all channels after the call it is in."""

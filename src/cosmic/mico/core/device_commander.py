@@ -11,7 +11,6 @@ from cosmic.mico.core.device import Device
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.orders import (
     Calibrate,
-    Grant,
     Jog,
     Motion,
     MoveBy,
@@ -141,17 +140,22 @@ class DeviceCommander(QObject):
         self.frequency_requested.emit(channel, frequency_hz)
 
     def send(
-        self, channel: int, motion: Motion, *, consent: bool = False, grant: Grant | None = None
+        self,
+        channel: int,
+        motion: Motion,
+        *,
+        consent: bool = False,
+        follows: Movement | None = None,
     ) -> Movement:
-        """Send any motion."""
-        return self._issue(channel, motion, consent=consent, grant=grant).movement
+        """Send any motion; with `follows`, only if that is still the newest on its channel."""
+        return self._issue(channel, motion, consent=consent, follows=follows).movement
 
     def _issue(
-        self, channel: int, motion: Motion, *, consent: bool, grant: Grant | None = None
+        self, channel: int, motion: Motion, *, consent: bool, follows: Movement | None = None
     ) -> Order:
         if not self._may_command:
             raise NotConnectedError("this commander is connected to no device, or only listens")
-        order = Order(channel, motion, self._token, self._source, consent, grant=grant)
+        order = Order(channel, motion, self._token, self._source, consent, follows=follows)
         self.order_issued.emit(order)
         return order
 

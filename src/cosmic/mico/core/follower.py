@@ -17,6 +17,7 @@ from cosmic.mico.core.flight import (
     counted_position,
     missed_target,
 )
+from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.orders import Grant, Jog
 from cosmic.mico.core.positioner import Confidence, PositionerBase
 from cosmic.mico.hw.interface import (
@@ -43,6 +44,7 @@ class ChannelFollower:
         self._position = Questions()
         self.flight: Flight | None = None
         self.next_poll_s = 0.0
+        self.newest: Movement | None = None
         self.settled = False
         self._frequency_hz = context.settings.defaults.closed_loop_frequency_hz
 
@@ -73,6 +75,7 @@ class ChannelFollower:
 
     def halt(self, error: CosmicError) -> None:
         """Stop the channel; the movement under way will fail with `error`."""
+        self.newest = None
         self._quietly(lambda: self._context.controller.stop(self._address))
         if self.flight is not None:
             self.flight.error = self.flight.error or error

@@ -124,6 +124,8 @@ class Order:
         Completed when the movement ends.
     grant : Grant or None
         Set where the gate has already decided, together with others.
+    follows : Movement or None
+        The order is void unless this was the newest on its channel, and nothing was halted since.
     """
 
     channel: int
@@ -133,4 +135,5 @@ class Order:
     consent: bool = False
     movement: Movement = field(default_factory=Movement)
     grant: Grant | None = None
+    follows: Movement | None = None
     number: int = field(default_factory=lambda: next(_numbers))

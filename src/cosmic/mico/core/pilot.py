@@ -36,10 +36,12 @@ class ChannelPilot(ChannelFollower):
 
     def launch(self, order: Order) -> None:
         """Ask the gate, send `order` to the library, and begin to follow it."""
-        if order.movement.cancelled:
+        if order.movement.cancelled or (order.follows and order.follows is not self.newest):
             self._give_back(order.grant)
-            order.movement.fail(MoveCancelled(f"{self.name}: cancelled before it started"))
+            why = "a newer command came first" if order.follows else "cancelled before it started"
+            order.movement.fail(MoveCancelled(f"{self.name}: {why}"))
             return
+        self.newest = order.movement
         if isinstance(order.motion, Jog):
             self._start_jog(order, JogRun(order.motion, self._context.settings))
             return

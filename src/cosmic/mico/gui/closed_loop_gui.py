@@ -11,7 +11,6 @@ from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.overrides import override
 from cosmic.frame.units import format_quantity
-from cosmic.mico.api.stepwise import issued
 from cosmic.mico.core.orders import FREQUENCY_HZ
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.gui.axis_menu import AxisMenu
@@ -158,20 +157,20 @@ class ClosedLoopGUI(PositionerBaseGUI):
     def _on_reference(self) -> None:
         self.commands.issue(
             "find the reference",
-            lambda consent: issued(self.axis.reference(wait=False, consent=consent)),
+            lambda consent: self.axis.reference(wait=False, consent=consent),
         )
 
     def _on_calibrate(self) -> None:
         self.commands.issue(
             "calibrate the sensor",
-            lambda consent: issued(self.axis.calibrate(wait=False, consent=consent)),
+            lambda consent: self.axis.calibrate(wait=False, consent=consent),
         )
 
     def _on_end_stop(self, direction: str) -> None:
         self.commands.issue(
             f"drive {direction} to the end stop",
-            lambda consent: issued(
-                self.axis.move_to_end_stop(Direction(direction), wait=False, consent=consent)
+            lambda consent: self.axis.move_to_end_stop(
+                Direction(direction), wait=False, consent=consent
             ),
         )
 

@@ -6,7 +6,7 @@ from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.mico.api.axis import Axis
-from cosmic.mico.api.stepwise import StepwiseMove, issued
+from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.settings import MotionDefaults
 
@@ -56,11 +56,11 @@ class MoveFields:
         way = direction * self.distance.value()
         if self.split.isChecked():
             return StepwiseMove.by(self._axis, way, self.largest.value(), consent=consent)
-        return issued(self._axis.move_by(way, wait=False, consent=consent))
+        return self._axis.move_by(way, wait=False, consent=consent)
 
     def move_to(self, *, consent: bool) -> Movement | StepwiseMove:
         """Move to the position, at once or in parts."""
         target = self.distance.value()
         if self.split.isChecked():
             return StepwiseMove(self._axis, target, self.largest.value(), consent=consent)
-        return issued(self._axis.move_to(target, wait=False, consent=consent))
+        return self._axis.move_to(target, wait=False, consent=consent)

@@ -6,7 +6,6 @@ from cosmic.frame.gui.build import named
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.mico.api.axis import Axis
-from cosmic.mico.api.stepwise import issued
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.orders import AMPLITUDE_V, FREQUENCY_HZ, LARGEST_STEPS
 from cosmic.mico.core.settings import MotionDefaults
@@ -50,14 +49,12 @@ class StepsPart(QWidget):
 
     def make(self, direction: int, *, consent: bool) -> Movement:
         """Make the steps in `direction`, 1 or -1."""
-        return issued(
-            self._axis.steps(
-                direction * self.steps.value(),
-                amplitude_v=self.amplitude.value(),
-                frequency_hz=self.frequency.value(),
-                wait=False,
-                consent=consent,
-            )
+        return self._axis.steps(
+            direction * self.steps.value(),
+            amplitude_v=self.amplitude.value(),
+            frequency_hz=self.frequency.value(),
+            wait=False,
+            consent=consent,
         )
 
 
