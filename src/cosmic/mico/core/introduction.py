@@ -74,7 +74,14 @@ class Introduction:
 
     def look(self) -> None:
         """See whether it is over."""
-        if self._over.is_set() or not self._context.container.clear:
+        container = self._context.container
+        if self._over.is_set() or not container.clear:
             return
-        if all(pilot.located for pilot in self.pilots.values()):
+        # The listener settles a channel before its answer gets here, so that a pilot may lack.
+        present = {
+            channel
+            for channel in container.channels()
+            if (state := container.state(channel)) is not None and state.present
+        }
+        if present <= self.pilots.keys() and all(each.located for each in self.pilots.values()):
             self._over.set()
