@@ -176,6 +176,7 @@ class DeviceManager(QObject):
                 raise
             library_index = library_indices(self.controller, wanted, identities)
             self._arrange(library_index)
+            self.changed.emit()  # commanders join the new devices before anybody may use them
             self._start(library_index)
             self._set_mode(Mode.RUN_TIME)
 

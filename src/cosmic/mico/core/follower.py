@@ -134,7 +134,7 @@ class ChannelFollower:
         if not self._positioner.has_sensor:
             return
         number = self.flight.order.number if self.flight else 0
-        final = self.flight is not None and self.flight.at_rest
+        final = self.flight is not None and self.flight.rests_seen > 0
         self._position.asked(-number if final else number)
         unit = self._positioner.state.unit
         self._quietly(lambda: self._context.controller.ask_position(self._address, unit))
@@ -146,13 +146,16 @@ class ChannelFollower:
         except DeviceError as exc:
             if exc.fault is not DeviceFault.UNSUPPORTED:
                 raise
-            self._on_known(PositionKnownRead(self._address, known=self.flight is not None))
+            # A run that ended without error has found it; before any, nothing can be said.
+            found = self.flight is not None and self.flight.error is None
+            self._on_known(PositionKnownRead(self._address, known=found))
 
     def take(self, event: Event) -> None:
         """Follow one event of this channel."""
         match event:
             case Completed():
                 self.ask_activity()
+                self.ask_position()
             case ActivityRead():
                 self._on_activity(event)
             case PositionRead():
@@ -173,14 +176,14 @@ class ChannelFollower:
             flight.rests_seen = 0
             return
         flight.rests_seen += 1
-        if not flight.at_rest:
+        if flight.rests_seen == 1:
+            # One answer may be too early. The position is asked for at once, and answered last.
             self.ask_activity()
-        elif not self._positioner.has_sensor:
-            self._land()
-        elif flight.rests_seen == 2:
             if flight.known_pending:
                 self.ask_position_known()
             self.ask_position()
+        elif not self._positioner.has_sensor:
+            self._land()
 
     def _settle(self, activity: Activity) -> None:
         """Bring to rest what was moving before anybody here could have asked for it."""
@@ -205,7 +208,7 @@ class ChannelFollower:
         known = Confidence.KNOWN if event.known else Confidence.UNKNOWN
         self._context.container.update(self._address.channel, confidence=known)
         flight = self.flight
-        if flight is not None and flight.known_pending and flight.at_rest:
+        if flight is not None and flight.known_pending and flight.rests_seen > 0:
             flight.known_pending = False
             if not event.known and flight.error is None:
                 text = f"{self.name}: it stopped without having found its reference"

@@ -87,17 +87,19 @@ class ChannelPilot(ChannelFollower):
         flight = Flight(order, grant, started_s=now_s, progress_s=now_s, jog=jog)
         flight.known_pending = isinstance(order.motion, Reference)
         replaced, self.flight = self.flight, flight
-        self._context.container.update(self._address.channel, in_motion=True, error="")
         self.next_poll_s = now_s + self._context.poll_s * max(self._context.clock.rate, 1.0)
         return replaced
 
     def _tell_begun(self, order: Order, replaced: Flight | None) -> None:
         """Tell everybody that `order` was sent, and that it ended the one before."""
+        failed = self.flight is not None and self.flight.error is not None
+        error = self._positioner.state.error if failed else ""
+        self._context.container.update(self._address.channel, in_motion=True, error=error)
         if replaced is not None:
             self._give_back(replaced.grant)
-            error = MoveCancelled(f"{self.name}: replaced by a newer command")
-            replaced.order.movement.fail(error)
-            self._context.on_failed(self.name, error)
+            over = MoveCancelled(f"{self.name}: replaced by a newer command")
+            replaced.order.movement.fail(over)
+            self._context.on_failed(self.name, over)
         logger.info("%s: %s (%s)", self.name, order.motion, order.source)
         self._announce()
 
