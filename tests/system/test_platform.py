@@ -119,7 +119,7 @@ def test_stop_passes_a_device_thread_that_hangs_in_the_library():
         WALL.sleep(0.05)
         began = WALL.now_s()
         mico.application.manager.stop("test")
-        assert WALL.now_s() - began < 0.1
+        assert WALL.now_s() - began < 0.5
         WALL.sleep(0.02)
         at = scene.truth()["left.y"]
         WALL.sleep(0.2)
@@ -149,7 +149,7 @@ def test_a_jog_moves_at_the_speed_asked():
                 jog.renew()
                 WALL.sleep(0.02)
             way, took = scene.truth()["left.x"] - start, WALL.now_s() - began
-        assert way / took == pytest.approx(400.0, rel=0.25)
+        assert way / took == pytest.approx(400.0, rel=0.35)
 
 
 def test_closing_releases_the_hold_and_leaves_nothing_moving():
