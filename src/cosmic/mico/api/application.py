@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Callable
 from queue import SimpleQueue
+from threading import Lock
 
 from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
@@ -52,6 +53,8 @@ class MicoApplication(CosmicApplicationBase):
         )
         self._jobs: SimpleQueue[tuple[Task, Callable[[Task], None]] | None] = SimpleQueue()
         self._running_task: Task | None = None
+        self._taking = Lock()
+        self._over = False
         self._failure = ""
         self._forget = policy.on_safe_stop(self.manager.stop)
 
@@ -116,7 +119,10 @@ class MicoApplication(CosmicApplicationBase):
             raise NotAvailable("MiCo is closed")
         task = Task(title)
         self._running_task = task
-        self._jobs.put((task, job))
+        with self._taking:
+            if self._over:
+                raise NotAvailable("MiCo is closed")
+            self._jobs.put((task, job))
         self.task_started.emit(task)
         return task
 
@@ -135,6 +141,22 @@ class MicoApplication(CosmicApplicationBase):
 
     @override
     def custom_event_loop(self) -> bool:
+        try:
+            self._work()
+        finally:
+            self._give_up_jobs()
+        return True
+
+    def _give_up_jobs(self) -> None:
+        """Leave nobody waiting for a task that will not be begun."""
+        with self._taking:
+            self._over = True
+        while not self._jobs.empty():
+            item = self._jobs.get_nowait()
+            if item is not None:
+                item[0].fail(NotAvailable("MiCo is closed"))
+
+    def _work(self) -> None:
         while not self.end_requested:
             item = self._jobs.get()
             if item is None:
@@ -151,7 +173,6 @@ class MicoApplication(CosmicApplicationBase):
                 logger.error("%s ended: %s", task.title, error)
             else:
                 logger.info("%s finished", task.title)
-        return True
 
     @override
     def request_end(self) -> None:
@@ -164,6 +185,6 @@ class MicoApplication(CosmicApplicationBase):
     def shut_down(self) -> None:
         """Stop every movement, release the hold, end all threads; any state."""
         self.request_end()
-        self.manager.shut_down()
+        self.manager.close()
         self.join()
         self._forget()

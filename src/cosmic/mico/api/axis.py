@@ -346,6 +346,8 @@ class Axis:
         state = self.details
         if state.position is None:
             raise NotAvailable(f"{self._name}: no position has been read yet")
+        if state.confidence is Confidence.UNKNOWN:
+            raise NotAvailable(f"{self._name}: its position is unknown; initialise it first")
         self._set_zero(state.position)
 
     def clear_zero(self) -> None:
@@ -380,13 +382,13 @@ class Axis:
 
     # The shape of a bluesky device
 
-    def check(self, position: Number) -> MoveVerdict:
+    def check(self, position: Number, *, consent: bool = False) -> MoveVerdict:
         """Return the gate's answer to `move_to(position)`, without moving."""
         try:
             target = self._number(position) + self.details.zero
         except MoveRefused as exc:
             return exc.verdict
-        return self._manager.check({self._name: MoveTo(target, self.unit)})
+        return self._manager.check({self._name: MoveTo(target, self.unit)}, consent=consent)
 
     def check_value(self, value: Number) -> None:
         """Raise `MoveRefused` where `move_to(value)` would; for bluesky's check_limits."""

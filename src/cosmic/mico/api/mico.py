@@ -1,6 +1,7 @@
 """The MiCo part of the scripted API: ``rig.mico``."""
 
 from collections.abc import Callable, Iterator, Mapping
+from threading import Lock
 from typing import Literal, overload
 
 from PySide6.QtCore import Qt
@@ -14,6 +15,7 @@ from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.entry import Number, as_number
 from cosmic.mico.api.group import GroupMovement, waited_for
 from cosmic.mico.core.collision import NO_MODEL_TEXT
+from cosmic.mico.core.device import Device
 from cosmic.mico.core.device_commander import DeviceCommander
 from cosmic.mico.core.orders import Motion, MoveBy, MoveTo
 
@@ -35,6 +37,8 @@ class Mico:
         self._source = source
         self._commanders: dict[int, DeviceCommander] = {}
         self._axes: dict[str, Axis] = {}
+        self._joined: dict[int, Device] = {}
+        self._joining = Lock()
         self._connect()
         # Direct, because a script has no event loop that a queued call could arrive in.
         application.manager.changed.connect(self._connect, Qt.ConnectionType.DirectConnection)
@@ -42,11 +46,14 @@ class Mico:
     def _connect(self) -> None:
         """Join the commanders to the devices there are now."""
         token = self._manager.lease.holder.token
-        for index in self._manager.devices:
-            commander = self._commanders.get(index)
-            if commander is None:
-                commander = self._commanders[index] = DeviceCommander(token, self._source)
-            self._manager.connect_device_commander(index, commander)
+        with self._joining:
+            for index, device in self._manager.devices.items():
+                commander = self._commanders.get(index)
+                if commander is None:
+                    commander = self._commanders[index] = DeviceCommander(token, self._source)
+                if self._joined.get(index) is not device:
+                    self._joined[index] = device
+                    self._manager.connect_device_commander(index, commander)
 
     @property
     def application(self) -> MicoApplication:

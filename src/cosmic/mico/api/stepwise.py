@@ -138,9 +138,8 @@ def _way(axis: Axis, target: Number, *, consent: bool) -> tuple[float, float]:
 
     The gate has then seen the whole of it.
     """
-    verdict = axis.check(target)
-    unknown = verdict.reason is Reason.POSITION_UNKNOWN
-    if not verdict.allowed and not (unknown and consent):
+    verdict = axis.check(target, consent=consent)
+    if not verdict.allowed:
         raise refusal(verdict)
     start = _position(axis)
     way = as_number(target, axis.unit, axis.name) - start

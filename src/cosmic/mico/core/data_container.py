@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from threading import Condition
 from typing import Final
 
@@ -33,6 +34,15 @@ Observer = Callable[[Event, PositionerState | None], None]
 
 NO_DEVICE: Final = "no device"
 _LOST_POSITION: Final = (DeviceFault.NO_SENSOR,)
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """What was set or counted on an axis, and must not be lost when devices are searched again."""
+
+    zero: float
+    frequency_hz: int | None
+    counted: float | None
 
 
 class DeviceDataContainer:
@@ -69,10 +79,23 @@ class DeviceDataContainer:
         self._positioners: dict[int, PositionerBase] = {}
         self._unclear: set[int] = set()
         self._observers: tuple[Observer, ...] = ()
+        self._memories: dict[str, Memory] = {}
 
     def observe(self, observer: Observer) -> None:
         """Call `observer(event, state)` after each event."""
         self._observers = (*self._observers, observer)
+
+    def remember(self, memories: Mapping[str, Memory]) -> None:
+        """Take over what was set on axes of an earlier search, by name."""
+        self._memories = dict(memories)
+
+    def memories(self) -> dict[str, Memory]:
+        """Return what is to be taken over to a later search, by name."""
+        kept = dict(self._memories)
+        for each in self._positioners.values():
+            counted = None if each.has_sensor else each.state.position
+            kept[each.state.name] = Memory(each.state.zero, each.frequency_hz, counted)
+        return kept
 
     # What is there
 
@@ -106,6 +129,12 @@ class DeviceDataContainer:
             return
         wanted = settings.positioner_kind
         positioner = class_for(wanted, found)(settings, self.address(channel), found, self._hold_s)
+        memory = self._memories.get(settings.name)
+        if memory is not None:
+            positioner.frequency_hz = memory.frequency_hz
+            positioner.update(zero=memory.zero)
+            if memory.counted is not None and not positioner.has_sensor:
+                positioner.update(position=memory.counted)
         if channel not in self._configured:
             text = "not in the configuration; add it there, then start again"
             positioner.update(present=False, error=text)

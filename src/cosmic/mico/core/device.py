@@ -42,7 +42,7 @@ from cosmic.mico.core.orders import Order
 from cosmic.mico.core.pilot import ChannelPilot
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.core.settings import MicoSettings
-from cosmic.mico.hw.interface import Controller, Event
+from cosmic.mico.hw.interface import Controller, Event, Failed
 
 logger = logging.getLogger(__name__)
 
@@ -90,6 +90,8 @@ class Device(WorkerThread):
         self._inbox: SimpleQueue[_Message] = SimpleQueue()
         self._intake = Lock()
         self._open = False
+        self._newest: dict[int, int] = {}
+        self._void: dict[int, int] = {}
         self._shown: dict[int, PositionerState] = {}
         self._context = PilotContext(
             controller=controller,
@@ -127,12 +129,17 @@ class Device(WorkerThread):
 
     def submit(self, order: Order) -> None:
         """Queue `order`; how it goes is told by its movement and by signals."""
+        stop = self._context.gate.stop_state
+        if stop.latched:
+            self._refuse_stopped(order, stop.reason or "")
+            return
         with self._intake:
             taken = self._open
             if taken:
-                self._inbox.put(order)
+                self._newest[order.channel] = order.number
+                self._inbox.put(replace(order, epoch=stop.epoch))
         if taken:
-            order.movement.on_cancel(lambda: self.halt(order.channel, "cancelled"))
+            order.movement.on_cancel(lambda: self._cancel(order))
         else:
             self._turn_away(order, self.container.state(order.channel))
 
@@ -146,12 +153,38 @@ class Device(WorkerThread):
         """Stop one channel past every queue; its movement fails with `MoveCancelled`."""
         state = self.container.state(channel)
         name = state.name if state else f"device {self.index} channel {channel}"
+        with self._intake:
+            self._void[channel] = self._newest.get(channel, 0)
         # First, so that the device thread knows of the halt before it sees the axis at rest.
         self._inbox.put(Halt(channel, MoveCancelled(f"{name}: {why}")))
         try:
             self._controller.stop(self.container.address(channel))
         except DeviceError as exc:
             logger.warning("%s: %s", name, exc)
+
+    def _cancel(self, order: Order) -> None:
+        """Stop one movement; another one that has replaced it goes on."""
+        error = MoveCancelled("cancelled")
+        self._inbox.put(Halt(order.channel, error, order.movement))
+        pilot = self._pilots.get(order.channel)
+        flight = pilot.flight if pilot is not None else None
+        if flight is None or flight.order.movement is not order.movement:
+            return  # not begun, or over: the device thread sees to the rest
+        try:
+            self._controller.stop(self.container.address(order.channel))
+        except DeviceError as exc:
+            logger.warning("device %d channel %d: %s", self.index, order.channel, exc)
+
+    def _refuse_stopped(self, order: Order, reason: str) -> None:
+        state = self.container.state(order.channel)
+        name = state.name if state else f"device {self.index} channel {order.channel}"
+        text = f"{name}: motion is stopped ({reason}); reset the stop first"
+        verdict = refuse(Reason.STOPPED, text, axis=name)
+        if order.grant is not None:
+            self._context.gate.release(order.grant)
+        logger.warning("refused (%s): %s", order.source, verdict)
+        order.movement.fail(refusal(verdict))
+        self.movement_refused.emit(verdict)
 
     def stop_later(self, error: CosmicError) -> None:
         """Have the device thread repeat the stop of all channels after the call it is in."""
@@ -211,7 +244,7 @@ class Device(WorkerThread):
             return self._settings.watch.idle_poll_s
         jogging = any(pilot.flight and pilot.flight.jog for pilot in self._pilots.values())
         if jogging:
-            rate = max(self._context.clock.rate, 1.0)
+            rate = self._context.clock.rate or 1.0
             return max(0.002, 0.2 * self._settings.jog.packet_s / rate)
         return self._context.poll_s
 
@@ -219,9 +252,10 @@ class Device(WorkerThread):
         try:
             action()
         except DeviceError as exc:
-            if exc.fault not in (DeviceFault.COMMUNICATION, DeviceFault.TIMEOUT):
-                raise
-            self._on_lost(exc)
+            if exc.fault in (DeviceFault.COMMUNICATION, DeviceFault.TIMEOUT):
+                self._on_lost(exc)
+            else:
+                logger.error("device %d: %s", self.index, exc)
 
     def _take(self, message: _Message) -> None:
         match message:
@@ -246,16 +280,29 @@ class Device(WorkerThread):
         if pilot is None:
             return
         if isinstance(message, Halt):
-            pilot.halt(message.error)
+            flight = pilot.flight
+            if message.only is None or (flight and flight.order.movement is message.only):
+                pilot.halt(message.error)
         else:
             pilot.set_frequency(message.frequency_hz)
 
     def _on_order(self, order: Order) -> None:
         pilot = self._pilots.get(order.channel)
-        if pilot is None:
+        if pilot is None or not self._introduction.over:
             self._turn_away(order, None)
-        else:
+            return
+        if order.number <= self._void.get(order.channel, 0):
+            if order.grant is not None:
+                self._context.gate.release(order.grant)
+            order.movement.fail(MoveCancelled(f"{pilot.name}: halted before it started"))
+            return
+        try:
             pilot.launch(order)
+        except DeviceError:
+            raise  # the end of a device that is lost is told by the pilot
+        except BaseException as exc:
+            order.movement.fail(DeviceError(f"{pilot.name}: {exc}"))
+            raise
 
     def _turn_away(self, order: Order, state: PositionerState | None) -> None:
         state = state or self.container.state(order.channel)
@@ -274,12 +321,22 @@ class Device(WorkerThread):
     def _on_event(self, event: Event) -> None:
         channel = event.channel.channel if event.channel else -1
         pilot = self._pilots.get(channel)
-        if pilot is None:
+        if event.channel is None:
+            self._on_device_event(event)
+        elif pilot is None:
             self._introduction.take(event, channel)
         else:
             pilot.take(event)
             self._emit_state(channel)
         self._introduction.look()
+
+    def _on_device_event(self, event: Event) -> None:
+        """Take what concerns the device as a whole, and so each of its channels."""
+        if isinstance(event, Failed):
+            logger.error("device %d: %s", self.index, event.error)
+        for channel, pilot in self._pilots.items():
+            pilot.take(event)
+            self._emit_state(channel)
 
     # Trouble and the end
 

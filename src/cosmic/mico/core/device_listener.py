@@ -43,6 +43,13 @@ class DeviceListener(WorkerThread):
 
     @override
     def run_body(self) -> None:
+        try:
+            self._listen()
+        except BaseException as exc:
+            self._on_lost(DeviceError(f"its listener failed: {exc!r}"))
+            raise
+
+    def _listen(self) -> None:
         while not self.end_requested:
             try:
                 event = self._controller.receive(self._container.library_index, RECEIVE_S)

@@ -13,13 +13,14 @@ from cosmic.frame.errors import (
     CosmicError,
     DeviceError,
     NotAvailable,
+    NotConnectedError,
     UnknownAxisError,
     refusal,
 )
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision import CollisionChecker, NoCollisionModel
-from cosmic.mico.core.data_container import NO_DEVICE, DeviceDataContainer
+from cosmic.mico.core.data_container import NO_DEVICE, DeviceDataContainer, Memory
 from cosmic.mico.core.device import Device
 from cosmic.mico.core.device_commander import CommanderType, DeviceCommander, join
 from cosmic.mico.core.device_listener import DeviceListener
@@ -89,6 +90,8 @@ class DeviceManager(QObject):
         self._addresses: dict[str, Channel] = {}
         self._missing: tuple[str, ...] = ()
         self._mode = Mode.CLOSED
+        self._closed = False
+        self._stuck: list[Device] = []
         steps = {"um": settings.defaults.largest_step_um, "deg": settings.defaults.largest_step_deg}
         self.gate = Gate(
             latch=self.latch,
@@ -138,9 +141,22 @@ class DeviceManager(QObject):
         """Return the state of an axis; raises `UnknownAxisError`."""
         address = self.address(name)
         state = self._devices[address.device].container.state(address.channel)
-        if state is None:
-            raise UnknownAxisError(name, self.names())
-        return state
+        return state if state is not None else self._looked_for(name)
+
+    def _looked_for(self, name: str) -> PositionerState:
+        """Return the state of a configured axis that has not answered yet."""
+        for settings in self.settings.positioner:
+            if settings.name == name:
+                return PositionerState(
+                    name=name,
+                    address=settings.address,
+                    kind=settings.positioner_kind,
+                    unit=settings.unit,
+                    limits=settings.limits,
+                    error="it is being looked for",
+                    present=False,
+                )
+        raise UnknownAxisError(name, self.names())
 
     def states(self) -> dict[str, PositionerState]:
         """Return the state of every axis by name."""
@@ -165,6 +181,13 @@ class DeviceManager(QObject):
             No device at all, or the library failed; nothing is left open.
         """
         with self._busy:
+            if self._closed:
+                raise NotConnectedError(CLOSED)
+            stuck = [device.name for device in self._stuck if device.isRunning()]
+            if stuck:
+                raise NotConnectedError(
+                    f"{', '.join(stuck)} still hangs in the library; start the program again"
+                )
             self._set_mode(Mode.INITIALISATION)
             try:
                 wanted = self.settings.serials
@@ -194,6 +217,7 @@ class DeviceManager(QObject):
             present = number in library_index
             at = library_index.get(number, number)
             container = DeviceDataContainer(number, here, hold_s, library_index=at)
+            container.remember(self._memories())
             if not present:
                 for channel in here:
                     container.settle(channel, None, NO_DEVICE)
@@ -205,6 +229,14 @@ class DeviceManager(QObject):
                 addresses[positioner.name] = positioner.address
         # Exchanged whole, for other threads look things up meanwhile.
         self._devices, self._addresses, self._missing = devices, addresses, tuple(missing)
+
+    def _memories(self) -> dict[str, Memory]:
+        """Return what the user has set on each axis, which outlives the search for devices."""
+        return {
+            name: memory
+            for device in self._devices.values()
+            for name, memory in device.container.memories().items()
+        }
 
     def _make_device(self, container: DeviceDataContainer) -> Device:
         device = Device(
@@ -232,7 +264,10 @@ class DeviceManager(QObject):
             device.begin()
         for number in numbers:
             self._await_introduction(self._devices[number])
-        self.gate.release_all()  # positions have just been read, and nothing moves
+        for number in numbers:
+            for state in self._devices[number].container.states():
+                if state.present and state.position is not None:
+                    self.gate.release_axis(state.name)  # it stands, and was read just now
 
     def _await_introduction(self, device: Device) -> None:
         if not device.wait_until_introduced(self.settings.watch.answer_s):
@@ -247,10 +282,17 @@ class DeviceManager(QObject):
     def shut_down(self) -> None:
         """Stop everything, release the hold, end the threads, close the library; any mode."""
         with self._busy:
-            for device in self._devices.values():
+            self.latch.void_grants()
+            running = [device for device in self._devices.values() if device.isRunning()]
+            for device in running:  # past the threads, one of which may hang in the library
+                self._stop_channels(device)
+            for device in running:
                 device.request_end()
-            for device in self._devices.values():
-                device.join()
+            self._stuck = [device for device in running if not device.join()]
+            for device in self._stuck:
+                logger.error("%s hangs in the library and was left behind", device.name)
+            for device in running:
+                self._stop_channels(device)
             for listener in self._listeners.values():
                 listener.request_end()
             for listener in self._listeners.values():
@@ -261,6 +303,11 @@ class DeviceManager(QObject):
             self.controller.close()
             self._set_mode(Mode.CLOSED)
 
+    def close(self) -> None:
+        """Shut down for good: nothing opens the hardware again; any mode."""
+        self._closed = True
+        self.shut_down()
+
     def rescan(self) -> None:
         """Close everything and look again for the hardware; raises as `initialize_devices`.
 
@@ -269,11 +316,12 @@ class DeviceManager(QObject):
         NotAvailable
             An axis is moving.
         """
-        moving = [state.name for state in self.states().values() if state.in_motion]
-        if moving:
-            raise NotAvailable(f"{', '.join(moving)} is moving; stop it before a rescan")
-        self.shut_down()
-        self.initialize_devices()
+        with self._busy:
+            moving = [state.name for state in self.states().values() if state.in_motion]
+            if moving:
+                raise NotAvailable(f"{', '.join(moving)} is moving; stop it before a rescan")
+            self.shut_down()
+            self.initialize_devices()
 
     def _set_mode(self, mode: Mode) -> None:
         self._mode = mode
@@ -302,9 +350,9 @@ class DeviceManager(QObject):
             raise NotAvailable(f"there is no device {index}")
         join(device, commander, kind)
 
-    def check(self, motions: Mapping[str, Motion]) -> MoveVerdict:
+    def check(self, motions: Mapping[str, Motion], *, consent: bool = False) -> MoveVerdict:
         """Return what the gate says to all of `motions` together, without moving anything."""
-        return self.gate.check(self._requests(motions, consent=False))
+        return self.gate.check(self._requests(motions, consent=consent))
 
     def order_together(
         self, motions: Mapping[str, Motion], *, source: str, consent: bool = False
@@ -319,6 +367,10 @@ class DeviceManager(QObject):
             One axis does not exist; nothing moved.
         """
         requests = self._requests(motions, consent=consent)
+        if self._mode is not Mode.RUN_TIME:
+            raise refusal(
+                refuse(Reason.DEVICE, f"MiCo is not ready ({self._mode}); wait, or rescan")
+            )
         verdict, grants = self.gate.decide(requests)
         if not verdict.allowed:
             logger.warning("refused (%s): %s", source, verdict)

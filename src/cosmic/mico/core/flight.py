@@ -3,9 +3,10 @@
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Final
 
-from cosmic.frame.clock import Clock
+from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, DeviceError
 from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import MoveVerdict
@@ -16,6 +17,10 @@ from cosmic.mico.core.orders import Grant, Jog, Order, Step
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Controller
+
+MOST_OPEN: Final = 8
+GIVEN_UP_S: Final = 2.0
+"""Wall time after which an answer is taken for lost."""
 
 
 @dataclass(slots=True)
@@ -32,6 +37,8 @@ class Flight:
         The controller still has to say whether the reference was found.
     error : CosmicError or None
         Why the movement will fail once it stands.
+    told : bool
+        Its movement has been failed already; it is only followed until it stands.
     progress_s : float
         Platform time of the last sign of life.
     progress_position : float or None
@@ -47,6 +54,7 @@ class Flight:
     known_pending: bool = False
     error: CosmicError | None = None
     jog: JogRun | None = None
+    told: bool = False
 
     @property
     def at_rest(self) -> bool:
@@ -86,24 +94,39 @@ class PilotContext:
     poll_s: float = 0.05
 
 
-@dataclass(slots=True)
 class Questions:
     """Order numbers that were current when each open question was asked.
 
     An answer says what was true when it was given: one asked for before a movement started says
     nothing about it. Each channel answers in order, so the oldest number belongs to the next
-    answer. A lost answer makes later ones look older than they are; the next poll repeats them.
+    answer. Lost answers make later ones look older than they are, which is safe, and are forgotten
+    when nothing has come for long.
     """
 
-    numbers: deque[int] = field(default_factory=lambda: deque(maxlen=64))
+    def __init__(self) -> None:
+        self._open: deque[tuple[int, float]] = deque()
+
+    def may_ask(self) -> bool:
+        """Return False while enough questions wait for their answers."""
+        if len(self._open) < MOST_OPEN:
+            return True
+        if WALL.now_s() - self._open[0][1] < GIVEN_UP_S:
+            return False
+        self._open.clear()
+        return True
 
     def asked(self, number: int) -> None:
         """Note a question."""
-        self.numbers.append(number)
+        self._open.append((number, WALL.now_s()))
+
+    def withdrawn(self) -> None:
+        """Forget the newest question, which could not be asked."""
+        if self._open:
+            self._open.pop()
 
     def answered(self) -> int:
         """Return the number under which the oldest open question was asked, 0 without one."""
-        return self.numbers.popleft() if self.numbers else 0
+        return self._open.popleft()[0] if self._open else 0
 
 
 def missed_target(

@@ -18,7 +18,7 @@ from cosmic.mico.core.flight import (
     missed_target,
 )
 from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import Grant, Jog
+from cosmic.mico.core.orders import Grant, Jog, Reference
 from cosmic.mico.core.positioner import Confidence, PositionerBase
 from cosmic.mico.hw.interface import (
     Activity,
@@ -65,6 +65,7 @@ class ChannelFollower:
     def set_frequency(self, frequency_hz: int) -> None:
         """Limit the closed-loop speed from now on."""
         self._frequency_hz = frequency_hz
+        self._positioner.frequency_hz = frequency_hz
         self._limit_speed(frequency_hz)
 
     def _limit_speed(self, frequency_hz: int) -> None:
@@ -76,10 +77,12 @@ class ChannelFollower:
     def halt(self, error: CosmicError) -> None:
         """Stop the channel; the movement under way will fail with `error`."""
         self.newest = None
-        self._quietly(lambda: self._context.controller.stop(self._address))
         if self.flight is not None:
+            self._context.gate.abandon(self.flight.grant)
             self.flight.error = self.flight.error or error
             self.flight.jog = None
+        self._quietly(lambda: self._context.controller.stop(self._address))
+        if self.flight is not None:
             self.flight.progress_s = self._context.clock.now_s()
             self.ask_activity()
 
@@ -87,6 +90,8 @@ class ChannelFollower:
         """Give up the movement of a channel that cannot be reached; its interval stays held."""
         flight, self.flight = self.flight, None
         if flight is not None:
+            self._context.gate.abandon(flight.grant)
+            self._count(flight)
             flight.order.movement.fail(error)
             self._context.on_failed(self.name, error)
 
@@ -111,33 +116,54 @@ class ChannelFollower:
             return
         watch = self._context.settings.watch
         period_s = watch.idle_poll_s if flight is None else self._context.poll_s
-        self.next_poll_s = now_s + period_s * max(self._context.clock.rate, 1.0)
+        self.next_poll_s = now_s + period_s * (self._context.clock.rate or 1.0)
         self.ask_position()
-        if flight is None:
-            return
         self.ask_activity()
+        if flight is not None:
+            self._watch(flight, now_s)
+
+    def _watch(self, flight: Flight, now_s: float) -> None:
+        """See that a movement makes progress, and that one to be stopped does stop."""
+        if flight.error is not None and not flight.at_rest:
+            self._quietly(lambda: self._context.controller.stop(self._address))
         late = now_s - flight.progress_s
-        patience_s = flight.patience_s(self._context.settings, self._context.clock.rate)
-        if late > patience_s and flight.error is not None:
-            self._conclude(flight.error)  # no answer: it may still move, so its interval stays held
-        elif late > patience_s:
+        if late <= flight.patience_s(self._context.settings, self._context.clock.rate):
+            return
+        if flight.error is None:
             text = f"{self.name}: no progress for {late:.1f} s, stopped"
             self._blame(DeviceTimeout(text, fault=DeviceFault.TIMEOUT))
+        elif not flight.told:
+            self._tell_failed(flight, flight.error)
+
+    def _tell_failed(self, flight: Flight, error: CosmicError) -> None:
+        """Fail the movement now, and go on following the axis until it stands somewhere known."""
+        flight.told = True
+        flight.error = flight.error or error
+        if not flight.at_rest:
+            self._note(DeviceError(f"{self.name}: it cannot be seen to stand ({error})"))
+        self._context.container.update(self._address.channel, in_motion=False)
+        self._announce()
+        flight.order.movement.fail(error)
+        self._context.on_failed(self.name, error)
 
     def ask_activity(self) -> None:
         """Ask what the channel is doing."""
+        if not self._activity.may_ask():
+            return
         self._activity.asked(self.flight.order.number if self.flight else 0)
-        self._quietly(lambda: self._context.controller.ask_activity(self._address))
+        if not self._quietly(lambda: self._context.controller.ask_activity(self._address)):
+            self._activity.withdrawn()
 
     def ask_position(self) -> None:
         """Ask for the position, where there is a sensor."""
-        if not self._positioner.has_sensor:
+        if not self._positioner.has_sensor or not self._position.may_ask():
             return
         number = self.flight.order.number if self.flight else 0
         final = self.flight is not None and self.flight.rests_seen > 0
         self._position.asked(-number if final else number)
         unit = self._positioner.state.unit
-        self._quietly(lambda: self._context.controller.ask_position(self._address, unit))
+        if not self._quietly(lambda: self._context.controller.ask_position(self._address, unit)):
+            self._position.withdrawn()
 
     def ask_position_known(self) -> None:
         """Ask whether the position is referenced; old libraries cannot say."""
@@ -146,9 +172,7 @@ class ChannelFollower:
         except DeviceError as exc:
             if exc.fault is not DeviceFault.UNSUPPORTED:
                 raise
-            # A run that ended without error has found it; before any, nothing can be said.
-            found = self.flight is not None and self.flight.error is None
-            self._on_known(PositionKnownRead(self._address, known=found))
+            self._on_known(PositionKnownRead(self._address, known=self._found(self.flight)))
 
     def take(self, event: Event) -> None:
         """Follow one event of this channel."""
@@ -217,13 +241,29 @@ class ChannelFollower:
 
     def _on_failed(self, error: DeviceError) -> None:
         flight = self.flight
-        if flight is None or error.fault is DeviceFault.UNSUPPORTED:
+        if error.fault in (DeviceFault.NO_SENSOR, DeviceFault.WRONG_KIND):
+            self._position.answered()  # that is what the question got for an answer
+        if error.fault is DeviceFault.UNSUPPORTED and self._only_asked(flight):
+            self._on_known(PositionKnownRead(self._address, known=self._found(flight)))
+        elif flight is None:
             self._note(error)
-        elif flight.at_rest:
+        elif flight.at_rest and not flight.told:
             self._note(error)
-            self._conclude(flight.error or error)  # it stands, and cannot say where
+            self._tell_failed(flight, flight.error or error)  # it stands, and cannot say where
         elif flight.error is None:
             self._blame(error)
+
+    @staticmethod
+    def _only_asked(flight: Flight | None) -> bool:
+        """Return True where a command not supported can only be a question of ours."""
+        return flight is None or (flight.known_pending and flight.rests_seen > 0)
+
+    @staticmethod
+    def _found(flight: Flight | None) -> bool:
+        """Return True after a reference run without error: the word of libraries that have none."""
+        if flight is None or flight.error is not None:
+            return False
+        return isinstance(flight.order.motion, Reference)
 
     def _blame(self, error: DeviceError) -> None:
         """Remember why the movement fails, and leave nothing moving unwatched."""
@@ -244,11 +284,7 @@ class ChannelFollower:
         if flight is None:
             return
         state, context = self._positioner.state, self._context
-        if not self._positioner.has_sensor:
-            nominal_um = context.settings.defaults.nominal_step_um
-            step_um = self._positioner.settings.step_um or nominal_um
-            where = counted_position(flight, state, step_um, context.clock.now_s())
-            context.container.update(self._address.channel, position=where)
+        self._count(flight)
         jogged = isinstance(flight.order.motion, Jog)
         missed = None
         if flight.error is None and not jogged:
@@ -257,6 +293,16 @@ class ChannelFollower:
             self._note(missed)
         self._give_back(flight.grant)
         self._conclude(flight.error or missed)
+
+    def _count(self, flight: Flight) -> None:
+        """Estimate where an axis without sensor is after `flight`."""
+        if self._positioner.has_sensor:
+            return
+        nominal_um = self._context.settings.defaults.nominal_step_um
+        step_um = self._positioner.settings.step_um or nominal_um
+        now_s = self._context.clock.now_s()
+        where = counted_position(flight, self._positioner.state, step_um, now_s)
+        self._context.container.update(self._address.channel, position=where)
 
     def _conclude(self, error: CosmicError | None) -> None:
         """End the movement under way; its interval stays held unless it has landed."""
@@ -270,9 +316,9 @@ class ChannelFollower:
         position = state.position if state else None
         self._announce()
         if error is None:
-            flight.order.movement.finish(position)
+            flight.order.movement.finish(state.shown_position if state else None)
             self._context.on_finished(self.name, position)
-        else:
+        elif not flight.told:
             flight.order.movement.fail(error)
             self._context.on_failed(self.name, error)
 
@@ -283,11 +329,13 @@ class ChannelFollower:
     def _announce(self) -> None:
         self._context.on_state(self._address.channel)
 
-    def _quietly(self, call: Callable[[], None]) -> None:
-        """Make a call that the unreachable-device path reports, not this one."""
+    def _quietly(self, call: Callable[[], None]) -> bool:
+        """Make a call and say whether it was taken; a device out of reach is another's matter."""
         try:
             call()
         except DeviceError as exc:
-            if exc.fault is DeviceFault.COMMUNICATION:
+            if exc.fault in (DeviceFault.COMMUNICATION, DeviceFault.TIMEOUT):
                 raise
             logger.warning("%s: %s", self.name, exc)
+            return False
+        return True

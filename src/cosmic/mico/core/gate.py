@@ -12,9 +12,9 @@ from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision import CollisionChecker
 from cosmic.mico.core.lease import Lease
 from cosmic.mico.core.orders import Grant, Interval, Motion
-from cosmic.mico.core.positioner import PositionerState
-from cosmic.mico.core.rules import Limits, check_axis, planned_target, swept_interval
-from cosmic.mico.core.stop_latch import StopLatch
+from cosmic.mico.core.positioner import Confidence, PositionerState
+from cosmic.mico.core.rules import EVERYWHERE, Limits, check_axis, planned_target, swept_interval
+from cosmic.mico.core.stop_latch import StopLatch, StopState
 
 logger = logging.getLogger(__name__)
 
@@ -90,6 +90,7 @@ def _first_refusal(request: Request, picture: Picture) -> MoveVerdict | None:
         state,
         consent=request.consent,
         running_target=picture.targets.get(axis),
+        held=picture.held.get(axis),
         age_s=picture.now_wall_s - state.read_wall_s,
         rules=picture.rules,
     )
@@ -98,11 +99,7 @@ def _first_refusal(request: Request, picture: Picture) -> MoveVerdict | None:
 def _clear_of_everything(
     intervals: Mapping[str, Interval], picture: Picture, checker: CollisionChecker
 ) -> MoveVerdict:
-    swept = {
-        name: Interval(state.position, state.position)
-        for name, state in picture.states.items()
-        if state.position is not None
-    }
+    swept = {name: _resting_place(state) for name, state in picture.states.items()}
     swept.update(picture.held)
     swept.update(intervals)
     try:
@@ -113,6 +110,14 @@ def _clear_of_everything(
             Reason.NO_ANSWER, "the collision check failed; nothing was moved (see the log)"
         )
     return verdict
+
+
+def _resting_place(state: PositionerState) -> Interval:
+    """Return where an axis without a movement of ours may be."""
+    placed = state.present and state.confidence is not Confidence.UNKNOWN
+    if state.position is None or not placed or not state.activity.at_rest:
+        return EVERYWHERE
+    return Interval(state.position, state.position)
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,10 +189,22 @@ class Gate:
         with self._lock:
             self._holds.get(grant.axis, {}).pop(grant.number, None)
 
-    def release_all(self) -> None:
-        """Give back everything, where nothing moves and every position has just been read."""
+    def abandon(self, grant: Grant) -> None:
+        """Keep the interval, but no longer count on the target: the movement will not get there."""
         with self._lock:
-            self._holds.clear()
+            hold = self._holds.get(grant.axis, {}).get(grant.number)
+            if hold is not None:
+                self._holds[grant.axis][grant.number] = _Hold(hold.interval, None)
+
+    def release_axis(self, axis: str) -> None:
+        """Give back all of an axis that stands and whose position has just been read."""
+        with self._lock:
+            self._holds.pop(axis, None)
+
+    @property
+    def stop_state(self) -> StopState:
+        """State of the stop latch; takes no lock."""
+        return self._latch.state
 
     def held(self) -> dict[str, Interval]:
         """Return the intervals in flight by axis."""

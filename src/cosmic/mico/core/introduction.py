@@ -25,6 +25,11 @@ class Introduction:
         self._over = ThreadEvent()
         self.pilots: dict[int, ChannelPilot] = {}
 
+    @property
+    def over(self) -> bool:
+        """True when everything is known; any thread."""
+        return self._over.is_set()
+
     def wait(self, timeout_s: float) -> bool:
         """Wait until it is over; False after `timeout_s` of wall time. Any thread."""
         return self._over.wait(timeout_s)
@@ -67,7 +72,8 @@ class Introduction:
         pilot = ChannelPilot(positioner, self._context)
         self.pilots[channel] = pilot
         if positioner.state.kind is not PositionerKind.OPEN_LOOP:
-            pilot.set_frequency(self._context.settings.defaults.closed_loop_frequency_hz)
+            usual_hz = self._context.settings.defaults.closed_loop_frequency_hz
+            pilot.set_frequency(positioner.frequency_hz or usual_hz)
             pilot.ask_position_known()
         pilot.ask_activity()
         pilot.ask_position()

@@ -1,6 +1,7 @@
 """Continuous movement as a chain of short packets, each kept alive by whoever holds the key."""
 
 import math
+from typing import Final
 
 from cosmic.frame.clock import WALL
 from cosmic.mico.core.orders import Jog, Motion, MoveTo, Step
@@ -8,16 +9,20 @@ from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import PositionerKind
 
+SHARE: Final = 0.8
+"""How much of a packet is travelled at speed; an axis is slower over its last micrometres."""
+
 
 class JogRun:
     """Works out the packets of one jog; device thread, except `renew`.
 
     No packet is longer than `packet_s` of motion, so whatever dies, the axis stands soon after.
-    The dead-man deadline counts on the wall clock.
+    The dead-man deadline counts on the wall clock. `top_speed` is what the axis can do at most.
     """
 
-    def __init__(self, jog: Jog, settings: MicoSettings) -> None:
+    def __init__(self, jog: Jog, settings: MicoSettings, top_speed: float = math.inf) -> None:
         self._jog = jog
+        self._speed = min(jog.speed, top_speed)
         self._settings = settings
         self._renewed_wall_s = WALL.now_s()
         self._started_s: float | None = None
@@ -59,8 +64,8 @@ class JogRun:
         position = state.position if state.position is not None else math.nan
         if self._started_s is None:
             self._started_s, self._start = now_s, position
-        sign, reach = self._jog.direction, self._jog.speed * packet_s
-        ahead = self._jog.speed * (now_s - self._started_s) + reach
+        sign, reach = self._jog.direction, SHARE * self._speed * packet_s
+        ahead = self._speed * (now_s - self._started_s) + reach
         # Never more than one packet ahead of where the axis really is.
         way = min(ahead, sign * (position - self._start) + reach)
         target = self._start + sign * way

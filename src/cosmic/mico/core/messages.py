@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from cosmic.frame.errors import CosmicError, DeviceError
+from cosmic.mico.core.movement import Movement
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +41,11 @@ class DeviceLost:
 
 @dataclass(frozen=True, slots=True)
 class Halt:
-    """Stop one channel again and fail its movement."""
+    """Stop one channel again and fail its movement; with `only`, if it is that one."""
 
     channel: int
     error: CosmicError
+    only: Movement | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -124,6 +124,8 @@ class Order:
         Completed when the movement ends.
     grant : Grant or None
         Set where the gate has already decided, together with others.
+    epoch : int or None
+        Number of stops so far when it was submitted; a stop since then makes it void.
     follows : Movement or None
         The order is void unless this was the newest on its channel, and nothing was halted since.
     """
@@ -136,4 +138,5 @@ class Order:
     movement: Movement = field(default_factory=Movement)
     grant: Grant | None = None
     follows: Movement | None = None
+    epoch: int | None = None
     number: int = field(default_factory=lambda: next(_numbers))

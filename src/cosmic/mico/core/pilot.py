@@ -22,6 +22,7 @@ from cosmic.mico.core.orders import (
     Order,
     Reference,
 )
+from cosmic.mico.core.rules import malformed
 
 logger = logging.getLogger(__name__)
 
@@ -41,11 +42,15 @@ class ChannelPilot(ChannelFollower):
             why = "a newer command came first" if order.follows else "cancelled before it started"
             order.movement.fail(MoveCancelled(f"{self.name}: {why}"))
             return
+        if order.epoch is not None and order.epoch != self._context.gate.stop_state.epoch:
+            self._give_back(order.grant)
+            self.turn_away(order, _stopped(self.name))
+            return
         self.newest = order.movement
         if isinstance(order.motion, Jog):
-            self._start_jog(order, JogRun(order.motion, self._context.settings))
+            self._start_jog(order, order.motion)
             return
-        grant = order.grant or self._grant(order, order.motion)
+        grant = self._granted(order)
         if grant is None:
             return
         if not self._context.gate.still_valid(grant):
@@ -60,6 +65,19 @@ class ChannelPilot(ChannelFollower):
         finally:
             self._tell_begun(order, replaced)
         self.ask_activity()
+
+    def _granted(self, order: Order) -> Grant | None:
+        flight, grant = self.flight, order.grant
+        nowhere = flight is not None and (flight.error is not None or flight.grant.target is None)
+        if nowhere and isinstance(order.motion, MoveBy) and grant is None:
+            text = f"{self.name}: it does not stand yet, so there is no place to go on from"
+            self.turn_away(order, refuse(Reason.NO_ANSWER, text, axis=self.name))
+            return None
+        if grant is not None and flight is not None and flight.grant.number > grant.number:
+            # Something was started since this was decided: the volume is another one now.
+            self._give_back(grant)
+            grant = None
+        return grant or self._grant(order, order.motion)
 
     def _grant(self, order: Order, motion: Motion) -> Grant | None:
         request = Request(self.name, motion, order.token, order.consent)
@@ -87,7 +105,7 @@ class ChannelPilot(ChannelFollower):
         flight = Flight(order, grant, started_s=now_s, progress_s=now_s, jog=jog)
         flight.known_pending = isinstance(order.motion, Reference)
         replaced, self.flight = self.flight, flight
-        self.next_poll_s = now_s + self._context.poll_s * max(self._context.clock.rate, 1.0)
+        self.next_poll_s = now_s + self._context.poll_s * (self._context.clock.rate or 1.0)
         return replaced
 
     def _tell_begun(self, order: Order, replaced: Flight | None) -> None:
@@ -96,10 +114,12 @@ class ChannelPilot(ChannelFollower):
         error = self._positioner.state.error if failed else ""
         self._context.container.update(self._address.channel, in_motion=True, error=error)
         if replaced is not None:
+            self._count(replaced)
             self._give_back(replaced.grant)
-            over = MoveCancelled(f"{self.name}: replaced by a newer command")
-            replaced.order.movement.fail(over)
-            self._context.on_failed(self.name, over)
+            if not replaced.told:
+                over = MoveCancelled(f"{self.name}: replaced by a newer command")
+                replaced.order.movement.fail(over)
+                self._context.on_failed(self.name, over)
         logger.info("%s: %s (%s)", self.name, order.motion, order.source)
         self._announce()
 
@@ -115,11 +135,20 @@ class ChannelPilot(ChannelFollower):
 
     # Jogging
 
+    def _nominal_step(self) -> float:
+        defaults = self._context.settings.defaults
+        rotary = self._positioner.state.unit == "deg"
+        return defaults.nominal_step_deg if rotary else defaults.nominal_step_um
+
+    def _top_speed(self) -> float:
+        """Return what the axis can do at its frequency limit; without a sensor, in Hz."""
+        if not self._positioner.has_sensor:
+            return float(FREQUENCY_HZ[1])
+        return self._frequency_hz * self._nominal_step()
+
     def _limit_jog_speed(self, speed: float) -> None:
         """Have the axis glide from packet to packet, not leap and wait."""
-        defaults, unit = self._context.settings.defaults, self._positioner.state.unit
-        step = defaults.nominal_step_deg if unit == "deg" else defaults.nominal_step_um
-        wanted_hz = math.ceil(GLIDE * speed / step)
+        wanted_hz = math.ceil(GLIDE * speed / self._nominal_step())
         self._limit_speed(max(FREQUENCY_HZ[0], min(wanted_hz, self._frequency_hz)))
 
     def renew(self, order_number: int) -> None:
@@ -128,10 +157,15 @@ class ChannelPilot(ChannelFollower):
         if flight is not None and flight.jog is not None and flight.order.number == order_number:
             flight.jog.renew()
 
-    def _start_jog(self, order: Order, jog: JogRun) -> None:
+    def _start_jog(self, order: Order, motion: Jog) -> None:
+        senseless = malformed(motion, self._positioner.state)
+        if senseless is not None:
+            self.turn_away(order, senseless)
+            return
+        jog = JogRun(motion, self._context.settings, self._top_speed())
         packet = jog.packet(self._positioner.state, self._context.clock.now_s())
         if packet is None:
-            order.movement.finish(self._positioner.state.position)
+            order.movement.finish(self._positioner.state.shown_position)
             return
         grant = self._grant(order, packet)
         if grant is not None:
@@ -152,6 +186,9 @@ class ChannelPilot(ChannelFollower):
 
     def _next_packet(self, flight: Flight, jog: JogRun) -> None:
         now_s = self._context.clock.now_s()
+        if not self._context.gate.still_valid(flight.grant):
+            self.halt(refusal(_stopped(self.name)))
+            return
         packet = jog.packet(self._positioner.state, now_s)
         if packet is None:
             self._end_jog(None)

@@ -122,6 +122,7 @@ class PositionerBase:
     ) -> None:
         self.settings = settings
         self.hold_s = hold_s
+        self.frequency_hz: int | None = None
         self.state = PositionerState(
             name=settings.name,
             address=address,

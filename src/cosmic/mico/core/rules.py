@@ -13,14 +13,18 @@ from cosmic.mico.core.orders import (
     LARGEST_STEPS,
     MOTION_WORDS,
     Interval,
+    Jog,
     Motion,
     MoveBy,
     MoveTo,
     Step,
+    ToEndStop,
 )
 from cosmic.mico.core.positioner import Confidence, PositionerState, class_for
-from cosmic.mico.hw.interface import PositionerKind
+from cosmic.mico.hw.interface import Direction, PositionerKind
 
+ROUNDING: Final = 1e-6
+"""What adding and taking away a user's zero may cost a limit that is shown and typed again."""
 EVERYWHERE: Final = Interval(-math.inf, math.inf)
 
 
@@ -46,18 +50,20 @@ def check_axis(
     *,
     consent: bool,
     running_target: float | None,
+    held: Interval | None,
     age_s: float,
     rules: Limits,
 ) -> MoveVerdict | None:
     """Return why this axis must not make `motion`, or None."""
     checks: tuple[Callable[[], MoveVerdict | None], ...] = (
+        lambda: malformed(motion, state),
         lambda: _not_finite(motion, state),
         lambda: _wrong_kind(motion, state),
         lambda: _step_range(motion, state),
         lambda: _device(state),
         lambda: _position_unknown(state, consent=consent),
         lambda: _stale(state, age_s, rules),
-        lambda: _limit(motion, state, planned_target(motion, state, running_target), rules),
+        lambda: _limit(motion, state, planned_target(motion, state, running_target), held, rules),
     )
     refusals = (check() for check in checks)
     return next((refusal for refusal in refusals if refusal is not None), None)
@@ -98,6 +104,33 @@ def swept_interval(
     return EVERYWHERE
 
 
+def malformed(motion: Motion, state: PositionerState) -> MoveVerdict | None:
+    """Return why `motion` is nothing that can be asked of any axis, or None."""
+    name = state.name
+    match motion:
+        case Jog():
+            fine = motion.direction in (1, -1) and _finite(motion.speed) and motion.speed > 0.0
+            text = f"{name}: jog in direction 1 or -1 with a speed above 0"
+        case ToEndStop():
+            fine, text = isinstance(motion.direction, Direction), f"{name}: no direction is given"
+        case _:
+            fine, text = type(motion) in MOTION_WORDS, f"{name}: {motion!r} is no movement"
+    return None if fine else refuse(Reason.NOT_FINITE, text, axis=name)
+
+
+def _finite(number: object) -> bool:
+    fine = isinstance(number, (int, float)) and not isinstance(number, bool)
+    return fine and math.isfinite(number)  # type: ignore[arg-type]
+
+
+def _returns(state: PositionerState, target: float, held: Interval | None) -> bool:
+    """Return True for a way from outside the limits towards the inside."""
+    if state.limits is None or state.position is None or held is not None:
+        return False
+    low, high = state.limits
+    return state.position < target <= low or high <= target < state.position
+
+
 def _not_finite(motion: Motion, state: PositionerState) -> MoveVerdict | None:
     match motion:
         case MoveTo():
@@ -109,8 +142,7 @@ def _not_finite(motion: Motion, state: PositionerState) -> MoveVerdict | None:
         case _:
             return None
     for number in numbers:
-        fine = isinstance(number, (int, float)) and not isinstance(number, bool)
-        if not (fine and math.isfinite(number)):  # type: ignore[arg-type]
+        if not _finite(number):
             return refuse(
                 Reason.NOT_FINITE,
                 f"{state.name}: {number!r} is not a finite number",
@@ -190,7 +222,11 @@ def _stale(state: PositionerState, age_s: float, rules: Limits) -> MoveVerdict |
 
 
 def _limit(
-    motion: Motion, state: PositionerState, target: float | None, rules: Limits
+    motion: Motion,
+    state: PositionerState,
+    target: float | None,
+    held: Interval | None,
+    rules: Limits,
 ) -> MoveVerdict | None:
     if state.limits is None:
         return None
@@ -198,9 +234,9 @@ def _limit(
     if target is None:
         if not isinstance(motion, Step):
             return None
-        swept = swept_interval(motion, state, None, None, rules)
+        swept = swept_interval(motion, state, None, held, rules)
         target = swept.high if motion.steps > 0 else swept.low
-    if low <= target <= high:
+    if low - ROUNDING <= target <= high + ROUNDING or _returns(state, target, held):
         return None
     value, limit = target - state.zero, (high if target > high else low) - state.zero
     what = "could reach" if isinstance(motion, Step) else "target"

@@ -18,7 +18,7 @@ Text = Annotated[str, Field(min_length=1)]
 class MotionDefaults(StrictModel):
     """What a movement uses where nothing else is said."""
 
-    hold_s: Annotated[float, Field(ge=0, lt=60)] | Literal["forever"] = "forever"
+    hold_s: Annotated[float, Field(ge=0, le=59.999)] | Literal["forever"] = "forever"
     closed_loop_frequency_hz: int = Field(default=5000, ge=1, le=18500)
     steps: int = Field(default=100, ge=0, le=29999)
     frequency_hz: int = Field(default=1000, ge=1, le=18500)
@@ -57,6 +57,12 @@ class WatchSettings(StrictModel):
     answer_s: float = Field(default=5.0, ge=0.5, le=60)
     tolerance_um: float = Field(default=2.0, gt=0)
     tolerance_deg: float = Field(default=0.01, gt=0)
+
+    @model_validator(mode="after")
+    def _polled_before_stale(self) -> Self:
+        if self.stale_s < 2 * self.idle_poll_s:
+            raise ValueError("stale_s must be at least twice idle_poll_s")
+        return self
 
 
 class PositionerSettings(StrictModel):
@@ -158,6 +164,7 @@ class MicoSettings(StrictModel):
             *self._twice("name", [each.name for each in self.positioner]),
             *self._same_channel(),
             *self._twice("key", self._keys()),
+            *self._twice("serial", [str(serial) for serial in self.serials]),
             *self._unknown_names(),
         ]
         if wrong:

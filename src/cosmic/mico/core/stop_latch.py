@@ -47,6 +47,11 @@ class StopLatch:
             before = self._state
             self._state = StopState(reason=before.reason or reason, epoch=before.epoch + 1)
 
+    def void_grants(self) -> None:
+        """Let nothing that was granted or queued so far start any more, without latching."""
+        with self._lock:
+            self._state = StopState(reason=self._state.reason, epoch=self._state.epoch + 1)
+
     def reset(self) -> None:
         """Allow motion again; what was stopped does not go on by itself."""
         with self._lock:
