@@ -75,7 +75,7 @@ def test_a_device_whose_thread_died_is_shown_as_gone():
         with pytest.raises(cosmic.CosmicError):
             rig["d0.c0"].move_to(1.0)
         wait_until(lambda: rig["d0.c0"].state is Status.UNKNOWN)
-        assert rig.missing
+        wait_until(lambda: bool(rig.missing))
         assert rig["d0.c0"].confidence is Confidence.UNKNOWN
 
 
