@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosmic.frame.verdict import ALLOWED, Reason, refuse
-from cosmic.mico.core.collision import NoCollisionModel
+from cosmic.mico.core.collision.checker import NoCollisionModel
 from cosmic.mico.core.gate import Gate, Picture, Request, judge
 from cosmic.mico.core.lease import Lease
 from cosmic.mico.core.orders import Calibrate, Interval, MoveBy, MoveTo, Reference, Step

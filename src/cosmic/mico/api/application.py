@@ -14,7 +14,7 @@ from cosmic.frame.errors import CosmicError, DeviceError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.task import Task
 from cosmic.mico.api import initialisation
-from cosmic.mico.core.collision import CollisionChecker
+from cosmic.mico.core.collision.checker import CollisionChecker
 from cosmic.mico.core.device_manager import DeviceManager, Mode
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Controller

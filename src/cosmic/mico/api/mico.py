@@ -14,7 +14,7 @@ from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.entry import Number, as_number
 from cosmic.mico.api.group import GroupMovement, waited_for
-from cosmic.mico.core.collision import NO_MODEL_TEXT
+from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.device import Device
 from cosmic.mico.core.device_commander import DeviceCommander
 from cosmic.mico.core.orders import Motion, MoveBy, MoveTo

@@ -19,7 +19,7 @@ from cosmic.frame.errors import (
 )
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
-from cosmic.mico.core.collision import CollisionChecker, NoCollisionModel
+from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
 from cosmic.mico.core.data_container import NO_DEVICE, DeviceDataContainer, Memory
 from cosmic.mico.core.device import Device
 from cosmic.mico.core.device_commander import CommanderType, DeviceCommander, join

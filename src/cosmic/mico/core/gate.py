@@ -9,7 +9,7 @@ from threading import Lock
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
-from cosmic.mico.core.collision import CollisionChecker
+from cosmic.mico.core.collision.checker import CollisionChecker
 from cosmic.mico.core.lease import Lease
 from cosmic.mico.core.orders import Grant, Interval, Motion
 from cosmic.mico.core.positioner import Confidence, PositionerState

@@ -1,0 +1,85 @@
+"""What is asked of the collision gate and what it answers, as plain data."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from cosmic.mico.core.collision.model import BodyPair
+
+
+@dataclass(frozen=True)
+class AxisSpan:
+    """Where one axis may be from now until the movement is over, in its unit.
+
+    Attributes
+    ----------
+    low, high : float
+        All places it can be at; infinite ends stand for the hard stops.
+    now : float or None
+        Where it stands as far as is known; None while it moves or is unknown.
+    moving : bool
+        It is about to move or does already. Pairs that no moving axis brings closer to each
+        other are not looked at.
+    estimated : bool
+        The position is believed, not measured: the span is widened by the drive's uncertainty.
+    free : bool
+        It was taken out of collision detection: on its own it makes no pair worth looking at.
+    """
+
+    low: float
+    high: float
+    now: float | None = None
+    moving: bool = False
+    estimated: bool = False
+    free: bool = False
+
+
+Spans = Mapping[str, AxisSpan]
+
+
+@dataclass(frozen=True)
+class Approach:
+    """Two bodies at a pose: how far apart, and where.
+
+    Attributes
+    ----------
+    distance_um : float
+        Gap between the two; 0 when they touch or overlap.
+    places_um : two tuples of float
+        The two points nearest to each other, in world coordinates.
+    pose : mapping of float
+        Position of every axis, in its unit.
+    """
+
+    bodies: BodyPair
+    distance_um: float
+    places_um: tuple[tuple[float, float, float], tuple[float, float, float]]
+    margin_um: float = 0.0
+    pose: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def place_um(self) -> tuple[float, float, float]:
+        """The middle between the two points."""
+        (ax, ay, az), (bx, by, bz) = self.places_um
+        return (ax + bx) / 2.0, (ay + by) / 2.0, (az + bz) / 2.0
+
+
+@dataclass(frozen=True)
+class SweepAnswer:
+    """What the gate found in the volume swept.
+
+    Attributes
+    ----------
+    clear : bool
+        No pair can come closer than its margin.
+    approach : Approach or None
+        Where a pair does, when it is not clear; else the nearest that was looked at, if any.
+    reason : str
+        Why there is no answer, when there is none; then `clear` is False.
+    queries : int
+        How many distances were computed.
+    """
+
+    clear: bool
+    approach: Approach | None = None
+    reason: str = ""
+    queries: int = 0
