@@ -186,7 +186,9 @@ class SceneModel:
         for drive in self.drives:
             if drive.axis == axis:
                 joint = self.joints[self.joint_number[drive.joint]]
-                ends = sorted((end - drive.offset) / drive.factor for end in (joint.low, joint.high))
+                ends = sorted(
+                    (end - drive.offset) / drive.factor for end in (joint.low, joint.high)
+                )
                 lows.append(ends[0])
                 highs.append(ends[1])
         if not lows:
