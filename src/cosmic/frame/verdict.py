@@ -46,7 +46,9 @@ class MoveVerdict:
     place_um : tuple of float or None
         Where they would, x, y, z in world coordinates.
     clearance_um : float or None
-        The smallest clearance on the way, where a collision model knows it.
+        How far apart the two bodies would be there.
+    pose : tuple of (str, float)
+        Where the axes would stand there, by name, in gate coordinates and the unit of each.
     text : str
         The whole story in one sentence: what, where and what to do.
     """
@@ -60,6 +62,7 @@ class MoveVerdict:
     bodies: tuple[str, ...] = ()
     place_um: tuple[float, float, float] | None = None
     clearance_um: float | None = None
+    pose: tuple[tuple[str, float], ...] = ()
     text: str = ""
 
     def __bool__(self) -> NoReturn:

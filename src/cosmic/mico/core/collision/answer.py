@@ -75,11 +75,8 @@ class SweepAnswer:
         Where a pair does, when it is not clear; else the nearest that was looked at, if any.
     reason : str
         Why there is no answer, when there is none; then `clear` is False.
-    queries : int
-        How many distances were computed.
     """
 
     clear: bool
     approach: Approach | None = None
     reason: str = ""
-    queries: int = 0

@@ -1,13 +1,12 @@
 """The place where a collision model plugs into the gate (thesis 6.1.2, Fig. 6.5)."""
 
 from abc import abstractmethod
-from collections.abc import Mapping
 from typing import Protocol
 
 from typing_extensions import override
 
 from cosmic.frame.verdict import MoveVerdict, Reason
-from cosmic.mico.core.orders import Interval
+from cosmic.mico.core.collision.answer import Spans
 
 NO_MODEL_TEXT = "no collision model"
 
@@ -21,11 +20,19 @@ class CollisionChecker(Protocol):
         """False where there is no model, which windows say loudly."""
 
     @abstractmethod
-    def check(self, swept: Mapping[str, Interval]) -> MoveVerdict:
-        """Judge the intervals of all axes, those in flight and those at rest, by axis name.
+    def check(self, spans: Spans) -> MoveVerdict:
+        """Judge where all axes may be, those about to move, in flight and at rest; any thread.
 
-        Infinite ends stand for the whole travel. An exception counts as a refusal.
+        An exception counts as a refusal.
         """
+
+    @abstractmethod
+    def start(self) -> None:
+        """Make it ready to answer; returns when it is, or has failed and answers no."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Give everything back; harmless the second time."""
 
 
 class NoCollisionModel(CollisionChecker):
@@ -37,5 +44,13 @@ class NoCollisionModel(CollisionChecker):
         return False
 
     @override
-    def check(self, swept: Mapping[str, Interval]) -> MoveVerdict:
+    def check(self, spans: Spans) -> MoveVerdict:
         return MoveVerdict(allowed=True, reason=Reason.ALLOWED, text=f"allowed; {NO_MODEL_TEXT}")
+
+    @override
+    def start(self) -> None:
+        """Do nothing: there is nothing to start."""
+
+    @override
+    def close(self) -> None:
+        """Do nothing: nothing was started."""

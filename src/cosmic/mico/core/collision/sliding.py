@@ -1,0 +1,166 @@
+"""Two pieces that slide past each other: the smallest gap over a joint box, exactly bounded.
+
+The distance of two convex bodies is a convex function of how one is shifted against the other.
+Wherever it has been measured, the plane normal to the two nearest points bounds it from below
+everywhere else (directional conservative advancement). Two such bounds together are a better one.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Final
+
+import numpy as np
+
+from cosmic.mico.core.collision.fcl_pieces import ConvexPiece, gap_along, least_overlap, separation
+from cosmic.mico.core.collision.model import Floats
+
+MOST_QUERIES: Final = 14
+"""After so many distances the swept body is built and measured once instead."""
+NOTHING_UM: Final = 1e-6
+_SHARES: Final = np.linspace(0.0, 1.0, 17)
+
+
+@dataclass(frozen=True, slots=True)
+class Slide:
+    """Two pieces, and how the second is shifted against the first.
+
+    Attributes
+    ----------
+    place_um : ndarray, shape (3,)
+        Where the second piece stands in the middle of the box; the first stands there already.
+    ways : ndarray, shape (3, m), um/um
+        How joint values shift the second against the first.
+    half : ndarray, shape (m,)
+        Half the widths of the box.
+    start : ndarray, shape (m,)
+        Where the joints stand, from the middle of the box.
+    asked_low, asked_high : ndarray, shape (m,)
+        The box without overshoot, from `start`.
+    """
+
+    first: ConvexPiece
+    second: ConvexPiece
+    rotation: Floats
+    place_um: Floats
+    ways: Floats
+    half: Floats
+    start: Floats
+    asked_low: Floats
+    asked_high: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Whether two pieces keep their margin; if not, at which joint values they do not.
+
+    Attributes
+    ----------
+    at : ndarray, shape (m,), or None
+        From the middle of the box.
+    normal : ndarray, shape (3,), or None
+        Direction that proved the gap: a good first guess the next time.
+    inside : bool
+        They are closer than the margin already where the movement begins.
+    """
+
+    clear: bool
+    at: Floats | None = None
+    normal: Floats | None = None
+    inside: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Bound:
+    """The gap is nowhere less than `value` + `slope` . shift."""
+
+    value: float
+    slope: Floats
+
+    def least(self, half: Floats) -> float:
+        return float(self.value - np.abs(self.slope) @ half)
+
+    def corner(self, half: Floats, otherwise: Floats) -> Floats:
+        """Return where the bound is least; where it is level, the place `otherwise`."""
+        level = np.abs(self.slope) <= 1e-12
+        return np.asarray(np.where(level, otherwise, -half * np.sign(self.slope)))
+
+
+def guess_holds(slide: Slide, normal: Floats, margin_um: float) -> bool:
+    """Return True when `normal` alone proves the gap, without measuring a distance."""
+    slide.second.put(slide.rotation, slide.place_um)
+    gap = gap_along(slide.first, slide.second, normal)
+    return bool(gap - np.abs(normal @ slide.ways) @ slide.half > margin_um)
+
+
+def smallest_gap(slide: Slide, margin_um: float) -> Finding:
+    """Decide whether the gap stays above `margin_um` over the whole box."""
+    half, at = slide.half, slide.start
+    best: _Bound | None = None
+    closest, closest_gap = at, np.inf
+    for number in range(MOST_QUERIES):
+        slide.second.put(slide.rotation, slide.place_um + slide.ways @ at)
+        found = separation(slide.first, slide.second)
+        normal = np.array(found.normal)
+        slope = normal @ slide.ways
+        if number == 0 and _leaves(slide, slope, found.gap_um):
+            return Finding(clear=True, normal=normal)
+        if not found.gap_um > margin_um:
+            return Finding(clear=False, at=at, inside=number == 0)
+        if found.gap_um < closest_gap:
+            closest, closest_gap = at, found.gap_um
+        bound = _Bound(found.gap_um - float(slope @ at), slope)
+        mixed = bound if best is None else _mix(best, bound, half)
+        if mixed.least(half) > margin_um:
+            return Finding(clear=True, normal=normal)
+        at = _next_place(best, bound, half, at)
+        best = mixed
+    return _by_hull(slide, margin_um, closest)
+
+
+def _leaves(slide: Slide, slope: Floats, gap_um: float) -> bool:
+    """Return True for a movement that brings the two nowhere closer than they are.
+
+    A pair inside its margin may do nothing else, and a pair outside it needs no more proof.
+    """
+    if gap_um <= 0.0:
+        normal = least_overlap(slide.first, slide.second)
+        slope = normal @ slide.ways
+    ends = np.minimum(slope * slide.asked_low, slope * slide.asked_high)
+    if not float(ends.sum()) >= -NOTHING_UM:
+        return False
+    farther = np.maximum(slope * slide.asked_low, slope * slide.asked_high)
+    return gap_um > 0.0 or float(farther.sum()) > NOTHING_UM
+
+
+def _mix(one: _Bound, other: _Bound, half: Floats) -> _Bound:
+    """Return the best of the bounds that lie between two."""
+    slopes = np.outer(1.0 - _SHARES, one.slope) + np.outer(_SHARES, other.slope)
+    values = (1.0 - _SHARES) * one.value + _SHARES * other.value
+    best = int(np.argmax(values - np.abs(slopes) @ half))
+    return _Bound(float(values[best]), slopes[best])
+
+
+def _next_place(best: _Bound | None, newest: _Bound, half: Floats, at: Floats) -> Floats:
+    """Return where to measure next: where what is known so far allows the smallest gap."""
+    there = newest.corner(half, at)
+    if best is None:
+        return there
+    here = best.corner(half, at)
+    # Along the line between both corners, one bound rises while the other falls.
+    lead_here = (newest.value + newest.slope @ here) - (best.value + best.slope @ here)
+    lead_there = (newest.value + newest.slope @ there) - (best.value + best.slope @ there)
+    if not lead_here * lead_there < 0.0:
+        return np.asarray((there + at) / 2.0 if np.array_equal(there, at) else there)
+    share = lead_here / (lead_here - lead_there)
+    return np.asarray(here + share * (there - here))
+
+
+def _by_hull(slide: Slide, margin_um: float, closest: Floats) -> Finding:
+    """Measure once, from the first piece to all that the second sweeps."""
+    used = slide.half > 0.0
+    signs = np.array(list(product((-1.0, 1.0), repeat=int(used.sum()))))
+    corners = (signs * slide.half[used]) @ slide.ways[:, used].T
+    slide.second.put(slide.rotation, slide.place_um)
+    found = separation(slide.first, slide.second.swept(corners))
+    clear = found.gap_um > margin_um
+    return Finding(clear=clear, at=None if clear else closest, normal=np.array(found.normal))
