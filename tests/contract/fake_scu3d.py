@@ -17,7 +17,7 @@ OK, NOT_INITIALIZED, NO_DEVICES, BAD_DEVICE, BAD_CHANNEL = 0, 2, 3, 5, 6
 BAD_PARAMETER, WRONG_MODE, LIST_TOO_SMALL, ALREADY_ADDED, NOT_FOUND = 9, 13, 17, 18, 19
 NO_SENSOR, WRONG_TYPE, OVERRIDDEN = 130, 131, 133
 NOTHING, ERROR, POSITION, ANGLE, COMPLETED, STATUS = 0, 1, 2, 3, 4, 5
-SENSOR_TYPE, SENSOR_PRESENT, KNOWN = 7, 8, 13
+SENSOR_TYPE, SENSOR_PRESENT, SAFE_DIRECTION, KNOWN = 7, 8, 11, 13
 STOPPED, HOLDING = 0, 4
 LINEAR_TYPE, ROTARY_TYPE, NO_TYPE = 21, 19, 0
 
@@ -111,6 +111,7 @@ class FakeScu3d:
             "SA_GetSensorPresent_A": ([], self._sensor_present),
             "SA_GetSensorType_A": ([], self._sensor_type),
             "SA_GetPhysicalPositionKnown_A": ([], self._position_known),
+            "SA_GetSafeDirection_A": ([], self._get_safe_direction),
             "SA_GetPosition_A": ([], self._get_position),
             "SA_GetAngle_A": ([], self._get_angle),
             "SA_GetStatus_A": ([], self._get_status),
@@ -227,6 +228,10 @@ class FakeScu3d:
 
     def _position_known(self, device: int, channel: int) -> int:
         self.push(device, KNOWN, channel, int(self.opened[device][channel].known))
+        return OK
+
+    def _get_safe_direction(self, device: int, channel: int) -> int:
+        self.push(device, SAFE_DIRECTION, channel, 0)
         return OK
 
     def _get_status(self, device: int, channel: int) -> int:

@@ -19,6 +19,7 @@ from cosmic.mico.hw.interface import (
     PositionerKind,
     PositionKnownRead,
     PositionRead,
+    SafeDirectionRead,
     SensorPresentRead,
     TypeRead,
 )
@@ -235,6 +236,11 @@ def test_a_referenced_positioner_knows_its_position(rig: Rig) -> None:
     rig.event(Completed, LINEAR)
     rig.controller.ask_position_known(LINEAR)
     assert rig.event(PositionKnownRead, LINEAR).known
+
+
+def test_a_channel_tells_which_way_it_looks_for_its_reference(rig: Rig) -> None:
+    rig.controller.ask_safe_direction(LINEAR)
+    assert rig.event(SafeDirectionRead, LINEAR).direction is Direction.BACKWARD
 
 
 def test_the_end_stops_are_found_in_both_directions(rig: Rig) -> None:

@@ -29,11 +29,14 @@ class AtPowerUp:
         The sensor was calibrated when the stage was mounted.
     scale : float
         Offset in the controller's memory: the position at its reference, in the stage's unit.
+    safe_forward : bool
+        The reference is looked for forward, not backward.
     """
 
     known: bool
     calibrated: bool
     scale: float
+    safe_forward: bool = False
 
 
 class Scene:
@@ -89,10 +92,16 @@ class Scene:
         at_power_up: dict[str, AtPowerUp] = {}
         for name, place in settings.stages.items():
             kind = settings.kinds[place.kind]
-            start = _somewhere(kind, name, seed) if cold else place.start
+            start = _somewhere(place.at_power_up(kind), name, seed) if cold else place.start
             stages[name] = Stage(name, kind, start=start, seed=seed)
             known = kind.sensor and not cold
-            at_power_up[name] = AtPowerUp(known=known, calibrated=True, scale=kind.low)
+            forward = place.safe_direction == "forward"
+            at_power_up[name] = AtPowerUp(
+                known=known,
+                calibrated=True,
+                scale=kind.high if forward else kind.low,
+                safe_forward=forward,
+            )
         wiring = tuple(tuple(name or None for name in d.channels) for d in settings.devices)
         return cls(
             settings, clock, seed=seed, stages=stages, wiring=wiring, at_power_up=at_power_up
@@ -133,7 +142,8 @@ class Scene:
             for name, letter in zip(names, letters, strict=True):
                 kind = _kind(settings, _KIND_OF_LETTER[letter])
                 middle = (kind.low + kind.high) / 2.0
-                start = _somewhere(kind, name, seed) if cold else middle
+                region = kind.power_up_low, kind.power_up_high
+                start = _somewhere(region, name, seed) if cold else middle
                 stages[name] = Stage(name, kind, start=start, seed=seed)
                 at_power_up[name] = AtPowerUp(
                     known=kind.sensor and not cold, calibrated=True, scale=0.0 if cold else kind.low
@@ -177,9 +187,9 @@ def _kind(settings: TwinSettings, name: str) -> StageKind:
     return settings.kinds[name]
 
 
-def _somewhere(kind: StageKind, name: str, seed: int) -> float:
+def _somewhere(region: tuple[float, float], name: str, seed: int) -> float:
     """Return a place where nobody left the stage on purpose: never the middle."""
-    low, high = kind.power_up_low, kind.power_up_high
+    low, high = region
     chance = random.Random(f"power-up {name} {seed}")
     part = chance.uniform(0.0, 0.4) if chance.random() < 0.5 else chance.uniform(0.6, 1.0)
     return low + part * (high - low)

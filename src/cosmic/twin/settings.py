@@ -1,7 +1,7 @@
 """Constants of the twin, as config/twin.toml states them."""
 
 from functools import cache
-from typing import Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -57,10 +57,26 @@ class StageKind(StrictModel):
 
 
 class StagePlace(StrictModel):
-    """One stage of the platform: its kind and where it stands when found warm."""
+    """One stage of the platform: its kind and where it stands when found warm.
+
+    Attributes
+    ----------
+    safe_direction : str
+        Which way it looks for its reference, as the controller's memory has it.
+    power_up_low, power_up_high : float or None
+        Where it may stand at power-up, when that differs from others of its kind.
+    """
 
     kind: str
     start: float
+    safe_direction: Literal["backward", "forward"] = "backward"
+    power_up_low: float | None = None
+    power_up_high: float | None = None
+
+    def at_power_up(self, kind: StageKind) -> tuple[float, float]:
+        """Return where it may stand at power-up, in its unit."""
+        low = kind.power_up_low if self.power_up_low is None else self.power_up_low
+        return low, kind.power_up_high if self.power_up_high is None else self.power_up_high
 
 
 class ControllerSettings(StrictModel):
@@ -121,6 +137,11 @@ class TwinSettings(StrictModel):
                 raise ValueError(
                     f"stage {name} starts at {place.start} {kind.unit}, "
                     f"outside its travel {kind.low} to {kind.high}"
+                )
+            low, high = place.at_power_up(kind)
+            if not kind.low <= low <= high <= kind.high:
+                raise ValueError(
+                    f"stage {name}: power_up_low and power_up_high must rise inside its travel"
                 )
         wired = [name for device in self.devices for name in device.channels if name]
         for name in wired:

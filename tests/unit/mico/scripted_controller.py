@@ -13,6 +13,7 @@ from cosmic.mico.hw.interface import (
     Completed,
     Controller,
     DeviceIdentity,
+    Direction,
     Event,
     Failed,
     PositionerKind,
@@ -20,6 +21,7 @@ from cosmic.mico.hw.interface import (
     PositionKnownRead,
     PositionRead,
     ReferenceKind,
+    SafeDirectionRead,
     SensorPresentRead,
     TypeRead,
 )
@@ -98,6 +100,9 @@ class ScriptedController(Controller):
 
     def ask_position_known(self, channel: Channel) -> None:
         self.emit(PositionKnownRead(channel, self.known))
+
+    def ask_safe_direction(self, channel: Channel) -> None:
+        self.emit(SafeDirectionRead(channel, Direction.BACKWARD))
 
     def ask_position(self, channel: Channel, unit: str) -> None:
         if self.broken:

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosmic.frame.verdict import ALLOWED, Reason, refuse
+from cosmic.mico.core.collision.answer import AxisSpan
 from cosmic.mico.core.collision.checker import NoCollisionModel
 from cosmic.mico.core.gate import Gate, Picture, Request, judge
 from cosmic.mico.core.lease import Lease
@@ -14,7 +15,14 @@ from cosmic.mico.core.orders import Calibrate, Interval, MoveBy, MoveTo, Referen
 from cosmic.mico.core.positioner import Confidence, PositionerState
 from cosmic.mico.core.rules import Limits
 from cosmic.mico.core.stop_latch import StopLatch
-from cosmic.mico.hw.interface import Channel, PositionerKind
+from cosmic.mico.hw.interface import (
+    Activity,
+    Channel,
+    Direction,
+    PositionerKind,
+    PositionerType,
+    ReferenceKind,
+)
 
 RULES = Limits(largest_step={"um": 3.0, "deg": 0.05}, stale_s=5.0)
 
@@ -131,16 +139,90 @@ def test_the_collision_check_sees_what_moves_what_is_in_flight_and_what_rests():
         checker=checker,
     )
     assert checker.swept == {
-        "x": Interval(0.0, 50.0),
-        "y": Interval(7.0, 7.0),
-        "z": Interval(1.0, 9.0),
+        "x": AxisSpan(0.0, 50.0, 0.0, moving=True),
+        "y": AxisSpan(7.0, 7.0, 7.0),
+        "z": AxisSpan(1.0, 9.0, 1.0, moving=True),
     }
+
+
+@pytest.mark.parametrize(
+    "unsure",
+    [
+        {"present": False},
+        {"read_wall_s": 100.0 - 2 * RULES.stale_s},
+        {"activity": Activity.TARGETING},
+        {"confidence": Confidence.UNKNOWN},
+        {"position": None},
+    ],
+)
+def test_an_axis_that_is_not_seen_to_stand_somewhere_may_be_anywhere(unsure):
+    checker = Records()
+    ask(MoveTo(50.0, "um"), linear(), linear(name="y", **unsure), checker=checker)
+    span = checker.swept["y"]
+    assert (span.low, span.high, span.now) == (-math.inf, math.inf, None)
+
+
+def test_a_counted_position_is_told_as_estimated():
+    checker = Records()
+    gripper = linear(name="g", kind=PositionerKind.OPEN_LOOP, confidence=Confidence.ESTIMATED)
+    ask(MoveTo(50.0, "um"), linear(), gripper, checker=checker)
+    assert checker.swept["g"] == AxisSpan(0.0, 0.0, 0.0, estimated=True)
+
+
+def test_an_unknown_axis_is_taken_to_stand_in_its_start_region():
+    checker = Records()
+    regions = {"y": Interval(-20.0, 30.0)}
+    lost = linear(name="y", confidence=Confidence.UNKNOWN)
+    ask(MoveTo(50.0, "um"), linear(), lost, checker=checker, regions=regions)
+    assert checker.swept["y"] == AxisSpan(-20.0, 30.0, None)
+
+
+@pytest.mark.parametrize(
+    ("direction", "low", "high"),
+    [
+        (Direction.FORWARD, -20.0, math.inf),
+        (Direction.BACKWARD, -math.inf, 30.0),
+        (None, -math.inf, math.inf),
+    ],
+)
+def test_a_reference_run_to_an_end_stop_sweeps_towards_that_stop(direction, low, high):
+    checker = Records()
+    found = PositionerType(1, "linear", PositionerKind.LINEAR, ReferenceKind.END_STOP)
+    lost = linear(
+        confidence=Confidence.UNKNOWN, positioner=found, safe_direction=direction, position=5.0
+    )
+    regions = {"x": Interval(-20.0, 30.0)}
+    assert ask(Reference(), lost, consent=True, checker=checker, regions=regions).verdict.allowed
+    assert checker.swept["x"] == AxisSpan(low, high, None, moving=True)
+
+
+def test_an_unknown_axis_may_be_wherever_it_was_driven_since():
+    state = linear(confidence=Confidence.UNKNOWN, read_wall_s=math.inf)
+    checker = Records()
+    one = gate(checker, states={"x": state}, regions={"x": Interval(-20.0, 30.0)})
+    token = one._lease.holder.token
+    for _ in range(2):
+        verdict, grants = one.decide([Request("x", MoveBy(10.0, "um"), token, consent=True)])
+        assert verdict.allowed
+        one.release(grants["x"])
+    assert checker.swept["x"] == AxisSpan(-20.0, 50.0, None, moving=True)
+
+
+def test_a_movement_that_goes_on_remembers_where_it_began():
+    states = {"x": linear(read_wall_s=math.inf)}
+    checker = Records()
+    one = gate(checker, states=states)
+    token = one._lease.holder.token
+    one.decide([Request("x", MoveTo(50.0, "um"), token)])
+    states["x"] = linear(read_wall_s=math.inf, position=20.0)
+    one.decide([Request("x", MoveTo(60.0, "um"), token)])
+    assert checker.swept["x"] == AxisSpan(0.0, 60.0, 0.0, moving=True)
 
 
 def test_a_sweep_takes_the_whole_travel():
     checker = Records()
     ask(Reference(), checker=checker)
-    assert checker.swept["x"] == Interval(-math.inf, math.inf)
+    assert checker.swept["x"] == AxisSpan(-math.inf, math.inf, 0.0, moving=True)
 
 
 @given(
@@ -166,7 +248,7 @@ def test_steps_that_are_allowed_cannot_leave_the_limits(steps, position):
         assert abs(steps) < 30000
 
 
-def gate(checker=None, latch=None, states=None):
+def gate(checker=None, latch=None, states=None, regions=None):
     states = states or {"x": linear(read_wall_s=math.inf)}
     return Gate(
         latch=latch or StopLatch(),
@@ -174,6 +256,7 @@ def gate(checker=None, latch=None, states=None):
         checker=checker or NoCollisionModel(),
         rules=RULES,
         states=lambda: states,
+        regions=regions,
     )
 
 

@@ -24,6 +24,7 @@ from cosmic.mico.hw.interface import (
     PositionerType,
     PositionKnownRead,
     PositionRead,
+    SafeDirectionRead,
     SensorPresentRead,
     TypeRead,
 )
@@ -240,6 +241,8 @@ def _reflect(event: Event, positioner: PositionerBase) -> PositionerState:
         case PositionKnownRead():
             known = Confidence.KNOWN if event.known else Confidence.UNKNOWN
             return positioner.update(confidence=known)
+        case SafeDirectionRead():
+            return positioner.update(safe_direction=event.direction)
         case Failed() if event.error.fault in _LOST_POSITION and positioner.has_sensor:
             return positioner.update(confidence=Confidence.UNKNOWN)
         case _:

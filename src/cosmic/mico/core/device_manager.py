@@ -29,7 +29,7 @@ from cosmic.mico.core.introduction import CHANNELS
 from cosmic.mico.core.lease import Lease
 from cosmic.mico.core.messages import DeviceLost
 from cosmic.mico.core.numbering import library_indices, serials_to_open
-from cosmic.mico.core.orders import Motion, Order
+from cosmic.mico.core.orders import Interval, Motion, Order
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.core.rules import Limits
 from cosmic.mico.core.settings import MicoSettings
@@ -99,6 +99,11 @@ class DeviceManager(QObject):
             checker=checker or NoCollisionModel(),
             rules=Limits(largest_step=steps, stale_s=settings.watch.stale_s),
             states=self.states,
+            regions={
+                each.name: Interval(*each.start_region)
+                for each in settings.positioner
+                if each.start_region is not None
+            },
         )
         self._arrange({})
 
@@ -189,6 +194,7 @@ class DeviceManager(QObject):
                     f"{', '.join(stuck)} still hangs in the library; start the program again"
                 )
             self._set_mode(Mode.INITIALISATION)
+            self.gate.checker.start()
             try:
                 wanted = self.settings.serials
                 identities = self.controller.open(serials_to_open(self.controller, wanted))
@@ -307,6 +313,7 @@ class DeviceManager(QObject):
         """Shut down for good: nothing opens the hardware again; any mode."""
         self._closed = True
         self.shut_down()
+        self.gate.checker.close()
 
     def rescan(self) -> None:
         """Close everything and look again for the hardware; raises as `initialize_devices`.

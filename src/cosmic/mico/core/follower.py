@@ -174,6 +174,14 @@ class ChannelFollower:
                 raise
             self._on_known(PositionKnownRead(self._address, known=self._found(self.flight)))
 
+    def ask_safe_direction(self) -> None:
+        """Ask which way a search for the reference goes; where unknown, it may go both."""
+        try:
+            self._context.controller.ask_safe_direction(self._address)
+        except DeviceError as exc:
+            if exc.fault is not DeviceFault.UNSUPPORTED:
+                raise
+
     def take(self, event: Event) -> None:
         """Follow one event of this channel."""
         match event:

@@ -2,19 +2,21 @@
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from itertools import count
 from threading import Lock
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.mico.core.collision.answer import AxisSpan
 from cosmic.mico.core.collision.checker import CollisionChecker
 from cosmic.mico.core.lease import Lease
 from cosmic.mico.core.orders import Grant, Interval, Motion
 from cosmic.mico.core.positioner import Confidence, PositionerState
 from cosmic.mico.core.rules import EVERYWHERE, Limits, check_axis, planned_target, swept_interval
 from cosmic.mico.core.stop_latch import StopLatch, StopState
+from cosmic.mico.hw.interface import PositionerKind
 
 logger = logging.getLogger(__name__)
 
@@ -31,7 +33,17 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """What the pure part of the gate looks at: the platform at one moment."""
+    """What the pure part of the gate looks at: the platform at one moment.
+
+    Attributes
+    ----------
+    held : mapping of Interval
+        What axes in flight may sweep.
+    begun_at : mapping of (float or None)
+        Where axes in flight stood before; None where that was not known.
+    regions : mapping of Interval
+        Where axes may be whose position is unknown.
+    """
 
     stop_reason: str | None
     token: str
@@ -40,6 +52,19 @@ class Picture:
     targets: Mapping[str, float]
     now_wall_s: float
     rules: Limits
+    begun_at: Mapping[str, float | None] = field(default_factory=dict)
+    regions: Mapping[str, Interval] = field(default_factory=dict)
+
+    def place(self, state: PositionerState) -> Interval:
+        """Return where an axis may be, if nobody moves it."""
+        place = self.held.get(state.name)
+        if state.confidence is Confidence.UNKNOWN:
+            region = self.regions.get(state.name, EVERYWHERE)
+            return region if place is None else region.hull(place)
+        if state.position is None:
+            return EVERYWHERE
+        here = Interval(state.position, state.position)
+        return here if place is None else here.hull(place)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +88,9 @@ def judge(requests: Sequence[Request], picture: Picture, checker: CollisionCheck
         target = planned_target(request.motion, state, picture.targets.get(request.axis))
         if target is not None:
             targets[request.axis] = target
+        place = picture.place(state)
         intervals[request.axis] = swept_interval(
-            request.motion, state, target, picture.held.get(request.axis), picture.rules
+            request.motion, state, target, place, picture.rules
         )
     verdict = _clear_of_everything(intervals, picture, checker)
     return Decision(verdict, intervals if verdict.allowed else {}, targets)
@@ -99,11 +125,11 @@ def _first_refusal(request: Request, picture: Picture) -> MoveVerdict | None:
 def _clear_of_everything(
     intervals: Mapping[str, Interval], picture: Picture, checker: CollisionChecker
 ) -> MoveVerdict:
-    swept = {name: _resting_place(state) for name, state in picture.states.items()}
-    swept.update(picture.held)
-    swept.update(intervals)
+    spans = {
+        name: _span(state, intervals.get(name), picture) for name, state in picture.states.items()
+    }
     try:
-        verdict = checker.check(swept)
+        verdict = checker.check(spans)
     except Exception:  # a check that cannot answer says no
         logger.exception("the collision check failed")
         return refuse(
@@ -112,18 +138,34 @@ def _clear_of_everything(
     return verdict
 
 
-def _resting_place(state: PositionerState) -> Interval:
-    """Return where an axis without a movement of ours may be."""
-    placed = state.present and state.confidence is not Confidence.UNKNOWN
-    if state.position is None or not placed or not state.activity.at_rest:
-        return EVERYWHERE
-    return Interval(state.position, state.position)
+def _span(state: PositionerState, asked: Interval | None, picture: Picture) -> AxisSpan:
+    """Return where an axis may be from now on, for the collision model."""
+    moving = asked is not None or state.name in picture.held
+    sensed = state.kind is not PositionerKind.OPEN_LOOP
+    fresh = not sensed or picture.now_wall_s - state.read_wall_s <= picture.rules.stale_s
+    sure = state.present and fresh and (moving or state.activity.at_rest)
+    place = asked or (picture.place(state) if sure else EVERYWHERE)
+    return AxisSpan(
+        place.low,
+        place.high,
+        origin(state, picture.begun_at) if sure else None,
+        moving=moving,
+        estimated=state.confidence is Confidence.ESTIMATED,
+    )
+
+
+def origin(state: PositionerState, begun_at: Mapping[str, float | None]) -> float | None:
+    """Return where an axis stands, or stood before its movement began; None where unknown."""
+    if state.confidence is Confidence.UNKNOWN:
+        return None
+    return begun_at.get(state.name, state.position)
 
 
 @dataclass(frozen=True, slots=True)
 class _Hold:
     interval: Interval
     target: float | None
+    begun_at: float | None
 
 
 class Gate:
@@ -133,6 +175,8 @@ class Gate:
     ----------
     states : callable
         Returns the state of every positioner by name.
+    regions : mapping of Interval
+        Where each axis may stand at power-up; anywhere, where it has none.
     """
 
     def __init__(
@@ -143,6 +187,7 @@ class Gate:
         checker: CollisionChecker,
         rules: Limits,
         states: Callable[[], Mapping[str, PositionerState]],
+        regions: Mapping[str, Interval] | None = None,
     ) -> None:
         self._latch = latch
         self._lease = lease
@@ -152,6 +197,8 @@ class Gate:
         self._lock = Lock()
         self._numbers = count(1)
         self._holds: dict[str, dict[int, _Hold]] = {}
+        self._power_up = dict(regions or {})
+        self._regions = dict(self._power_up)
 
     @property
     def checker(self) -> CollisionChecker:
@@ -167,12 +214,17 @@ class Gate:
         """Decide `requests` together; when allowed, hold their intervals and grant each axis."""
         with self._lock:
             epoch = self._latch.state.epoch
-            decision = judge(requests, self._picture(), self._checker)
+            picture = self._picture()
+            decision = judge(requests, picture, self._checker)
             grants: dict[str, Grant] = {}
             for axis, interval in decision.intervals.items():
                 target = decision.targets.get(axis)
                 grant = Grant(axis, next(self._numbers), epoch, target)
-                self._holds.setdefault(axis, {})[grant.number] = _Hold(interval, target)
+                state = picture.states[axis]
+                if state.confidence is Confidence.UNKNOWN:
+                    self._regions[axis] = interval  # wherever that ends, it is somewhere there
+                hold = _Hold(interval, target, origin(state, picture.begun_at))
+                self._holds.setdefault(axis, {})[grant.number] = hold
                 grants[axis] = grant
             return decision.verdict, grants
 
@@ -194,7 +246,7 @@ class Gate:
         with self._lock:
             hold = self._holds.get(grant.axis, {}).get(grant.number)
             if hold is not None:
-                self._holds[grant.axis][grant.number] = _Hold(hold.interval, None)
+                self._holds[grant.axis][grant.number] = replace(hold, target=None)
 
     def release_axis(self, axis: str) -> None:
         """Give back all of an axis that stands and whose position has just been read."""
@@ -222,12 +274,27 @@ class Gate:
         newest = {axis: holds[max(holds)] for axis, holds in self._holds.items() if holds}
         return {axis: hold.target for axis, hold in newest.items() if hold.target is not None}
 
+    def _begun_at(self) -> dict[str, float | None]:
+        return {axis: holds[min(holds)].begun_at for axis, holds in self._holds.items() if holds}
+
+    def _regions_now(self, states: Mapping[str, PositionerState]) -> dict[str, Interval]:
+        """Return where axes may be that nobody knows, or would be, were their position lost."""
+        for name, state in states.items():
+            known = state.present and state.confidence is not Confidence.UNKNOWN
+            if known and state.position is not None and name in self._power_up:
+                here = Interval(state.position, state.position)
+                self._regions[name] = self._power_up[name].hull(here)
+        return dict(self._regions)
+
     def _picture(self) -> Picture:
+        states = self._states()
         return Picture(
             stop_reason=self._latch.state.reason,
             token=self._lease.holder.token,
-            states=self._states(),
+            states=states,
             held=self._held(),
+            begun_at=self._begun_at(),
+            regions=self._regions_now(states),
             targets=self._targets(),
             now_wall_s=WALL.now_s(),
             rules=self._rules,

@@ -7,7 +7,13 @@ from typing import Final
 from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.mico.core.flight import PilotContext
 from cosmic.mico.core.pilot import ChannelPilot
-from cosmic.mico.hw.interface import Event, PositionerKind, SensorPresentRead, TypeRead
+from cosmic.mico.hw.interface import (
+    Event,
+    PositionerKind,
+    ReferenceKind,
+    SensorPresentRead,
+    TypeRead,
+)
 
 logger = logging.getLogger(__name__)
 
@@ -75,6 +81,9 @@ class Introduction:
             usual_hz = self._context.settings.defaults.closed_loop_frequency_hz
             pilot.set_frequency(positioner.frequency_hz or usual_hz)
             pilot.ask_position_known()
+            found = positioner.state.positioner
+            if found is not None and found.reference is ReferenceKind.END_STOP:
+                pilot.ask_safe_direction()
         pilot.ask_activity()
         pilot.ask_position()
 

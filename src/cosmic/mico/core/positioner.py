@@ -20,7 +20,14 @@ from cosmic.mico.core.orders import (
     ToEndStop,
 )
 from cosmic.mico.core.settings import PositionerSettings
-from cosmic.mico.hw.interface import Activity, Channel, Controller, PositionerKind, PositionerType
+from cosmic.mico.hw.interface import (
+    Activity,
+    Channel,
+    Controller,
+    Direction,
+    PositionerKind,
+    PositionerType,
+)
 
 
 class Confidence(StrEnum):
@@ -62,6 +69,8 @@ class PositionerState:
         What is wrong with it, empty when nothing is.
     present : bool
         Its device answers.
+    safe_direction : Direction or None
+        Which way a search for the reference begins; None where the controller has not told.
     """
 
     name: str
@@ -78,6 +87,7 @@ class PositionerState:
     in_motion: bool = False
     error: str = ""
     present: bool = True
+    safe_direction: Direction | None = None
 
     @property
     def status(self) -> Status:

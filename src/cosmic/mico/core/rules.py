@@ -17,11 +17,12 @@ from cosmic.mico.core.orders import (
     Motion,
     MoveBy,
     MoveTo,
+    Reference,
     Step,
     ToEndStop,
 )
 from cosmic.mico.core.positioner import Confidence, PositionerState, class_for
-from cosmic.mico.hw.interface import Direction, PositionerKind
+from cosmic.mico.hw.interface import Direction, PositionerKind, ReferenceKind
 
 ROUNDING: Final = 1e-6
 """What adding and taking away a user's zero may cost a limit that is shown and typed again."""
@@ -87,21 +88,48 @@ def swept_interval(
     motion: Motion,
     state: PositionerState,
     target: float | None,
-    held: Interval | None,
+    place: Interval,
     rules: Limits,
 ) -> Interval:
-    """Return all places the movement can take the axis to, whatever is interrupted when."""
+    """Return all places the movement can take the axis to, whatever is interrupted when.
+
+    Parameters
+    ----------
+    place : Interval
+        Where the axis may be now: where it stands, what it may have swept already, or, while its
+        position is unknown, anywhere it can be.
+    """
     if state.position is None:
         return EVERYWHERE
-    start = Interval(state.position, state.position)
-    if held is not None:
-        start = start.hull(held)
     if target is not None:
-        return start.hull(Interval(target, target))
-    if isinstance(motion, Step):
-        reach = motion.steps * rules.largest_step[state.unit]
-        return start.hull(Interval(start.low + min(reach, 0.0), start.high + max(reach, 0.0)))
+        if state.confidence is not Confidence.UNKNOWN:
+            return place.hull(Interval(target, target))
+        # The counter is somewhere; what it will count is known.
+        return _extended(place, target - state.position)
+    match motion:
+        case Step():
+            return _extended(place, motion.steps * rules.largest_step[state.unit])
+        case ToEndStop():
+            return _to_the_stop(place, motion.direction)
+        case Reference():
+            found = state.positioner
+            if found is not None and found.reference is ReferenceKind.END_STOP:
+                return _to_the_stop(place, state.safe_direction)
     return EVERYWHERE
+
+
+def _extended(place: Interval, way: float) -> Interval:
+    return Interval(place.low + min(way, 0.0), place.high + max(way, 0.0))
+
+
+def _to_the_stop(place: Interval, direction: Direction | None) -> Interval:
+    match direction:
+        case Direction.FORWARD:
+            return Interval(place.low, math.inf)
+        case Direction.BACKWARD:
+            return Interval(-math.inf, place.high)
+        case None:
+            return EVERYWHERE
 
 
 def malformed(motion: Motion, state: PositionerState) -> MoveVerdict | None:
@@ -234,7 +262,11 @@ def _limit(
     if target is None:
         if not isinstance(motion, Step):
             return None
-        swept = swept_interval(motion, state, None, held, rules)
+        stands = 0.0 if state.position is None else state.position
+        place = Interval(stands, stands)
+        if held is not None:
+            place = place.hull(held)
+        swept = swept_interval(motion, state, None, place, rules)
         target = swept.high if motion.steps > 0 else swept.low
     if low - ROUNDING <= target <= high + ROUNDING or _returns(state, target, held):
         return None

@@ -77,6 +77,8 @@ class PositionerSettings(StrictModel):
     limits_deg: Range | None = None
     start_um: float | None = None
     start_deg: float | None = None
+    start_region_um: Range | None = None
+    start_region_deg: Range | None = None
     step_um: Annotated[float, Field(gt=0)] | None = None
     forward_text: Text = "+"
     backward_text: Text = "-"
@@ -108,20 +110,28 @@ class PositionerSettings(StrictModel):
         """Start pose in `unit`, None where it has none."""
         return self.start_deg if self.kind == "rotary" else self.start_um
 
+    @property
+    def start_region(self) -> tuple[float, float] | None:
+        """Where it may stand at power-up, in `unit`; None: anywhere in its travel."""
+        return self.start_region_deg if self.kind == "rotary" else self.start_region_um
+
     @model_validator(mode="after")
     def _units_fit(self) -> Self:
         allowed = {
-            "linear": {"limits_um", "start_um"},
-            "rotary": {"limits_deg", "start_deg"},
+            "linear": {"limits_um", "start_um", "start_region_um"},
+            "rotary": {"limits_deg", "start_deg", "start_region_deg"},
             "open-loop": {"start_um", "step_um"},
         }[self.kind]
-        for key in ("limits_um", "limits_deg", "start_um", "start_deg", "step_um"):
+        regions = "start_region_um", "start_region_deg"
+        for key in ("limits_um", "limits_deg", "start_um", "start_deg", "step_um", *regions):
             if getattr(self, key) is not None and key not in allowed:
                 raise ValueError(f"{self.name}: {key} does not fit, the axis is {self.kind}")
         if self.kind != "open-loop" and self.limits is None:
             raise ValueError(f"{self.name}: limits_{self.unit} is missing, the axis is {self.kind}")
         if self.limits and not self.limits[0] < self.limits[1]:
             raise ValueError(f"{self.name}: limits must be (low, high) with low < high")
+        if self.start_region and not self.start_region[0] <= self.start_region[1]:
+            raise ValueError(f"{self.name}: start_region must be (low, high) with low <= high")
         if self.limits and self.start is not None:
             low, high = self.limits
             if not low <= self.start <= high:

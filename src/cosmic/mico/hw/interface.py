@@ -170,6 +170,14 @@ class PositionKnownRead:
 
 
 @dataclass(frozen=True, slots=True)
+class SafeDirectionRead:
+    """Answer to `ask_safe_direction`: where a search for the reference begins."""
+
+    channel: Channel
+    direction: Direction
+
+
+@dataclass(frozen=True, slots=True)
 class OtherAnswer:
     """An answer that MiCo did not ask for and does not need; kept for the log."""
 
@@ -185,6 +193,7 @@ Event = (
     | SensorPresentRead
     | TypeRead
     | PositionKnownRead
+    | SafeDirectionRead
     | OtherAnswer
 )
 
@@ -259,6 +268,13 @@ class Controller(Protocol):
     @abstractmethod
     def ask_position_known(self, channel: Channel) -> None:
         """Ask whether the position is referenced; `DeviceFault.UNSUPPORTED` on old libraries."""
+
+    @abstractmethod
+    def ask_safe_direction(self, channel: Channel) -> None:
+        """Ask which way a search for the reference begins; `DeviceFault.UNSUPPORTED` if it can't.
+
+        A positioner that is referenced at an end stop goes that way only.
+        """
 
     @abstractmethod
     def ask_position(self, channel: Channel, unit: AxisUnit) -> None:

@@ -154,6 +154,10 @@ class Scu3dController(Controller):
         self._send(channel, "SA_GetPhysicalPositionKnown_A")
 
     @override
+    def ask_safe_direction(self, channel: Channel) -> None:
+        self._send(channel, "SA_GetSafeDirection_A")
+
+    @override
     def ask_position(self, channel: Channel, unit: AxisUnit) -> None:
         self._send(channel, "SA_GetPosition_A" if unit == "um" else "SA_GetAngle_A")
 

@@ -8,11 +8,13 @@ from cosmic.mico.hw.interface import (
     ActivityRead,
     Channel,
     Completed,
+    Direction,
     Event,
     Failed,
     OtherAnswer,
     PositionKnownRead,
     PositionRead,
+    SafeDirectionRead,
     SensorPresentRead,
     TypeRead,
 )
@@ -28,6 +30,10 @@ _ACTIVITIES: Final[dict[int, Activity]] = {
     sa.SA_HOLDING_STATUS: Activity.HOLDING,
     sa.SA_CALIBRATING_STATUS: Activity.CALIBRATING,
     sa.SA_MOVING_TO_REFERENCE_STATUS: Activity.REFERENCING,
+}
+_DIRECTIONS: Final = {
+    sa.SA_BACKWARD_DIRECTION: Direction.BACKWARD,
+    sa.SA_FORWARD_DIRECTION: Direction.FORWARD,
 }
 _OTHERS: Final[dict[int, str]] = {
     sa.SA_CLOSED_LOOP_FREQUENCY_PACKET_TYPE: "closed-loop frequency limit in Hz",
@@ -70,7 +76,7 @@ def event_from_packet(
             # Only the documented 1 counts: a doubtful position must not pass as known.
             return PositionKnownRead(at, known=value == sa.SA_PHYSICAL_POSITION_KNOWN)
         case _:
-            return _other(at, packet)
+            return _seldom(at, packet)
 
 
 def _failed(at: Channel, code: int, serial: int | None) -> Event:
@@ -84,7 +90,9 @@ def _failed(at: Channel, code: int, serial: int | None) -> Event:
     return Failed(at if channel is not None else None, error)
 
 
-def _other(at: Channel, packet: sa.SA_PACKET) -> OtherAnswer:
+def _seldom(at: Channel, packet: sa.SA_PACKET) -> SafeDirectionRead | OtherAnswer:
+    if packet.packetType == sa.SA_SAFE_DIRECTION_PACKET_TYPE and packet.data1 in _DIRECTIONS:
+        return SafeDirectionRead(at, _DIRECTIONS[packet.data1])
     what = _OTHERS.get(packet.packetType, f"packet of type {packet.packetType}")
     text = f"{what}: {packet.data1}, {packet.data2}, {packet.data3}"
     return OtherAnswer(at if at.channel < _NO_CHANNEL else None, text)

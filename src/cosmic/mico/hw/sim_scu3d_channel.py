@@ -75,7 +75,7 @@ class Channel:
         self._post = post
         # kept without power
         self.positioner_type = stage.kind.positioner_type
-        self.safe_direction = 0
+        self.safe_direction = int(memory.safe_forward)
         self.calibrated = memory.calibrated
         self.alignment = (0, 1000, 1000)
         self.default_frequency_hz = settings.closed_loop_frequency_hz
