@@ -1,0 +1,260 @@
+"""`GateProcess`: asks the gate's own process, and replaces it when it fails."""
+
+import logging
+from collections import deque
+from collections.abc import Iterator, Mapping, Set
+from contextlib import contextmanager
+from threading import Lock
+from typing import Final
+
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import CosmicError
+from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
+from cosmic.mico.core.collision.helper_spawn import (
+    HelperFaultError,
+    HelperProcess,
+    HelperRefusalError,
+    pickle_scene,
+)
+from cosmic.mico.core.collision.helper_wire import pack_spans
+from cosmic.mico.core.collision.model import BodyPair, SceneModel
+
+logger = logging.getLogger(__name__)
+
+MOST_FAILURES: Final = 5
+FAILURES_WITHIN_S: Final = 10.0
+_LOOK_S: Final = 0.02
+NOBODY: Final[frozenset[BodyPair]] = frozenset()
+
+
+class NoAnswerError(CosmicError):
+    """The collision gate gave no answer, so the answer is no; the text says why."""
+
+
+class GateProcess:
+    """The pure gate in a process of its own; any thread.
+
+    A process that dies, hangs or answers nonsense costs the question that met it a
+    `NoAnswerError` and is replaced at once; until the new one has loaded the scene, questions
+    are answered with `NoAnswerError` without waiting. After five failures within ten seconds it
+    stays down until `start` is called again.
+
+    Parameters
+    ----------
+    answer_s : float
+        How long to wait for an answer, in wall time.
+    start_s : float
+        How long the process may take to come up.
+    handlers : mapping of str
+        "module:function" by kind of question for `ask`; each function is called there with the
+        `Sweep` and the payload.
+    """
+
+    def __init__(
+        self,
+        model: SceneModel,
+        *,
+        answer_s: float = 1.0,
+        start_s: float = 15.0,
+        handlers: Mapping[str, str] | None = None,
+    ) -> None:
+        self._scene = pickle_scene(model)
+        self._answer_s = answer_s
+        self._start_s = start_s
+        self._handlers = dict(handlers or {})
+        self._lock = Lock()
+        self._helper: HelperProcess | None = None
+        self._down = "it was not started"
+        self._failures: deque[float] = deque(maxlen=MOST_FAILURES)
+        self._restarts = 0
+        self._closing = False
+
+    @property
+    def alive(self) -> bool:
+        """Whether it runs and has loaded the scene."""
+        helper = self._helper
+        return helper is not None and helper.ready and helper.running
+
+    @property
+    def pid(self) -> int | None:
+        """Number of the process, None while there is none."""
+        helper = self._helper
+        return None if helper is None else helper.pid
+
+    @property
+    def restarts(self) -> int:
+        """How often it was replaced."""
+        return self._restarts
+
+    # Start and end
+
+    def start(self) -> None:
+        """Start the process and wait until it can be asked; forgets earlier failures.
+
+        Raises
+        ------
+        NoAnswerError
+            It does not come up; questions are refused until this is called again.
+        """
+        with self._lock:
+            self._closing = False
+            self._down = ""
+            self._failures.clear()
+            if self._helper is not None and not self._helper.running:
+                self._end_helper()
+            if self._helper is None:
+                self._launch()
+        until_s = WALL.now_s() + self._start_s
+        while not self._came_up():
+            if WALL.now_s() > until_s:
+                with self._lock:
+                    self._stay_down(f"it did not come up within {self._start_s:g} s")
+                    raise NoAnswerError(self._down)
+
+    def _came_up(self) -> bool:
+        """Look a moment whether the process is ready, so that nobody waits for the lock long."""
+        with self._lock:
+            if self._down or self._helper is None:
+                raise NoAnswerError(self._down or "it could not be started")
+            try:
+                return self._helper.poll_ready(_LOOK_S)
+            except HelperFaultError as exc:
+                self._stay_down(str(exc))
+                raise NoAnswerError(self._down) from exc
+
+    def close(self) -> None:
+        """End the process, also under a question that waits; harmless the second time."""
+        self._closing = True
+        helper = self._helper
+        if helper is not None:
+            helper.kill()
+        with self._lock:
+            self._end_helper()
+            self._down = "it was closed"
+
+    # Questions
+
+    def check(self, spans: Spans, ignored: Set[BodyPair] = NOBODY) -> SweepAnswer:
+        """Ask `Sweep.check`.
+
+        Raises
+        ------
+        NoAnswerError
+            There is no answer.
+        """
+        answer = self.ask("check", (pack_spans(spans), ignored))
+        if not (isinstance(answer, SweepAnswer) and isinstance(answer.clear, bool)):
+            raise NoAnswerError("the answer to a check makes no sense")
+        return answer
+
+    def nearest(
+        self, positions: Mapping[str, float], ignored: Set[BodyPair] = NOBODY
+    ) -> Approach | None:
+        """Ask `Sweep.nearest`.
+
+        Raises
+        ------
+        NoAnswerError
+            There is no answer.
+        """
+        answer = self.ask("nearest", (dict(positions), ignored))
+        if not (answer is None or isinstance(answer, Approach)):
+            raise NoAnswerError("the answer about the nearest pair makes no sense")
+        return answer
+
+    def free_way(self, spans: Spans, axis: str, ignored: Set[BodyPair] = NOBODY) -> float | None:
+        """Return how far `axis` may go towards the refused end of its span, in its unit.
+
+        Raises
+        ------
+        NoAnswerError
+            There is no answer.
+        """
+        answer = self.ask("free_way", (pack_spans(spans), axis, ignored))
+        if not (answer is None or isinstance(answer, float)):
+            raise NoAnswerError("the answer about the free way makes no sense")
+        return answer
+
+    def ask(self, kind: str, payload: object, timeout_s: float | None = None) -> object:
+        """Put a question of any kind that the process knows and return the answer.
+
+        Raises
+        ------
+        NoAnswerError
+            There is no answer within `timeout_s` (`answer_s` unless told).
+        """
+        timeout_s = self._answer_s if timeout_s is None else timeout_s
+        with self._turn(timeout_s):
+            helper = self._usable()
+            try:
+                return helper.ask(kind, payload, timeout_s)
+            except HelperRefusalError as exc:
+                raise NoAnswerError(str(exc)) from exc
+            except HelperFaultError as exc:
+                self._replace(str(exc))
+                raise NoAnswerError(f"{exc}; {self._down or 'it is being restarted'}") from exc
+
+    @contextmanager
+    def _turn(self, timeout_s: float) -> Iterator[None]:
+        if not self._lock.acquire(timeout=timeout_s):
+            raise NoAnswerError(f"it was busy for {timeout_s:g} s")
+        try:
+            yield
+        finally:
+            self._lock.release()
+
+    # Replacing; all under the lock
+
+    def _usable(self) -> HelperProcess:
+        """Return the process if it can be asked now."""
+        if self._closing:
+            raise NoAnswerError("it was closed")
+        if self._down:
+            raise NoAnswerError(self._down)
+        if self._helper is None:
+            self._launch()
+        helper = self._helper
+        try:
+            if helper is not None and helper.poll_ready(0.0):
+                return helper
+            if helper is not None and WALL.now_s() - helper.began_s > self._start_s:
+                self._replace(f"it did not come up within {self._start_s:g} s")
+        except HelperFaultError as exc:
+            self._replace(str(exc))
+        raise NoAnswerError(self._down or "it is being restarted")
+
+    def _launch(self) -> None:
+        try:
+            self._helper = HelperProcess(self._scene, self._handlers)
+        except OSError as exc:
+            self._helper = None
+            logger.error("the collision gate's process cannot be started: %s", exc)
+            self._count_failure(f"cannot be started ({exc})")
+
+    def _replace(self, why: str) -> None:
+        """Put a new process in the place of one that failed, unless too many did."""
+        if self._closing:
+            self._down = "it was closed"
+            return
+        words = self._end_helper()
+        logger.warning("the collision gate's process failed: %s; it is replaced\n%s", why, words)
+        self._count_failure(why)
+        if not self._down:
+            self._restarts += 1
+            self._launch()
+
+    def _count_failure(self, why: str) -> None:
+        now_s = WALL.now_s()
+        self._failures.append(now_s)
+        full = len(self._failures) == MOST_FAILURES
+        if full and now_s - self._failures[0] <= FAILURES_WITHIN_S:
+            self._stay_down(f"it failed {MOST_FAILURES} times in a row, last because {why}")
+
+    def _stay_down(self, why: str) -> None:
+        words = self._end_helper()
+        self._down = f"{why}; it stays down until the devices are searched again"
+        logger.error("the collision gate's process is down: %s\n%s", self._down, words)
+
+    def _end_helper(self) -> str:
+        helper, self._helper = self._helper, None
+        return "" if helper is None else helper.end()
