@@ -1,21 +1,19 @@
 """`CollisionManager`: lets no two bodies come closer than their margin (thesis 6.1.2, Fig. 6.5)."""
 
 import logging
-from collections.abc import Callable, Iterable, Iterator, Mapping, Set
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import replace
-from threading import Lock
 from typing import Final, Protocol
 
 from typing_extensions import override
 
-from cosmic.frame.errors import NotAvailable, UnknownAxisError
-from cosmic.frame.listeners import tell
+from cosmic.frame.errors import NotAvailable
 from cosmic.frame.verdict import ALLOWED, MoveVerdict, Reason
 from cosmic.mico.core.collision import words
 from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
 from cosmic.mico.core.collision.callback import CollisionCallbackBase, RefuseContact, Response
 from cosmic.mico.core.collision.checker import CollisionChecker
+from cosmic.mico.core.collision.exemptions import Exemptions
 from cosmic.mico.core.collision.helper_link import GateProcess, NoAnswerError
 from cosmic.mico.core.collision.model import BodyPair, SceneModel, pair_of
 from cosmic.mico.core.collision.sweep import INSIDE_TEXT
@@ -46,7 +44,7 @@ class Answering(Protocol):
         """See `free_way`; raises `NoAnswerError`."""
 
 
-class CollisionManager(CollisionChecker):
+class CollisionManager(Exemptions, CollisionChecker):
     """Judges movements on the scene, in words for the operator; any thread.
 
     Parameters
@@ -67,15 +65,9 @@ class CollisionManager(CollisionChecker):
         process: Answering | None = None,
         axes: Iterable[str] = (),
     ) -> None:
+        super().__init__(model.contacts, tuple(axes) or model.axes)
         self.model = model
         self._process = process or GateProcess(model, answer_s=answer_s)
-        self._axes = tuple(axes) or model.axes
-        self._lock = Lock()
-        self._taken_out: frozenset[str] = frozenset()
-        self._allowed: frozenset[str] = frozenset()
-        self._uses: dict[str, list[object]] = {contact.name: [] for contact in model.contacts}
-        self._ignored = _NOBODY
-        self._listeners: tuple[Callable[[], object], ...] = ()
         self._callbacks: dict[BodyPair, CollisionCallbackBase] = {}
         self._default_callback: CollisionCallbackBase = RefuseContact()
 
@@ -117,10 +109,10 @@ class CollisionManager(CollisionChecker):
         NoAnswerError
             There is no answer.
         """
-        return self._process.nearest(positions, self._ignored)
+        return self._process.nearest(positions, self.ignored_pairs)
 
     def _with_freed(self, spans: Spans) -> Spans:
-        freed = self._taken_out
+        freed = self.taken_out
         if not freed:
             return spans
         return {
@@ -129,10 +121,10 @@ class CollisionManager(CollisionChecker):
         }
 
     def _judge(self, spans: Spans) -> MoveVerdict:
-        ignored = self._ignored
+        ignored = self.ignored_pairs
         while True:
             answer = self._process.check(spans, ignored)
-            if answer.clear:
+            if answer.clear is True:
                 return self._allow(spans)
             approach = answer.approach
             if approach is None:
@@ -144,7 +136,7 @@ class CollisionManager(CollisionChecker):
             ignored = ignored | {approach.bodies}
 
     def _allow(self, spans: Spans) -> MoveVerdict:
-        if not self._taken_out:
+        if not self.taken_out:
             return ALLOWED
         unwatched = [axis for axis, span in spans.items() if span.free and span.moving]
         if not unwatched:
@@ -173,143 +165,7 @@ class CollisionManager(CollisionChecker):
             logger.exception("the collision callback %r failed", callback)
             return Response.REFUSE
 
-    # Axes taken out (MiCoCL.13)
-
-    @property
-    def taken_out(self) -> frozenset[str]:
-        """Axes whose movements are not checked."""
-        return self._taken_out
-
-    def take_out(self, axis: str, *, source: str = "script") -> None:
-        """Check movements of `axis` no longer; other axes still keep clear of its bodies.
-
-        Raises
-        ------
-        UnknownAxisError
-            The platform has no such axis.
-        """
-        if self._set_taken_out(axis, out=True):
-            logger.warning(
-                "%s was taken out of collision detection by %s: its movements are NOT checked",
-                axis,
-                source,
-            )
-            tell(self._listeners)
-
-    def take_in(self, axis: str, *, source: str = "script") -> None:
-        """Check movements of `axis` again.
-
-        Raises
-        ------
-        UnknownAxisError
-            The platform has no such axis.
-        """
-        if self._set_taken_out(axis, out=False):
-            logger.info("%s was taken into collision detection again by %s", axis, source)
-            tell(self._listeners)
-
-    def _set_taken_out(self, axis: str, *, out: bool) -> bool:
-        if axis not in self._axes:
-            raise UnknownAxisError(axis, self._axes)
-        with self._lock:
-            before = self._taken_out
-            self._taken_out = before | {axis} if out else before - {axis}
-            return self._taken_out != before
-
-    # Contacts that are meant
-
-    @property
-    def allowed_contacts(self) -> frozenset[str]:
-        """Names of the contacts of the scene that are allowed now."""
-        return self._allowed
-
-    def allow_contact(self, name: str, *, source: str = "script") -> None:
-        """Leave the pairs of a contact of the scene aside until it is forbidden.
-
-        Raises
-        ------
-        NotAvailable
-            The scene describes no such contact.
-        """
-        self._use(name, name, source)
-
-    def forbid_contact(self, name: str, *, source: str = "script") -> None:
-        """Watch the pairs of a contact again, whoever allowed it.
-
-        Raises
-        ------
-        NotAvailable
-            The scene describes no such contact.
-        """
-        self._end_uses(name, None, source)
-
-    @contextmanager
-    def contact(self, name: str, *, source: str = "script") -> Iterator[None]:
-        """Leave the pairs of a contact aside during a ``with`` block; may be nested.
-
-        Raises
-        ------
-        NotAvailable
-            The scene describes no such contact.
-        """
-        use = object()
-        self._use(name, use, source)
-        try:
-            yield
-        finally:
-            self._end_uses(name, use, source)
-
-    def _use(self, name: str, use: object, source: str) -> None:
-        with self._lock:
-            uses = self._uses_of(name)
-            if use not in uses:
-                uses.append(use)
-            changed = self._renew_allowed()
-        if changed:
-            logger.info("the contact %r was allowed by %s", name, source)
-            tell(self._listeners)
-
-    def _end_uses(self, name: str, use: object | None, source: str) -> None:
-        with self._lock:
-            uses = self._uses_of(name)
-            uses[:] = [] if use is None else [each for each in uses if each != use]
-            changed = self._renew_allowed()
-        if changed:
-            logger.info("the contact %r was forbidden again by %s", name, source)
-            tell(self._listeners)
-
-    def _uses_of(self, name: str) -> list[object]:
-        if name not in self._uses:
-            known = ", ".join(self._uses) or "none"
-            raise NotAvailable(f"the scene describes no contact {name!r}; it knows: {known}")
-        return self._uses[name]
-
-    def _renew_allowed(self) -> bool:
-        before = self._allowed
-        self._allowed = frozenset(name for name, uses in self._uses.items() if uses)
-        self._ignored = frozenset(
-            pair_of(*pair)
-            for contact in self.model.contacts
-            if contact.name in self._allowed
-            for pair in contact.pairs
-        )
-        return self._allowed != before
-
-    # Who is told, and who responds
-
-    def subscribe(self, callback: Callable[[], object]) -> Callable[[], None]:
-        """Call `callback` when axes are taken out or in, or contacts allowed or forbidden.
-
-        Called in the thread of the change. Returns the function that ends it.
-        """
-        with self._lock:
-            self._listeners = (*self._listeners, callback)
-
-        def unsubscribe() -> None:
-            with self._lock:
-                self._listeners = tuple(each for each in self._listeners if each != callback)
-
-        return unsubscribe
+    # Who responds
 
     def set_callback(self, bodies: BodyPair, callback: CollisionCallbackBase | None) -> None:
         """Let a pair of bodies have its own response to a contact; None gives it back.
@@ -322,9 +178,10 @@ class CollisionManager(CollisionChecker):
         pair = pair_of(*bodies)
         if all(watched.bodies != pair for watched in self.model.pairs):
             raise NotAvailable(f"{pair[0]} and {pair[1]} are not watched in {self.model.name}")
-        with self._lock:
-            callbacks = {key: each for key, each in self._callbacks.items() if key != pair}
-            self._callbacks = callbacks if callback is None else {**callbacks, pair: callback}
+        if callback is None:
+            self._callbacks.pop(pair, None)
+        else:
+            self._callbacks[pair] = callback
 
     def set_default_callback(self, callback: CollisionCallbackBase) -> None:
         """Set the response of all pairs without their own."""

@@ -5,7 +5,8 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
 from threading import Lock
-from typing import Final
+from types import NoneType
+from typing import Final, TypeVar
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError
@@ -24,6 +25,8 @@ logger = logging.getLogger(__name__)
 MOST_FAILURES: Final = 5
 FAILURES_WITHIN_S: Final = 10.0
 _LOOK_S: Final = 0.02
+T = TypeVar("T")
+
 NOBODY: Final[frozenset[BodyPair]] = frozenset()
 
 
@@ -86,6 +89,11 @@ class GateProcess:
         """How often it was replaced."""
         return self._restarts
 
+    @property
+    def busy(self) -> bool:
+        """Whether somebody asks it just now."""
+        return self._lock.locked()
+
     # Start and end
 
     def start(self) -> None:
@@ -142,10 +150,7 @@ class GateProcess:
         NoAnswerError
             There is no answer.
         """
-        answer = self.ask("check", (pack_spans(spans), ignored))
-        if not (isinstance(answer, SweepAnswer) and isinstance(answer.clear, bool)):
-            raise NoAnswerError("the answer to a check makes no sense")
-        return answer
+        return self._ask("check", (pack_spans(spans), ignored), self._answer_s, SweepAnswer)
 
     def nearest(
         self, positions: Mapping[str, float], ignored: Set[BodyPair] = NOBODY
@@ -157,10 +162,8 @@ class GateProcess:
         NoAnswerError
             There is no answer.
         """
-        answer = self.ask("nearest", (dict(positions), ignored))
-        if not (answer is None or isinstance(answer, Approach)):
-            raise NoAnswerError("the answer about the nearest pair makes no sense")
-        return answer
+        payload = (dict(positions), ignored)
+        return self._ask("nearest", payload, self._answer_s, Approach, NoneType)
 
     def free_way(self, spans: Spans, axis: str, ignored: Set[BodyPair] = NOBODY) -> float | None:
         """Return how far `axis` may go towards the refused end of its span, in its unit.
@@ -170,10 +173,8 @@ class GateProcess:
         NoAnswerError
             There is no answer.
         """
-        answer = self.ask("free_way", (pack_spans(spans), axis, ignored))
-        if not (answer is None or isinstance(answer, float)):
-            raise NoAnswerError("the answer about the free way makes no sense")
-        return answer
+        payload = (pack_spans(spans), axis, ignored)
+        return self._ask("free_way", payload, self._answer_s, float, NoneType)
 
     def ask(self, kind: str, payload: object, timeout_s: float | None = None) -> object:
         """Put a question of any kind that the process knows and return the answer.
@@ -183,16 +184,21 @@ class GateProcess:
         NoAnswerError
             There is no answer within `timeout_s` (`answer_s` unless told).
         """
-        timeout_s = self._answer_s if timeout_s is None else timeout_s
+        return self._ask(kind, payload, self._answer_s if timeout_s is None else timeout_s, object)
+
+    def _ask(self, kind: str, payload: object, timeout_s: float, *expected: type[T]) -> T:
         with self._turn(timeout_s):
             helper = self._usable()
             try:
-                return helper.ask(kind, payload, timeout_s)
+                answer = helper.ask(kind, payload, timeout_s)
+                if not isinstance(answer, expected):
+                    raise HelperFaultError(f"its answer is a {type(answer).__name__}")
             except HelperRefusalError as exc:
                 raise NoAnswerError(str(exc)) from exc
             except HelperFaultError as exc:
                 self._replace(str(exc))
                 raise NoAnswerError(f"{exc}; {self._down or 'it is being restarted'}") from exc
+            return answer
 
     @contextmanager
     def _turn(self, timeout_s: float) -> Iterator[None]:

@@ -159,7 +159,7 @@ class HelperProcess:
         except subprocess.TimeoutExpired:
             return ""
         if code < 0:
-            return f"it was ended by {signal.Signals(-code).name}"
+            return f"it was ended by signal {-code} ({signal.strsignal(-code)})"
         return f"it ended with code {code}"
 
     def kill(self) -> None:
