@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from cosmic.app.platform import PlatformFile, load_platform, platform_path
+from cosmic.app.platform import PlatformFile, load_platform, misfits, platform_path
 from cosmic.frame.config import load_model, read_toml
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.units import format_quantity
@@ -30,7 +30,19 @@ def find_mistakes(config: str | Path) -> list[str]:
         lines += key_mistakes(file, path)
     if file is not None and twin is not None:
         lines += _twin_mistakes(file, path, twin, twin_path)
+    if file is not None and file.platform.scene:
+        lines += _scene_mistakes(file, path)
     return lines
+
+
+def _scene_mistakes(file: PlatformFile, path: Path) -> list[str]:
+    # Imported here: what reads meshes takes its time to load.
+    from cosmic.mico.core.collision.scene_loader import load_scene
+
+    try:
+        return misfits(file, path, load_scene(path.parent / file.platform.scene))
+    except ConfigError as exc:
+        return str(exc).splitlines()
 
 
 def _named_twin(path: Path) -> str:

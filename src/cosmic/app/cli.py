@@ -19,7 +19,6 @@ NOT_BUILT: Final = {
     "daqco": "data acquisition in a window of its own",
     "vico": "vision in a window of its own",
     "serve": "a station without a window",
-    "scene": "checks of scenes",
     "export": "export of recordings",
 }
 _WINDOW_SIZE: Final = (1600, 1000)
@@ -44,6 +43,8 @@ def _carry_out(chosen: argparse.Namespace, parser: argparse.ArgumentParser) -> i
         return _check(chosen.platform)
     if chosen.command == "init":
         return _init(chosen.folder)
+    if chosen.command == "scene":
+        return _scene(chosen)
     return _window(chosen, parser)
 
 
@@ -63,6 +64,22 @@ def _check(platform: Path) -> int:
     if mistakes:
         return _fail("\n".join(mistakes))
     sys.stdout.write(f"{platform}: ok\n")
+    return 0
+
+
+def _scene(chosen: argparse.Namespace) -> int:
+    from cosmic.app.scene_command import check_scene, decompose
+
+    if chosen.task == "decompose":
+        for line in decompose(chosen.mesh, chosen.folder):
+            sys.stdout.write(f"{line}\n")
+        return 0
+    mistakes, warnings = check_scene(chosen.scene)
+    for line in warnings:
+        sys.stderr.write(f"cosmic: warning: {line}\n")
+    if mistakes:
+        return _fail("\n".join(mistakes))
+    sys.stdout.write(f"{chosen.scene}: ok\n")
     return 0
 
 
@@ -143,6 +160,13 @@ def _parser() -> argparse.ArgumentParser:
     check.add_argument("platform", type=Path, metavar="PLATFORM.toml")
     init = commands.add_parser("init", help="copy the shipped configuration out, to change it")
     init.add_argument("folder", type=Path, metavar="FOLDER")
+    scene = commands.add_parser("scene", help="check the scene of a collision model, and more")
+    tasks = scene.add_subparsers(dest="task", metavar="TASK", required=True)
+    look = tasks.add_parser("check", help="check a scene with its URDF, SRDF and meshes")
+    look.add_argument("scene", type=Path, metavar="SCENE.toml")
+    split = tasks.add_parser("decompose", help="split a concave mesh into convex pieces")
+    split.add_argument("mesh", type=Path, metavar="MESH.stl")
+    split.add_argument("folder", type=Path, metavar="FOLDER")
     for name, what in NOT_BUILT.items():
         commands.add_parser(name, help=f"{what} (not built yet)", add_help=False)
     return parser

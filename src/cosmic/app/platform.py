@@ -12,6 +12,9 @@ from cosmic.frame.config import StrictModel, load_model, shipped_config_dir
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
+from cosmic.mico.core.collision.collision_manager import CollisionManager
+from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.factory import make_controller, make_simulated
 from cosmic.mico.hw.interface import Controller
@@ -30,6 +33,7 @@ class PlatformSettings(StrictModel):
 
     name: str = Field(min_length=1)
     twin: str = "twin.toml"
+    scene: str = ""
     stop_key: str = "F12"
     applications: Annotated[tuple[str, ...], Field(strict=False)] = BUILT_APPLICATIONS
 
@@ -100,6 +104,50 @@ def load_twin(file: PlatformFile, path: Path) -> TwinSettings:
     return load_model(path.parent / file.platform.twin, TwinSettings)
 
 
+def load_checker(file: PlatformFile, path: Path) -> CollisionChecker:
+    """Return the collision model that a platform file names, or the stand-in where none is named.
+
+    Raises
+    ------
+    ConfigError
+        The scene is wrong, or does not fit the platform; a line for every mistake.
+    """
+    if not file.platform.scene:
+        return NoCollisionModel()
+    # Imported here: what reads meshes takes its time to load.
+    from cosmic.mico.core.collision.scene_loader import load_scene
+
+    scene = load_scene(path.parent / file.platform.scene)
+    mistakes = misfits(file, path, scene)
+    if mistakes:
+        raise ConfigError("\n".join(mistakes))
+    return CollisionManager(scene)
+
+
+def misfits(file: PlatformFile, path: Path, scene: SceneModel) -> list[str]:
+    """Return where a scene and the positioners do not fit together, a line each."""
+    positioners = {each.name: each for each in file.mico.positioner}
+    lines = [
+        f"{path}: platform.scene: {file.platform.scene} drives {axis}, which is no positioner"
+        for axis in scene.axes
+        if axis not in positioners
+    ]
+    for index, each in enumerate(file.mico.positioner):
+        where = f"{path}: mico.positioner[{index}]"
+        if each.name not in scene.axes:
+            lines.append(
+                f"{where}.name: {each.name} moves nothing in {file.platform.scene}; add a drive"
+            )
+        elif each.limits is not None:
+            low, high = scene.travel(each.name)
+            if not low <= each.limits[0] <= each.limits[1] <= high:
+                lines.append(
+                    f"{where}.limits_{each.unit}: {each.limits[0]:g} to {each.limits[1]:g} reaches "
+                    f"beyond the hard stops of {file.platform.scene}, {low:g} to {high:g}"
+                )
+    return lines
+
+
 def build_platform(
     config: str | Path | None = None,
     *,
@@ -149,6 +197,11 @@ def build_platform(
         else:
             controller = make_controller(file.mico.backend, library_path=file.mico.library)
         mico = MicoApplication(
-            controller, file.mico, clock=clock, policy=policy, gui_factory=mico_gui
+            controller,
+            file.mico,
+            clock=clock,
+            policy=policy,
+            checker=load_checker(file, path),
+            gui_factory=mico_gui,
         )
     return Platform(file=file, path=path, clock=clock, policy=policy, mico=mico, faults=faults)

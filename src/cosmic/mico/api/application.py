@@ -15,6 +15,8 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.task import Task
 from cosmic.mico.api import initialisation
 from cosmic.mico.core.collision.checker import CollisionChecker
+from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
+from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.device_manager import DeviceManager, Mode
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Controller
@@ -51,6 +53,12 @@ class MicoApplication(CosmicApplicationBase):
         self.manager = DeviceManager(
             controller, settings, clock=clock, policy=policy, checker=checker
         )
+        self.collision = checker if isinstance(checker, CollisionManager) else None
+        self.clearance_watch = (
+            ClearanceWatch(self.collision, self.manager.positions, policy)
+            if self.collision is not None
+            else None
+        )
         self._jobs: SimpleQueue[tuple[Task, Callable[[Task], None]] | None] = SimpleQueue()
         self._running_task: Task | None = None
         self._taking = Lock()
@@ -74,7 +82,7 @@ class MicoApplication(CosmicApplicationBase):
 
         With no controller to be reached it stays open with `failure` set, and can rescan.
         """
-        self.start()
+        self._start()
         try:
             self.manager.initialize_devices()
             self._failure = ""
@@ -88,8 +96,13 @@ class MicoApplication(CosmicApplicationBase):
 
         For windows, which stand before the hardware is there. `rescanned` tells the end.
         """
-        self.start()
+        self._start()
         return self.rescan()
+
+    def _start(self) -> None:
+        self.start()
+        if self.clearance_watch is not None:
+            self.clearance_watch.start()
 
     def initialise_platform(self) -> Task:
         """Find the reference of every axis in the configured order; returns at once.
@@ -185,6 +198,9 @@ class MicoApplication(CosmicApplicationBase):
     def shut_down(self) -> None:
         """Stop every movement, release the hold, end all threads; any state."""
         self.request_end()
+        if self.clearance_watch is not None:
+            self.clearance_watch.request_end()
+            self.clearance_watch.join()
         self.manager.close()
         self.join()
         self._forget()

@@ -14,6 +14,8 @@ from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.api.entry import Number, as_number, as_whole
 from cosmic.mico.api.group import waited_for
 from cosmic.mico.api.jogging import Jogging
+from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
+from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.device_commander import DeviceCommander
 from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.movement import Movement
@@ -91,6 +93,26 @@ class Axis:
     def limits(self) -> tuple[float, float] | None:
         """Soft limits (low, high) in `unit` from the user's zero; None without a sensor."""
         return self.details.shown_limits
+
+    @property
+    def collision_detection(self) -> bool:
+        """Whether its movements are checked for collisions; set it to take the axis out (CL.13).
+
+        Raises
+        ------
+        NotAvailable
+            It is set, and there is no collision model.
+        """
+        model = self._manager.gate.checker
+        return isinstance(model, CollisionManager) and self._name not in model.taken_out
+
+    @collision_detection.setter
+    def collision_detection(self, on: bool) -> None:
+        model = self._manager.gate.checker
+        if not isinstance(model, CollisionManager):
+            raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the platform file")
+        change = model.take_in if on else model.take_out
+        change(self._name, source=self.commander.source)
 
     @property
     def position_um(self) -> float | None:

@@ -12,8 +12,10 @@ from cosmic.frame.task import Progress, Task
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.api.axis import Axis
+from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.entry import Number, as_number
 from cosmic.mico.api.group import GroupMovement, waited_for
+from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.device import Device
 from cosmic.mico.core.device_commander import DeviceCommander
@@ -228,12 +230,20 @@ class Mico:
         except MoveRefused as exc:
             return exc.verdict
 
-    def clearance(self) -> None:
-        """Return the nearest pair of bodies and their distance.
+    @property
+    def collision(self) -> Collision:
+        """What is watched for collisions; raises `NotAvailable` without a collision model."""
+        model = self._application.collision
+        if model is None:
+            raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the platform file")
+        return Collision(self._manager, model, self._source)
+
+    def clearance(self) -> Approach:
+        """Return the nearest pair of bodies: `bodies`, `distance_um`, `place_um`.
 
         Raises
         ------
         NotAvailable
-            There is no collision model yet.
+            There is no collision model, or the position of some axis is not known.
         """
-        raise NotAvailable(f"{NO_MODEL_TEXT}: clearance is not known")
+        return self.collision.clearance()

@@ -68,7 +68,7 @@ class DeviceCommander(QObject):
     def __init__(self, token: str, source: str = "script", parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._token = token
-        self._source = source
+        self.source = source
         self._may_command = False
         self._connections: list[QMetaObject.Connection] = []
 
@@ -155,7 +155,7 @@ class DeviceCommander(QObject):
     ) -> Order:
         if not self._may_command:
             raise NotConnectedError("this commander is connected to no device, or only listens")
-        order = Order(channel, motion, self._token, self._source, consent, follows=follows)
+        order = Order(channel, motion, self._token, self.source, consent, follows=follows)
         self.order_issued.emit(order)
         return order
 

@@ -30,7 +30,7 @@ from cosmic.mico.core.lease import Lease
 from cosmic.mico.core.messages import DeviceLost
 from cosmic.mico.core.numbering import library_indices, serials_to_open
 from cosmic.mico.core.orders import Interval, Motion, Order
-from cosmic.mico.core.positioner import PositionerState
+from cosmic.mico.core.positioner import Confidence, PositionerState
 from cosmic.mico.core.rules import Limits
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.stop_latch import StopLatch
@@ -170,6 +170,15 @@ class DeviceManager(QObject):
             for device in list(self._devices.values())
             for state in device.container.states()
         }
+
+    def positions(self) -> dict[str, float] | None:
+        """Return the position of every axis in gate coordinates; None while one is unknown."""
+        positions: dict[str, float] = {}
+        for state in self.states().values():
+            if state.position is None or state.confidence is Confidence.UNKNOWN:
+                return None
+            positions[state.name] = state.position
+        return positions
 
     def device(self, name: str) -> Device:
         """Return the device that drives an axis; raises `UnknownAxisError`."""

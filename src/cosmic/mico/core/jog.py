@@ -4,13 +4,15 @@ import math
 from typing import Final
 
 from cosmic.frame.clock import WALL
-from cosmic.mico.core.orders import Jog, Motion, MoveTo, Step
+from cosmic.mico.core.orders import LARGEST_STEPS, Jog, Motion, MoveTo, Step
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import PositionerKind
 
 SHARE: Final = 0.8
 """How much of a packet is travelled at speed; an axis is slower over its last micrometres."""
+SLOWER: Final = tuple(0.5**number for number in range(7))
+"""Parts of the speed asked for, tried one after the other where something is in the way."""
 
 
 class JogRun:
@@ -28,11 +30,35 @@ class JogRun:
         self._started_s: float | None = None
         self._start = 0.0
         self._next_s = 0.0
+        self._share = 1.0
 
     @property
     def speed(self) -> float:
-        """Speed asked for, in the axis' unit per second, or Hz without a sensor."""
-        return self._jog.speed
+        """Speed now, in the axis' unit per second, or Hz without a sensor."""
+        return self._share * self._jog.speed
+
+    def slow_down(self, share: float) -> bool:
+        """Go at `share` of the speed asked for; returns True when that is a change."""
+        changed = share != self._share
+        if changed:
+            self._share, self._started_s = share, None
+        return changed
+
+    def look_ahead(self, state: PositionerState, share: float) -> Motion:
+        """Return the way that must be free for the axis to go on at `share` of its speed."""
+        ahead_s = share * self._settings.jog.look_ahead_s
+        if state.kind is PositionerKind.OPEN_LOOP:
+            steps = max(1, min(LARGEST_STEPS, round(self._jog.speed * ahead_s)))
+            return self._step(steps, round(self._jog.speed))
+        position = state.position if state.position is not None else math.nan
+        target = position + self._jog.direction * self._speed * ahead_s
+        if state.limits is not None:
+            target = min(max(target, state.limits[0]), state.limits[1])
+        return MoveTo(target, state.unit)
+
+    def _step(self, steps: int, frequency_hz: int) -> Step:
+        amplitude_v = self._settings.defaults.amplitude_v
+        return Step(self._jog.direction * steps, amplitude_v, frequency_hz)
 
     def renew(self) -> None:
         """Say that the key is still held; any thread."""
@@ -52,10 +78,8 @@ class JogRun:
         packet_s = self._settings.jog.packet_s
         self._next_s = now_s + 0.4 * packet_s
         if state.kind is PositionerKind.OPEN_LOOP:
-            frequency_hz = round(self._jog.speed)
-            steps = max(1, math.floor(frequency_hz * packet_s))
-            amplitude_v = self._settings.defaults.amplitude_v
-            return Step(self._jog.direction * steps, amplitude_v, frequency_hz)
+            frequency_hz = max(1, round(self.speed))
+            return self._step(max(1, math.floor(frequency_hz * packet_s)), frequency_hz)
         return self._towards_limit(state, now_s, packet_s)
 
     def _towards_limit(
@@ -64,8 +88,9 @@ class JogRun:
         position = state.position if state.position is not None else math.nan
         if self._started_s is None:
             self._started_s, self._start = now_s, position
-        sign, reach = self._jog.direction, SHARE * self._speed * packet_s
-        ahead = self._speed * (now_s - self._started_s) + reach
+        speed = self._share * self._speed
+        sign, reach = self._jog.direction, SHARE * speed * packet_s
+        ahead = speed * (now_s - self._started_s) + reach
         # Never more than one packet ahead of where the axis really is.
         way = min(ahead, sign * (position - self._start) + reach)
         target = self._start + sign * way

@@ -11,7 +11,7 @@ from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.flight import Flight
 from cosmic.mico.core.follower import ChannelFollower
 from cosmic.mico.core.gate import Request
-from cosmic.mico.core.jog import JogRun
+from cosmic.mico.core.jog import SLOWER, JogRun
 from cosmic.mico.core.orders import (
     FREQUENCY_HZ,
     Grant,
@@ -163,6 +163,7 @@ class ChannelPilot(ChannelFollower):
             self.turn_away(order, senseless)
             return
         jog = JogRun(motion, self._context.settings, self._top_speed())
+        jog.slow_down(self._free_share(order, jog))
         packet = jog.packet(self._positioner.state, self._context.clock.now_s())
         if packet is None:
             order.movement.finish(self._positioner.state.shown_position)
@@ -175,6 +176,16 @@ class ChannelPilot(ChannelFollower):
                 self._send(packet, grant)
             finally:
                 self._tell_begun(order, replaced)
+
+    def _free_share(self, order: Order, jog: JogRun) -> float:
+        """Return how much of its speed a jog may keep with what is in its way."""
+        for share in SLOWER:
+            ahead = jog.look_ahead(self._positioner.state, share)
+            request = Request(self.name, ahead, order.token, order.consent)
+            verdict = self._context.gate.check([request])
+            if verdict.reason is not Reason.COLLISION:
+                return share
+        return SLOWER[-1]
 
     @override
     def poll(self) -> None:
@@ -189,6 +200,8 @@ class ChannelPilot(ChannelFollower):
         if not self._context.gate.still_valid(flight.grant):
             self.halt(refusal(_stopped(self.name)))
             return
+        if jog.slow_down(self._free_share(flight.order, jog)):
+            self._quietly(lambda: self._limit_jog_speed(jog.speed))
         packet = jog.packet(self._positioner.state, now_s)
         if packet is None:
             self._end_jog(None)

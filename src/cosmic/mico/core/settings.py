@@ -43,6 +43,7 @@ class JogSettings(StrictModel):
     speed_deg_s: float = Field(default=2.0, gt=0)
     frequency_hz: int = Field(default=200, ge=1, le=18500)
     packet_s: float = Field(default=0.1, gt=0, le=0.1)
+    look_ahead_s: float = Field(default=0.4, ge=0.1, le=5.0)
     dead_man_s: float = Field(default=0.25, ge=0.05, le=1.0)
 
 
