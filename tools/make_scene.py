@@ -191,7 +191,7 @@ def make_meshes() -> None:
     write_stl("cone.stl", lathe(cone, 48))
     write_stl("cone_hull.stl", hull(rings([(6.0, 0.0), (15.0, 12.0)], 24)))
     write_stl(
-        "rotor.stl", lathe([(0.0, -1.5), (9.5, -1.5), (9.5, 1.0), (9.0, 1.5), (0.0, 1.5)], 48)
+        "rotor.stl", lathe([(0.0, -2.0), (9.5, -2.0), (9.5, 1.5), (9.0, 2.0), (0.0, 2.0)], 48)
     )
 
 
@@ -292,12 +292,12 @@ def table_assembly() -> list[Link]:
     return [
         Link("table_stage", "frame", (0.0, 0.0, -40.0), solids=[
             cylinder(8.0, -40.0, -14.0, "pedestal", name="pedestal"),
-            box((-10.0, -10.0, -14.0), (10.0, 10.0, -4.1), "aluminium", name="stage"),
+            box((-10.0, -10.0, -14.0), (10.0, 10.0, -5.1), "aluminium", name="stage"),
         ]),
-        Link("table", "table_stage", (0.0, 0.0, -4.0), joint="table_rotation", kind="revolute",
+        Link("table", "table_stage", (0.0, 0.0, -5.0), joint="table_rotation", kind="revolute",
              axis=(0.0, 0.0, 1.0), limits=(-170.0, 170.0), solids=[
-            cylinder(9.5, -4.0, -1.0, "rotor", name="rotor", seen=False),
-            mesh("rotor.stl", (0.0, 0.0, -2.5), "rotor", solid=False),
+            cylinder(9.5, -5.0, -1.0, "rotor", name="rotor", seen=False),
+            mesh("rotor.stl", (0.0, 0.0, -3.0), "rotor", solid=False),
         ]),
         Link("plate", "table", (0.0, 0.0, 0.0), solids=[
             box((-12.0, -12.0, -1.0), (12.0, 12.0, 0.0), "glass", name="glass"),
@@ -403,13 +403,12 @@ def urdf_text() -> str:
     return "\n".join([*parts, "</robot>", ""])
 
 
-def main() -> None:
+def make_scene() -> None:
     """Write everything."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.parse_args()
     make_meshes()
     (SCENES / "fiberstation.urdf").write_text(urdf_text(), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main()
+    argparse.ArgumentParser(description=__doc__).parse_args()
+    make_scene()
