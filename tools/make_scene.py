@@ -179,7 +179,7 @@ def make_meshes() -> None:
     screws = [
         trimesh.creation.cylinder(
             radius=1.1, height=0.1, sections=12,
-            transform=trimesh.transformations.translation_matrix((x, y, 2.12)),
+            transform=trimesh.transformations.translation_matrix((x, y, 2.07)),
         )
         for x in (-8.0, 8.0)
         for y in (-5.5, 5.5)
@@ -187,7 +187,7 @@ def make_meshes() -> None:
     write_stl("screws.stl", trimesh.util.concatenate(screws))
     write_stl("jaw.stl", jaw())
     write_stl("gripper.stl", chamfered(8.0, 10.0, 3.7, 0.6))
-    cone = [(0.0, 0.0), (6.0, 0.0), (15.0, 12.0), (0.0, 12.0)]
+    cone = [(0.0, 0.0), (6.0, 0.0), (14.8, 12.0), (0.0, 12.0)]
     write_stl("cone.stl", lathe(cone, 48))
     write_stl("cone_hull.stl", hull(rings([(6.0, 0.0), (15.0, 12.0)], 24)))
     write_stl(
@@ -211,7 +211,7 @@ def arm_assembly(side: str, sign: float) -> list[Link]:
     half = math.pi / 2.0
     flat, across = (0.0, 0.0, 0.0), (0.0, 0.0, half)
     upright = (0.0, half, 0.0)  # long side along z, thin along x
-    screws = mesh("screws.stl", (sign * 52.5, 0.0, -9.1), "screw", rpy=across, solid=False)
+    screws = mesh("screws.stl", (sign * 52.5, 0.0, -9.09), "screw", rpy=across, solid=False)
     slide = ("prismatic", (-TRAVEL, TRAVEL))
     turned = sign > 0
     forward = 1.0 if not turned else -1.0
@@ -273,13 +273,13 @@ def probe_assembly() -> list[Link]:
              joint="probe_y", kind="prismatic", axis=(0.0, 1.0, 0.0),
              limits=(-TRAVEL, TRAVEL), solids=[
             *stage_half((-8.5, 33.5, -7.2), (8.5, 55.5, -3.0), across),
-            mesh("screws.stl", (0.0, 44.5, -5.1), "screw", rpy=across, solid=False),
+            mesh("screws.stl", (0.0, 44.5, -5.09), "screw", rpy=across, solid=False),
             box((-4.5, 28.0, -3.0), (4.5, 50.0, -1.0), "anodised", name="holder"),
             box((-4.5, 28.0, -1.0), (4.5, 34.0, 2.4), "anodised", name="clamp"),
         ]),
         Link("probe_chip", "probe_y_carriage", (0.0, 28.0, 1.4), solids=[
             box((-3.0, 8.0, 0.4), (3.0, 28.0, 2.4), "board", name="board"),
-            box((-1.5, 8.6, 2.4), (1.5, 12.0, 2.5), "silicon", name="sensor", solid=False),
+            box((-1.5, 8.6, 2.4), (1.5, 12.0, 2.5), "silicon", name="sensor"),
         ]),
         Link("probe_tip", "probe_chip", (0.0, 5.0, 0.7), solids=[
             box((-0.025, 5.0, 0.675), (0.025, 8.0, 0.725), "silicon", name="shaft"),
@@ -317,9 +317,10 @@ def standing() -> list[Link]:
         Link("objective", "frame", (0.0, 0.0, 50.0), solids=[
             mesh("cone_hull.stl", (0.0, 0.0, 50.0), "barrel", name="front", seen=False),
             mesh("cone.stl", (0.0, 0.0, 50.0), "barrel", solid=False),
-            cylinder(15.0, 62.0, 110.0, "barrel", name="barrel"),
-            cylinder(15.05, 66.0, 68.0, "band", solid=False),
-            cylinder(15.1, 74.0, 82.0, "ring", solid=False),
+            cylinder(15.0, 62.0, 110.0, "barrel", name="barrel", seen=False),
+            cylinder(14.8, 62.0, 110.0, "barrel", solid=False),
+            cylinder(15.0, 66.0, 68.0, "band", solid=False),
+            cylinder(15.0, 74.0, 82.0, "ring", solid=False),
         ]),
         Link("camera", "frame", (0.0, 0.0, 110.0), solids=[
             box((-15.0, -15.0, 110.0), (15.0, 15.0, 145.0), "anodised", name="housing"),

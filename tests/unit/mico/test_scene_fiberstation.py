@@ -245,6 +245,21 @@ def test_it_can_be_drawn_quickly() -> None:
     assert {view.body for view in scene().views} == set(scene().bodies)
 
 
+def test_nothing_is_drawn_that_is_not_guarded() -> None:
+    for view in scene().views:
+        out = np.full(len(view.vertices_um), np.inf)
+        for piece in scene().pieces:
+            if piece.body == view.body:
+                triangles = piece.vertices_um[piece.faces]
+                normals = np.cross(
+                    triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+                )
+                normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+                planes = np.einsum("ij,ij->i", normals, triangles[:, 0])
+                out = np.minimum(out, (view.vertices_um @ normals.T - planes).max(axis=1))
+        assert out.max() <= 50.0, f"{view.body}: {out.max()} um"
+
+
 def test_the_files_are_what_the_script_makes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
