@@ -1,5 +1,6 @@
-"""What follows from a scene once and for all: chains of joints, ways, and where pieces reach."""
+"""What follows from a scene once and for all: chains of joints, ways, and where bodies stand."""
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -7,6 +8,29 @@ import numpy as np
 from cosmic.mico.core.collision.kinematics import body_poses
 from cosmic.mico.core.collision.model import Floats, JointKind, SceneModel
 from cosmic.mico.core.collision.motion_box import Flags
+
+
+@dataclass(frozen=True, eq=False)
+class Turned:
+    """All bodies with the turning joints at certain angles.
+
+    Attributes
+    ----------
+    rotations : list of ndarray, shape (3, 3)
+        How the bodies are turned.
+    places : ndarray, shape (bodies, 3), um
+        Where they stand with all sliding joints at 0.
+    shifts : ndarray, shape (bodies, 3, joints), um/um
+        How the places follow the sliding joints.
+    """
+
+    rotations: list[Floats]
+    places: Floats
+    shifts: Floats
+
+    def places_at(self, values: Floats) -> Floats:
+        """Return the place of every body, shape (bodies, 3), at joint `values`."""
+        return np.asarray(self.places + self.shifts @ values)
 
 
 class Arrangement:
@@ -19,15 +43,31 @@ class Arrangement:
     def __init__(self, model: SceneModel) -> None:
         self.model = model
         self._start = body_poses(model, np.zeros(len(model.joints)))
+        self.child = [model.body_number[joint.child] for joint in model.joints]
+        self._parent = [model.body_number[joint.parent] for joint in model.joints]
+        self._step = [
+            (np.ascontiguousarray(j.parent_from_child[:3, :3]), j.parent_from_child[:3, 3].copy())
+            for j in model.joints
+        ]
+        self._cross = [cross_matrix(joint.axis) for joint in model.joints]
+        self._squared = [cross @ cross for cross in self._cross]
+        self._turning_joints = np.flatnonzero(self.turning)
+        self._late_joints = [
+            number for number, child in enumerate(self.child) if not self.slides[child]
+        ]
+        rotations = [np.ascontiguousarray(pose[:3, :3]) for pose in self._start]
+        sliding = self.chains & ~self.turning
+        shifts = sliding[:, np.newaxis, :] * self.ways.T[np.newaxis, :, :]
+        self._zero = Turned(rotations, self._start[:, :3, 3].copy(), np.asarray(shifts))
+        self._last = (np.zeros(self._turning_joints.size).tobytes(), self._zero)
 
     @cached_property
     def chains(self) -> Flags:
         """Which joints carry which body, shape (bodies, joints)."""
         model = self.model
         chains = np.zeros((len(model.bodies), len(model.joints)), dtype=bool)
-        for number, joint in enumerate(model.joints):
-            child = model.body_number[joint.child]
-            chains[child] = chains[model.body_number[joint.parent]]
+        for number, child in enumerate(self.child):
+            chains[child] = chains[self._parent[number]]
             chains[child, number] = True
         return chains
 
@@ -47,40 +87,82 @@ class Arrangement:
         ways = np.zeros((len(self.model.joints), 3))
         for number, joint in enumerate(self.model.joints):
             if joint.kind is not JointKind.FIXED:
-                child = self.model.body_number[joint.child]
-                ways[number] = self._start[child][:3, :3] @ joint.axis
+                ways[number] = self._start[self.child[number]][:3, :3] @ joint.axis
         return ways
 
     @cached_property
     def steady(self) -> Flags:
         """Joints whose direction is the same whatever the others do, shape (joints,)."""
-        parents = [self.model.body_number[joint.parent] for joint in self.model.joints]
-        return np.asarray(self.slides[parents])
+        return np.asarray(self.slides[self._parent])
 
     @cached_property
+    def swings(self) -> Flags:
+        """Joints that turn, and those whose direction turns, shape (joints,)."""
+        return np.asarray(self.turning | ~self.steady)
+
+    @property
     def shifts(self) -> Floats:
-        """How the place of each body follows the sliding joints, shape (bodies, 3, joints)."""
-        sliding = self.chains & ~self.turning
-        return np.asarray(sliding[:, np.newaxis, :] * self.ways.T[np.newaxis, :, :])
+        """How the places follow the sliding joints with the turning ones at 0."""
+        return self._zero.shifts
+
+    def turned(self, values: Floats) -> Turned:
+        """Return all bodies with the turning joints at `values`; the last ones are kept."""
+        key = values[self._turning_joints].tobytes()
+        if key != self._last[0]:
+            self._last = (key, self._turn(values))
+        return self._last[1]
+
+    def _turn(self, values: Floats) -> Turned:
+        rotations = list(self._zero.rotations)
+        places, shifts = self._zero.places.copy(), self._zero.shifts.copy()
+        for number in self._late_joints:
+            child, parent = self.child[number], self._parent[number]
+            rotations[child], places[child] = self._onwards(
+                number, float(values[number]), rotations[parent], places[parent], slides=False
+            )
+            shifts[child] = shifts[parent]
+            if self.model.joints[number].kind is JointKind.PRISMATIC:
+                shifts[child, :, number] = rotations[child] @ self.model.joints[number].axis
+        return Turned(rotations, places, shifts)
+
+    def _onwards(
+        self, number: int, value: float, rotation: Floats, place: Floats, *, slides: bool
+    ) -> tuple[Floats, Floats]:
+        """Return where the child of a joint stands, from where its parent does."""
+        turn, shift = self._step[number]
+        kind = self.model.joints[number].kind
+        place = place + rotation @ shift
+        rotation = rotation @ turn
+        if kind is JointKind.REVOLUTE:
+            sine, cosine = np.sin(value), np.cos(value)
+            motion = sine * self._cross[number] + (1.0 - cosine) * self._squared[number]
+            rotation = rotation + rotation @ motion
+        elif slides and kind is JointKind.PRISMATIC:
+            place = place + rotation @ self.model.joints[number].axis * value
+        return rotation, place
 
     @cached_property
-    def places(self) -> Floats:
-        """Where the bodies stand with all joints at 0, shape (bodies, 3)."""
-        return self._start[:, :3, 3].copy()
+    def _late_chain(self) -> list[tuple[int, list[int]]]:
+        """Last sliding body on the way to every body, and the joints after it."""
+        found = []
+        for body in range(len(self.model.bodies)):
+            joints = [n for n in self._late_joints if self.chains[body, n]]
+            found.append((self._parent[joints[0]] if joints else body, joints))
+        return found
 
-    @cached_property
-    def rotations(self) -> list[Floats]:
-        """How the bodies are turned with all joints at 0."""
-        return [np.ascontiguousarray(pose[:3, :3]) for pose in self._start]
+    def pose(self, body: int, values: Floats) -> tuple[Floats, Floats]:
+        """Return rotation and place of one body at joint `values`."""
+        start, joints = self._late_chain[body]
+        rotation = self._zero.rotations[start]
+        place = self._zero.places[start] + self._zero.shifts[start] @ values
+        for number in joints:
+            rotation, place = self._onwards(
+                number, float(values[number]), rotation, place, slides=True
+            )
+        return rotation, place
 
-    def poses(self, values: Floats) -> tuple[list[Floats], Floats]:
-        """Return rotations and places, shape (bodies, 3), of all bodies at joint `values`."""
-        places = self.places + self.shifts @ values
-        if self.slides.all():
-            return self.rotations, places
-        whole = body_poses(self.model, values)
-        rotations = list(self.rotations)
-        for body in np.flatnonzero(~self.slides):
-            rotations[body] = np.ascontiguousarray(whole[body][:3, :3])
-            places[body] = whole[body][:3, 3]
-        return rotations, places
+
+def cross_matrix(vector: Floats) -> Floats:
+    """Return the matrix that gives the cross product of `vector` with what it is applied to."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -18,6 +18,7 @@ from cosmic.mico.core.collision.model import Floats, Shape
 
 TRUST_UM: Final = 1e-3
 """How much the distance told and the one verified may differ before the first is distrusted."""
+ORTHONORMAL: Final = 1e-9
 
 _IDENTITY: Final = np.eye(3)
 _REQUEST: Final = fcl.DistanceRequest(enable_nearest_points=True)
@@ -55,6 +56,7 @@ class ConvexPiece:
     def __init__(self, shape: Shape) -> None:
         self._shape = shape
         self._vertices = np.ascontiguousarray(shape.vertices_um)
+        self._across = np.ascontiguousarray(self._vertices.T)
         self.fcl_object = _collision_object(shape)
         self._rotation: Floats = _IDENTITY
         self._place_um: Floats = np.zeros(3)
@@ -70,17 +72,20 @@ class ConvexPiece:
         if not math.isfinite(place_um[0] + place_um[1] + place_um[2]):
             raise ValueError("a pose is not finite")
         if rotation is not self._rotation:
-            if not np.allclose(rotation @ rotation.T, _IDENTITY, rtol=0.0, atol=1e-9):
+            if not np.abs(rotation @ rotation.T - _IDENTITY).max() <= ORTHONORMAL:
                 raise ValueError("a rotation is not orthonormal")
             self._rotation = rotation
             self.fcl_object.setRotation(rotation)
         self._place_um = place_um
         self.fcl_object.setTranslation(place_um)
 
+    def world_um(self) -> Floats:
+        """Return the vertices, shape (n, 3), where the piece stands."""
+        return np.asarray(self._vertices @ self._rotation.T + self._place_um)
+
     def support(self, direction: Floats) -> float:
         """Return how far the piece reaches along `direction`, in world coordinates."""
-        reach = self._vertices @ (direction @ self._rotation)
-        return float(reach.max() + direction @ self._place_um)
+        return float((direction @ self._rotation @ self._across).max() + direction @ self._place_um)
 
     def normals(self) -> Floats:
         """Return the outward unit normals of all faces, shape (m, 3), in world coordinates."""

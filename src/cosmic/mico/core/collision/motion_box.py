@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +12,7 @@ from cosmic.mico.core.collision.answer import AxisSpan, Spans
 from cosmic.mico.core.collision.model import Drive, Floats, Joint, JointKind, SceneModel
 
 Flags = npt.NDArray[np.bool_]
+_Row = tuple[float, float, float, float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +22,7 @@ class MotionBox:
     Attributes
     ----------
     low, high
-        All places, with overshoot.
+        All places, where everything stands among them, with overshoot.
     asked_low, asked_high
         The same without overshoot.
     origin
@@ -49,6 +51,19 @@ class MotionBox:
         """Half the width of all intervals."""
         return (self.high - self.low) / 2.0
 
+    @property
+    def outward(self) -> tuple[Floats, Floats]:
+        """How far down and up the joints can go from `origin`.
+
+        An axis sent to one side does not overshoot to the other: else nothing could be driven
+        away from where it is too close. One sent nowhere may overshoot to both.
+        """
+        down, up = self.asked_low < self.origin, self.asked_high > self.origin
+        still = ~(down | up)
+        lowest = np.where(down | still, self.low - self.origin, 0.0)
+        highest = np.where(up | still, self.high - self.origin, 0.0)
+        return np.minimum(lowest, 0.0), np.maximum(highest, 0.0)
+
 
 class SpanError(ValueError):
     """What was asked makes no sense; the text says why."""
@@ -65,68 +80,81 @@ def make_box(model: SceneModel, spans: Spans) -> MotionBox:
         A number is NaN, an interval is empty or outside the travel, or an axis that moves is
         not in the scene.
     """
-    count = len(model.joints)
-    low, high = np.zeros(count), np.zeros(count)
-    asked_low, asked_high, origin = np.zeros(count), np.zeros(count), np.zeros(count)
-    known, moving = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
     for axis, span in spans.items():
         _check(axis, span, model)
+    number_of = model.joint_number
+    rows = [_REST] * len(model.joints)
     for drive in model.drives:
-        number = model.joint_number[drive.joint]
-        joint = model.joints[number]
-        span = spans.get(drive.axis, _ANYWHERE)
-        asked, wide = _intervals(drive, span)
-        now = None if span.now is None else drive.offset + drive.factor * span.now
-        asked_low[number], asked_high[number] = _within(asked, joint, now)
-        low[number], high[number] = _within(wide, joint, now)
-        known[number] = now is not None and not span.estimated
-        origin[number] = (low[number] + high[number]) / 2.0 if now is None else now
-        moving[number] = span.moving and not span.free
-    if not (np.isfinite(low).all() and np.isfinite(high).all()):
+        number = number_of[drive.joint]
+        rows[number] = _row(drive, model.joints[number], spans.get(drive.axis, _ANYWHERE))
+    table = np.array(rows, dtype=float).reshape(-1, 7).T
+    low, high, asked_low, asked_high, origin, known, moving = table
+    if not np.isfinite(table).all():
         raise SpanError("a joint without end has no interval")
-    return MotionBox(low, high, asked_low, asked_high, origin, known, moving)
+    return MotionBox(low, high, asked_low, asked_high, origin, known > 0.0, moving > 0.0)
 
 
-_ANYWHERE = AxisSpan(-math.inf, math.inf)
+_ANYWHERE: Final = AxisSpan(-math.inf, math.inf)
+_REST: Final[_Row] = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
 def _check(axis: str, span: AxisSpan, model: SceneModel) -> None:
     now = 0.0 if span.now is None else span.now
     if not (span.low <= span.high and math.isfinite(now)):
         raise SpanError(f"{axis}: {span.low} to {span.high} at {span.now} is no interval")
-    if axis not in model.axes and span.moving and not span.free:
+    if span.moving and not span.free and axis not in model.axes:
         raise SpanError(f"{axis} moves nothing in the scene {model.name}; describe its bodies")
 
 
-def _intervals(drive: Drive, span: AxisSpan) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the interval asked for and the one with overshoot, as joint values."""
+def _row(drive: Drive, joint: Joint, span: AxisSpan) -> _Row:
+    """Return one joint's numbers in the order of the fields of `MotionBox`."""
+    if span.low == span.now == span.high and not (span.moving or span.estimated):
+        rest = drive.offset + drive.factor * span.now
+        return rest, rest, rest, rest, rest, 1.0, 0.0
     spread = drive.uncertainty if span.estimated else 0.0
     over = drive.overshoot if span.moving else 0.0
-    asked = _joint(drive, span.low - spread, span.high + spread)
-    return asked, _joint(drive, span.low - spread - over, span.high + spread + over)
+    now = None if span.now is None else drive.offset + drive.factor * span.now
+    asked_low, asked_high = low, high = _interval(drive, joint, span, spread, now)
+    if over != 0.0:
+        low, high = _interval(drive, joint, span, spread + over, now)
+    origin = (low + high) / 2.0 if now is None else now
+    known = now is not None and not span.estimated
+    moves = span.moving and not span.free
+    return low, high, asked_low, asked_high, origin, float(known), float(moves)
 
 
-def _joint(drive: Drive, low: float, high: float) -> tuple[float, float]:
-    one, other = drive.offset + drive.factor * low, drive.offset + drive.factor * high
-    return (one, other) if one <= other else (other, one)
+def _interval(
+    drive: Drive, joint: Joint, span: AxisSpan, wider: float, now: float | None
+) -> tuple[float, float]:
+    """Return where a joint may be, `wider` on both sides, with where it stands."""
+    one = drive.offset + drive.factor * (span.low - wider)
+    other = drive.offset + drive.factor * (span.high + wider)
+    low, high = (one, other) if one <= other else (other, one)
+    if now is not None:
+        low, high = min(low, now), max(high, now)
+    return _within(low, high, joint, now)
 
 
-def _within(interval: tuple[float, float], joint: Joint, now: float | None) -> tuple[float, float]:
+def _within(low: float, high: float, joint: Joint, now: float | None) -> tuple[float, float]:
     """Return the part of an interval between the hard stops, which nothing goes beyond.
 
     A reading a little beyond a stop moves the stop.
     """
-    low, high = joint.low, joint.high
-    if joint.kind is JointKind.REVOLUTE and not math.isfinite(high - low):
-        low, high = -math.pi, math.pi
-        if math.isfinite(interval[0] + interval[1]):
-            return interval
+    first, last = joint.low, joint.high
+    if joint.kind is JointKind.REVOLUTE and not math.isfinite(last - first):
+        # Without stops one whole turn is everywhere, wherever it is counted from.
+        return (low, high) if math.isfinite(high - low) else _whole_turn(now)
     if now is not None:
-        low, high = min(low, now), max(high, now)
-    inside = max(interval[0], low), min(interval[1], high)
+        first, last = min(first, now), max(last, now)
+    inside = max(low, first), min(high, last)
     if inside[0] <= inside[1]:
         return inside
-    raise SpanError(f"{joint.name}: {interval[0]:g} to {interval[1]:g} lies beyond its hard stops")
+    raise SpanError(f"{joint.name}: {low:g} to {high:g} lies beyond its hard stops")
+
+
+def _whole_turn(now: float | None) -> tuple[float, float]:
+    middle = now or 0.0
+    return middle - math.pi, middle + math.pi
 
 
 def axis_positions(model: SceneModel, values: Floats) -> Mapping[str, float]:

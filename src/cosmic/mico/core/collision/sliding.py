@@ -34,8 +34,10 @@ class Slide:
         Half the widths of the box.
     start : ndarray, shape (m,)
         Where the joints stand, from the middle of the box.
-    asked_low, asked_high : ndarray, shape (m,)
-        The box without overshoot, from `start`.
+    lowest, highest : ndarray, shape (m,)
+        From `start`: how far the joints can go from where they stand; see `MotionBox.outward`.
+    known : bool
+        All joints stand where they are said to.
     """
 
     first: ConvexPiece
@@ -45,8 +47,9 @@ class Slide:
     ways: Floats
     half: Floats
     start: Floats
-    asked_low: Floats
-    asked_high: Floats
+    lowest: Floats
+    highest: Floats
+    known: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,14 +105,16 @@ def smallest_gap(slide: Slide, margin_um: float) -> Finding:
         found = separation(slide.first, slide.second)
         normal = np.array(found.normal)
         slope = normal @ slide.ways
-        if number == 0 and _leaves(slide, slope, found.gap_um):
+        if number == 0 and slide.known and _leaves(slide, slope, found.gap_um):
             return Finding(clear=True, normal=normal)
         if not found.gap_um > margin_um:
-            return Finding(clear=False, at=at, inside=number == 0)
+            return Finding(clear=False, at=at, inside=number == 0 and slide.known)
         if found.gap_um < closest_gap:
             closest, closest_gap = at, found.gap_um
         bound = _Bound(found.gap_um - float(slope @ at), slope)
-        mixed = bound if best is None else _mix(best, bound, half)
+        mixed = bound
+        if best is not None and not bound.least(half) > margin_um:
+            mixed = _mix(best, bound, half)
         if mixed.least(half) > margin_um:
             return Finding(clear=True, normal=normal)
         at = _next_place(best, bound, half, at)
@@ -123,13 +128,11 @@ def _leaves(slide: Slide, slope: Floats, gap_um: float) -> bool:
     A pair inside its margin may do nothing else, and a pair outside it needs no more proof.
     """
     if gap_um <= 0.0:
-        normal = least_overlap(slide.first, slide.second)
-        slope = normal @ slide.ways
-    ends = np.minimum(slope * slide.asked_low, slope * slide.asked_high)
-    if not float(ends.sum()) >= -NOTHING_UM:
+        slope = least_overlap(slide.first, slide.second) @ slide.ways
+    low, high = slope * slide.lowest, slope * slide.highest
+    if not float(np.minimum(low, high).sum()) >= -NOTHING_UM:
         return False
-    farther = np.maximum(slope * slide.asked_low, slope * slide.asked_high)
-    return gap_um > 0.0 or float(farther.sum()) > NOTHING_UM
+    return gap_um > 0.0 or float(np.maximum(low, high).sum()) > NOTHING_UM
 
 
 def _mix(one: _Bound, other: _Bound, half: Floats) -> _Bound:

@@ -1,6 +1,6 @@
 """The pure gate: tells whether the volume that a movement can sweep is clear (thesis 6.1.2)."""
 
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from typing import Final
 
@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
-from cosmic.mico.core.collision.arrangement import Arrangement
+from cosmic.mico.core.collision.arrangement import Arrangement, Turned
 from cosmic.mico.core.collision.fcl_pieces import ConvexPiece, separation
 from cosmic.mico.core.collision.model import BodyPair, Floats, SceneModel
 from cosmic.mico.core.collision.motion_box import (
@@ -26,8 +26,19 @@ INSIDE_TEXT: Final = "closer than the margin already; they may only move apart"
 
 
 @dataclass(frozen=True, eq=False)
+class _Concern:
+    """The pairs that some joints bring nearer to each other, or apart; one row a pair."""
+
+    rows: _Numbers
+    first: _Numbers
+    second: _Numbers
+    margin: Floats
+    reach: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class _Stand:
-    """All pieces with the joints in the middle of a box."""
+    """All pieces with the joints somewhere, and the boxes round them."""
 
     rotations: list[Floats]
     places: Floats
@@ -51,11 +62,13 @@ class Sweep:
         self._turning = TurningPairs(self._arrangement, self._pieces)
         self._body = np.array([model.body_number[piece.body] for piece in model.pieces], np.intp)
         self._list_pairs()
-        self._corner_low = np.array([piece.vertices_um.min(axis=0) for piece in model.pieces])
-        self._corner_high = np.array([piece.vertices_um.max(axis=0) for piece in model.pieces])
-        self._turn_boxes()
-        self._concerned: dict[bytes, _Numbers] = {}
+        self._concerns: dict[bytes, _Concern] = {}
         self._normals: dict[int, Floats] = {}
+        self._late = np.flatnonzero(~self._arrangement.slides[self._body]).tolist()
+        zero = self._arrangement.turned(np.zeros(len(model.joints)))
+        boxes = [self._box(n, zero.rotations[body]) for n, body in enumerate(self._body)]
+        low, high = np.array(boxes, float).reshape(-1, 2, 3).transpose(1, 0, 2).copy()
+        self._corners = (zero, low, high)
 
     def _list_pairs(self) -> None:
         """Lay all watched pairs of pieces out as arrays."""
@@ -76,16 +89,6 @@ class Sweep:
         first_body, second_body = self._body[self._first], self._body[self._second]
         self._between = chains[first_body] ^ chains[second_body]
         self._ways = arrangement.shifts[second_body] - arrangement.shifts[first_body]
-        unsteady = arrangement.turning | ~arrangement.steady
-        self._turns = np.asarray((self._between & unsteady).any(axis=1))
-
-    def _turn_boxes(self) -> None:
-        """Bring the boxes round the pieces of sliding bodies into the directions of the world."""
-        for number, piece in enumerate(self.model.pieces):
-            world = piece.vertices_um @ self._arrangement.rotations[self._body[number]].T
-            self._corner_low[number] = world.min(axis=0)
-            self._corner_high[number] = world.max(axis=0)
-        self._turned = np.flatnonzero(~self._arrangement.slides[self._body])
 
     # The question
 
@@ -103,77 +106,90 @@ class Sweep:
             box = make_box(self.model, spans)
         except SpanError as exc:
             return SweepAnswer(clear=False, reason=str(exc))
-        stand = self._stand(box.centre)
+        centre = box.centre
+        stand = self._stand(centre)
         for row in self._candidates(box, stand):
             pair = self.model.pairs[self._pair[row]]
             if pair.bodies in ignored:
                 continue
-            touch = self._first_touch(int(row), box, stand)
+            touch = self._first_touch(row, box, stand, pair.margin_um)
             if touch is not None:
                 values, inside = touch
-                approach = self._approach(int(row), values)
+                approach = self._approach(row, values)
                 reason = INSIDE_TEXT if inside else ""
                 return SweepAnswer(clear=False, approach=approach, reason=reason)
         return SweepAnswer(clear=True)
 
     def _stand(self, values: Floats) -> _Stand:
-        rotations, places = self._arrangement.poses(values)
+        turned = self._arrangement.turned(values)
+        places = turned.places_at(values)
+        low, high = self._boxes(turned)
         shift = places[self._body]
-        low, high = self._corner_low + shift, self._corner_high + shift
-        for piece in self._turned:
-            body = self._body[piece]
-            world = self.model.pieces[piece].vertices_um @ rotations[body].T + places[body]
-            low[piece], high[piece] = world.min(axis=0), world.max(axis=0)
-        return _Stand(rotations, places, low, high)
+        return _Stand(turned.rotations, places, low + shift, high + shift)
 
-    def _concerning(self, moving: npt.NDArray[np.bool_]) -> _Numbers:
+    def _boxes(self, turned: Turned) -> tuple[Floats, Floats]:
+        """Return the boxes round all pieces, their bodies being at the origin of the world."""
+        if self._corners[0] is not turned:
+            low, high = self._corners[1:]
+            for number in self._late:
+                rotation = turned.rotations[self._body[number]]
+                low[number], high[number] = self._box(number, rotation)
+            self._corners = (turned, low, high)
+        return self._corners[1], self._corners[2]
+
+    def _box(self, number: int, rotation: Floats) -> tuple[Floats, Floats]:
+        world = rotation @ self.model.pieces[number].vertices_um.T
+        return world.min(axis=1), world.max(axis=1)
+
+    def _concerning(self, moving: npt.NDArray[np.bool_]) -> _Concern:
         """Return the pairs that some moving joint brings nearer to each other, or apart."""
         key = moving.tobytes()
-        rows = self._concerned.get(key)
-        if rows is None:
+        concern = self._concerns.get(key)
+        if concern is None:
             rows = np.flatnonzero((self._between & moving).any(axis=1))
-            self._concerned[key] = rows
-        return rows
+            # What joints that swing can do is added to the boxes.
+            steady = np.where(self._arrangement.swings, 0.0, np.abs(self._ways[rows]))
+            concern = _Concern(
+                rows, self._first[rows], self._second[rows], self._margin[rows], steady
+            )
+            self._concerns[key] = concern
+        return concern
 
-    def _candidates(self, box: MotionBox, stand: _Stand) -> Iterator[int]:
-        """Yield the pairs whose swept boxes come within the margin, the nearest first."""
-        rows = self._concerning(box.moving)
-        first, second = self._first[rows], self._second[rows]
-        apart = np.maximum(
-            stand.low[second] - stand.high[first], stand.low[first] - stand.high[second]
-        )
-        reach = np.abs(self._ways[rows]) @ box.half
-        turning = np.flatnonzero(self._turns[rows])
-        if turning.size:
-            reach[turning] += self._turned_reach(rows[turning], box, stand)[:, np.newaxis]
-        near = ((apart - reach) <= self._margin[rows][:, np.newaxis]).all(axis=1)
-        found = np.flatnonzero(near)
-        order = np.argsort((apart - reach)[found].max(axis=1))
-        yield from (int(row) for row in rows[found[order]])
+    def _candidates(self, box: MotionBox, stand: _Stand) -> list[int]:
+        """Return the pairs whose swept boxes come within the margin, the nearest first."""
+        concern = self._concerning(box.moving)
+        low, high = self._widened(box, stand)
+        first, second = concern.first, concern.second
+        apart = np.maximum(low[second] - high[first], low[first] - high[second])
+        apart -= concern.reach @ box.half
+        least = apart.max(axis=1)
+        near = np.flatnonzero(least <= concern.margin)
+        order = np.argsort(least[near])
+        return [int(row) for row in concern.rows[near[order]]]
 
-    def _turned_reach(self, rows: _Numbers, box: MotionBox, stand: _Stand) -> Floats:
-        """Return how far turning can carry the pieces of each pair, in any direction."""
-        half = np.where(self._arrangement.turning | ~self._arrangement.steady, box.half, 0.0)
-        return np.array(
-            [
-                self._turning.any_way(self._turn(row), half, stand.rotations, stand.places)
-                for row in rows
-            ]
-        )
+    def _widened(self, box: MotionBox, stand: _Stand) -> tuple[Floats, Floats]:
+        """Return the boxes round all pieces, widened by all that joints can turn them."""
+        wide = self._arrangement.swings & (box.half > 0.0)
+        if not wide.any():
+            return stand.low, stand.high
+        low, high = stand.low.copy(), stand.high.copy()
+        for piece in np.flatnonzero((self._arrangement.chains[self._body] & wide).any(axis=1)):
+            body = int(self._body[piece])
+            self._pieces[piece].put(stand.rotations[body], stand.places[body])
+            self._turning.widen(int(piece), body, box, (low[piece], high[piece]))
+        return low, high
 
     def _turn(self, row: int) -> Turn:
         first, second = int(self._first[row]), int(self._second[row])
         return Turn(first, second, int(self._body[first]), int(self._body[second]))
 
-    def _first_touch(self, row: int, box: MotionBox, stand: _Stand) -> tuple[Floats, bool] | None:
+    def _first_touch(
+        self, row: int, box: MotionBox, stand: _Stand, margin: float
+    ) -> tuple[Floats, bool] | None:
         """Return joint values at which a pair is too close, and whether it begins so."""
-        margin = float(self._margin[row])
-        half = box.half
-        used = np.flatnonzero(self._between[row] & (half > 0.0))
-        swings = self._arrangement.turning[used] | ~self._arrangement.steady[used]
-        if swings.any():
-            values = self._turning.first_touch(self._turn(row), box, margin)
-            return None if values is None else (values, False)
+        used = np.flatnonzero(self._between[row] & (box.half > 0.0))
+        if self._arrangement.swings[used].any():
+            return self._turning.first_touch(self._turn(row), box, margin)
         slide = self._slide(row, box, stand, used)
         guess = self._normals.get(row)
         if guess is not None and guess_holds(slide, guess, margin):
@@ -192,18 +208,19 @@ class Sweep:
         first, second = self._first[row], self._second[row]
         self._pieces[first].put(stand.rotations[self._body[first]], stand.places[self._body[first]])
         body = self._body[second]
-        centre = box.centre[used]
-        start = np.clip(box.origin[used] - centre, -box.half[used], box.half[used])
+        half = box.half[used]
+        lowest, highest = box.outward
         return Slide(
             first=self._pieces[first],
             second=self._pieces[second],
             rotation=stand.rotations[body],
             place_um=stand.places[body],
             ways=self._ways[row][:, used],
-            half=box.half[used],
-            start=start,
-            asked_low=box.asked_low[used] - box.origin[used],
-            asked_high=box.asked_high[used] - box.origin[used],
+            half=half,
+            start=np.clip(box.origin[used] - box.centre[used], -half, half),
+            lowest=lowest[used],
+            highest=highest[used],
+            known=bool(box.origin_known[used].all()),
         )
 
     # Poses

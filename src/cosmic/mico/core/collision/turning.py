@@ -4,16 +4,18 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from cosmic.mico.core.collision.arrangement import Arrangement
-from cosmic.mico.core.collision.fcl_pieces import ConvexPiece, separation
+from cosmic.mico.core.collision.circling import chord, circling_box, circling_loss, radius_about
+from cosmic.mico.core.collision.fcl_pieces import ConvexPiece, gap_along, separation
 from cosmic.mico.core.collision.model import Floats
-from cosmic.mico.core.collision.motion_box import Flags, MotionBox
+from cosmic.mico.core.collision.motion_box import MotionBox
 from cosmic.mico.core.collision.sliding import NOTHING_UM
 
 MOST_QUERIES: Final = 600
 FLOOR_UM: Final = 1.0
-"""A part that moves less than this and is not proved free counts as not free."""
+"""A part that brings the two less than this closer and is not proved free counts as not free."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,153 +28,201 @@ class Turn:
     second_body: int
 
 
+@dataclass(frozen=True, slots=True)
+class _Rider:
+    """A piece, and a joint that carries it but not the other piece.
+
+    Attributes
+    ----------
+    sign : float
+        1 for the second piece, -1 for the first: which way brings the two apart.
+    firm : bool
+        No other joint of the box turns the joint's own direction.
+    beyond : tuple of int
+        Joints of the box between this one and the piece.
+    """
+
+    joint: int
+    piece: int
+    body: int
+    sign: float
+    firm: bool
+    beyond: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A part of the joint box: from `lowest` below to `highest` above `values`."""
+
+    values: Floats
+    lowest: Floats
+    highest: Floats
+
+
 class TurningPairs:
     """Checks pairs of pieces with a turning joint between them; one thread."""
 
     def __init__(self, arrangement: Arrangement, pieces: list[ConvexPiece]) -> None:
         self._arrangement = arrangement
         self._pieces = pieces
-        shapes = arrangement.model.pieces
-        self._vertices = [shape.vertices_um for shape in shapes]
+        self._joints = arrangement.model.joints
+        self._normals: dict[Turn, Floats] = {}
+        self._values = np.zeros(len(self._joints))
 
-    def first_touch(self, turn: Turn, box: MotionBox, margin_um: float) -> Floats | None:
-        """Return joint values at which the margin is not kept, or None where it always is."""
-        between = self._between(turn)
-        wide = between & (box.high > box.low)
-        if self._leaves(turn, box, wide):
+    def first_touch(
+        self, turn: Turn, box: MotionBox, margin_um: float
+    ) -> tuple[Floats, bool] | None:
+        """Return joint values at which the margin is not kept, or None where it always is.
+
+        The second value is True where the pair begins so.
+        """
+        riders = self._riders(turn, box)
+        low, high = box.centre, box.centre
+        joints = [rider.joint for rider in riders]
+        low[joints], high[joints] = box.low[joints], box.high[joints]
+        if self._remembered(turn, riders, _part(low, high), margin_um):
             return None
-        low, high = box.centre.copy(), box.centre.copy()
-        low[wide], high[wide] = box.low[wide], box.high[wide]
-        parts = [(low, high)]
+        if box.origin_known[joints].all():
+            start = _Part(box.origin, *box.outward)
+            gap, normal = self._measure(turn, start.values)
+            if gap > 0.0 and sum(self._losses(riders, start, normal)) <= NOTHING_UM:
+                return None
+            if not gap > margin_um:
+                return box.origin.copy(), True
+        touch = self._search(turn, riders, (low, high), margin_um)
+        return None if touch is None else (touch, False)
+
+    def widen(self, piece: int, body: int, box: MotionBox, corners: tuple[Floats, Floats]) -> None:
+        """Widen the box round a piece, put in the middle, by all that joints can turn it."""
+        low, high = corners
+        arrangement, half = self._arrangement, box.half
+        wide = arrangement.chains[body] & (half > 0.0)
+        riders = self._carriers(piece, body, 1.0, np.flatnonzero(wide & arrangement.swings))
+        self._values = box.centre
+        if len(riders) == 1 and arrangement.turning[riders[0].joint]:
+            points, axis, place = self._about(riders[0])
+            swept = circling_box(points, axis, float(half[riders[0].joint]))
+            low[:], high[:] = swept[0] + place, swept[1] + place
+            return
+        reach = sum(self._reach(rider, half) for rider in riders)
+        low -= reach
+        high += reach
+
+    def _riders(self, turn: Turn, box: MotionBox) -> list[_Rider]:
+        """Return the joints of the box that move the two against each other."""
+        first = self._arrangement.chains[turn.first_body]
+        second = self._arrangement.chains[turn.second_body]
+        wide = (first ^ second) & (box.high > box.low)
+        return [
+            *self._carriers(turn.first, turn.first_body, -1.0, np.flatnonzero(wide & first)),
+            *self._carriers(turn.second, turn.second_body, 1.0, np.flatnonzero(wide & second)),
+        ]
+
+    def _carriers(
+        self, piece: int, body: int, sign: float, wide: npt.NDArray[np.intp]
+    ) -> list[_Rider]:
+        # Joints of one chain are numbered from the root outwards.
+        joints, turning = wide.tolist(), self._arrangement.turning
+        return [
+            _Rider(
+                joint, piece, body, sign, not turning[joints[:place]].any(), (*joints[place + 1 :],)
+            )
+            for place, joint in enumerate(joints)
+        ]
+
+    def _search(
+        self, turn: Turn, riders: list[_Rider], whole: tuple[Floats, Floats], margin_um: float
+    ) -> Floats | None:
+        parts = [whole]
         for _ in range(MOST_QUERIES):
             if not parts:
                 return None
             low, high = parts.pop()
-            middle, half = (low + high) / 2.0, (high - low) / 2.0
-            gap, terms = self._measure(turn, middle, half, wide)
-            if not gap > margin_um:
-                return middle
-            if gap - terms.sum() > margin_um:
+            part = _part(low, high)
+            if self._remembered(turn, riders, part, margin_um):
                 continue
-            if not terms.sum() > FLOOR_UM:
-                return middle
-            widest = int(np.argmax(terms))
+            gap, normal = self._measure(turn, part.values)
+            if not gap > margin_um:
+                return part.values
+            losses = self._losses(riders, part, normal)
+            if gap - sum(losses) > margin_um:
+                self._normals[turn] = normal
+                continue
+            if not sum(losses) > FLOOR_UM:
+                return part.values
+            widest = riders[int(np.argmax(losses))].joint
             upper, lower = low.copy(), high.copy()
-            upper[widest] = lower[widest] = middle[widest]
+            upper[widest] = lower[widest] = part.values[widest]
             parts += [(upper, high), (low, lower)]
         return parts[-1][0] if parts else None
 
-    def any_way(self, turn: Turn, half: Floats, rotations: list[Floats], places: Floats) -> float:
-        """Return how far the joints, each by its `half`, can carry the two in any direction."""
-        total = 0.0
-        for joint in np.flatnonzero(self._between(turn) & (half > 0.0)):
-            reach = float(half[joint])
-            if not self._arrangement.turning[joint]:
-                total += reach
-                continue
-            second = bool(self._arrangement.chains[turn.second_body, joint])
-            piece = turn.second if second else turn.first
-            body = turn.second_body if second else turn.first_body
-            total += self._chord(piece, body, int(joint), reach, (rotations, places), half)
-        return total
+    def _put(self, turn: Turn, values: Floats) -> tuple[ConvexPiece, ConvexPiece]:
+        first, second = self._pieces[turn.first], self._pieces[turn.second]
+        first.put(*self._arrangement.pose(turn.first_body, values))
+        second.put(*self._arrangement.pose(turn.second_body, values))
+        self._values = values
+        return first, second
 
-    def _between(self, turn: Turn) -> Flags:
-        chains = self._arrangement.chains
-        return np.asarray(chains[turn.first_body] ^ chains[turn.second_body])
+    def _measure(self, turn: Turn, values: Floats) -> tuple[float, Floats]:
+        found = separation(*self._put(turn, values))
+        return found.gap_um, np.array(found.normal)
 
-    def _leaves(self, turn: Turn, box: MotionBox, wide: Flags) -> bool:
-        """Return True when no joint of the box brings the two closer than they stand."""
-        gap, normal, poses = self._stand(turn, box.origin)
-        if not gap > 0.0:
+    def _remembered(self, turn: Turn, riders: list[_Rider], part: _Part, margin_um: float) -> bool:
+        """Return True when the direction that proved a part before proves this one too."""
+        normal = self._normals.get(turn)
+        if normal is None:
             return False
-        total = 0.0
-        for joint in np.flatnonzero(wide):
-            ends = (
-                box.asked_low[joint] - box.origin[joint],
-                box.asked_high[joint] - box.origin[joint],
-            )
-            slope = self._slope(turn, int(joint), normal)
-            if slope is None:
-                reach = float(np.max(np.abs(ends)))
-                total -= self._term(turn, int(joint), reach, normal, poses, box.half)
+        gap = gap_along(*self._put(turn, part.values), normal)
+        return gap > margin_um and gap - sum(self._losses(riders, part, normal)) > margin_um
+
+    def _losses(self, riders: list[_Rider], part: _Part, normal: Floats) -> list[float]:
+        """Return the most that each joint of a part can take from the gap along `normal`.
+
+        The pieces stand at the `values` of the part.
+        """
+        span = np.maximum(-part.lowest, part.highest)
+        losses = []
+        for rider in riders:
+            lowest, highest = float(part.lowest[rider.joint]), float(part.highest[rider.joint])
+            if not rider.firm:
+                losses.append(self._reach(rider, span))
+            elif not self._arrangement.turning[rider.joint]:
+                slope = rider.sign * float(normal @ self._axis(rider.joint)[0])
+                losses.append(-min(slope * lowest, slope * highest))
+            elif not rider.beyond:
+                points, axis, _ = self._about(rider)
+                towards = rider.sign * normal
+                losses.append(circling_loss(points, axis, towards, lowest, highest))
             else:
-                total += min(slope * ends[0], slope * ends[1])
-        return total >= -NOTHING_UM
+                along = float(normal @ self._axis(rider.joint)[0])
+                losses.append(max(0.0, 1.0 - along * along) ** 0.5 * self._reach(rider, span))
+        return losses
 
-    def _stand(
-        self, turn: Turn, values: Floats
-    ) -> tuple[float, Floats, tuple[list[Floats], Floats]]:
-        rotations, places = self._arrangement.poses(values)
-        for piece, body in ((turn.first, turn.first_body), (turn.second, turn.second_body)):
-            self._pieces[piece].put(rotations[body], places[body])
-        found = separation(self._pieces[turn.first], self._pieces[turn.second])
-        return found.gap_um, np.array(found.normal), (rotations, places)
+    def _axis(self, joint: int) -> tuple[Floats, Floats]:
+        """Return the direction of a joint and a place on it, where the pieces stand."""
+        rotation, place = self._arrangement.pose(self._arrangement.child[joint], self._values)
+        return rotation @ self._joints[joint].axis, place
 
-    def _measure(
-        self, turn: Turn, values: Floats, half: Floats, wide: Flags
-    ) -> tuple[float, Floats]:
-        """Return the gap at `values`, and how much each joint of a part can take away from it."""
-        gap, normal, poses = self._stand(turn, values)
-        terms = np.zeros(len(values))
-        for joint in np.flatnonzero(wide & (half > 0.0)):
-            reach = float(half[joint])
-            terms[joint] = self._term(turn, int(joint), reach, normal, poses, half)
-        return gap, terms
+    def _about(self, rider: _Rider) -> tuple[Floats, Floats, Floats]:
+        """Return the vertices from a place on the axis, the axis, and that place."""
+        axis, place = self._axis(rider.joint)
+        return self._pieces[rider.piece].world_um() - place, axis, place
 
-    def _slope(self, turn: Turn, joint: int, normal: Floats) -> float | None:
-        """Return by how much the gap along `normal` grows per um, None where that varies."""
-        arrangement = self._arrangement
-        if arrangement.turning[joint] or not arrangement.steady[joint]:
-            return None
-        sign = 1.0 if arrangement.chains[turn.second_body, joint] else -1.0
-        return sign * float(normal @ arrangement.ways[joint])
+    def _reach(self, rider: _Rider, span: Floats) -> float:
+        """Return how far one joint can carry any point of a piece, others moving as well."""
+        far = float(span[rider.joint])
+        if not self._arrangement.turning[rider.joint]:
+            return far
+        points, axis, _ = self._about(rider)
+        radius = radius_about(points, axis)
+        for place, number in enumerate(rider.beyond):
+            outer = _Rider(
+                number, rider.piece, rider.body, rider.sign, False, rider.beyond[place + 1 :]
+            )
+            radius += self._reach(outer, span)
+        return chord(radius, far)
 
-    def _term(
-        self,
-        turn: Turn,
-        joint: int,
-        reach: float,
-        normal: Floats,
-        poses: tuple[list[Floats], Floats],
-        half: Floats,
-    ) -> float:
-        """Return the most that one joint can take from the gap when it moves by `reach`."""
-        arrangement = self._arrangement
-        slope = self._slope(turn, joint, normal)
-        if slope is not None:
-            return abs(slope) * reach
-        if not arrangement.turning[joint]:
-            return reach
-        second = bool(arrangement.chains[turn.second_body, joint])
-        piece = turn.second if second else turn.first
-        body = turn.second_body if second else turn.first_body
-        across = 1.0
-        if arrangement.steady[joint]:
-            child = arrangement.model.body_number[arrangement.model.joints[joint].child]
-            axis = poses[0][child] @ arrangement.model.joints[joint].axis
-            along = float(normal @ axis)
-            across = float(np.sqrt(max(0.0, 1.0 - along * along)))
-        return across * self._chord(piece, body, joint, reach, poses, half)
 
-    def _chord(
-        self,
-        piece: int,
-        body: int,
-        joint: int,
-        reach: float,
-        poses: tuple[list[Floats], Floats],
-        half: Floats,
-    ) -> float:
-        """Return how far a turn by `reach` can carry any point of a piece."""
-        arrangement = self._arrangement
-        rotations, places = poses
-        child = arrangement.model.body_number[arrangement.model.joints[joint].child]
-        axis = rotations[child] @ arrangement.model.joints[joint].axis
-        world = self._vertices[piece] @ rotations[body].T + places[body] - places[child]
-        radius = float(np.sqrt(np.max((np.cross(world, axis) ** 2).sum(axis=1))))
-        for farther in np.flatnonzero(arrangement.chains[body] & ~arrangement.chains[child]):
-            if arrangement.turning[farther] and half[farther] > 0.0:
-                radius += self._chord(piece, body, int(farther), float(half[farther]), poses, half)
-            elif not arrangement.turning[farther]:
-                radius += float(half[farther])
-        return float(2.0 * radius * np.sin(min(reach, np.pi) / 2.0))
+def _part(low: Floats, high: Floats) -> _Part:
+    half = (high - low) / 2.0
+    return _Part((low + high) / 2.0, -half, half)
