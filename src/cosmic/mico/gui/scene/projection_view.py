@@ -1,0 +1,252 @@
+"""The scene without OpenGL: seen from above and from the front or the side, as outlines."""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QBrush, QColor, QPainter, QPaintEvent, QPen, QPolygonF, QWheelEvent
+from PySide6.QtWidgets import QWidget
+
+from cosmic.frame.gui.palette import Palette, blend
+from cosmic.frame.gui.theme import STEP_PX, number_font, ui_font
+from cosmic.frame.overrides import override
+from cosmic.mico.core.collision.model import Floats
+from cosmic.mico.gui.scene.annotations import (
+    draw_annotations,
+    draw_ground,
+    draw_legend,
+    round_length,
+)
+from cosmic.mico.gui.scene.camera import Sight
+from cosmic.mico.gui.scene.content import SceneContent
+from cosmic.mico.gui.scene.outlines import FRONT, SIDE, TOP, Outline, Outlines, Plane, eye
+from cosmic.mico.gui.scene.picking import Ray, pick
+from cosmic.mico.gui.scene.view import SceneView
+
+_TITLES: Final = {TOP: "Top", FRONT: "Front", SIDE: "Side"}
+_AXIS_PX: Final = 28
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One of the two pictures: where it is on the widget, and what is where in it."""
+
+    plane: Plane
+    box: QRectF
+    centre_mm: tuple[float, float, float]
+    px_mm: float
+    cut_mm: float
+
+    @property
+    def begins_mm(self) -> float:
+        """How far towards the eye the picture begins; what lies wholly before is not filled."""
+        return eye(self.plane) * self.centre_mm[self.plane[2]] + self.cut_mm
+
+    def project(self, points_mm: Floats) -> Floats:
+        """Return where points of the world are, shape (n, 2), px."""
+        right, up = self.plane[:2]
+        middle = self.box.center()
+        x = middle.x() + (points_mm[:, right] - self.centre_mm[right]) * self.px_mm
+        y = middle.y() - (points_mm[:, up] - self.centre_mm[up]) * self.px_mm
+        return np.stack([x, y], axis=1)
+
+    def outline(self, corners_mm: Floats) -> QPolygonF:
+        """Return corners given in the plane as a polygon on the widget."""
+        world = np.zeros((len(corners_mm), 3))
+        world[:, list(self.plane[:2])] = corners_mm
+        return QPolygonF([QPointF(x, y) for x, y in self.project(world)])
+
+    def ray(self, place: QPointF) -> Ray:
+        """Return the line of sight at a place of the widget."""
+        right, up, towards = self.plane
+        from_middle = place - self.box.center()
+        way, origin = np.zeros(3), np.array(self.centre_mm)
+        origin[right] += from_middle.x() / self.px_mm
+        origin[up] -= from_middle.y() / self.px_mm
+        way[towards] = -eye(self.plane)
+        return Ray(origin - self.cut_mm * way, way)
+
+
+class ProjectionView(SceneView):
+    """Shows the scene from above, and below or beside that from the front or the side.
+
+    Parameters
+    ----------
+    reason : str
+        Why this is shown and not the 3D view; stands in the picture.
+    """
+
+    def __init__(
+        self, content: SceneContent, reason: str = "", parent: QWidget | None = None
+    ) -> None:
+        super().__init__(content, parent)
+        self._reason = reason
+        self._sight = Sight()
+        self._upright: Plane = FRONT
+        self._outlines = Outlines()
+
+    @property
+    def reason(self) -> str:
+        """Why this is shown and not the 3D view."""
+        return self._reason
+
+    @override
+    def rebuild(self) -> None:
+        self._outlines.clear()
+        self.update()
+
+    @override
+    def refresh(self) -> None:
+        self.update()
+
+    @override
+    def look(self, sight: Sight) -> None:
+        self._sight = sight
+        self._upright = SIDE if abs(sight.azimuth_deg) < 45.0 else FRONT
+        self.update()
+
+    def panels(self) -> tuple[Panel, Panel]:
+        """Return the two pictures as they lie on the widget now."""
+        width, height = float(self.width()), float(self.height())
+        if width > 1.2 * height:
+            half = (width - STEP_PX) / 2.0
+            boxes = QRectF(0, 0, half, height), QRectF(half + STEP_PX, 0, half, height)
+        else:
+            half = (height - STEP_PX) / 2.0
+            boxes = QRectF(0, 0, width, half), QRectF(0, half + STEP_PX, width, half)
+        inner = [box.adjusted(_AXIS_PX, 0, 0, -_AXIS_PX + STEP_PX) for box in boxes]
+        px_mm = min(min(box.width(), box.height()) for box in inner) / 2.0 / self._sight.radius_mm
+        centre, cut_mm = self._sight.centre_mm, self._sight.cut_mm
+        return (
+            Panel(TOP, inner[0], centre, px_mm, cut_mm),
+            Panel(self._upright, inner[1], centre, px_mm, cut_mm),
+        )
+
+    # Painting
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        self.frames += 1
+        palette = self.theme()
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.fillRect(self.rect(), QColor(palette.panel))
+        for panel in self.panels():
+            painter.fillRect(panel.box, QColor(palette.window))
+            _draw_rulers(painter, panel, palette)
+            painter.save()
+            painter.setClipRect(panel.box)
+            self._draw_bodies(painter, panel, palette)
+            draw_annotations(painter, self.content, panel.project, palette)
+            _draw_title(painter, panel, palette)
+            painter.restore()
+        notes = [f"{self._reason}: projections"] if self._reason else []
+        room = self.panels()[0].box.adjusted(0, 2.5 * STEP_PX, 0, 0)
+        draw_legend(painter, self.content, room, palette, notes)
+        self.draw_hovered(painter, palette)
+
+    def _draw_bodies(self, painter: QPainter, panel: Panel, palette: Palette) -> None:
+        shown = self.content.shown
+        outlines = [
+            outline
+            for body, mesh in shown.items()
+            for outline in self._outlines.of(mesh, self.content.poses[body], panel.plane)
+        ]
+        for outline in sorted(outlines, key=lambda each: each.nearest_mm):
+            self._draw_outline(painter, panel, outline, palette)
+        painter.setPen(QPen(QColor(palette.refused), 1.5, Qt.PenStyle.DashLine))
+        ground = QColor(palette.refused)
+        ground.setAlphaF(0.3)
+        painter.setBrush(ground)
+        ghosts = Outlines()  # of its own: it must not spoil what is known of the live bodies
+        for body, pose in self.content.ghosts.items():
+            if body in shown:
+                for outline in ghosts.of(shown[body], pose, panel.plane):
+                    painter.drawPolygon(panel.outline(outline.corners_mm))
+
+    def _draw_outline(
+        self, painter: QPainter, panel: Panel, outline: Outline, palette: Palette
+    ) -> None:
+        red, green, blue, opacity = outline.colour
+        shape = panel.outline(outline.corners_mm)
+        if outline.farthest_mm > panel.begins_mm:
+            painter.setPen(QPen(QColor(palette.border_strong), 1.0, Qt.PenStyle.DotLine))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawPolygon(shape)
+            return
+        fill = QColor.fromRgbF(red, green, blue, 0.8 * opacity)
+        edge = blend(QColor.fromRgbF(red, green, blue).name(), palette.text, 0.6)
+        painter.setPen(QPen(QColor(edge), 1.0))
+        painter.setBrush(fill)
+        painter.drawPolygon(shape)
+        if outline.body in self.content.unwatched:
+            painter.setBrush(QBrush(QColor(palette.warning), Qt.BrushStyle.BDiagPattern))
+            painter.drawPolygon(shape)
+
+    # The mouse
+
+    def _panel_at(self, place: QPointF) -> Panel | None:
+        return next((panel for panel in self.panels() if panel.box.contains(place)), None)
+
+    @override
+    def body_at(self, place: QPointF) -> str:
+        panel = self._panel_at(place)
+        if panel is None:
+            return ""
+        content = self.content
+        return pick(content.meshes, content.poses, panel.ray(place), content.hidden)
+
+    @override
+    def drag(self, before: QPointF, now: QPointF, *, turn: bool) -> None:
+        panel = self._panel_at(before)
+        if panel is None:
+            return
+        centre, moved = list(self._sight.centre_mm), now - before
+        centre[panel.plane[0]] -= moved.x() / panel.px_mm
+        centre[panel.plane[1]] += moved.y() / panel.px_mm
+        x, y, z = centre
+        self._sight = replace(self._sight, centre_mm=(x, y, z))
+        self.update()
+
+    @override
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        radius = self._sight.radius_mm * 1.0015 ** -event.angleDelta().y()
+        self._sight = replace(self._sight, radius_mm=float(np.clip(radius, 0.2, 5000.0)))
+        self.update()
+        event.accept()
+
+
+def _draw_title(painter: QPainter, panel: Panel, palette: Palette) -> None:
+    painter.setFont(ui_font(12, bold=True))
+    axes = ", ".join("xyz"[number] for number in panel.plane[:2])
+    box = panel.box.adjusted(STEP_PX, STEP_PX / 2, -STEP_PX, 0)
+    text = f"{_TITLES[panel.plane]}  {axes} in mm"
+    draw_ground(painter, painter.boundingRect(box, Qt.AlignmentFlag.AlignLeft, text), palette)
+    painter.drawText(box, Qt.AlignmentFlag.AlignLeft, text)
+
+
+def _draw_rulers(painter: QPainter, panel: Panel, palette: Palette) -> None:
+    painter.setFont(number_font(11))
+    step = round_length(70.0 / panel.px_mm)
+    box, middle = panel.box, panel.box.center()
+    for across, way in ((True, panel.plane[0]), (False, panel.plane[1])):
+        centre = panel.centre_mm[way]
+        half = (box.width() if across else box.height()) / 2.0 / panel.px_mm
+        first, last = np.ceil((centre - half) / step), np.floor((centre + half) / step)
+        for number in np.arange(first, last + 1):
+            shift = (number * step - centre) * panel.px_mm
+            text = f"{number * step:.6g}"
+            painter.setPen(QPen(QColor(palette.border), 1.0))
+            if across:
+                x = middle.x() + shift
+                painter.drawLine(QPointF(x, box.top()), QPointF(x, box.bottom()))
+                place = QRectF(x - 30, box.bottom() + 1, 60, 16)
+                align = Qt.AlignmentFlag.AlignHCenter
+            else:
+                y = middle.y() - shift
+                painter.drawLine(QPointF(box.left(), y), QPointF(box.right(), y))
+                place = QRectF(box.left() - 34, y - 8, 31, 16)
+                align = Qt.AlignmentFlag.AlignRight
+            painter.setPen(QColor(palette.dim))
+            painter.drawText(place, align, text)
