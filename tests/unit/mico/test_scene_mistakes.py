@@ -44,6 +44,7 @@ def test_a_sound_scene_has_neither_mistakes_nor_warnings(tmp_path: Path) -> None
 URDF_MISTAKES = {
     "a place that is nan": ({ORIGIN: '<origin xyz="0 nan 0"/>'}, "link 'slider'.*not finite"),
     "a place that is infinite": ({ORIGIN: '<origin xyz="inf 0 0"/>'}, "not finite"),
+    "a place beyond all sense": ({ORIGIN: '<origin xyz="1e308 0 0"/>'}, "above 1e.09"),
     "an angle that is nan": ({ORIGIN: '<origin rpy="0 0 nan"/>'}, "rpy.*not finite"),
     "a place of two numbers": ({ORIGIN: '<origin xyz="0 0"/>'}, "3 numbers are wanted"),
     "a place in words": ({ORIGIN: '<origin xyz="a b c"/>'}, "not a number"),
@@ -208,6 +209,11 @@ def with_nan() -> trimesh.Trimesh:
     return trimesh.Trimesh(vertices, part.faces, process=False)
 
 
+def far_away() -> trimesh.Trimesh:
+    part = block()
+    return trimesh.Trimesh(part.vertices + 1e38, part.faces, process=False)
+
+
 PARTS = {
     "concave": (concave, "not convex.*cosmic scene decompose"),
     "dented by a micrometre": (dented, "not convex, by [0-9.]+ um"),
@@ -219,6 +225,7 @@ PARTS = {
     "doubled": (doubled, "twice"),
     "flat": (flat, "no area|no volume|twice"),
     "with a face that is a line": (with_a_line_for_a_face, "no area"),
+    "beyond all sense": (far_away, "a coordinate is above 1e.09"),
     "with a vertex that is nan": (with_nan, "not finite"),
 }
 

@@ -97,14 +97,13 @@ def _check_free(
     model: SceneModel, positions: dict[str, float], where: str, findings: Findings
 ) -> None:
     margins = {watched.bodies: watched.margin_um for watched in model.pairs}
-    widest = max(margins.values(), default=0.0)
-    for pair, gap_um in close_pairs(model, positions, widest):
+    for pair, gap_um in close_pairs(model, positions):
         names = f"{pair[0]!r} and {pair[1]!r}"
         if not gap_um > 0.0:
             findings.mistakes.append(
                 f"{where} {names} overlap; move one, or let them touch in the SRDF and say why"
             )
-        elif not gap_um > margins[pair]:
+        else:
             findings.warnings.append(
                 f"{where} {names} may be closer than their margin of {margins[pair]:g} um"
             )

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from cosmic.frame.config import load_model
 from cosmic.frame.errors import ConfigError
-from cosmic.mico.core.collision.model import AllowedPair, SceneModel, Shape
+from cosmic.mico.core.collision.model import SceneModel, Shape
 from cosmic.mico.core.collision.scene_checks import check_model
 from cosmic.mico.core.collision.scene_drives import make_drives
 from cosmic.mico.core.collision.scene_files import SceneFiles
@@ -62,6 +62,7 @@ class _Reading:
         folder, limits = self._path.parent, settings.limits
         files = SceneFiles(folder, limits.file_bytes, settings.sha256, self._findings)
         srdf = read_xml(folder / settings.srdf, files, f"{self._path}: srdf", self._findings)
+        disabled = [] if srdf is None else read_disabled(srdf, self._findings)
         urdf, described = self._describe(folder / settings.urdf, files, f"{self._path}: urdf")
         if urdf is None or described is None:
             return None
@@ -72,9 +73,7 @@ class _Reading:
         if len(joints) != len(bodies) - 1 or len(bodies) != len(described.links):
             return None
         pairing = Pairing(bodies, joints, pieces, self._findings)
-        allowed: tuple[AllowedPair, ...] = ()
-        if srdf is not None:
-            allowed = pairing.allowed(read_disabled(srdf, self._findings))
+        allowed = pairing.allowed(disabled)
         watched = pairing.watched(settings, allowed, self._path, folder / settings.srdf)
         model = SceneModel(
             name=self._path.stem,

@@ -19,6 +19,7 @@ _SIDES: Final = 24
 _VIEW_SIDES: Final = 48
 _ROUNDING: Final = 1e-6  # STL keeps 24 bits: about 1e-7 of the largest coordinate
 _TOLERANCE_UM: Final = 1e-3
+_LARGEST: Final = 1e9  # in the unit of the file; what is larger is rubbish
 
 
 def parse_mesh(content: bytes, suffix: str) -> Mesh:
@@ -30,7 +31,8 @@ def parse_mesh(content: bytes, suffix: str) -> Mesh:
         The content is no mesh of that format, or has no triangle.
     """
     try:
-        mesh = trimesh.load_mesh(io.BytesIO(content), file_type=suffix[1:], process=False)
+        with np.errstate(all="ignore"):
+            mesh = trimesh.load_mesh(io.BytesIO(content), file_type=suffix[1:], process=False)
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, EOFError) as exc:
         raise ValueError(f"not a mesh: {exc}") from exc
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
@@ -39,6 +41,8 @@ def parse_mesh(content: bytes, suffix: str) -> Mesh:
     faces = np.asarray(mesh.faces)
     if not np.isfinite(vertices).all():
         raise ValueError("a vertex is not finite")
+    if not np.abs(vertices).max() <= _LARGEST:
+        raise ValueError(f"a coordinate is above {_LARGEST:g}")
     if not (faces.min() >= 0 and faces.max() < len(vertices)):
         raise ValueError("a face names a vertex that is not there")
     whole = trimesh.Trimesh(vertices, faces, process=False)

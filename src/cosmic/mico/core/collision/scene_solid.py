@@ -60,9 +60,12 @@ def overlapping_pairs(model: SceneModel, positions: dict[str, float]) -> list[Bo
 
 
 def close_pairs(
-    model: SceneModel, positions: dict[str, float], within_um: float
+    model: SceneModel, positions: dict[str, float], within_um: float | None = None
 ) -> list[tuple[BodyPair, float]]:
-    """Return the watched pairs whose gap may be within `within_um`, and a gap that is sure."""
+    """Return the watched pairs whose gap may be within `within_um`, and a gap that is sure.
+
+    Without `within_um` each pair is asked for its own margin.
+    """
     if not model.pieces:
         return []
     corners = placed_corners(model, positions)
@@ -73,15 +76,16 @@ def close_pairs(
         of_body.setdefault(piece.body, []).append(number)
     found = []
     for watched in model.pairs:
+        near_um = watched.margin_um if within_um is None else within_um
         ones, others = (of_body.get(body, []) for body in watched.bodies)
         gaps = [
             solid_gap_um(corners[one], corners[other])
             for one in ones
             for other in others
-            if (lows[one] - within_um <= highs[other]).all()
-            and (lows[other] - within_um <= highs[one]).all()
+            if (lows[one] - near_um <= highs[other]).all()
+            and (lows[other] - near_um <= highs[one]).all()
         ]
-        if gaps and min(gaps) <= within_um:
+        if gaps and min(gaps) <= near_um:
             found.append((watched.bodies, min(gaps)))
     return found
 

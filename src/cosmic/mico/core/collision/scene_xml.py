@@ -37,6 +37,7 @@ _NEEDED: Final = {
     "sphere": ("radius",),
     "mesh": ("filename",),
 }
+_LARGEST: Final = 1e9
 _SHAPES: Final = ("box", "cylinder", "sphere", "mesh")
 _PARTS: Final = ("link", "joint")
 _JOINTS: Final = ("fixed", "prismatic", "revolute", "continuous")
@@ -183,6 +184,8 @@ def _check_numbers(file: XmlFile, element: Any, name: str, text: str, findings: 
         findings.wrong(where, f"{wanted} numbers are wanted")
     if not all(math.isfinite(number) for number in numbers):
         findings.wrong(where, "not finite")
+    elif not all(abs(number) <= _LARGEST for number in numbers):
+        findings.wrong(where, f"above {_LARGEST:g}; URDF counts in metres and radians")
     elif positive and not all(number > 0.0 for number in numbers):
         what = "a mirrored mesh is inside out; mirror it in the file" if name == "scale" else ""
         findings.wrong(where, f"must be larger than 0{'; ' + what if what else ''}")
