@@ -1,0 +1,112 @@
+"""Ways that an operator would choose: straight on, one axis after the other, up and over."""
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+
+from cosmic.mico.core.planning.boxes import Boxes
+from cosmic.mico.core.planning.space import Place, Space, Way
+
+
+def one_by_one(boxes: Boxes, here: Place, there: Place, up: Mapping[int, float]) -> Way | None:
+    """Return legs that move axes one after the other, those left over at once where possible.
+
+    Parameters
+    ----------
+    up : mapping of float
+        Highest places of lifting axes, by number: those that go up go first, down last.
+    """
+    hopeless: set[Place] = set()
+
+    def rank(number: int) -> int:
+        if number not in up:
+            return 1
+        return 0 if abs(there[number] - up[number]) < abs(here[number] - up[number]) else 2
+
+    order = sorted(range(len(here)), key=rank)
+
+    def onwards(at: Place) -> Way | None:
+        if at == there:
+            return ()
+        if at in hopeless:
+            return None
+        if boxes.clear(at, there):
+            return (there,)
+        for number in order:
+            following = (*at[:number], there[number], *at[number + 1 :])
+            if following not in (at, there) and boxes.clear(at, following):
+                rest = onwards(following)
+                if rest is not None:
+                    return (following, *rest)
+        hopeless.add(at)
+        return None
+
+    return onwards(here)
+
+
+def detour(boxes: Boxes, here: Place, there: Place, heights: Mapping[str, float]) -> Way | None:
+    """Return a way that retracts, travels and descends.
+
+    Lifting axes go to their detour height, the fewest first; where that does not help, any one
+    axis goes to one of its ends.
+    """
+    up = lifts(boxes.space, heights)
+    found = [
+        way
+        for way in (over(boxes, here, there, lifted, up) for lifted in _choices(up))
+        if way is not None
+    ]
+    if found:
+        return min(found, key=lambda way: boxes.space.length((here, *way)))
+    for lifted in _ends(boxes.space):
+        way = over(boxes, here, there, lifted, up)
+        if way is not None:
+            return way
+    return None
+
+
+def lifts(space: Space, heights: Mapping[str, float]) -> dict[int, float]:
+    """Return how high the lifting axes go, within their limits, by number of axis."""
+    return {
+        number: min(max(heights[axis], space.low[number]), space.high[number])
+        for number, axis in enumerate(space.axes)
+        if axis in heights
+    }
+
+
+def _choices(up: Mapping[int, float]) -> Iterator[Mapping[int, float]]:
+    for count in range(1, len(up) + 1):
+        for chosen in combinations(up, count):
+            yield {number: up[number] for number in chosen}
+
+
+def _ends(space: Space) -> Iterator[Mapping[int, float]]:
+    for number in range(len(space.axes)):
+        yield {number: space.low[number]}
+        yield {number: space.high[number]}
+
+
+def over(
+    boxes: Boxes, here: Place, there: Place, lifted: Mapping[int, float], up: Mapping[int, float]
+) -> Way | None:
+    """Return a way on which the axes `lifted` are out of the way while the others travel."""
+    above, beyond = (
+        _raised(boxes.space, here, there, lifted),
+        _raised(boxes.space, there, here, lifted),
+    )
+    way: Way = ()
+    for begin, end in ((here, above), (above, beyond), (beyond, there)):
+        leg = one_by_one(boxes, begin, end, up)
+        if leg is None:
+            return None
+        way += leg
+    return way
+
+
+def _raised(space: Space, place: Place, other: Place, lifted: Mapping[int, float]) -> Place:
+    """Return `place` with some axes lifted; one that is higher at either end stays there."""
+    raised = list(place)
+    for number, height in lifted.items():
+        upwards = height >= (space.low[number] + space.high[number]) / 2.0
+        ends = (height, place[number], other[number])
+        raised[number] = max(ends) if upwards else min(ends)
+    return tuple(raised)

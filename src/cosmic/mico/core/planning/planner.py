@@ -1,0 +1,161 @@
+"""The way from one place of some axes to another: what is simplest first, then a search."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+from cosmic.mico.core.collision.sweep import Sweep
+from cosmic.mico.core.planning.boxes import Boxes, Effort
+from cosmic.mico.core.planning.detour import detour, lifts, one_by_one
+from cosmic.mico.core.planning.margins import arrival, departure
+from cosmic.mico.core.planning.problem import NoWay, Plan, Problem, Segment, validate
+from cosmic.mico.core.planning.refusals import at_goal, at_start, no_way, too_tight
+from cosmic.mico.core.planning.rrt import MOST_LEGS, search
+from cosmic.mico.core.planning.simplify import legs, shorten
+from cosmic.mico.core.planning.space import Place, Space, Way
+
+LONG: Final = 1.5
+"""A way this many times as long as the straight one is worth a search for a better one."""
+MOST_STEPS: Final = 16
+"""The straight way is driven in at most so many legs."""
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A way in clear legs, with its first place, and how long it was before it was shortened."""
+
+    method: str
+    way: Way
+    found_length: float
+
+
+def plan(sweep: Sweep, problem: Problem) -> Plan | NoWay:
+    """Return a way from start to goal on which every leg is clear, or what is in the way.
+
+    Straight at once, in steps, one axis after the other, up and over, and only then a search by
+    chance, which is the same for the same seed as long as the time suffices.
+
+    Raises
+    ------
+    UnknownAxisError, MoveRefused
+        The problem makes no sense, or the gate has no answer.
+    """
+    validate(sweep.model, problem)
+    space = Space(sweep.model, problem)
+    boxes = Boxes(sweep, problem, space, Effort(problem.budget_s))
+    if space.start == space.goal:
+        return _plan(problem, space, _Found("straight", (space.start,), 0.0))
+    ends = _ends(boxes)
+    if isinstance(ends, NoWay):
+        return ends
+    here, there = ends
+    found = _Found("straight", (here,), 0.0) if here == there else _best(boxes, problem, ends)
+    if found is None:
+        return no_way(boxes, here, there)
+    before = () if here == space.start else (space.start,)
+    after = () if there == space.goal else (space.goal,)
+    whole = _Found(found.method, before + found.way + after, found.found_length)
+    if not _certified(boxes, whole.way, leaving=bool(before), arriving=bool(after)):
+        return no_way(boxes, here, there)
+    return _plan(problem, space, whole)
+
+
+def _ends(boxes: Boxes) -> tuple[Place, Place] | NoWay:
+    """Return where the axes move freely from the start, and until shortly before the goal."""
+    start, goal = boxes.space.start, boxes.space.goal
+    here, there = start, goal
+    if not boxes.free(goal):
+        touch = boxes.touch_exactly_at(goal)
+        if touch is not None:
+            return at_goal(touch)
+        before = arrival(boxes, goal)
+        if before is None:
+            return too_tight(boxes.touch_at(goal))
+        there = before
+    if not (boxes.free(start) and boxes.space.contains(start)):
+        after = departure(boxes, start, there)
+        if after is None:
+            return at_start(boxes, boxes.touch_at(start))
+        here = after
+    return here, there
+
+
+def _best(boxes: Boxes, problem: Problem, ends: tuple[Place, Place]) -> _Found | None:
+    """Return the shortest way that was found, None where there is none."""
+    space = boxes.space
+    near = _nearby(boxes, *ends)
+    long = LONG * space.distance(*ends)
+    if near is not None:
+        direct = near.method in ("straight", "steps")
+        if direct or (space.length(near.way) <= long and not problem.optimise):
+            return near
+    found = [near]
+    seed = problem.seed
+    while not boxes.effort.spent:
+        found.append(_searched(boxes, *ends, seed))
+        if not problem.optimise:
+            break
+        seed += 1
+    ways = [each for each in found if each is not None]
+    return min(ways, key=lambda each: space.length(each.way), default=None)
+
+
+def _nearby(boxes: Boxes, here: Place, there: Place) -> _Found | None:
+    """Return a way that an operator would choose."""
+    edge = boxes.edge(here, there, MOST_STEPS)
+    if edge is not None:
+        method = "straight" if len(edge) == 1 else "steps"
+        return _in_legs(boxes, method, (here, there), MOST_STEPS)
+    serial = one_by_one(boxes, here, there, lifts(boxes.space, boxes.detour_height))
+    if serial is not None:
+        return _in_legs(boxes, "one by one", (here, *serial), 1)
+    way = detour(boxes, here, there, boxes.detour_height)
+    return None if way is None else _in_legs(boxes, "detour", (here, *way), 1)
+
+
+def _searched(boxes: Boxes, here: Place, there: Place, seed: int) -> _Found | None:
+    corners = search(boxes, here, there, seed)
+    if corners is None:
+        return None
+    raw = (here, *corners)
+    way = shorten(boxes, raw, seed, MOST_LEGS)
+    return _in_legs(boxes, "search", way, MOST_LEGS, boxes.space.length(raw))
+
+
+def _in_legs(
+    boxes: Boxes, method: str, way: Sequence[Place], most: int, before: float | None = None
+) -> _Found | None:
+    driven = legs(boxes, way, most)
+    if driven is None:
+        return None
+    return _Found(method, driven, boxes.space.length(way) if before is None else before)
+
+
+def _certified(boxes: Boxes, way: Way, *, leaving: bool, arriving: bool) -> bool:
+    """Ask once more about every leg as it will be driven, with nothing remembered."""
+    for number, (one, other) in enumerate(pairwise(way)):
+        if (leaving and number == 0) or (arriving and number == len(way) - 2):
+            touch = boxes.touch_tight(one, other, leaving=leaving and number == 0)
+        else:
+            touch = boxes.touch(one, other)
+        if touch is not None:
+            return False
+    return True
+
+
+def _plan(problem: Problem, space: Space, found: _Found) -> Plan:
+    pairs = pairwise(found.way)
+    return Plan(
+        start=dict(problem.start),
+        segments=tuple(_segment(space, one, other) for one, other in pairs),
+        method=found.method,
+        length=space.length(found.way),
+        straight_length=space.distance(space.start, space.goal),
+        found_length=found.found_length,
+    )
+
+
+def _segment(space: Space, one: Place, other: Place) -> Segment:
+    targets = zip(space.axes, one, other, strict=True)
+    return Segment({axis: target for axis, before, target in targets if target != before})

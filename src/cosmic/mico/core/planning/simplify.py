@@ -1,0 +1,97 @@
+"""Makes a way shorter by cutting corners, and its legs fewer; every cut is proved by the gate."""
+
+import random
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Final
+
+from cosmic.mico.core.planning.boxes import Boxes
+from cosmic.mico.core.planning.space import DIGITS, Place, Way, between
+
+CUTS: Final = 60
+"""Random cuts tried."""
+IN_VAIN: Final = 20
+"""It is left at that after so many cuts in a row that were of no use."""
+WORTHWHILE: Final = 0.002
+"""A cut that shortens the way by less, as a share, is of no use."""
+
+
+def shorten(boxes: Boxes, way: Sequence[Place], seed: int, most: int) -> Way:
+    """Return a shorter way of clear edges between the same ends.
+
+    Parameters
+    ----------
+    way : sequence of places
+        With both ends; its edges can be driven in `most` legs each.
+    """
+    chance = random.Random(seed)
+    best = _skip(boxes, way, most)
+    in_vain = 0
+    for _ in range(CUTS):
+        if len(best) < 3 or in_vain >= IN_VAIN or boxes.effort.spent:
+            break
+        cut = _cut(boxes, best, chance, most)
+        before = boxes.space.length(best)
+        useful = cut is not None and boxes.space.length(cut) < before * (1.0 - WORTHWHILE)
+        in_vain = 0 if useful else in_vain + 1
+        if cut is not None and useful:
+            best = cut
+    return _skip(boxes, best, most)
+
+
+def _skip(boxes: Boxes, way: Sequence[Place], most: int) -> Way:
+    """Go from each corner straight to the farthest one that can be reached."""
+    kept = [way[0]]
+    at = 0
+    while at < len(way) - 1:
+        following = at + 1
+        for farther in range(len(way) - 1, at + 1, -1):
+            if boxes.edge(way[at], way[farther], most) is not None:
+                following = farther
+                break
+        kept.append(way[following])
+        at = following
+    return tuple(kept)
+
+
+def _cut(boxes: Boxes, way: Way, chance: random.Random, most: int) -> Way | None:
+    """Return the way with a straight edge between two of its places, None if blocked."""
+    first, second = sorted(chance.sample(range(len(way) - 1), 2))
+    begin = _on(way, first, chance)
+    end = _on(way, second, chance)
+    for one, other in ((way[first], begin), (begin, end), (end, way[second + 1])):
+        if one != other and boxes.edge(one, other, most) is None:
+            return None
+    middle = [place for place in (begin, end) if place not in (way[first], way[second + 1])]
+    return (*way[: first + 1], *middle, *way[second + 1 :])
+
+
+def _on(way: Way, edge: int, chance: random.Random) -> Place:
+    place = between(way[edge], way[edge + 1], chance.random())
+    return tuple(round(value, DIGITS) for value in place)
+
+
+def legs(boxes: Boxes, way: Sequence[Place], most: int) -> Way | None:
+    """Return the corners of the legs of a way, as few as can be found by joining neighbours.
+
+    None when one of its edges is not clear after all.
+    """
+    corners = [way[0]]
+    for one, other in pairwise(way):
+        edge = boxes.edge(one, other, most)
+        if edge is None:
+            return None
+        corners.extend(edge)
+    return _joined(boxes, corners)
+
+
+def _joined(boxes: Boxes, corners: Sequence[Place]) -> Way:
+    kept = [corners[0]]
+    at = 0
+    while at < len(corners) - 1:
+        reach = at + 1
+        while reach < len(corners) - 1 and boxes.clear(corners[at], corners[reach + 1]):
+            reach += 1
+        kept.append(corners[reach])
+        at = reach
+    return tuple(kept)
