@@ -13,6 +13,7 @@ import numpy as np
 
 from cosmic.mico.core.collision.fcl_pieces import ConvexPiece, gap_along, least_overlap, separation
 from cosmic.mico.core.collision.model import Floats
+from cosmic.mico.core.collision.swept_gap import decide
 
 MOST_QUERIES: Final = 14
 """After so many distances the swept body is built and measured once instead."""
@@ -95,20 +96,39 @@ def guess_holds(slide: Slide, normal: Floats, margin_um: float) -> bool:
     return bool(gap - np.abs(normal @ slide.ways) @ slide.half > margin_um)
 
 
-def smallest_gap(slide: Slide, margin_um: float) -> Finding:
+def smallest_gap(slide: Slide, margin_um: float, guess: Floats | None = None) -> Finding:
     """Decide whether the gap stays above `margin_um` over the whole box."""
+    first, second = slide.first, slide.second
+    second.put(slide.rotation, slide.place_um)
+    answer = decide(
+        first.world_um().T, second.world_um().T, slide.ways, slide.half, margin_um, guess
+    )
+    if answer is not None and answer[0]:
+        return Finding(clear=True, normal=answer[1])
+    if slide.known:
+        second.put(slide.rotation, slide.place_um + slide.ways @ slide.start)
+        found = separation(first, second)
+        if _leaves(slide, np.array(found.normal) @ slide.ways, found.gap_um):
+            return Finding(clear=True)
+        if not found.gap_um > margin_um:
+            return Finding(clear=False, at=slide.start, inside=True)
+    if answer is not None:
+        return Finding(clear=False, at=answer[1])
+    return by_advancement(slide, margin_um)
+
+
+def by_advancement(slide: Slide, margin_um: float) -> Finding:
+    """Decide the same by distances at several places, where the quick way leaves it open."""
     half, at = slide.half, slide.start
     best: _Bound | None = None
     closest, closest_gap = at, np.inf
-    for number in range(MOST_QUERIES):
+    for _ in range(MOST_QUERIES):
         slide.second.put(slide.rotation, slide.place_um + slide.ways @ at)
         found = separation(slide.first, slide.second)
         normal = np.array(found.normal)
         slope = normal @ slide.ways
-        if number == 0 and slide.known and _leaves(slide, slope, found.gap_um):
-            return Finding(clear=True, normal=normal)
         if not found.gap_um > margin_um:
-            return Finding(clear=False, at=at, inside=number == 0 and slide.known)
+            return Finding(clear=False, at=at)
         if found.gap_um < closest_gap:
             closest, closest_gap = at, found.gap_um
         bound = _Bound(found.gap_um - float(slope @ at), slope)

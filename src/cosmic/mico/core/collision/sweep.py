@@ -194,7 +194,7 @@ class Sweep:
         guess = self._normals.get(row)
         if guess is not None and guess_holds(slide, guess, margin):
             return None
-        finding = smallest_gap(slide, margin)
+        finding = smallest_gap(slide, margin, guess)
         if finding.clear:
             if finding.normal is not None:
                 self._normals[row] = finding.normal
