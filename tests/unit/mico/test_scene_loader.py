@@ -9,6 +9,7 @@ import pytest
 import trimesh
 
 from cosmic.frame.errors import ConfigError
+from cosmic.mico.core.collision.kinematics import body_poses
 from cosmic.mico.core.collision.model import JointKind
 from cosmic.mico.core.collision.scene_loader import find_scene_mistakes, load_scene
 from unit.mico.scene_writer import (
@@ -186,3 +187,29 @@ def test_the_shapes_of_a_scene_cannot_be_changed(tmp_path: Path) -> None:
     piece = load_scene(write_scene(tmp_path)).pieces[0]
     with pytest.raises(ValueError, match="read-only"):
         piece.vertices_um[0, 0] = 1.0
+
+
+def test_a_mesh_may_be_scaled_differently_along_its_axes(tmp_path: Path) -> None:
+    write_part(tmp_path, block(1.0, 1.0, 1.0))
+    urdf = {SLIDER_BOX: SLIDER_MESH.replace("0.001 0.001 0.001", "0.004 0.002 0.001")}
+    slider = load_scene(write_scene(tmp_path, urdf=urdf)).pieces[1]
+    assert np.ptp(slider.vertices_um, axis=0) == pytest.approx([4000.0, 2000.0, 1000.0], abs=0.01)
+
+
+def test_a_shape_is_turned_counter_clockwise_about_its_own_place(tmp_path: Path) -> None:
+    urdf = {'<origin xyz="0 0 0.002"/>': '<origin xyz="0 0 0.002" rpy="0 0 0.5235987755982988"/>'}
+    slider = load_scene(write_scene(tmp_path, urdf=urdf)).pieces[1]
+    cosine, sine = math.cos(math.radians(30.0)), 0.5
+    corner = (2000.0 * cosine - 1000.0 * sine, 2000.0 * sine + 1000.0 * cosine, 2500.0)
+    assert np.abs(slider.vertices_um - corner).max(axis=1).min() < 1e-6
+
+
+def test_a_joint_moves_along_its_axis_in_the_frame_of_the_child(tmp_path: Path) -> None:
+    joint = '<child link="slider"/>'
+    urdf = {
+        joint: f'{joint}<origin xyz="0 0 0.001" rpy="0 0 0.5235987755982988"/>',
+        'xyz="0 0 2"': 'xyz="1 0 0"',
+    }
+    scene = load_scene(write_scene(tmp_path, urdf=urdf))
+    pose = body_poses(scene, scene.joint_values({"lift": 1000.0}))[scene.body_number["slider"]]
+    assert pose[:3, 3] == pytest.approx([1000.0 * math.cos(math.radians(30.0)), 500.0, 1000.0])
