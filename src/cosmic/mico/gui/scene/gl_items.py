@@ -4,8 +4,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 import pyqtgraph.opengl as gl
 from OpenGL import GL
+from pyqtgraph.opengl.items.GLMeshItem import DirtyFlag
 from PySide6.QtGui import QMatrix4x4
 
 from cosmic.mico.core.collision.model import Floats
@@ -13,6 +15,7 @@ from cosmic.mico.gui.scene.gl_shader import light_shader, set_look
 from cosmic.mico.gui.scene.meshes import BodyMesh, Bools
 
 _BUFFERS: Final = ("m_vbo_position", "m_vbo_normal", "m_vbo_color", "m_ibo_faces")
+_ALL: Final = DirtyFlag.POSITION | DirtyFlag.NORMAL | DirtyFlag.COLOR | DirtyFlag.FACES
 _SOLID: Final = {GL.GL_DEPTH_TEST: True, GL.GL_BLEND: False, GL.GL_CULL_FACE: True}
 _BLENDED: Final = (
     GL.GL_SRC_ALPHA,
@@ -71,7 +74,10 @@ class Look:
 
 
 class BodyItem:
-    """One body in OpenGL: what is solid of it, and what can be seen through."""
+    """One body in OpenGL: what is solid of it, and what can be seen through.
+
+    Its context must be current when it is made.
+    """
 
     def __init__(self, mesh: BodyMesh, stage: Stage) -> None:
         self.body = mesh.body
@@ -84,11 +90,11 @@ class BodyItem:
     def _item(self, mesh: BodyMesh, which: Bools) -> Any:
         if not which.any():
             return None
-        colours = np.repeat(mesh.colours[which][:, None, :], 3, axis=1)
-        data = gl.MeshData(vertexes=mesh.corners_mm[which], vertexColors=colours)
-        data.faceNormals(indexed="faces")[:] = mesh.normals[which]  # smooth, where it is round
-        item = gl.GLMeshItem(meshdata=data, smooth=False)
+        item = gl.GLMeshItem()
+        # Handed over ready: pyqtgraph's own normals are made in a loop, and are soft at edges.
+        item.vertexes, item.normals, item.colors, item.faces = indexed(mesh, which)
         item._setView(self._stage)  # noqa: SLF001 - pyqtgraph has no other way to give a camera
+        item.upload_vertex_buffers(_ALL)
         return item
 
     def draw_solid(self, camera_from_body: Floats, look: Look) -> None:
@@ -120,6 +126,29 @@ class BodyItem:
             if item is not None:
                 for name in _BUFFERS:
                     getattr(item, name).destroy()
+
+
+def indexed(
+    mesh: BodyMesh, which: Bools
+) -> tuple[
+    npt.NDArray[np.float32],
+    npt.NDArray[np.float32],
+    npt.NDArray[np.float32],
+    npt.NDArray[np.uint32],
+]:
+    """Return vertices, normals, colours and faces of some triangles, each vertex once.
+
+    A processor that draws works out the light at every vertex: three a triangle would be six times
+    as many as there are.
+    """
+    colours = np.repeat(mesh.colours[which][:, None, :], 3, axis=1)
+    corners = np.concatenate([mesh.corners_mm[which], mesh.normals[which], colours], axis=2)
+    rows = np.round(corners.reshape(-1, 10), 6)
+    vertices, faces = np.unique(rows, axis=0, return_inverse=True)
+    place, normals, shades = (
+        np.ascontiguousarray(part, dtype=np.float32) for part in np.split(vertices, (3, 6), axis=1)
+    )
+    return place, normals, shades, faces.astype(np.uint32).reshape(-1, 3)
 
 
 def matrix(values: Floats) -> QMatrix4x4:

@@ -25,6 +25,8 @@ from cosmic.mico.gui.scene.picking import Ray, pick
 from cosmic.mico.gui.scene.view import SceneView
 
 _DEG_PX: Final = 0.4
+_SMOOTH_PX: Final = 250_000
+_SMOOTH_TRIANGLES: Final = 6_000
 _PLAIN: Final = Look()
 
 
@@ -80,8 +82,8 @@ class GLSceneView(SceneView):
         size = QSize(round(self.width() * ratio), round(self.height() * ratio))
         if self._image is None or self._image.size() != size:
             try:
-                self._image = self._context.draw(size, self._draw_scene)
-            except (NotAvailable, GL.GLError) as exc:
+                self._image = self._context.draw(size, self._draw_scene, smooth=self._smooth(size))
+            except (NotAvailable, GL.GLError, RuntimeError) as exc:  # a shader: RuntimeError
                 self.failed.emit(str(exc))
                 return
             self._image.setDevicePixelRatio(ratio)
@@ -94,6 +96,11 @@ class GLSceneView(SceneView):
         draw_scale(painter, self._camera.px_mm(self.width(), self.height()), palette)
         draw_legend(painter, self.content, QRectF(self.rect()), palette)
         self.draw_hovered(painter, palette)
+
+    def _smooth(self, size: QSize) -> bool:
+        """Tell whether soft edges leave 20 pictures per second."""
+        few = size.width() * size.height() <= _SMOOTH_PX
+        return not self._context.software or (few and self.content.triangles <= _SMOOTH_TRIANGLES)
 
     def _project(self, points_mm: Floats) -> Floats:
         return self._camera.project(points_mm, self.width(), self.height())[0]

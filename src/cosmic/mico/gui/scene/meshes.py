@@ -74,6 +74,13 @@ class BodyMesh:
         return self.vertices_mm.min(axis=0), self.vertices_mm.max(axis=0)
 
     @cached_property
+    def edges(self) -> tuple[Floats, Floats, Floats]:
+        """Two edges of every triangle and their product, each of shape (triangles, 3), mm."""
+        first = self.corners_mm[:, 1] - self.corners_mm[:, 0]
+        second = self.corners_mm[:, 2] - self.corners_mm[:, 0]
+        return first, second, np.cross(first, second)
+
+    @cached_property
     def glass(self) -> Bools:
         """Which triangles can be seen through, shape (triangles,)."""
         return np.asarray(self.colours[:, 3] < 0.999)

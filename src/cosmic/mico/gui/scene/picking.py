@@ -32,15 +32,15 @@ def pick(
     hidden : collection of str
         Bodies that are looked through.
     """
+    local = {body: _in_body(ray, poses[body]) for body in meshes if body not in hidden}
+    enters = {body: _enters_box(own, *meshes[body].bounds_mm) for body, own in local.items()}
     nearest, found = np.inf, ""
-    for body, mesh in meshes.items():
-        if body in hidden:
-            continue
-        local = _in_body(ray, poses[body])
-        if _enters_box(local, *mesh.bounds_mm) < nearest:
-            distance = _meets(local, mesh.corners_mm)
-            if distance < nearest:
-                nearest, found = distance, body
+    for body in sorted(enters, key=enters.__getitem__):
+        if enters[body] >= nearest:
+            break
+        distance = _meets(local[body], meshes[body])
+        if distance < nearest:
+            nearest, found = distance, body
     return found
 
 
@@ -57,17 +57,17 @@ def _enters_box(ray: Ray, low: Floats, high: Floats) -> float:
     return max(enter, 0.0) if enter <= leave and leave >= 0.0 else float("inf")
 
 
-def _meets(ray: Ray, corners: Floats) -> float:
+def _meets(ray: Ray, mesh: BodyMesh) -> float:
     """Return the distance to the nearest triangle (Moeller and Trumbore); infinite when none."""
-    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    across = np.cross(ray.direction, second)
-    size = np.einsum("ij,ij->i", first, across)
+    first, second, across = mesh.edges
+    away = ray.origin_mm - mesh.corners_mm[:, 0]
+    x, y, z = ray.direction
+    turned = away @ np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])  # away x direction
     with np.errstate(divide="ignore", invalid="ignore"):
-        away = ray.origin_mm - corners[:, 0]
-        u = np.einsum("ij,ij->i", away, across) / size
-        turned = np.cross(away, first)
-        v = turned @ ray.direction / size
-        distance = np.einsum("ij,ij->i", second, turned) / size
+        size = -1.0 / (across @ ray.direction)
+        u = np.einsum("ij,ij->i", second, turned) * size
+        v = -np.einsum("ij,ij->i", first, turned) * size
+        distance = np.einsum("ij,ij->i", away, across) * size
         inside = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (distance > 0.0)
     hits = distance[inside]
     return float(hits.min()) if len(hits) else float("inf")

@@ -80,7 +80,9 @@ class SceneWidget(QWidget):
 
     def _arrange(self) -> None:
         for each in (self._toolbar, self._nearest, self._refused):
-            each.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+            policy = QSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+            policy.setRetainSizeWhenHidden(True)  # a refusal must not make the picture jump
+            each.setSizePolicy(policy)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, STEP_PX // 2, 0, STEP_PX // 2)
         column.setSpacing(STEP_PX // 2)
