@@ -63,9 +63,6 @@ class Link:
     solids: list[Solid] = field(default_factory=list)
 
 
-# ---------------------------------------------------------------- shapes
-
-
 def number(value: float) -> str:
     """Write a number as short as it goes, never as -0."""
     return f"{round(value, 9) + 0.0:.9g}"
@@ -119,9 +116,6 @@ def stage_half(low: Vector, high: Vector, rpy: Vector = (0.0, 0.0, 0.0)) -> list
         box(low, high, seen=False, name="stage"),
         mesh("stage.stl", middle(low, high), "aluminium", rpy=rpy, solid=False),
     ]
-
-
-# ---------------------------------------------------------------- meshes
 
 
 def write_stl(name: str, made: trimesh.Trimesh) -> None:
@@ -193,9 +187,6 @@ def make_meshes() -> None:
     write_stl(
         "rotor.stl", lathe([(0.0, -2.0), (9.5, -2.0), (9.5, 1.5), (9.0, 2.0), (0.0, 2.0)], 48)
     )
-
-
-# ---------------------------------------------------------------- assemblies
 
 
 def arm_assembly(side: str, sign: float) -> list[Link]:
@@ -326,9 +317,6 @@ def standing() -> list[Link]:
             box((-15.0, -15.0, 110.0), (15.0, 15.0, 145.0), "anodised", name="housing"),
         ]),
     ]  # fmt: skip
-
-
-# ---------------------------------------------------------------- URDF
 
 
 def shape_text(tag: str, each: Solid, link: Link) -> str:

@@ -3,7 +3,11 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+import pytest
 import trimesh
+
+from cosmic.frame.errors import ConfigError
+from cosmic.mico.core.collision.scene_loader import find_scene_mistakes, load_scene
 
 URDF = """<?xml version="1.0"?>
 <robot name="small">
@@ -82,6 +86,15 @@ def write_part(folder: Path, part: trimesh.Trimesh, name: str = "part.stl") -> N
 def block(x: float = 4.0, y: float = 2.0, z: float = 1.0) -> trimesh.Trimesh:
     """A box in mm, as a mesh."""
     return trimesh.creation.box(extents=(x, y, z))
+
+
+def mistakes(path: Path) -> str:
+    """What is found wrong, which is also what loading raises."""
+    found, _ = find_scene_mistakes(path)
+    with pytest.raises(ConfigError) as caught:
+        load_scene(path)
+    assert str(caught.value) == "\n".join(found)
+    return "\n".join(found)
 
 
 def _edited(usual: str, edit: str | Mapping[str, str]) -> str:
