@@ -8,9 +8,12 @@ import cosmic
 from cosmic.frame.errors import DeviceFault
 from cosmic.frame.task import Progress, Task
 from cosmic.mico.api.axis import Axis, Jogging
+from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.stepwise import StepwiseMove
+from cosmic.mico.api.ways import Way
+from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.positioner import Confidence, PositionerState, Status
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
@@ -18,6 +21,9 @@ from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
 CLASSES: Final[dict[str, type]] = {
     "Rig": cosmic.Rig,
     "Mico": Mico,
+    "Collision": Collision,
+    "Approach": Approach,
+    "Way": Way,
     "Axis": Axis,
     "Movement": Movement,
     "GroupMovement": GroupMovement,
@@ -40,6 +46,8 @@ ENUMS: Final[dict[str, type[Enum]]] = {
 # Attributes that an object gets when it is made, which the class does not show.
 MADE_LATER: Final = {
     "Axis": ("commander",),
+    "Approach": ("bodies", "distance_um", "places_um", "pose"),
+    "Way": ("start", "waypoints", "method", "length", "straight_length", "duration_s"),
     "GroupMovement": ("movements",),
     "StepwiseMove": ("planned", "movement"),
 }

@@ -42,6 +42,8 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
 WHOLE_FILES: Final = (PlatformFile, TwinSettings)
 
 _UNITS: Final = (
+    ("_um_s2", "µm/s²"),
+    ("_deg_s2", "°/s²"),
     ("_um_s", "µm/s"),
     ("_deg_s", "°/s"),
     ("_deg_c", "°C"),

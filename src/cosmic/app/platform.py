@@ -121,7 +121,7 @@ def load_checker(file: PlatformFile, path: Path) -> CollisionChecker:
     mistakes = misfits(file, path, scene)
     if mistakes:
         raise ConfigError("\n".join(mistakes))
-    return CollisionManager(scene)
+    return CollisionManager(scene, axes=(each.name for each in file.mico.positioner))
 
 
 def misfits(file: PlatformFile, path: Path, scene: SceneModel) -> list[str]:

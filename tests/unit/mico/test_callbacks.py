@@ -13,7 +13,7 @@ X = Channel(0, 0)
 
 def test_a_callback_that_waits_for_a_movement_is_told_not_to(caplog):
     caught = []
-    with mico() as (rig, _):
+    with mico() as (rig, controller):
         axis = rig["d0.c0"]
 
         def wait_in_callback(_):
@@ -22,7 +22,10 @@ def test_a_callback_that_waits_for_a_movement_is_told_not_to(caplog):
             except WrongThreadError as exc:
                 caught.append(str(exc))
 
-        axis.move_to(5.0, wait=False).add_callback(wait_in_callback)
+        controller.block.clear()  # it must not be over before anybody listens
+        movement = axis.move_to(5.0, wait=False)
+        movement.add_callback(wait_in_callback)
+        controller.block.set()
         wait_until(lambda: bool(caught))
         assert "device 0" in caught[0]
         assert axis.move_to(7.0) == 7.0

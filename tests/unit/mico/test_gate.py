@@ -107,7 +107,7 @@ def test_a_sweep_of_an_unknown_axis_needs_consent():
 class Explodes:
     available = True
 
-    def check(self, swept):
+    def check(self, swept, *, advice=True):
         raise RuntimeError("library crashed")
 
 
@@ -118,7 +118,7 @@ class Records:
         self.swept = None
         self.verdict = verdict
 
-    def check(self, swept):
+    def check(self, swept, *, advice=True):
         self.swept = dict(swept)
         return self.verdict
 

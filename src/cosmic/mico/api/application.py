@@ -1,27 +1,33 @@
 """MiCo as a CoSMic application (thesis 5.4)."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from queue import SimpleQueue
 from threading import Lock
+from typing import Final
 
 from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
 
 from cosmic.frame.application import CosmicApplicationBase, GuiFactory
 from cosmic.frame.clock import Clock
-from cosmic.frame.errors import CosmicError, DeviceError, NotAvailable
+from cosmic.frame.errors import CosmicError, DeviceError, MoveRefused, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.task import Task
 from cosmic.mico.api import initialisation
-from cosmic.mico.core.collision.checker import CollisionChecker
+from cosmic.mico.api.ways import Way, follow, way_from_plan
+from cosmic.mico.core.collision.checker import NO_MODEL_TEXT, CollisionChecker
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.device_manager import DeviceManager, Mode
 from cosmic.mico.core.settings import MicoSettings
+from cosmic.mico.core.way_finder import WayFinder
 from cosmic.mico.hw.interface import Controller
 
 logger = logging.getLogger(__name__)
+
+WAY_BUDGET_S: Final = 1.0
+"""How long a way is looked for, in wall time."""
 
 
 class MicoApplication(CosmicApplicationBase):
@@ -31,12 +37,16 @@ class MicoApplication(CosmicApplicationBase):
     -------
     task_started(Task)
         A long operation began; widgets show its progress.
+    way_found(Way), way_missing(MoveVerdict)
+        How `search_way` ended.
     status_changed()
         Devices came or went, or MiCo failed.
     """
 
     task_started = Signal(object)
     rescanned = Signal()
+    way_found = Signal(object)
+    way_missing = Signal(object)
 
     def __init__(
         self,
@@ -58,6 +68,9 @@ class MicoApplication(CosmicApplicationBase):
             ClearanceWatch(self.collision, self.manager.positions, policy)
             if self.collision is not None
             else None
+        )
+        self.way_finder = (
+            WayFinder(self.manager, self.collision.model) if self.collision is not None else None
         )
         self._jobs: SimpleQueue[tuple[Task, Callable[[Task], None]] | None] = SimpleQueue()
         self._running_task: Task | None = None
@@ -123,6 +136,49 @@ class MicoApplication(CosmicApplicationBase):
             Another long operation is under way.
         """
         return self._begin("Looking for devices", self._rescan)
+
+    # Ways round (ECM)
+
+    def find_way(self, targets: Mapping[str, float], budget_s: float) -> Way:
+        """Return a way of some axes to `targets`, in gate coordinates; waits for it.
+
+        Raises
+        ------
+        NotAvailable
+            There is no collision model.
+        MoveRefused
+            No way was found; the verdict says what blocks.
+        """
+        if self.way_finder is None:
+            raise NotAvailable(f"{NO_MODEL_TEXT}: without one there is nothing to go round")
+        return way_from_plan(self.way_finder.find(targets, budget_s))
+
+    def search_way(self, targets: Mapping[str, float], budget_s: float = WAY_BUDGET_S) -> Task:
+        """Look for a way in the application's thread; `way_found` or `way_missing` tells."""
+
+        def search(task: Task) -> None:
+            try:
+                way = self.find_way(targets, budget_s)
+            except MoveRefused as exc:
+                self.way_missing.emit(exc.verdict)
+                task.fail(exc)
+            except CosmicError as exc:
+                task.fail(exc)
+            else:
+                self.way_found.emit(way)
+                task.finish()
+
+        return self._begin("Looking for a way", search)
+
+    def follow_way(self, way: Way, source: str) -> Task:
+        """Go a way that was found; returns at once.
+
+        Raises
+        ------
+        NotAvailable
+            Another long operation is under way.
+        """
+        return self._begin("Going round", lambda task: follow(self.manager, way, task, source))
 
     def _begin(self, title: str, job: Callable[[Task], None]) -> Task:
         running = self._running_task
@@ -201,6 +257,8 @@ class MicoApplication(CosmicApplicationBase):
         if self.clearance_watch is not None:
             self.clearance_watch.request_end()
             self.clearance_watch.join()
+        if self.way_finder is not None:
+            self.way_finder.close()
         self.manager.close()
         self.join()
         self._forget()

@@ -9,12 +9,14 @@ from typing_extensions import override
 
 from cosmic.frame.errors import MoveRefused, NotAvailable
 from cosmic.frame.task import Progress, Task
+from cosmic.frame.threads import forbid_waiting_here
 from cosmic.frame.verdict import MoveVerdict
-from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.application import WAY_BUDGET_S, MicoApplication
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.entry import Number, as_number
 from cosmic.mico.api.group import GroupMovement, waited_for
+from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.device import Device
@@ -205,9 +207,7 @@ class Mico:
     def _targets(self, targets: Mapping[str, Number]) -> dict[str, Motion]:
         motions: dict[str, Motion] = {}
         for name, value in targets.items():
-            axis = self[name]
-            target = as_number(value, axis.unit, name) + axis.details.zero
-            motions[name] = MoveTo(target, axis.unit)
+            motions[name] = MoveTo(self._in_gate(name, value), self[name].unit)
         return motions
 
     def _together(
@@ -229,6 +229,59 @@ class Mico:
             return self._manager.check(self._targets(targets))
         except MoveRefused as exc:
             return exc.verdict
+
+    # Ways round (ECM)
+
+    def find_way(self, targets: Mapping[str, Number], *, budget_s: float = WAY_BUDGET_S) -> Way:
+        """Look for a way to absolute targets round what is in between, without moving.
+
+        Parameters
+        ----------
+        targets : mapping
+            Positions by axis name, in the unit of each axis, from the user's zero.
+        budget_s : float
+            How long to look, in wall time.
+
+        Raises
+        ------
+        NotAvailable
+            There is no collision model.
+        UnknownAxisError
+            One axis does not exist.
+        MoveRefused
+            No way was found; the verdict says what blocks.
+        WrongThreadError
+            Called in the GUI thread.
+        """
+        forbid_waiting_here("looking for a way")
+        places = {name: self._in_gate(name, value) for name, value in targets.items()}
+        return self._application.find_way(places, budget_s)
+
+    def follow(
+        self, way: Way, progress: Callable[[Progress], None] | None = None, *, wait: bool = True
+    ) -> Task:
+        """Go a way that `find_way` found, part by part; the arguments are those of `initialise`.
+
+        Raises
+        ------
+        NotAvailable
+            Another long operation is under way.
+        MoveRefused
+            The gate refused a part: something has moved since.
+        """
+        return self._follow(self._application.follow_way(way, self._source), progress, wait=wait)
+
+    def move_around(
+        self, targets: Mapping[str, Number], *, budget_s: float = WAY_BUDGET_S, wait: bool = True
+    ) -> Task:
+        """Find a way to absolute targets and go it; raises as `find_way` and `follow`."""
+        return self.follow(self.find_way(targets, budget_s=budget_s), wait=wait)
+
+    def _in_gate(self, name: str, value: Number) -> float:
+        axis = self[name]
+        return as_number(value, axis.unit, name) + axis.details.zero
+
+    # Collisions
 
     @property
     def collision(self) -> Collision:

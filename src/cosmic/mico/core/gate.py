@@ -76,7 +76,13 @@ class Decision:
     targets: Mapping[str, float]
 
 
-def judge(requests: Sequence[Request], picture: Picture, checker: CollisionChecker) -> Decision:
+def judge(
+    requests: Sequence[Request],
+    picture: Picture,
+    checker: CollisionChecker,
+    *,
+    advice: bool = True,
+) -> Decision:
     """Decide several movements together; pure: state in, answer out, nothing else touched."""
     intervals: dict[str, Interval] = {}
     targets: dict[str, float] = {}
@@ -92,7 +98,7 @@ def judge(requests: Sequence[Request], picture: Picture, checker: CollisionCheck
         intervals[request.axis] = swept_interval(
             request.motion, state, target, place, picture.rules
         )
-    verdict = _clear_of_everything(intervals, picture, checker)
+    verdict = _clear_of_everything(intervals, picture, checker, advice=advice)
     return Decision(verdict, intervals if verdict.allowed else {}, targets)
 
 
@@ -123,13 +129,17 @@ def _first_refusal(request: Request, picture: Picture) -> MoveVerdict | None:
 
 
 def _clear_of_everything(
-    intervals: Mapping[str, Interval], picture: Picture, checker: CollisionChecker
+    intervals: Mapping[str, Interval],
+    picture: Picture,
+    checker: CollisionChecker,
+    *,
+    advice: bool,
 ) -> MoveVerdict:
     spans = {
         name: _span(state, intervals.get(name), picture) for name, state in picture.states.items()
     }
     try:
-        verdict = checker.check(spans)
+        verdict = checker.check(spans, advice=advice)
     except Exception:  # a check that cannot answer says no
         logger.exception("the collision check failed")
         return refuse(
@@ -205,10 +215,13 @@ class Gate:
         """The collision model, or the stand-in that says there is none."""
         return self._checker
 
-    def check(self, requests: Sequence[Request]) -> MoveVerdict:
-        """Say whether `requests` would be allowed now, without reserving anything."""
+    def check(self, requests: Sequence[Request], *, advice: bool = True) -> MoveVerdict:
+        """Say whether `requests` would be allowed now, without reserving anything.
+
+        `advice` is that of `CollisionChecker.check`.
+        """
         with self._lock:
-            return judge(requests, self._picture(), self._checker).verdict
+            return judge(requests, self._picture(), self._checker, advice=advice).verdict
 
     def decide(self, requests: Sequence[Request]) -> tuple[MoveVerdict, dict[str, Grant]]:
         """Decide `requests` together; when allowed, hold their intervals and grant each axis."""
@@ -227,6 +240,12 @@ class Gate:
                 self._holds.setdefault(axis, {})[grant.number] = hold
                 grants[axis] = grant
             return decision.verdict, grants
+
+    def spans(self) -> dict[str, AxisSpan]:
+        """Return where every axis may be as things are now."""
+        with self._lock:
+            picture = self._picture()
+        return {name: _span(state, None, picture) for name, state in picture.states.items()}
 
     def still_valid(self, grant: Grant) -> bool:
         """Return False when a stop came after `grant`; takes no lock."""

@@ -182,7 +182,7 @@ class ChannelPilot(ChannelFollower):
         for share in SLOWER:
             ahead = jog.look_ahead(self._positioner.state, share)
             request = Request(self.name, ahead, order.token, order.consent)
-            verdict = self._context.gate.check([request])
+            verdict = self._context.gate.check([request], advice=False)
             if verdict.reason is not Reason.COLLISION:
                 return share
         return SLOWER[-1]

@@ -29,6 +29,8 @@ class MotionDefaults(StrictModel):
     nominal_step_deg: float = Field(default=0.025, gt=0)
     largest_step_um: float = Field(default=3.0, gt=0)
     largest_step_deg: float = Field(default=0.05, gt=0)
+    acceleration_um_s2: float = Field(default=100_000.0, gt=0)
+    acceleration_deg_s2: float = Field(default=1_000.0, gt=0)
 
     @property
     def hold(self) -> float:

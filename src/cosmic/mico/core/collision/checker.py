@@ -20,10 +20,11 @@ class CollisionChecker(Protocol):
         """False where there is no model, which windows say loudly."""
 
     @abstractmethod
-    def check(self, spans: Spans) -> MoveVerdict:
+    def check(self, spans: Spans, *, advice: bool = True) -> MoveVerdict:
         """Judge where all axes may be, those about to move, in flight and at rest; any thread.
 
-        An exception counts as a refusal.
+        An exception counts as a refusal. Without `advice` a refusal does not say how far the
+        axis could go, which takes longer to find out than that it cannot.
         """
 
     @abstractmethod
@@ -44,7 +45,7 @@ class NoCollisionModel(CollisionChecker):
         return False
 
     @override
-    def check(self, spans: Spans) -> MoveVerdict:
+    def check(self, spans: Spans, *, advice: bool = True) -> MoveVerdict:
         return MoveVerdict(allowed=True, reason=Reason.ALLOWED, text=f"allowed; {NO_MODEL_TEXT}")
 
     @override

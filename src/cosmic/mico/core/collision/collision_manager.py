@@ -92,9 +92,9 @@ class CollisionManager(Exemptions, CollisionChecker):
     # Questions
 
     @override
-    def check(self, spans: Spans) -> MoveVerdict:
+    def check(self, spans: Spans, *, advice: bool = True) -> MoveVerdict:
         try:
-            return self._judge(self._with_freed(spans))
+            return self._judge(self._with_freed(spans), advice=advice)
         except NoAnswerError as exc:
             return words.no_answer(str(exc))
         except Exception as exc:  # a check that cannot answer says no
@@ -120,7 +120,7 @@ class CollisionManager(Exemptions, CollisionChecker):
             for axis, span in spans.items()
         }
 
-    def _judge(self, spans: Spans) -> MoveVerdict:
+    def _judge(self, spans: Spans, *, advice: bool) -> MoveVerdict:
         ignored = self.ignored_pairs
         while True:
             answer = self._process.check(spans, ignored)
@@ -132,7 +132,7 @@ class CollisionManager(Exemptions, CollisionChecker):
             if approach.bodies in ignored:
                 return words.no_answer(f"it does not leave {approach.bodies} aside")
             if self._respond(approach, spans) is not Response.IGNORE:
-                return self._refuse(spans, answer, approach, ignored)
+                return self._refuse(spans, answer, approach, ignored if advice else None)
             ignored = ignored | {approach.bodies}
 
     def _allow(self, spans: Spans) -> MoveVerdict:
@@ -145,12 +145,13 @@ class CollisionManager(Exemptions, CollisionChecker):
         return MoveVerdict(allowed=True, reason=Reason.ALLOWED, text=text)
 
     def _refuse(
-        self, spans: Spans, answer: SweepAnswer, approach: Approach, ignored: Set[BodyPair]
+        self, spans: Spans, answer: SweepAnswer, approach: Approach, ignored: Set[BodyPair] | None
     ) -> MoveVerdict:
+        """Put a refusal into words; with None for `ignored`, without looking for a free part."""
         inside = answer.reason == INSIDE_TEXT
         axes = words.moving_axes(spans)
         free_to = None
-        if len(axes) == 1 and not inside:
+        if len(axes) == 1 and not inside and ignored is not None:
             try:
                 free_to = self._process.free_way(spans, axes[0], ignored)
             except NoAnswerError as exc:  # the refusal stands without it

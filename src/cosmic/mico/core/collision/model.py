@@ -174,6 +174,15 @@ class SceneModel:
         """Place of each body in `bodies`."""
         return {name: number for number, name in enumerate(self.bodies)}
 
+    def carried(self, axis: str) -> frozenset[str]:
+        """Return the bodies that an axis moves."""
+        driven = {drive.joint for drive in self.drives if drive.axis == axis}
+        bodies: set[str] = set()
+        for joint in self.joints:  # parents come before their children
+            if joint.name in driven or joint.parent in bodies:
+                bodies.add(joint.child)
+        return frozenset(bodies)
+
     def travel(self, axis: str) -> tuple[float, float]:
         """Return the hard limits of an axis in its unit, those of all its joints together.
 

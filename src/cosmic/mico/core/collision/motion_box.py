@@ -28,7 +28,7 @@ class MotionBox:
     origin
         Where everything stands, as far as it is known; else the middle of the interval.
     origin_known
-        False for joints whose axis is somewhere in its interval.
+        False for joints whose axis moves from somewhere in its interval.
     moving
         Joints of moving axes that collision detection looks after.
     """
@@ -118,7 +118,9 @@ def _row(drive: Drive, joint: Joint, span: AxisSpan) -> _Row:
     if over != 0.0:
         low, high = _interval(drive, joint, span, spread + over, now)
     origin = (low + high) / 2.0 if now is None else now
-    known = now is not None and not span.estimated
+    # An axis at rest whose place is only believed keeps nobody from retreating: the gap that
+    # counts is then the one where it is believed to be.
+    known = now is not None and not (span.estimated and span.moving)
     moves = span.moving and not span.free
     return low, high, asked_low, asked_high, origin, float(known), float(moves)
 

@@ -1,0 +1,74 @@
+"""Ways round what is in between: found first, looked at, then gone (ECM, thesis 3.4.2)."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from cosmic.frame.errors import CosmicError, MoveCancelled
+from cosmic.frame.task import Task
+from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.core.device_manager import DeviceManager
+from cosmic.mico.core.orders import Motion, MoveTo
+from cosmic.mico.core.planning.problem import Plan
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way to some targets on which nothing comes closer than its margin.
+
+    Attributes
+    ----------
+    start : mapping of float
+        Where the axes stood when it was looked for, in gate coordinates and their units.
+    waypoints : tuple of mappings of float
+        Where they go, one after the other; the axes of a waypoint move at once and may arrive
+        in any order. In gate coordinates.
+    method : str
+        How it was found: "straight", "detour", ...
+    length, straight_length : float
+        Of the way, and of the straight line to its end; um.
+    duration_s : float
+        How long it takes, at the speeds that are set.
+    """
+
+    start: Mapping[str, float]
+    waypoints: tuple[Mapping[str, float], ...]
+    method: str
+    length: float
+    straight_length: float
+    duration_s: float
+
+
+def way_from_plan(plan: Plan) -> Way:
+    """Return a plan as scripts and windows see it."""
+    return Way(
+        start=dict(plan.start),
+        waypoints=tuple(dict(segment.targets) for segment in plan.segments),
+        method=plan.method,
+        length=plan.length,
+        straight_length=plan.straight_length,
+        duration_s=math.nan if plan.duration_s is None else plan.duration_s,
+    )
+
+
+def follow(manager: DeviceManager, way: Way, task: Task, source: str) -> None:
+    """Go `way` part by part and end `task`; in the application's thread.
+
+    The gate decides each part again when its turn comes.
+    """
+    try:
+        count = len(way.waypoints)
+        for number, waypoint in enumerate(way.waypoints):
+            if task.cancel_requested:
+                raise MoveCancelled("the way was left before its end")
+            task.report(number / count, f"part {number + 1} of {count}: {', '.join(waypoint)}")
+            motions: dict[str, Motion] = {
+                name: MoveTo(target, manager.state(name).unit) for name, target in waypoint.items()
+            }
+            orders = manager.order_together(motions, source=source)
+            together = GroupMovement({name: order.movement for name, order in orders.items()})
+            task.on_cancel(together.cancel)
+            together.wait()
+        task.finish()
+    except CosmicError as exc:
+        task.fail(exc)
