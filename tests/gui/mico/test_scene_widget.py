@@ -150,6 +150,13 @@ def test_the_operator_can_take_the_ghost_away(qtbot, scene):
     assert scene.refused_text == ""
 
 
+def test_a_refusal_does_not_make_the_picture_jump(scene):
+    before = scene.view.size()
+    scene.show_refused(TOUCH)
+    QApplication.processEvents()
+    assert scene.view.size() == before
+
+
 def test_the_ghost_is_gone_where_the_body_has_come_to_stand(scene):
     scene.show_refused(TOUCH)
     scene.set_positions(TOUCH.pose)

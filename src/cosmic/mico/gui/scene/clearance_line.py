@@ -1,12 +1,13 @@
 """The lines below the scene: how near the nearest pair is, and what was refused."""
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
 
 from cosmic.frame.gui.build import named, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import LARGE_PX, STEP_PX, State, current_palette, number_font
+from cosmic.frame.overrides import override
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.gui.scene.annotations import distance_text
 
@@ -16,6 +17,7 @@ class ClearanceLine(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self._approach: Approach | None = None
         self._figures = named(QLabel(), "sceneClearance")
         self._figures.setFont(number_font(LARGE_PX, bold=True))
         self._figures.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
@@ -39,6 +41,7 @@ class ClearanceLine(QWidget):
 
     def set_nearest(self, approach: Approach | None) -> None:
         """Show another pair, or that none is known."""
+        self._approach = approach
         if approach is None:
             self._figures.setText("–")
             self._names.set_text("nearest pair not known")
@@ -50,6 +53,12 @@ class ClearanceLine(QWidget):
         margin = f"  (margin {distance_text(approach.margin_um)} µm reached)" if inside else ""
         self._names.set_text(f"{one} – {other}{margin}")
         self._tint(current_palette().refused if inside else "")
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self.set_nearest(self._approach)
 
     def _tint(self, colour: str) -> None:
         sheet = f"color: {colour};" if colour else ""
@@ -70,8 +79,9 @@ class RefusedLine(QWidget):
         away.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         away.clicked.connect(self.cleared)
         row = QHBoxLayout(self)
-        row.setContentsMargins(STEP_PX, 0, STEP_PX, 0)
+        row.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX // 2)
         row.setSpacing(STEP_PX)
+        self.setAutoFillBackground(True)
         row.addWidget(StateBadge(State.REFUSED))
         row.addWidget(self._words, 1)
         row.addWidget(away)

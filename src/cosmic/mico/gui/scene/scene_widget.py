@@ -7,6 +7,7 @@ from typing import Final
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
+    QGridLayout,
     QLabel,
     QSizePolicy,
     QStackedWidget,
@@ -80,14 +81,21 @@ class SceneWidget(QWidget):
 
     def _arrange(self) -> None:
         for each in (self._toolbar, self._nearest, self._refused):
-            policy = QSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-            policy.setRetainSizeWhenHidden(True)  # a refusal must not make the picture jump
-            each.setSizePolicy(policy)
+            each.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        # The refusal lies over the picture, so that it does not make it jump.
+        middle = QWidget()
+        grid = QGridLayout(middle)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setSpacing(0)
+        grid.addWidget(self._stack, 0, 0)
+        grid.addWidget(self._refused, 0, 0, Qt.AlignmentFlag.AlignBottom)
+        self._refused.raise_()
         column = QVBoxLayout(self)
         column.setContentsMargins(0, STEP_PX // 2, 0, STEP_PX // 2)
         column.setSpacing(STEP_PX // 2)
-        for widget in (self._toolbar, self._stack, self._nearest, self._refused):
-            column.addWidget(widget, 1 if widget is self._stack else 0)
+        column.addWidget(self._toolbar)
+        column.addWidget(middle, 1)
+        column.addWidget(self._nearest)
 
     def _make_view(self, prefer_gl: bool) -> SceneView:
         view: SceneView
