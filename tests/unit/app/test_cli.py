@@ -104,6 +104,44 @@ def test_check_of_what_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixtur
 # init
 
 
+# scene
+
+
+def test_the_shipped_scene_is_ok(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scene", "check", str(folder / "scenes" / "fiberstation.toml")]) == 0
+    assert capsys.readouterr().out.rstrip().endswith("ok")
+
+
+def test_a_mistake_in_the_scene_is_named(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene = folder / "scenes" / "fiberstation.toml"
+    edit(folder / "platform.toml", 'name = "left.x"', 'name = "left.q"')
+    edit(folder / "platform.toml", '["left.x", "right.x"]', '["left.q", "right.x"]')
+    edit(folder / "platform.toml", '"left.x"', '"left.q"')
+    assert main(["scene", "check", str(folder / "scenes" / "nothing.toml")]) == 1
+    assert "nothing.toml" in complaints(capsys)[0]
+    assert main(["check", str(folder)]) == 1
+    said = complaints(capsys)
+    assert any("left.q moves nothing" in line for line in said), said
+    assert any("drives left.x, which is no positioner" in line for line in said)
+    edit(scene, 'joint = "left_x"', 'joint = "nowhere"')
+    assert main(["scene", "check", str(scene)]) == 1
+    assert any("nowhere" in line for line in complaints(capsys))
+
+
+def test_soft_limits_beyond_the_scenes_hard_stops_are_a_mistake(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    edit(folder / "scenes" / "fiberstation.urdf", 'upper="0.006"', 'upper="0.005"')
+    assert main(["check", str(folder)]) == 1
+    assert any("beyond the hard stops of scenes" in line for line in complaints(capsys))
+
+
+def test_a_scene_needs_a_task(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["scene"])
+    assert "TASK" in capsys.readouterr().err
+
+
 def test_init_copies_the_configuration_and_never_overwrites(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
