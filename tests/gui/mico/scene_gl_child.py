@@ -9,7 +9,7 @@ import sys
 import warnings
 
 import numpy as np
-from PySide6.QtCore import QEvent, QPointF, qInstallMessageHandler
+from PySide6.QtCore import QEvent, QPointF, qInstallMessageHandler, qWarning
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QDockWidget, QMainWindow
 
@@ -211,4 +211,6 @@ if __name__ == "__main__":
         for check in CHECKS.values() if sys.argv[1] == "all" else [CHECKS[sys.argv[1]]]:
             check()
     assert not said, said
+    qWarning("still heard")
+    assert said == ["still heard"], "the message handler was not put back"
     sys.stdout.write("fine\n")

@@ -1,5 +1,7 @@
 """Camera, picking, tips and outlines of the scene, without a widget."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -89,6 +91,20 @@ def test_the_nearest_body_on_the_line_of_sight_is_picked():
     assert pick(meshes, poses, Ray(np.array([0.0, 0.0, 40.0]), np.array([0.0, 0.0, 1.0]))) == ""
 
 
+def test_a_body_whose_box_only_is_met_hides_nothing():
+    model = two_arms()
+    views = (
+        box("floor", "frame", (-5e3, -5e3, -1e3), (5e3, 5e3, 0.0)),
+        box("tower", "frame", (4e3, 4e3, 0.0), (5e3, 5e3, 30e3)),
+        box("foot", "plate", (-5e3, -5e3, 1e3), (-4e3, 5e3, 2e3)),
+        box("shelf", "plate", (-5e3, 4e3, 1e3), (5e3, 5e3, 20e3)),
+    )
+    meshes = body_meshes(replace(model, views=views))
+    poses = dict(zip(model.bodies, poses_mm(model, {}), strict=True))
+    ray = Ray(np.array([0.0, 0.0, 40.0]), np.array([0.0, 0.0, -1.0]))
+    assert pick(meshes, poses, ray) == "frame"
+
+
 def test_an_outline_follows_its_body_when_it_slides_and_when_it_turns():
     mesh = body_meshes(two_arms())["plate"]
     outlines, pose = Outlines(), np.eye(4)
@@ -110,12 +126,8 @@ def test_a_hull_of_a_flat_cloud_is_no_error(points):
 def test_a_body_without_view_shapes_is_drawn_by_its_collision_pieces():
     model = two_arms()
     piece = box("hidden wall", "left_x", (0.0, 0.0, 0.0), (1e3, 1e3, 1e3))
-    seen = body_meshes(type(model)(**(vars_of(model) | {"pieces": (piece,)})))
+    seen = body_meshes(replace(model, pieces=(piece,)))
     assert "left_x" in seen
-
-
-def vars_of(model):
-    return {name: getattr(model, name) for name in model.__dataclass_fields__}
 
 
 def test_normals_are_sharp_at_the_edges_of_a_box():
