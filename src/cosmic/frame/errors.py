@@ -66,6 +66,7 @@ class DeviceFault(StrEnum):
     COMMUNICATION = "communication with the controller failed"
     TIMEOUT = "no answer in time"
     STATE = "library not in the right state"
+    OVERRUN = "samples were lost"
     OTHER = "unclassified failure"
 
 

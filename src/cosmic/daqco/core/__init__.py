@@ -1,0 +1,1 @@
+"""Acquisition, buffering, storage."""

@@ -1,0 +1,1 @@
+"""Acquisition boards behind one Protocol."""

@@ -1,0 +1,169 @@
+"""What DAQCo asks of an acquisition board, whoever made it (thesis 4.3, 6.2)."""
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+Volts = npt.NDArray[np.float64]
+
+
+class InputMode(StrEnum):
+    """How an input is wired; names and meaning are NI's."""
+
+    RSE = "rse"
+    NRSE = "nrse"
+    DIFFERENTIAL = "differential"
+
+
+@dataclass(frozen=True, slots=True)
+class BoardInfo:
+    """What a board is and what it can do.
+
+    Attributes
+    ----------
+    name : str
+        What the driver calls it, such as "Dev1".
+    product : str
+        Such as "PCI-6229".
+    inputs : tuple of str
+        Single-ended inputs in order, "ai0" and so on; the first half of them can be wired
+        differentially, each with its partner in the second half.
+    max_single_rate_hz, max_multi_rate_hz : float
+        Highest rate of one input alone, and the sum of the rates of several.
+    ranges_v : tuple of (float, float)
+        Input ranges, the widest first.
+    """
+
+    name: str
+    product: str
+    simulated: bool
+    serial: int
+    inputs: tuple[str, ...]
+    max_single_rate_hz: float
+    max_multi_rate_hz: float
+    ranges_v: tuple[tuple[float, float], ...]
+
+    def highest_rate_hz(self, active: int) -> float:
+        """Return the highest sampling rate a channel with `active` channels at once."""
+        if active <= 1:
+            return self.max_single_rate_hz
+        return self.max_multi_rate_hz / active
+
+
+@dataclass(frozen=True, slots=True)
+class InputSettings:
+    """One input to acquire: which, how it is wired, and the voltages expected there."""
+
+    input: str
+    mode: InputMode
+    low_v: float
+    high_v: float
+
+
+@dataclass(frozen=True, slots=True)
+class BoardChunk:
+    """Samples of one board, in one piece.
+
+    Attributes
+    ----------
+    first_sample : int
+        Number of the first sample since the start; no gaps between chunks.
+    time_s : float
+        Platform time of that sample.
+    volts : ndarray, shape (inputs, n), float64, V
+        In the order configured; fresh for each chunk, and the receiver's.
+    """
+
+    first_sample: int
+    time_s: float
+    volts: Volts
+
+
+class Board(Protocol):
+    """One acquisition board.
+
+    Order of calls: `configure`, `start`, `receive` again and again, `stop`; then `configure` or
+    `start` again; at last `close`. One thread receives; any thread may stop.
+    """
+
+    @property
+    @abstractmethod
+    def info(self) -> BoardInfo:
+        """What the board is and can do."""
+
+    @abstractmethod
+    def configure(
+        self, inputs: Sequence[InputSettings], rate_hz: float, chunk_samples: int
+    ) -> float:
+        """Prepare to acquire and return the rate that the board really makes, Hz.
+
+        Raises
+        ------
+        LimitError
+            A rate, range or number of inputs that the board does not have.
+        DeviceError
+            The board is gone or taken by another program.
+        """
+
+    @abstractmethod
+    def start(self) -> None:
+        """Begin to acquire; sample 0 is taken now.
+
+        Raises
+        ------
+        DeviceError
+            The board is gone, taken, or was not configured.
+        """
+
+    @abstractmethod
+    def receive(self, timeout_s: float) -> BoardChunk | None:
+        """Return the next chunk, or None after `timeout_s` of wall time.
+
+        Raises
+        ------
+        DeviceError
+            `DeviceFault.OVERRUN` when samples were lost, with how many in the text; the board is
+            gone, or failed. After it nothing more comes before the next `start`.
+        """
+
+    @abstractmethod
+    def stop(self) -> None:
+        """End acquiring; harmless when nothing runs. A `receive` that waits returns None."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Give the board back; harmless the second time."""
+
+
+class BoardLibrary(Protocol):
+    """The driver behind some boards."""
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """What the operator reads, such as "NI-DAQmx 26.8"."""
+
+    @abstractmethod
+    def list_boards(self) -> tuple[BoardInfo, ...]:
+        """Return the boards there are.
+
+        Raises
+        ------
+        NotConnectedError
+            The driver is not installed; the text says what to install.
+        """
+
+    @abstractmethod
+    def open(self, name: str) -> Board:
+        """Return a board by name.
+
+        Raises
+        ------
+        NotConnectedError
+            There is none of that name.
+        """
