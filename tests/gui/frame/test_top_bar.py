@@ -3,6 +3,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QPushButton, QToolButton
 from pytestqt.qtbot import QtBot
 
+from cosmic.frame.gui.clearance_meter import Clearance
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.stop_button import StopButton
@@ -72,9 +73,76 @@ def test_the_whole_latched_bar_is_red(bar: TopBar) -> None:
 
 def test_missing_collision_model_is_said_loudly(bar: TopBar) -> None:
     assert "no collision model" in texts(bar)
-    bar.set_collision("clearance 182 µm  jaw-plate")
+    bar.set_collision_model(present=True)
     assert "no collision model" not in texts(bar)
-    assert "clearance 182 µm jaw-plate" in texts(bar)
+
+
+def test_the_clearance_says_how_near_and_who(bar: TopBar) -> None:
+    bar.set_collision_model(present=True)
+    bar.set_clearance(Clearance(182.4, ("jaw", "plate"), 5.0))
+    assert bar.clearance_text == "clearance 182 µm  jaw – plate"
+    assert "182" in texts(bar)
+    assert "jaw – plate" in texts(bar)
+
+
+@pytest.mark.parametrize(
+    ("distance_um", "word"),
+    [
+        (25.0, "● clearance"),
+        (24.9, "▲ close"),
+        (5.1, "▲ close"),
+        (5.0, "◆ at margin"),
+        (0.0, "◆ at margin"),
+        (float("nan"), "◆ at margin"),
+    ],
+)
+def test_closeness_is_said_by_sign_and_word(bar: TopBar, distance_um: float, word: str) -> None:
+    bar.set_collision_model(present=True)
+    bar.set_clearance(Clearance(distance_um, ("jaw", "plate"), 5.0))
+    assert word in texts(bar)
+
+
+def test_an_unknown_clearance_says_why_and_shows_no_number(bar: TopBar) -> None:
+    bar.set_collision_model(present=True)
+    bar.set_clearance(Clearance(182.4, ("jaw", "plate"), 5.0))
+    bar.set_clearance(None, "not referenced")
+    assert bar.clearance_text == "clearance unknown: not referenced"
+    assert "unknown: not referenced" in texts(bar)
+    assert "182" not in texts(bar)
+
+
+def test_the_figures_of_the_clearance_never_move(qtbot: QtBot, bar: TopBar) -> None:
+    bar.set_collision_model(present=True)
+    places = set()
+    figures = bar.findChild(QLabel, "clearance")
+    assert figures is not None
+    for distance_um in (0.0, 7.2, 182.0, 123456.0):
+        bar.set_clearance(Clearance(distance_um, ("a", "right_finger_b_with_a_long_name"), 5.0))
+        qtbot.waitUntil(lambda: f"{distance_um:.0f}"[:1] in figures.text())  # noqa: B023
+        places.add(figures.geometry().getRect())
+    bar.set_clearance(None, "not referenced")
+    places.add(figures.geometry().getRect())
+    assert len(places) == 1
+
+
+def test_axes_taken_out_are_named_loudly_while_it_lasts(bar: TopBar) -> None:
+    assert "CD OFF" not in texts(bar)
+    bar.set_unwatched(("left.x", "left.y", "left.z"))
+    assert "CD OFF: left.x, left.y +1" in texts(bar)
+    chip = next(each for each in bar.findChildren(QLabel) if "CD OFF" in each.text())
+    assert "left.z" in chip.toolTip()
+    assert "to watch it again" in chip.toolTip()
+    bar.set_latched("F12")
+    assert "CD OFF" in texts(bar)
+    bar.set_unwatched(())
+    assert "CD OFF" not in texts(bar)
+
+
+def test_contacts_allowed_are_named(bar: TopBar) -> None:
+    bar.set_contacts(("grasp",))
+    assert "contact: grasp" in texts(bar)
+    bar.set_contacts(())
+    assert "contact" not in texts(bar)
 
 
 def test_the_rate_is_shown_where_it_is_not_one(bar: TopBar) -> None:
@@ -114,8 +182,11 @@ def test_a_long_message_is_elided_has_a_tooltip_and_opens_the_log(
 
 def test_the_bar_fits_the_smallest_screen(bar: TopBar) -> None:
     bar.set_rate(20.0, 18.66)
-    bar.set_collision("")
     assert bar.minimumSizeHint().width() <= 1280
+    bar.set_collision_model(present=True)
+    bar.set_contacts(("grasp",))
+    bar.set_unwatched(("right.gripper", "table.rotation", "left.x"))
+    assert bar.minimumSizeHint().width() <= 1366
 
 
 def test_a_badge_keeps_its_width_whatever_it_shows(qtbot: QtBot) -> None:

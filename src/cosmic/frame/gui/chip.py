@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
 from cosmic.frame.gui.theme import ui_font
 
-Tone = Literal["simulated", "real", "warning", "quiet"]
+Tone = Literal["simulated", "real", "alarm", "warning", "quiet"]
 
 
 def set_style_property(widget: QWidget, name: str, value: object) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 from string import Template
 from typing import Final
 
-from cosmic.frame.gui.palette import INK, Palette
+from cosmic.frame.gui.palette import INK, OKABE_ITO, Palette
 
 _ASSETS: Final = Path(__file__).parent / "assets"
 
@@ -175,9 +175,16 @@ QHeaderView::section {
     background: transparent; color: $accent; border: 1px solid $accent; padding: 1px 7px;
 }
 #chip[tone="real"] { background: $raised; color: $text; }
+#chip[tone="alarm"] { background: $alarm; color: $ink; }
 #chip[tone="warning"] { background: $warning; color: $ink; }
 #chip[tone="quiet"] { background: $raised; color: $text; }
 #topBar[latched="true"] #chip[tone="simulated"] { color: $on_stop; border-color: $on_stop; }
+QPushButton[watched="false"], QPushButton[watched="false"]:hover {
+    background: $alarm; color: $ink; border-color: $alarm;
+}
+#takeOutQuestion {
+    background: $raised; border: 2px solid $alarm; border-radius: 4px;
+}
 #reasonBubble {
     background: $raised; color: $text; border: 2px solid $refused; border-radius: 4px;
     padding: 4px 8px;
@@ -188,5 +195,9 @@ QHeaderView::section {
 def stylesheet(palette: Palette) -> str:
     """Return the style sheet in the colours of `palette`."""
     return Template(_SHEET).substitute(
-        asdict(palette), ink=INK, hover_on_stop="#E3E8ED", assets=_ASSETS.as_posix()
+        asdict(palette),
+        ink=INK,
+        alarm=OKABE_ITO["vermillion"],
+        hover_on_stop="#E3E8ED",
+        assets=_ASSETS.as_posix(),
     )

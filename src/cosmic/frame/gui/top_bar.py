@@ -1,5 +1,8 @@
 """The bar on top of every main window: what is in force, what is wrong, and STOP."""
 
+from collections.abc import Collection
+from typing import Final
+
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QHBoxLayout,
@@ -13,6 +16,7 @@ from PySide6.QtWidgets import (
 
 from cosmic.frame.gui.build import named, push_button, tight_row
 from cosmic.frame.gui.chip import Chip, set_style_property
+from cosmic.frame.gui.clearance_meter import Clearance, ClearanceMeter
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.mode_selector import ModeSelector
 from cosmic.frame.gui.state_badge import StateBadge
@@ -20,6 +24,7 @@ from cosmic.frame.gui.stop_button import StopButton
 from cosmic.frame.gui.theme import LARGE_PX, STEP_PX, State, ui_font
 
 NO_COLLISION_MODEL = "no collision model"
+_NAMES_SHOWN: Final = 2
 
 
 class TopBar(QWidget):
@@ -62,11 +67,13 @@ class TopBar(QWidget):
         self._simulated = Chip("SIMULATED", "simulated", "No hardware is driven: this is the twin")
         self._modes = ModeSelector()
         self._controls = Chip("", "quiet")
-        self._collision = ElidedLabel()
+        self._clearance = ClearanceMeter()
         self._no_model = Chip(f"▲ {NO_COLLISION_MODEL}", "warning")
         self._no_model.setToolTip(
             "Movements within the limits are made without a check for collisions"
         )
+        self._unwatched = Chip("", "alarm")
+        self._contacts = Chip("", "warning")
         self._rate = Chip("", "warning", "The platform's clock does not run in real time")
         self._message = ElidedLabel(hint="Click to open the log")
         self._message_state = StateBadge(State.ERROR)
@@ -83,13 +90,16 @@ class TopBar(QWidget):
         self._reset.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.set_controls("this window")
         self.set_rate(1.0)
-        self.set_collision("")
+        self.set_collision_model(present=False)
+        self.set_unwatched(())
+        self.set_contacts(())
 
     def _arrange(self) -> None:
         normal, row = tight_row(STEP_PX)
         for widget in (self._modes, self._controls, self._no_model, self._rate):
             row.addWidget(widget)
-        row.addWidget(self._collision, 1)
+        row.addWidget(self._clearance, 1)
+        row.addStretch(0)
         latched, row = tight_row(STEP_PX)
         row.addWidget(self._latched_text, 1)
         row.addWidget(self._reset)
@@ -103,6 +113,8 @@ class TopBar(QWidget):
         self._first_row.setSpacing(STEP_PX)
         self._first_row.addWidget(self._message_state)
         self._first_row.addWidget(self._message, 1)
+        for chip in (self._contacts, self._unwatched):  # where they are seen while stopped, too
+            self._first_row.addWidget(chip)
         self._first_row.addWidget(self._theme)
         second = QHBoxLayout()
         second.setSpacing(2 * STEP_PX)
@@ -159,10 +171,39 @@ class TopBar(QWidget):
         self._controls.setText(f"controls: {who}")
         self._controls.setToolTip(f"Movements are commanded by {who}")
 
-    def set_collision(self, text: str) -> None:
-        """Show the smallest clearance; an empty `text` says loudly that nothing is checked."""
-        self._no_model.setVisible(not text)
-        self._collision.set_text(text)
+    @property
+    def clearance_text(self) -> str:
+        """What is said of the clearance, in one line; empty without a collision model."""
+        return "" if self._clearance.isHidden() else self._clearance.text
+
+    def set_collision_model(self, *, present: bool) -> None:
+        """Have a meter for the clearance; without a model say loudly that nothing is checked."""
+        self._no_model.setVisible(not present)
+        self._clearance.setVisible(present)
+
+    def set_clearance(self, reading: Clearance | None, why_not: str = "") -> None:
+        """Show how near the nearest two bodies are; None: it is not known, and why."""
+        if reading is None:
+            self._clearance.show_unknown(why_not)
+        else:
+            self._clearance.show_clearance(reading)
+
+    def set_unwatched(self, axes: Collection[str]) -> None:
+        """Say loudly which axes are taken out of collision detection."""
+        self._unwatched.setText(f"▲ CD OFF: {_short(axes)}")
+        self._unwatched.setToolTip(
+            f"Taken out of collision detection: {', '.join(axes)}. Nothing keeps their movements "
+            "from hitting something. Press CD OFF on the card of the axis to watch it again."
+        )
+        self._unwatched.setVisible(bool(axes))
+
+    def set_contacts(self, operations: Collection[str]) -> None:
+        """Say which contacts between bodies are allowed at the moment."""
+        self._contacts.setText(f"contact: {_short(operations)}")
+        self._contacts.setToolTip(
+            f"Allowed to touch at the moment, as the scene describes it: {', '.join(operations)}"
+        )
+        self._contacts.setVisible(bool(operations))
 
     def set_rate(self, rate: float, reached: float | None = None) -> None:
         """Show how fast the platform's clock runs where it is not real time."""
@@ -188,3 +229,10 @@ class TopBar(QWidget):
     def set_stop_key(self, key_text: str) -> None:
         """Write another key on the STOP button."""
         self._stop.set_key_text(key_text)
+
+
+def _short(names: Collection[str]) -> str:
+    """Return as many names as the bar has room for; the tooltip has them all."""
+    shown = list(names)[:_NAMES_SHOWN]
+    more = len(names) - len(shown)
+    return ", ".join(shown) + (f" +{more}" if more else "")
