@@ -193,13 +193,14 @@ class CosmicServerGui(QMainWindow):
 
     def _size_bottom(self) -> None:
         """Give log and console a quarter of the height at a first start."""
-        bottom = [
-            dock
+        bottom = {
+            dock: self.dockWidgetArea(dock) == Area.BottomDockWidgetArea
             for dock in self._docks.values()
-            if self.dockWidgetArea(dock) == Area.BottomDockWidgetArea
-        ]
+        }
         height = max(_BOTTOM_LEAST_PX, self.height() // 4)
-        self.resizeDocks(bottom, [height] * len(bottom), Qt.Orientation.Vertical)
+        # Those above are named, too: Qt shares out anew only among the docks it is given.
+        heights = [height if below else self.height() - height for below in bottom.values()]
+        self.resizeDocks(list(bottom), heights, Qt.Orientation.Vertical)
 
     def _on_theme_requested(self) -> None:
         self.set_theme("light" if self.theme == "dark" else "dark")
