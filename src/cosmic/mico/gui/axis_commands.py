@@ -54,6 +54,8 @@ class AxisCommands(QObject):
         A command was given.
     refused(QWidget or None, str)
         It was refused, with the field it came from and the reason.
+    verdict_given(MoveVerdict)
+        The gate's own words to a refusal, also of a jog that stops in front of something.
     ended(str)
         It ended; the text says why, and is empty at its target.
     consent_wanted(ConsentRequest)
@@ -62,6 +64,7 @@ class AxisCommands(QObject):
 
     begun = Signal()
     refused = Signal(object, str)
+    verdict_given = Signal(object)
     ended = Signal(str)
     consent_wanted = Signal(object)
 
@@ -131,6 +134,7 @@ class AxisCommands(QObject):
         if not isinstance(error, MoveRefused):
             self.ended.emit("" if isinstance(error, MoveCancelled) else str(error))
             return
+        self.verdict_given.emit(error.verdict)
         reason = error.verdict.reason
         if reason is Reason.STOPPED and self._moved:
             self.ended.emit(str(error))

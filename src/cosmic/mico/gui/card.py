@@ -3,12 +3,12 @@
 from typing import Final
 
 from PySide6.QtCore import QEvent, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from cosmic.frame.gui.build import named
 from cosmic.frame.gui.chip import Chip, Tone
-from cosmic.frame.gui.palette import blend
+from cosmic.frame.gui.palette import OKABE_ITO, blend
 from cosmic.frame.gui.theme import (
     LARGE_PX,
     STEP_PX,
@@ -22,6 +22,7 @@ from cosmic.frame.units import DISPLAY, format_quantity
 from cosmic.mico.core.positioner import Confidence
 
 _EDGE_PX: Final = 3
+_LOUD_PX: Final = 2.0
 _CALM: Final = (State.OK,)
 
 CONFIDENCE: Final[dict[Confidence, tuple[str, Tone, str]]] = {
@@ -41,6 +42,7 @@ class Card(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._edge = State.OK
+        self._loud = False
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
     def set_edge(self, state: State) -> None:
@@ -49,13 +51,21 @@ class Card(QWidget):
             self._edge = state
             self.update()
 
+    def set_loud(self, loud: bool) -> None:
+        """Draw a border that cannot be missed, or the usual one."""
+        if loud is not self._loud:
+            self._loud = loud
+            self.update()
+
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
         palette = current_palette()
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        box = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
-        painter.setPen(QColor(palette.border))
+        inset = _LOUD_PX / 2.0 if self._loud else 0.5
+        box = QRectF(self.rect()).adjusted(inset, inset, -inset, -inset)
+        loud = QPen(QColor(OKABE_ITO["vermillion"]), _LOUD_PX)
+        painter.setPen(loud if self._loud else QColor(palette.border))
         painter.setBrush(QColor(blend(palette.raised, palette.panel, 0.45)))
         painter.drawRoundedRect(box, 5.0, 5.0)
         if self._edge in _CALM:

@@ -18,9 +18,6 @@ from cosmic.mico.gui.move_row import MoveFields
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
 from cosmic.mico.hw.interface import Direction
 
-NO_MODEL_TIP: Final = (
-    "No collision model: movements within the limits are made without a check for collisions"
-)
 NO_LINK_TIP: Final = "Not available: linking axes comes with synchronous movement"
 
 
@@ -32,6 +29,8 @@ class ClosedLoopGUI(PositionerBaseGUI):
     position_name: ClassVar[str] = "MiCoCL_5"
     forward_name: ClassVar[str] = "MiCoCL_6"
     backward_name: ClassVar[str] = "MiCoCL_7"
+    sign_name: ClassVar[str] = "MiCoCL_2"
+    switch_name: ClassVar[str] = "MiCoCL_13"
 
     # Putting it together
 
@@ -45,9 +44,6 @@ class ClosedLoopGUI(PositionerBaseGUI):
         self._make_speed()
 
     def _make_indicators(self) -> None:
-        self._collision = tipped(named(QLabel("▲"), "MiCoCL_2"), NO_MODEL_TIP)
-        self._collision.setAccessibleName("no collision model")
-        self._rules = _switch("CD off", "MiCoCL_13", f"Not available: {NO_MODEL_TIP.lower()}")
         self._linked = tipped(named(QLabel("○"), "MiCoCL_3"), "Moves on its own, linked to none")
         self._linked.setAccessibleName("not linked")
         self._link = _switch("Link off", "MiCoCL_12", NO_LINK_TIP)
@@ -76,8 +72,8 @@ class ClosedLoopGUI(PositionerBaseGUI):
 
     @override
     def _first_row(self) -> Sequence[QWidget]:
-        signs = (self._collision, self._rules, self._linked, self._link)
-        return *super()._first_row()[:-1], _gap(), *signs, self._menu.button, self._stop
+        signs = (self._linked, self._link)
+        return *super()._first_row()[:-1], *signs, self._menu.button, self._stop
 
     @override
     def _second_row(self) -> Sequence[QWidget]:

@@ -13,6 +13,7 @@ from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.settings import GroupSettings, PositionerSettings
 from cosmic.mico.gui.axis_commands import ConsentRequest
+from cosmic.mico.gui.collision_status import CollisionStatus
 from cosmic.mico.gui.columns import GroupColumns
 from cosmic.mico.gui.consent_dialog import ConsentDialog
 from cosmic.mico.gui.device_gui import DeviceGUI
@@ -38,9 +39,15 @@ class MicoWidget(QWidget):
     -------
     failure_changed(str)
         Why MiCo cannot work; empty when it can.
+    refreshed()
+        There may be other devices now.
+    verdict_given(MoveVerdict)
+        A command of this panel was refused, or a jog stopped in front of something.
     """
 
     failure_changed = Signal(str)
+    refreshed = Signal()
+    verdict_given = Signal(object)
 
     def __init__(self, mico: Mico, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -52,6 +59,7 @@ class MicoWidget(QWidget):
         self._cards: dict[str, PositionerBaseGUI] = {}
         self._shape: list[tuple[str, str]] = []
         self._dialog: ConsentDialog | None = None
+        self._collision = CollisionStatus(self._application.collision)
         self._header = MicoHeader(self._settings.jog)
         self._columns = GroupColumns()
         self._feed = StateFeed(mico, self)
@@ -67,6 +75,7 @@ class MicoWidget(QWidget):
     def _connect(self) -> None:
         self._header.initialise_requested.connect(self.initialise)
         self._header.rescan_requested.connect(self.rescan)
+        self._collision.changed.connect(self._on_collision_changed)
         application = self._application
         application.task_started.connect(self._on_task_started)
         application.status_changed.connect(self._on_status_changed)
@@ -77,6 +86,11 @@ class MicoWidget(QWidget):
     def mico(self) -> Mico:
         """What it commands."""
         return self._mico
+
+    @property
+    def collision(self) -> CollisionStatus:
+        """What is watched for collisions."""
+        return self._collision
 
     @property
     def cards(self) -> dict[str, PositionerBaseGUI]:
@@ -131,6 +145,7 @@ class MicoWidget(QWidget):
                 self._feed.add(name, group)
         self._header.set_missing(self._mico.missing)
         self.failure_changed.emit(self._application.failure)
+        self.refreshed.emit()
 
     def _rebuild(self) -> None:
         self._keys.set_keys({})
@@ -140,6 +155,7 @@ class MicoWidget(QWidget):
         groups = [self._make_group(each) for each in self._arrangement()]
         self._columns.set_groups(groups)
         self._keys.set_keys(self._jog_keys())
+        self._on_collision_changed()
 
     def _arrangement(self) -> list[GroupSettings]:
         """Return the groups of the configuration, and one a device for what they leave out."""
@@ -162,6 +178,7 @@ class MicoWidget(QWidget):
             make_card = gui_class(axis.kind, axis.details.positioner)
             card = make_card(axis, self._settings_of(name), self._settings.defaults)
             card.consent_wanted.connect(self._on_consent_wanted)
+            card.commands.verdict_given.connect(self.verdict_given)
             self._cards[name] = card
             group.add(card)
         return group
@@ -189,6 +206,11 @@ class MicoWidget(QWidget):
 
     def _on_status_changed(self) -> None:
         self.refresh()
+
+    def _on_collision_changed(self) -> None:
+        unwatched, model = self._collision.unwatched, self._collision.has_model
+        for name, card in self._cards.items():
+            card.show_detection(model=model, watched=name not in unwatched)
 
     # Long operations
 

@@ -6,6 +6,7 @@ from typing import ClassVar, Final
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QToolButton, QVBoxLayout, QWidget
 
+from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.chip import set_style_property
 from cosmic.frame.gui.elided_label import ElidedLabel
@@ -18,6 +19,7 @@ from cosmic.mico.core.positioner import PositionerState, Status
 from cosmic.mico.core.settings import MotionDefaults, PositionerSettings
 from cosmic.mico.gui.axis_commands import AxisCommands
 from cosmic.mico.gui.card import Card, ConfidenceMark, PositionDisplay
+from cosmic.mico.gui.collision_switch import UNWATCHED_TEXT, CollisionSwitch
 from cosmic.mico.gui.key_names import key_text
 from cosmic.mico.gui.steps_part import StepsPart
 
@@ -60,6 +62,8 @@ class PositionerBaseGUI(Card):
     forward_name: ClassVar[str] = "MiCoOL_3"
     backward_name: ClassVar[str] = "MiCoOL_4"
     position_name: ClassVar[str] = "position"
+    sign_name: ClassVar[str] = "collisionSign"
+    switch_name: ClassVar[str] = "collisionSwitch"
 
     def __init__(
         self,
@@ -75,6 +79,7 @@ class PositionerBaseGUI(Card):
         self.commands = AxisCommands(settings.name, self)
         self._defaults = defaults
         self._note = ""
+        self._watched = True
         self._state: PositionerState | None = None
         self._shown: tuple[State, str] | None = None
         self._inputs: list[QWidget] = []
@@ -100,6 +105,9 @@ class PositionerBaseGUI(Card):
         self._title.setMinimumWidth(min(wanted, _TITLE_PX))
         self._position = PositionDisplay(settings.unit, self.position_name)
         self._confidence = ConfidenceMark()
+        self._detection = named(CollisionSwitch(settings.name), self.switch_name)
+        self._detection.sign.setObjectName(self.sign_name)
+        self._detection.wanted.connect(self._on_detection_wanted)
         self._stop = named(QToolButton(), "stopAxis")
         self._stop.setText("■")
         self._stop.setStyleSheet(f"QToolButton:enabled {{ color: {OKABE_ITO['vermillion']}; }}")
@@ -137,7 +145,8 @@ class PositionerBaseGUI(Card):
         column.addWidget(self._line)
 
     def _first_row(self) -> Sequence[QWidget]:
-        return self._badge, self._title, self._position, self._confidence, self._stop
+        detection = (self._detection.sign, self._detection)
+        return self._badge, self._title, self._position, self._confidence, *detection, self._stop
 
     def _second_row(self) -> Sequence[QWidget]:
         return self._backward, self._steps, self._forward
@@ -162,6 +171,14 @@ class PositionerBaseGUI(Card):
         self._confidence.set_confidence(state.confidence)
         self._show_usable(state)
         self._show_line(state)
+
+    def show_detection(self, *, model: bool, watched: bool) -> None:
+        """Show whether there is a collision model, and whether this axis is checked with it."""
+        self._detection.show_detection(model=model, watched=watched)
+        self._watched = watched
+        self.set_loud(model and not watched)
+        if self._state is not None:
+            self._show_line(self._state)
 
     def _show_badge(self, badge: State, detail: str) -> None:
         if (badge, detail) != self._shown:  # most states differ in the position alone
@@ -192,7 +209,7 @@ class PositionerBaseGUI(Card):
             look = state_look(State.UNKNOWN if not state.present else State.ERROR)
             text = f"{look.glyph} {state.error}"
         else:
-            text = self._note
+            text = self._note or ("" if self._watched else UNWATCHED_TEXT)
         loud = bool(text)
         self._line.set_text(text or self._usual_line(state))
         set_style_property(self._line, "role", "" if loud else "dim")
@@ -229,6 +246,12 @@ class PositionerBaseGUI(Card):
     def _on_stop_clicked(self) -> None:
         self.commands.abandon_series()
         self.axis.halt()
+
+    def _on_detection_wanted(self, on: bool) -> None:
+        try:
+            self.axis.collision_detection = on
+        except CosmicError as exc:
+            self._on_refused(None, str(exc))
 
     def _on_begun(self) -> None:
         self._set_note("")

@@ -2,7 +2,7 @@
 
 from typing import Final, Protocol
 
-from PySide6.QtCore import QObject, QTimer
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.device_commander import DeviceCommander
@@ -23,15 +23,30 @@ class StateFeed(QObject):
 
     The commanders emit in the device threads; the slot is a method of this object, so Qt queues
     the call into the GUI thread, where it costs one entry in a dictionary.
+
+    Parameters
+    ----------
+    period_ms : int
+        The least time between two looks.
+
+    Signals
+    -------
+    flushed()
+        The views were shown what had come in.
     """
 
-    def __init__(self, mico: Mico, parent: QObject | None = None) -> None:
+    flushed = Signal()
+
+    def __init__(
+        self, mico: Mico, parent: QObject | None = None, *, period_ms: int = PERIOD_MS
+    ) -> None:
         super().__init__(parent)
         self._mico = mico
         self._views: dict[str, list[StateView]] = {}
         self._newest: dict[str, PositionerState] = {}
         self._commanders: set[DeviceCommander] = set()
-        self._timer = QTimer(self, interval=PERIOD_MS, singleShot=True)
+        self._paused = False
+        self._timer = QTimer(self, interval=period_ms, singleShot=True)
         self._timer.timeout.connect(self.flush)
 
     def clear(self) -> None:
@@ -51,8 +66,16 @@ class StateFeed(QObject):
 
     def _on_state_changed(self, state: PositionerState) -> None:
         self._newest[state.name] = state
-        if not self._timer.isActive():
+        if not self._paused and not self._timer.isActive():
             self._timer.start()
+
+    def set_paused(self, paused: bool) -> None:
+        """Show nothing while nobody looks; the newest states are kept for afterwards."""
+        self._paused = paused
+        if paused:
+            self._timer.stop()
+        elif self._newest:
+            self.flush()
 
     def flush(self) -> None:
         """Show what has come in."""
@@ -60,3 +83,5 @@ class StateFeed(QObject):
         for name, state in newest.items():
             for view in self._views.get(name, ()):
                 view.show_state(state)
+        if newest:
+            self.flushed.emit()

@@ -1,0 +1,188 @@
+"""The part of a card that says whether its axis is checked for collisions, and switches that."""
+
+from typing import Final
+
+from PySide6.QtCore import QEvent, QObject, QPoint, Qt, Signal
+from PySide6.QtGui import QHideEvent, QKeyEvent
+from PySide6.QtWidgets import (
+    QApplication,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from cosmic.frame.gui.build import named, push_button, tipped
+from cosmic.frame.gui.chip import set_style_property
+from cosmic.frame.gui.theme import STEP_PX
+from cosmic.frame.overrides import override
+
+NO_MODEL_TIP: Final = (
+    "No collision model: movements within the limits are made without a check for collisions"
+)
+UNWATCHED_TEXT: Final = "▲ taken out of collision detection: its movements are NOT checked"
+_QUESTION_PX: Final = 40 * STEP_PX
+
+
+class CollisionSwitch(QPushButton):
+    """Says "CD on" or, loudly, "CD OFF"; asks before it takes an axis out, never to take it in.
+
+    Parameters
+    ----------
+    axis : str
+        Name of the axis.
+
+    Signals
+    -------
+    wanted(bool)
+        The operator wants the axis checked, or taken out.
+    """
+
+    wanted = Signal(bool)
+
+    def __init__(self, axis: str, parent: QWidget | None = None) -> None:
+        super().__init__("CD OFF", parent)
+        self._axis = axis
+        self._model = False
+        self._watched = True
+        self.setStyleSheet(f"QPushButton {{ padding: 3px {STEP_PX - 2}px; }}")
+        self.setFixedWidth(self.fontMetrics().horizontalAdvance("CD OFF") + 2 * STEP_PX + 2)
+        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self.sign = QLabel("▲")
+        self.sign.setFixedWidth(self.sign.fontMetrics().horizontalAdvance("▲") + 2)
+        self.clicked.connect(self._on_clicked)
+        self.show_detection(model=False, watched=True)
+
+    @property
+    def question(self) -> "TakeOutQuestion | None":
+        """The question that waits for an answer in this window, if it is about this axis."""
+        found = self.window().findChild(
+            TakeOutQuestion, options=Qt.FindChildOption.FindDirectChildrenOnly
+        )
+        if isinstance(found, TakeOutQuestion) and found.switch is self:
+            return found
+        return None
+
+    def show_detection(self, *, model: bool, watched: bool) -> None:
+        """Show whether there is a collision model, and whether the axis is checked with it."""
+        self._model, self._watched = model, watched
+        self.setEnabled(model)
+        self.setText("CD OFF" if model and not watched else "CD on" if model else "CD off")
+        self.setAccessibleName(f"{self._axis} collision detection {'on' if watched else 'off'}")
+        set_style_property(self, "watched", watched or not model)
+        if not model:
+            tip, sign = f"Not available: {NO_MODEL_TIP.lower()}", "no collision model"
+        elif watched:
+            tip = f"{self._axis} is checked for collisions; press to take it out"
+            sign = "checked for collisions"
+        else:
+            tip = f"{self._axis} is NOT checked for collisions; press to check it again"
+            sign = "not checked for collisions"
+        self.setToolTip(tip)
+        calm = model and watched
+        self.sign.setText("" if calm else "▲")
+        self.sign.setAccessibleName(sign)
+        tipped(self.sign, tip if model else NO_MODEL_TIP)
+
+    def _on_clicked(self) -> None:
+        if not self._watched:
+            self.wanted.emit(True)
+            return
+        if self.question is not None:
+            self.question.close()
+            return
+        question = TakeOutQuestion(self._axis, self)
+        question.agreed.connect(self._on_agreed)
+        question.show()
+
+    def _on_agreed(self) -> None:
+        self.wanted.emit(False)
+
+    @override
+    def hideEvent(self, event: QHideEvent) -> None:
+        super().hideEvent(event)
+        if self.question is not None:
+            self.question.close()
+
+
+class TakeOutQuestion(QFrame):
+    """Asks once more, below the switch; it lies over its window, so nothing jumps.
+
+    No dialog: STOP, keys and everything else act as before. Whatever else takes the focus is
+    taken for a no.
+
+    Signals
+    -------
+    agreed()
+        Take it out.
+    """
+
+    agreed = Signal()
+
+    def __init__(self, axis: str, switch: CollisionSwitch) -> None:
+        self._window = switch.window()
+        super().__init__(self._window)
+        self.setObjectName("takeOutQuestion")
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.switch = switch
+        text = QLabel(
+            f"Take {axis} out of collision detection? Nothing will keep it from hitting something."
+        )
+        text.setWordWrap(True)
+        text.setFixedWidth(_QUESTION_PX - 2 * STEP_PX)
+        self.cancel = named(push_button("Cancel", "Leave it checked"), "cancelTakeOut")
+        self.take_out = named(
+            push_button("Take out", f"Move {axis} unchecked until CD is switched on again"),
+            "takeOut",
+        )
+        buttons = QHBoxLayout()
+        buttons.addStretch(1)
+        buttons.addWidget(self.take_out)
+        buttons.addWidget(self.cancel)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
+        column.setSpacing(STEP_PX)
+        column.addWidget(text)
+        column.addLayout(buttons)
+        self.cancel.clicked.connect(self.close)
+        self.take_out.clicked.connect(self._on_take_out)
+        self._place()
+        self.raise_()
+        self._window.installEventFilter(self)
+        app = QApplication.instance()
+        if isinstance(app, QApplication):
+            app.focusChanged.connect(self._on_focus_changed)
+        self.cancel.setFocus()
+
+    def _place(self) -> None:
+        self.ensurePolished()
+        self.adjustSize()
+        window = self._window
+        below = self.switch.mapTo(window, QPoint(0, self.switch.height() + STEP_PX // 2))
+        x = max(0, min(below.x(), window.width() - self.width()))
+        y = below.y()
+        if y + self.height() > window.height():
+            y -= self.height() + self.switch.height() + STEP_PX
+        self.move(x, max(0, y))
+
+    def _on_take_out(self) -> None:
+        self.agreed.emit()
+        self.close()
+
+    def _on_focus_changed(self, _before: QWidget | None, now: QWidget | None) -> None:
+        if now is not None and now is not self.switch and not self.isAncestorOf(now):
+            self.close()
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        super().keyPressEvent(event)
+        if event.key() == Qt.Key.Key_Escape:  # which stops everything, too
+            self.close()
+
+    @override
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize:
+            self.close()
+        return super().eventFilter(watched, event)
