@@ -7,9 +7,11 @@ from PySide6.QtCore import QObject, QSettings, Qt, Signal
 from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
 import cosmic
+from cosmic.app.collision_bar import CollisionBar
 from cosmic.app.hint_bar import HintBar, first_steps
 from cosmic.app.platform import Platform
 from cosmic.app.rig import Rig
+from cosmic.app.scene_panel import ScenePanel
 from cosmic.frame.failure import Failure
 from cosmic.frame.gui.console_panel import ConsolePanel
 from cosmic.frame.gui.log_panel import LogPanel
@@ -25,6 +27,10 @@ logger = logging.getLogger(__name__)
 
 MICO: Final = "MiCo"
 CONSOLE: Final = "Console"
+SCENE: Final = "Scene"
+
+_SHARES: Final = [3, 2]
+"""How panels beside each other share the width at a first start."""
 
 
 class _Bridge(QObject):
@@ -72,6 +78,7 @@ class OperatorWindow(CosmicServerGui):
         self._platform = platform
         self._console: ConsolePanel | None = None
         self._mico_gui: MicoWidget | None = None
+        self._scene: ScenePanel | None = None
         self._bridge = _Bridge()
         self._forget_policy = platform.policy.subscribe(self._bridge.tell_failure)
         self._stop_filter = StopKeyFilter(_application(), stop_key, self)
@@ -98,6 +105,10 @@ class OperatorWindow(CosmicServerGui):
         self._mico_gui = gui
         gui.failure_changed.connect(self._on_mico_failure)
         application.manager.latch.subscribe(self._bridge.tell_latch)
+        self._scene = ScenePanel(gui, settings)
+        self.add_panel(SCENE, self._scene, Qt.DockWidgetArea.RightDockWidgetArea, scroll=False)
+        self.resizeDocks([self.dock(MICO), self.dock(SCENE)], _SHARES, Qt.Orientation.Horizontal)
+        self._collision_bar = CollisionBar(self.top_bar, gui, self)
 
     def _add_log(self, ring: RingBufferHandler, *, console: bool) -> None:
         below = Qt.DockWidgetArea.BottomDockWidgetArea
@@ -112,7 +123,7 @@ class OperatorWindow(CosmicServerGui):
                 "Ctrl+C or Interrupt breaks what runs.\n",
             )
             docks.append(self.add_panel(CONSOLE, self._console, scroll=False, beside=LOG_TITLE))
-            self.resizeDocks(docks, [3, 2], Qt.Orientation.Horizontal)
+            self.resizeDocks(docks, _SHARES, Qt.Orientation.Horizontal)
 
     def _connect_all(self) -> None:
         self.stop_requested.connect(self._on_stop_button)
@@ -151,6 +162,11 @@ class OperatorWindow(CosmicServerGui):
     def mico_gui(self) -> MicoWidget | None:
         """The MiCo panel, where MiCo is hosted."""
         return self._mico_gui
+
+    @property
+    def scene_panel(self) -> ScenePanel | None:
+        """The panel with the scene, where MiCo is hosted."""
+        return self._scene
 
     @property
     def console(self) -> ConsolePanel | None:
@@ -214,6 +230,8 @@ class OperatorWindow(CosmicServerGui):
     def _on_closing(self) -> None:
         """Leave everything safe; motion ends first, the console with what it waits for next."""
         self._forget_policy()
+        if self._scene is not None:
+            self._scene.save()
         if self._mico_gui is not None:
             self._mico_gui.release_keys()
         self._platform.shut_down()
