@@ -123,7 +123,7 @@ class Advancement:
     def __init__(self, model: SceneModel) -> None:
         self._model = model
         self._pairs = Pairs(model)
-        self._objects = [_mesh(piece.vertices_um, piece.faces) for piece in model.pieces]
+        self._objects = [fcl_mesh(piece.vertices_um, piece.faces) for piece in model.pieces]
         self._request = fcl.DistanceRequest()
 
     def clear(self, start: Mapping[str, float], axis: str, way: float) -> bool:
@@ -212,7 +212,8 @@ class _Motion:
         return turn @ rotation, self._centre + turn @ (origin - self._centre)
 
 
-def _mesh(vertices: np.ndarray, faces: np.ndarray) -> fcl.CollisionObject:
+def fcl_mesh(vertices: np.ndarray, faces: np.ndarray) -> fcl.CollisionObject:
+    """Return a mesh of triangles as fcl wants it."""
     geometry = fcl.BVHModel()
     geometry.beginModel(len(vertices), len(faces))
     geometry.addSubModel(np.ascontiguousarray(vertices), np.ascontiguousarray(faces))
