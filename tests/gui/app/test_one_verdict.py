@@ -1,0 +1,168 @@
+"""Whichever way a command comes in, the same gate says the same words."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QSettings, Qt
+from PySide6.QtWidgets import QPushButton
+from pytestqt.qtbot import QtBot
+
+from cosmic.app.operator_window import OperatorWindow
+from cosmic.app.platform import build_platform
+from cosmic.app.rig import Rig
+from cosmic.frame.errors import MoveRefused
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.log import RingBufferHandler
+from cosmic.frame.overrides import override
+from cosmic.frame.threads import WorkerThread
+from cosmic.frame.verdict import MoveVerdict, Reason
+from cosmic.mico.core.collision.answer import Approach
+from cosmic.mico.gui.mico_widget import MicoWidget, make_mico_gui
+from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
+from gui.mico.panels import click, enter, field, part, position, show, wait_for_position
+
+AXIS = "left.z"
+NEAR_UM = 30.0
+"""How far in front of the end of its free way the axis stands at first."""
+BEYOND_UM = 60.0
+"""How far behind that end it is sent: there is one pair of bodies only that can meet."""
+
+
+@pytest.fixture
+def window(qtbot: QtBot, tmp_path: Path) -> Iterator[OperatorWindow]:
+    platform = build_platform(rate=10.0, mico_gui=make_mico_gui)
+    settings = QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
+    window = OperatorWindow(platform, settings, RingBufferHandler())
+    qtbot.addWidget(window)
+    show(qtbot, window)
+    window.open_hardware()
+    forward = part(panel(window).cards[AXIS], "MiCoCL_6", QPushButton)
+    qtbot.waitUntil(forward.isEnabled, timeout=8000)
+    yield window
+    window.close()
+
+
+def panel(window: OperatorWindow) -> MicoWidget:
+    assert window.mico_gui is not None
+    return window.mico_gui
+
+
+class Script(WorkerThread):
+    """Moves from a thread of its own, as a script does that runs beside the window."""
+
+    def __init__(self, act: Callable[[], object]) -> None:
+        super().__init__("script", FailurePolicy())
+        self._act = act
+        self.verdict: MoveVerdict | None = None
+
+    @override
+    def run_body(self) -> None:
+        try:
+            self._act()
+        except MoveRefused as exc:
+            self.verdict = exc.verdict
+
+
+class Guard:
+    """Keeps asking for the real clearance, so that nobody comes too near unseen."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self.smallest: Approach = rig.mico.clearance()
+
+    def look(self) -> bool:
+        now = self._rig.mico.clearance()
+        if now.distance_um < self.smallest.distance_um:
+            self.smallest = now
+        return True
+
+
+def by_field(card: PositionerBaseGUI, qtbot: QtBot, target: float) -> None:
+    enter(qtbot, field(card, "MiCoCL_8"), f"{target:.1f}")
+    click(qtbot, card, "MiCoCL_9")
+
+
+def by_button(card: PositionerBaseGUI, qtbot: QtBot, target: float) -> None:
+    enter(qtbot, field(card, "MiCoCL_8"), f"{position(card) - target:.1f}")
+    click(qtbot, card, "MiCoCL_7")
+
+
+def test_every_way_in_meets_the_same_verdict(window: OperatorWindow, qtbot: QtBot) -> None:
+    mico, rig, card = panel(window).mico, Rig(window.platform), panel(window).cards[AXIS]
+    start = free_end(window) + NEAR_UM
+    mico[AXIS].move_to(start, wait=False)
+    wait_for_position(qtbot, card, start)
+    target = start - NEAR_UM - BEYOND_UM
+    expected = mico.check({AXIS: target})
+    assert expected.reason is Reason.COLLISION
+    guard, heard = Guard(rig), list[MoveVerdict]()
+    mico[AXIS].commander.movement_refused.connect(heard.append, Qt.ConnectionType.DirectConnection)
+
+    entry = field(card, "MiCoCL_8")
+    for give in (by_field, by_button):
+        heard.clear()
+        give(card, qtbot, target)
+        qtbot.waitUntil(lambda: bool(heard) and str(heard[-1]) in entry.reason)
+        same(heard[-1], expected)
+
+    console = window.console
+    assert console is not None
+    heard.clear()
+    console.run(f'rig.mico["{AXIS}"].move_to({target})')
+    qtbot.waitUntil(lambda: bool(heard) and str(heard[-1]) in " ".join(console.text().split()))
+    same(heard[-1], expected)
+
+    way = target - start
+    scripts: list[Callable[[], object]] = [
+        lambda: rig.mico[AXIS].move_to(target),
+        lambda: rig.mico[AXIS].move_by(f"{way} um"),
+        lambda: rig.mico.move({AXIS: target}),
+        lambda: rig.mico.move_by({AXIS: way, "left.x": 1.0}),
+    ]
+    for script in scripts:
+        same(refused(script, qtbot), expected)
+    assert position(card) == pytest.approx(start, abs=1.0)
+    assert position(panel(window).cards["left.x"]) == 0.0
+
+    same(hold_down(window, qtbot, guard), expected)
+    assert target + BEYOND_UM - 1.0 <= position(card) < start
+    assert guard.smallest.distance_um >= guard.smallest.margin_um
+    assert "plate" in guard.smallest.bodies
+
+
+def free_end(window: OperatorWindow) -> float:
+    """Return how far the axis may go down."""
+    verdict = panel(window).mico.check({AXIS: -5000.0})
+    assert verdict.reason is Reason.COLLISION
+    assert verdict.limit is not None
+    return verdict.limit
+
+
+def refused(act: Callable[[], object], qtbot: QtBot) -> MoveVerdict:
+    script = Script(act)
+    script.start()
+    qtbot.waitUntil(script.isFinished)
+    script.join()
+    assert script.verdict is not None
+    return script.verdict
+
+
+def same(verdict: MoveVerdict, expected: MoveVerdict) -> None:
+    assert not verdict.allowed
+    assert verdict.reason is Reason.COLLISION
+    assert verdict.bodies == expected.bodies
+    assert all(body in str(verdict) for body in verdict.bodies)
+
+
+def hold_down(window: OperatorWindow, qtbot: QtBot, guard: Guard) -> MoveVerdict:
+    """Hold the key of the axis until it is stopped in front of the other body."""
+    told: list[MoveVerdict] = []
+    card = panel(window).cards[AXIS]
+    panel(window).verdict_given.connect(told.append)
+    part(panel(window), "initialise", QPushButton).setFocus()
+    qtbot.keyPress(panel(window).focusWidget(), Qt.Key.Key_F)
+    qtbot.waitUntil(lambda: guard.look() and bool(told), timeout=8000)
+    qtbot.waitUntil(lambda: guard.look() and not card.axis.details.in_motion)
+    qtbot.keyRelease(panel(window).focusWidget(), Qt.Key.Key_F)
+    return told[-1]
