@@ -1,19 +1,18 @@
 """MiCo as a CoSMic application (thesis 5.4)."""
 
 import logging
-from collections.abc import Callable, Mapping
-from queue import SimpleQueue
-from threading import Lock
+from collections.abc import Mapping
 from typing import Final
 
 from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
 
-from cosmic.frame.application import CosmicApplicationBase, GuiFactory
+from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import CosmicError, DeviceError, MoveRefused, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.task import Task
+from cosmic.frame.task_application import TaskApplication
 from cosmic.mico.api import initialisation
 from cosmic.mico.api.ways import Way, follow, way_from_plan
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT, CollisionChecker
@@ -30,20 +29,17 @@ WAY_BUDGET_S: Final = 1.0
 """How long a way is looked for, in wall time."""
 
 
-class MicoApplication(CosmicApplicationBase):
+class MicoApplication(TaskApplication):
     """Owns the `DeviceManager` and carries out what takes long, in its own thread.
 
     Signals
     -------
-    task_started(Task)
-        A long operation began; widgets show its progress.
     way_found(Way), way_missing(MoveVerdict)
         How `search_way` ended.
     status_changed()
         Devices came or went, or MiCo failed.
     """
 
-    task_started = Signal(object)
     rescanned = Signal()
     way_found = Signal(object)
     way_missing = Signal(object)
@@ -72,10 +68,6 @@ class MicoApplication(CosmicApplicationBase):
         self.way_finder = (
             WayFinder(self.manager, self.collision.model) if self.collision is not None else None
         )
-        self._jobs: SimpleQueue[tuple[Task, Callable[[Task], None]] | None] = SimpleQueue()
-        self._running_task: Task | None = None
-        self._taking = Lock()
-        self._over = False
         self._failure = ""
         self._forget = policy.on_safe_stop(self.manager.stop)
 
@@ -83,11 +75,6 @@ class MicoApplication(CosmicApplicationBase):
     def failure(self) -> str:
         """Why MiCo cannot work; empty when it can."""
         return self._failure
-
-    @property
-    def running_task(self) -> Task | None:
-        """The long operation under way."""
-        return self._running_task
 
     @override
     def initialize(self) -> None:
@@ -125,7 +112,7 @@ class MicoApplication(CosmicApplicationBase):
         NotAvailable
             Another long operation is under way.
         """
-        return self._begin("Initialisation", lambda task: initialisation.run(self.manager, task))
+        return self.begin("Initialisation", lambda task: initialisation.run(self.manager, task))
 
     def rescan(self) -> Task:
         """Look again for the hardware; returns at once.
@@ -135,7 +122,7 @@ class MicoApplication(CosmicApplicationBase):
         NotAvailable
             Another long operation is under way.
         """
-        return self._begin("Looking for devices", self._rescan)
+        return self.begin("Looking for devices", self._rescan)
 
     # Ways round (ECM)
 
@@ -168,7 +155,7 @@ class MicoApplication(CosmicApplicationBase):
                 self.way_found.emit(way)
                 task.finish()
 
-        return self._begin("Looking for a way", search)
+        return self.begin("Looking for a way", search)
 
     def follow_way(self, way: Way, source: str) -> Task:
         """Go a way that was found; returns at once.
@@ -178,22 +165,7 @@ class MicoApplication(CosmicApplicationBase):
         NotAvailable
             Another long operation is under way.
         """
-        return self._begin("Going round", lambda task: follow(self.manager, way, task, source))
-
-    def _begin(self, title: str, job: Callable[[Task], None]) -> Task:
-        running = self._running_task
-        if running is not None and not running.done:
-            raise NotAvailable(f"{running.title} is under way; cancel it or wait for its end")
-        if not self.isRunning() or self.end_requested:
-            raise NotAvailable("MiCo is closed")
-        task = Task(title)
-        self._running_task = task
-        with self._taking:
-            if self._over:
-                raise NotAvailable("MiCo is closed")
-            self._jobs.put((task, job))
-        self.task_started.emit(task)
-        return task
+        return self.begin("Going round", lambda task: follow(self.manager, way, task, source))
 
     def _rescan(self, task: Task) -> None:
         task.report(0.1, "closing and opening the library")
@@ -207,48 +179,6 @@ class MicoApplication(CosmicApplicationBase):
             task.fail(exc)
         self.rescanned.emit()
         self.status_changed.emit()
-
-    @override
-    def custom_event_loop(self) -> bool:
-        try:
-            self._work()
-        finally:
-            self._give_up_jobs()
-        return True
-
-    def _give_up_jobs(self) -> None:
-        """Leave nobody waiting for a task that will not be begun."""
-        with self._taking:
-            self._over = True
-        while not self._jobs.empty():
-            item = self._jobs.get_nowait()
-            if item is not None:
-                item[0].fail(NotAvailable("MiCo is closed"))
-
-    def _work(self) -> None:
-        while not self.end_requested:
-            item = self._jobs.get()
-            if item is None:
-                continue
-            task, job = item
-            logger.info("%s started", task.title)
-            try:
-                job(task)
-            except Exception as exc:
-                task.fail(exc)  # whoever waits for it must not wait for ever
-                raise
-            error = task.progress.error
-            if error:
-                logger.error("%s ended: %s", task.title, error)
-            else:
-                logger.info("%s finished", task.title)
-
-    @override
-    def request_end(self) -> None:
-        super().request_end()
-        if self._running_task is not None:
-            self._running_task.cancel()
-        self._jobs.put(None)
 
     @override
     def shut_down(self) -> None:
