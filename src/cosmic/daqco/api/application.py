@@ -1,0 +1,292 @@
+"""DAQCo as a CoSMic application (thesis 5.5, 6.2)."""
+
+import logging
+from collections.abc import Callable, Mapping
+from threading import RLock
+
+from PySide6.QtCore import QObject, Qt
+from typing_extensions import override
+
+from cosmic.daqco.core.chunk import DataChunk
+from cosmic.daqco.core.limits import Limit, LimitGuard
+from cosmic.daqco.core.plan import make_plan
+from cosmic.daqco.core.scale import Scale
+from cosmic.daqco.core.settings import DaqcoSettings, ScaleSettings
+from cosmic.daqco.core.udaq_buffer import UDaqBuffer
+from cosmic.daqco.core.udaq_core import UDaqCore
+from cosmic.daqco.hw.interface import Board, BoardInfo, BoardLibrary
+from cosmic.frame.application import GuiFactory
+from cosmic.frame.clock import Clock
+from cosmic.frame.errors import ConfigError, CosmicError, DeviceError, NotAvailable
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.task_application import TaskApplication
+from cosmic.frame.threads import WorkerThread
+
+logger = logging.getLogger(__name__)
+
+
+class SilenceWatch(WorkerThread):
+    """Looks again and again whether an armed channel has fallen silent."""
+
+    def __init__(self, guard: LimitGuard, policy: FailurePolicy) -> None:
+        super().__init__("limit watch", policy)
+        self._guard = guard
+
+    @override
+    def run_body(self) -> None:
+        while not self._end_requested.wait(0.02):
+            self._guard.look_for_silence()
+
+
+class DaqcoApplication(TaskApplication):
+    """Owns boards, acquisition, buffer and limits; its methods may be called from any thread.
+
+    Parameters
+    ----------
+    library : BoardLibrary
+        The driver behind the boards.
+    """
+
+    def __init__(
+        self,
+        library: BoardLibrary,
+        settings: DaqcoSettings,
+        *,
+        clock: Clock,
+        policy: FailurePolicy,
+        gui_factory: GuiFactory | None = None,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__("DAQCo", policy, gui_factory, parent)
+        self.library = library
+        self.clock = clock
+        self.buffer = UDaqBuffer()
+        self.guard = LimitGuard(clock)
+        self._policy = policy
+        self._settings = settings
+        self._lock = RLock()
+        self._boards: dict[str, Board] = {}
+        self._infos: dict[str, BoardInfo] = {}
+        self._core: UDaqCore | None = None
+        self._problem = ""
+        self._silence = SilenceWatch(self.guard, policy)
+        self._before_change: tuple[Callable[[DaqcoSettings], None], ...] = ()
+
+    # What there is
+
+    @property
+    def settings(self) -> DaqcoSettings:
+        """What is in force."""
+        return self._settings
+
+    @property
+    def problem(self) -> str:
+        """Why acquisition cannot run, or ended by itself; empty when all is well."""
+        return self._problem
+
+    @property
+    def infos(self) -> Mapping[str, BoardInfo]:
+        """The boards there are, by name."""
+        return dict(self._infos)
+
+    @property
+    def running(self) -> bool:
+        """Samples are being acquired."""
+        core = self._core
+        return core is not None and core.isRunning()
+
+    @property
+    def rate_hz(self) -> float:
+        """The rate the boards really make; that of the settings while nothing runs."""
+        core = self._core
+        return core.rate_hz if core is not None else self._settings.rate_hz
+
+    def scales(self) -> dict[str, Scale]:
+        """Return the scale in force of every channel, by its name."""
+        known = self._settings.scales()
+        return {each.name: known[each.scale] for each in self._settings.channel}
+
+    # Starting and ending
+
+    @override
+    def initialize(self) -> None:
+        """Open the boards and begin to acquire; stays open with `problem` set where it cannot."""
+        self.start()
+        self._silence.start()
+        try:
+            self.look_for_boards()
+            self.start_acquisition()
+            self._arm_configured()
+        except CosmicError as exc:
+            self._fail(str(exc))
+        self.status_changed.emit()
+
+    def _arm_configured(self) -> None:
+        for each in self._settings.limit:
+            self.guard.set_limit(
+                Limit(
+                    each.channel,
+                    low=-float("inf") if each.low is None else each.low,
+                    high=float("inf") if each.high is None else each.high,
+                    hysteresis=each.hysteresis,
+                    armed=each.armed,
+                )
+            )
+
+    def look_for_boards(self) -> None:
+        """Look for boards and open those there are.
+
+        Raises
+        ------
+        NotConnectedError
+            The driver is not installed.
+        """
+        with self._lock:
+            self._close_boards()
+            self._infos = {info.name: info for info in self.library.list_boards()}
+
+    def start_acquisition(self) -> None:
+        """Begin to acquire with the settings in force; harmless while it runs.
+
+        Raises
+        ------
+        LimitError
+            A board does not do what the settings ask.
+        NotConnectedError, DeviceError
+            A board is not there, or taken.
+        """
+        with self._lock:
+            if self.running:
+                return
+            if self.end_requested:
+                raise NotAvailable("DAQCo is closed")
+            settings = self._settings
+            plan = make_plan(settings.channel, settings.rate_hz, settings.chunk_s, self._infos)
+            for name in plan.boards:
+                if name not in self._boards:
+                    self._boards[name] = self.library.open(name)
+            core = UDaqCore(plan, self._boards, self.scales(), self._take, self._policy)
+            core.failed.connect(self._on_core_failed, Qt.ConnectionType.DirectConnection)
+            self.buffer.clear()
+            core.open()
+            self._core, self._problem = core, ""
+            self.guard.set_rate(core.rate_hz)
+        logger.info(
+            "acquiring %d channels at %g Hz from %s",
+            len(plan.channels),
+            core.rate_hz,
+            ", ".join(plan.boards),
+        )
+        self.status_changed.emit()
+
+    def stop_acquisition(self) -> None:
+        """End acquiring; harmless when nothing runs. Limits that are armed are disarmed."""
+        with self._lock:
+            core, self._core = self._core, None
+            if core is None:
+                return
+            self.guard.set_rate(0.0)
+            core.request_end()
+            core.join()
+        logger.info("acquisition ended")
+        self.status_changed.emit()
+
+    def apply(self, settings: DaqcoSettings) -> None:
+        """Put `settings` in force; acquisition goes on with them if it ran.
+
+        Raises
+        ------
+        LimitError, NotConnectedError, ConfigError
+            They cannot be; what was in force stays.
+        NotAvailable
+            Rate or channels would change while recording.
+        """
+        with self._lock:
+            if self._infos:
+                make_plan(settings.channel, settings.rate_hz, settings.chunk_s, self._infos)
+            for check in self._before_change:
+                check(settings)
+            before, self._settings = self._settings, settings
+            core = self._core
+            if core is not None and not restarts(before, settings):
+                core.set_scales(self.scales())
+            elif core is not None:
+                self.stop_acquisition()
+                try:
+                    self.start_acquisition()
+                except CosmicError:
+                    self._settings = before
+                    raise
+        self.status_changed.emit()
+
+    def before_change(self, check: Callable[[DaqcoSettings], None]) -> None:
+        """Call `check(settings)` before they come into force; what it raises forbids them."""
+        self._before_change = (*self._before_change, check)
+
+    # Data
+
+    def _take(self, chunk: DataChunk) -> None:
+        """Take a chunk: the limits see it before anybody else; acquisition thread."""
+        self.guard.look(chunk)
+        self.buffer.put(chunk)
+
+    def _on_core_failed(self, error: DeviceError) -> None:
+        self.guard.look_for_silence()
+        self._fail(str(error))
+        self.status_changed.emit()
+
+    def _fail(self, text: str) -> None:
+        self._problem = text
+        logger.error("DAQCo: %s", text)
+
+    def set_scale(self, channel: str, scale: Scale) -> None:
+        """Give a channel a scale of any name; others of that name are replaced by it.
+
+        Raises
+        ------
+        ConfigError
+            There is no such channel.
+        """
+        settings = self._settings
+        if channel not in {each.name for each in settings.channel}:
+            names = ", ".join(each.name for each in settings.channel)
+            raise ConfigError(f"there is no channel {channel!r}; there are {names}")
+        added = ScaleSettings(name=scale.name, unit=scale.unit, coefficients=scale.coefficients)
+        scales = (*(each for each in settings.scale if each.name != scale.name), added)
+        channels = tuple(
+            each.model_copy(update={"scale": scale.name}) if each.name == channel else each
+            for each in settings.channel
+        )
+        self.apply(settings.model_copy(update={"scale": scales, "channel": channels}))
+
+    # The end
+
+    def _close_boards(self) -> None:
+        for board in self._boards.values():
+            board.close()
+        self._boards.clear()
+
+    @override
+    def shut_down(self) -> None:
+        """End acquisition, close the boards, end all threads; any state."""
+        self.request_end()
+        self._silence.request_end()
+        self._silence.join()
+        self.stop_acquisition()
+        with self._lock:
+            self._close_boards()
+        self.join()
+
+
+def restarts(before: DaqcoSettings, after: DaqcoSettings) -> bool:
+    """Return True when acquisition must begin anew for `after`, not only scale differently."""
+
+    def wiring(settings: DaqcoSettings) -> object:
+        inputs = [
+            (each.name, each.board, each.input, each.mode, each.low_v, each.high_v)
+            for each in settings.channel
+            if each.active
+        ]
+        return settings.rate_hz, settings.chunk_s, inputs
+
+    return wiring(before) != wiring(after)
