@@ -242,8 +242,23 @@ class ScenePanel(QWidget):
             distance_um=verdict.clearance_um or 0.0,
             places_um=(verdict.place_um, verdict.place_um),
             margin_um=_margin_um(self._model, one, other),
-            pose=dict(verdict.pose),
+            pose=self._ghost_pose(verdict),
         )
+
+    def _ghost_pose(self, verdict: MoveVerdict) -> dict[str, float]:
+        """Return where the axes that were to move would stand.
+
+        The pose of the verdict also has a place for every axis that is known by its steps only,
+        in the middle of where it may be; to draw that would tell of a movement nobody wished.
+        """
+        if verdict.axis:
+            return {axis: there for axis, there in verdict.pose if axis == verdict.axis}
+        return {
+            axis: there
+            for axis, there in verdict.pose
+            if self._mico[axis].details.confidence is Confidence.KNOWN
+            or self._mico[axis].details.in_motion
+        }
 
     def clear_refused(self) -> None:
         """Take the refused movement out of the picture."""

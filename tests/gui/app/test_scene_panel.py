@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QSettings, Qt
-from PySide6.QtWidgets import QLabel
+from PySide6.QtWidgets import QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.operator_window import SCENE, OperatorWindow
@@ -173,8 +173,27 @@ def test_a_refused_move_is_shown_as_a_ghost(window: OperatorWindow, qtbot: QtBot
     assert shown.content.refused.approach.margin_um == 5.0
     assert shown.content.refused.approach.pose["left.z"] < -500.0
     assert verdict.bodies == shown.content.refused.approach.bodies
+    assert not any(body.startswith("right") for body in shown.content.ghosts)
     reason = field(mico(window).cards["left.z"], "MiCoCL_8").reason
     assert "left_jaw" in reason
+
+
+def test_a_jog_that_ends_in_front_of_something_shows_why(
+    window: OperatorWindow, qtbot: QtBot
+) -> None:
+    shown = scene(window, qtbot)
+    card = mico(window).cards["left.z"]
+    start = model_limit(window) + 20.0
+    card.axis.move_to(start, wait=False)
+    wait_for_position(qtbot, card, start)
+    assert not shown.refused_text
+    part(mico(window), "initialise", QPushButton).setFocus()
+    qtbot.keyPress(mico(window).focusWidget(), Qt.Key.Key_F)
+    qtbot.waitUntil(lambda: "plate" in shown.refused_text, timeout=8000)
+    qtbot.keyRelease(mico(window).focusWidget(), Qt.Key.Key_F)
+    qtbot.waitUntil(lambda: not card.axis.details.in_motion)
+    qtbot.wait(120)
+    assert shown.refused_text  # its own end does not count as the next movement
 
 
 def test_a_move_of_another_axis_leaves_the_ghost(window: OperatorWindow, qtbot: QtBot) -> None:
