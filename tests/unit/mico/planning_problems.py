@@ -9,7 +9,7 @@ from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
 from cosmic.mico.core.planning.planner import plan
 from cosmic.mico.core.planning.problem import Plan, Problem
-from unit.mico.small_scenes import two_arms
+from unit.mico.small_scenes import turntable, two_arms
 
 LEFT = ("left.x", "left.y", "left.z")
 RIGHT = ("right.x", "right.y", "right.z")
@@ -78,3 +78,11 @@ def least_gap(model: SceneModel, found: Plan, steps: int = 4) -> float:
             assert nearest is not None
             least = min(least, nearest.distance_um)
     return least
+
+
+def table_and_arm() -> SceneModel:
+    """A bar that turns below an arm; both overshoot."""
+    model = turntable()
+    over = {"table.rotation": 0.01}
+    drives = tuple(replace(d, overshoot=over.get(d.axis, 1.0)) for d in model.drives)
+    return replace(model, drives=drives)

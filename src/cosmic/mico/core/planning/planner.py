@@ -17,6 +17,10 @@ from cosmic.mico.core.planning.space import Place, Space, Way
 
 LONG: Final = 1.5
 """A way this many times as long as the straight one is worth a search for a better one."""
+GOOD: Final = 1.1
+"""A way not longer than this many times the straight one is left as it is."""
+WORTH_LEGS: Final = 0.95
+"""Cutting the corners of a simple way makes more legs; it must save this much of its length."""
 MOST_STEPS: Final = 16
 """The straight way is driven in at most so many legs."""
 
@@ -85,10 +89,13 @@ def _best(boxes: Boxes, problem: Problem, ends: tuple[Place, Place]) -> _Found |
     """Return the shortest way that was found, None where there is none."""
     space = boxes.space
     near = _nearby(boxes, *ends)
-    long = LONG * space.distance(*ends)
+    straight = space.distance(*ends)
     if near is not None:
-        direct = near.method in ("straight", "steps")
-        if direct or (space.length(near.way) <= long and not problem.optimise):
+        if near.method in ("straight", "steps"):
+            return near
+        if space.length(near.way) > GOOD * straight:
+            near = _shortened(boxes, near, problem.seed)
+        if space.length(near.way) <= LONG * straight and not problem.optimise:
             return near
     found = [near]
     seed = problem.seed
@@ -121,6 +128,15 @@ def _searched(boxes: Boxes, here: Place, there: Place, seed: int) -> _Found | No
     raw = (here, *corners)
     way = shorten(boxes, raw, seed, MOST_LEGS)
     return _in_legs(boxes, "search", way, MOST_LEGS, boxes.space.length(raw))
+
+
+def _shortened(boxes: Boxes, found: _Found, seed: int) -> _Found:
+    """Return the way with its corners cut, where that saves enough to be worth more legs."""
+    way = shorten(boxes, found.way, seed, MOST_STEPS)
+    cut = _in_legs(boxes, found.method, way, MOST_STEPS, found.found_length)
+    length = boxes.space.length(found.way)
+    worthwhile = cut is not None and boxes.space.length(cut.way) < WORTH_LEGS * length
+    return cut if cut is not None and worthwhile else found
 
 
 def _in_legs(

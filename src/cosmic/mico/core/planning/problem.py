@@ -152,11 +152,12 @@ def _finite(axis: str, value: float, what: str) -> None:
 
 def _within(model: SceneModel, problem: Problem, axis: str, target: float) -> None:
     low, high = limits_of(model, problem, axis)
-    if not (math.isfinite(low) and math.isfinite(high)):
+    soft_low, soft_high = problem.limits.get(axis, (low, high))
+    if not (soft_low <= soft_high and -math.inf < low <= high < math.inf):
         raise refusal(
             refuse(
                 Reason.LIMIT,
-                f"{axis}: a way needs limits at both ends, got {low:g} to {high:g}; set them",
+                f"{axis}: a way needs limits at both ends, got {soft_low:g} to {soft_high:g}",
                 axis=axis,
                 value=target,
             )
