@@ -1,0 +1,326 @@
+"""Simulated boards: paced by the platform's clock, with a real board's limits and troubles."""
+
+import logging
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from typing_extensions import override
+
+from cosmic.daqco.hw.board_checks import check_chunk, check_inputs, check_rate, range_in_force
+from cosmic.daqco.hw.interface import (
+    Board,
+    BoardChunk,
+    BoardInfo,
+    BoardLibrary,
+    InputSettings,
+)
+from cosmic.daqco.hw.sim_faults import BoardFaults
+from cosmic.daqco.hw.sim_signal import BoardSignal, Signal, Source
+from cosmic.frame.clock import WALL, Clock
+from cosmic.frame.errors import ConfigError, DeviceError, DeviceFault, NotConnectedError
+
+logger = logging.getLogger(__name__)
+
+PCI_6229: Final = BoardInfo(
+    name="Dev",
+    product="PCI-6229",
+    simulated=True,
+    serial=0x0146_2290,
+    inputs=tuple(f"ai{number}" for number in range(32)),
+    max_single_rate_hz=250_000.0,
+    max_multi_rate_hz=250_000.0,
+    ranges_v=((-10.0, 10.0), (-5.0, 5.0), (-1.0, 1.0), (-0.2, 0.2)),
+)
+TIMEBASE_HZ: Final = 20e6
+FIFO_SAMPLES: Final = 4095
+BUFFER_S: Final = 10.0
+
+MakeSignal = Callable[[Sequence[InputSettings], int], Signal]
+
+
+@dataclass(frozen=True, slots=True)
+class _Setup:
+    inputs: tuple[InputSettings, ...]
+    rate_hz: float
+    chunk_samples: int
+    signal: Signal
+
+
+@dataclass(slots=True)
+class _Run:
+    """One acquisition under way; only the receiving thread moves `next_sample`."""
+
+    setup: _Setup
+    start_s: float
+    next_sample: int = 0
+
+    def time_s(self, sample: int) -> float:
+        return self.start_s + sample / self.setup.rate_hz
+
+
+class SimulatedBoard(Board):
+    """One simulated board; made by its library.
+
+    Parameters
+    ----------
+    make_signal : callable
+        Makes what the inputs carry, from their settings and the length of a chunk.
+    timebase_hz : float
+        The rate is this over a whole number, as on the real board; 0 allows any rate.
+    paced : bool
+        False: chunks are due at once, however many are asked for.
+    """
+
+    def __init__(
+        self,
+        info: BoardInfo,
+        clock: Clock,
+        faults: BoardFaults,
+        make_signal: MakeSignal,
+        *,
+        timebase_hz: float = TIMEBASE_HZ,
+        paced: bool = True,
+    ) -> None:
+        self._info = info
+        self._clock = clock
+        self._faults = faults
+        self._make_signal = make_signal
+        self._timebase_hz = timebase_hz
+        self._paced = paced
+        self._setup: _Setup | None = None
+        self._run: _Run | None = None
+        self._closed = False
+
+    @property
+    @override
+    def info(self) -> BoardInfo:
+        return self._info
+
+    @override
+    def configure(
+        self, inputs: Sequence[InputSettings], rate_hz: float, chunk_samples: int
+    ) -> float:
+        self._check_there("configure")
+        if self._run is not None:
+            raise self._error("configure: it is acquiring; stop it first", DeviceFault.STATE)
+        check_inputs(self._info, inputs)
+        check_rate(self._info, len(inputs), rate_hz)
+        check_chunk(self._info, chunk_samples)
+        real_hz = self._nearest_rate_hz(rate_hz)
+        signal = self._make_signal(inputs, chunk_samples)
+        self._setup = _Setup(tuple(inputs), real_hz, chunk_samples, signal)
+        logger.debug("%s: %d inputs at %g Hz", self._info.name, len(inputs), real_hz)
+        return real_hz
+
+    @override
+    def start(self) -> None:
+        self._check_there("start")
+        if self._setup is None:
+            raise self._error("start: it was not configured", DeviceFault.STATE)
+        with self._faults.changed:
+            if self._run is not None:
+                raise self._error("start: it is acquiring already", DeviceFault.STATE)
+            self._run = _Run(self._setup, self._clock.now_s())
+
+    @override
+    def receive(self, timeout_s: float) -> BoardChunk | None:
+        run = self._wait_until_due(timeout_s)
+        if run is None:
+            return None
+        setup, first = run.setup, run.next_sample
+        times_s = run.start_s + (first + np.arange(setup.chunk_samples)) / setup.rate_hz
+        # Outside the lock: a source may be slow, and a stop must not wait for it.
+        volts = setup.signal.volts(first, times_s)
+        run.next_sample = first + setup.chunk_samples
+        if self._run is not run:
+            return None
+        return BoardChunk(first, float(times_s[0]), volts)
+
+    @override
+    def stop(self) -> None:
+        with self._faults.changed:
+            self._run = None
+            self._faults.changed.notify_all()
+
+    @override
+    def close(self) -> None:
+        self.stop()
+        self._closed = True
+
+    def _wait_until_due(self, timeout_s: float) -> _Run | None:
+        """Return the acquisition whose next chunk is due, or None; raises `DeviceError`."""
+        end_s = WALL.now_s() + timeout_s
+        changed = self._faults.changed
+        with changed:
+            run = self._run
+            while run is not None and self._run is run:
+                self._check_going(run)
+                now_s = self._clock.now_s()
+                due_s = self._due_s(run)
+                if due_s <= now_s:
+                    return run
+                left_s = end_s - WALL.now_s()
+                if left_s <= 0.0:
+                    return None
+                # A clock that a test moves has no rate: it looks up every now and then.
+                rate = self._clock.rate
+                until_s = min(due_s, now_s + left_s * rate) if rate else due_s
+                self._clock.wait(changed, until_s)
+        return None
+
+    def _due_s(self, run: _Run) -> float:
+        if self._faults.hit("stalled", self._info.name):
+            return math.inf
+        if not self._paced:
+            return -math.inf
+        return run.time_s(run.next_sample + run.setup.chunk_samples)
+
+    def _check_going(self, run: _Run) -> None:
+        """End the acquisition and raise when it failed; the lock is held."""
+        try:
+            self._check_there("receive")
+            self._check_overrun(run)
+        except DeviceError:
+            self._run = None
+            raise
+
+    def _check_overrun(self, run: _Run) -> None:
+        setup = run.setup
+        if self._faults.hit("overrun", self._info.name):
+            raise self._overrun(run, setup.chunk_samples)
+        if not self._paced or self._faults.hit("stalled", self._info.name):
+            return
+        taken = int((self._clock.now_s() - run.start_s) * setup.rate_hz)
+        # The receiver is late by the wall: on a fast clock the buffer holds as much longer.
+        room_s = BUFFER_S * max(1.0, self._clock.rate)
+        room = int(room_s * setup.rate_hz) + FIFO_SAMPLES // len(setup.inputs)
+        lost = taken - run.next_sample - max(room, 4 * setup.chunk_samples)
+        if lost > 0:
+            raise self._overrun(run, lost)
+
+    def _overrun(self, run: _Run, lost: int) -> DeviceError:
+        return self._error(
+            f"receive: {lost} samples of each channel were lost after sample {run.next_sample}: "
+            f"they were not fetched in time; close what slows the computer, or lower the rate, "
+            f"and start again",
+            DeviceFault.OVERRUN,
+        )
+
+    def _check_there(self, call: str) -> None:
+        name = self._info.name
+        if self._closed:
+            raise self._error(f"{call}: it was closed; open it again", DeviceFault.STATE)
+        if self._faults.hit("unplugged", name) or self._faults.hit("no_driver", name):
+            raise NotConnectedError(
+                f"{name}: {call}: the board is gone; check its cable and power, then start again",
+                fault=DeviceFault.COMMUNICATION,
+            )
+        if self._faults.hit("reserved", name) and call in ("configure", "start"):
+            raise self._error(
+                f"{call}: another program uses the board; close it, then try again",
+                DeviceFault.STATE,
+            )
+
+    def _error(self, text: str, fault: DeviceFault) -> DeviceError:
+        return DeviceError(f"{self._info.name}: {text}", fault=fault)
+
+    def _nearest_rate_hz(self, rate_hz: float) -> float:
+        """Return the highest rate up to `rate_hz` that divides the time base."""
+        if not self._timebase_hz:
+            return rate_hz
+        return self._timebase_hz / math.ceil(self._timebase_hz / rate_hz)
+
+
+class SimulatedLibrary(BoardLibrary):
+    """Simulated boards `Dev1`, `Dev2`, ..., PCI-6229 unless told otherwise; any thread.
+
+    Parameters
+    ----------
+    clock : Clock
+        Paces the samples: the platform's.
+    sources : mapping of (str, str) to Source
+        What is connected, by board and input, such as ``("Dev1", "ai0")``; every other input
+        carries some millivolts of noise and hum.
+    boards : int
+        How many there are.
+    info : BoardInfo
+        What each is; names and serials are numbered from it.
+
+    Attributes
+    ----------
+    faults : BoardFaults
+        Trouble to inject by name.
+
+    Raises
+    ------
+    ConfigError
+        A source is connected where there is no input.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        sources: Mapping[tuple[str, str], Source] | None = None,
+        *,
+        boards: int = 2,
+        seed: int = 0,
+        info: BoardInfo = PCI_6229,
+    ) -> None:
+        self._clock = clock
+        self._sources = dict(sources or {})
+        self._seed = seed
+        self._infos = {
+            each.name: each
+            for each in (
+                replace(info, name=f"Dev{number}", serial=info.serial + number)
+                for number in range(1, boards + 1)
+            )
+        }
+        self.faults = BoardFaults()
+        for board, name in self._sources:
+            if board not in self._infos or name not in self._infos[board].inputs:
+                raise ConfigError(
+                    f"a source is connected to {board}/{name}, but the simulated boards are "
+                    f"{', '.join(self._infos)} with {info.inputs[0]} to {info.inputs[-1]}"
+                )
+
+    @property
+    @override
+    def name(self) -> str:
+        return "Simulated boards"
+
+    @override
+    def list_boards(self) -> tuple[BoardInfo, ...]:
+        if self.faults.hit("no_driver", ""):
+            raise NotConnectedError(
+                "the driver of the simulated boards is not installed (injected fault)",
+                fault=DeviceFault.COMMUNICATION,
+            )
+        return tuple(
+            info for name, info in self._infos.items() if not self.faults.hit("unplugged", name)
+        )
+
+    @override
+    def open(self, name: str) -> SimulatedBoard:
+        there = [info.name for info in self.list_boards()]
+        if name not in there:
+            raise NotConnectedError(
+                f"there is no board {name!r}; there are: {', '.join(there) or 'none'}",
+                fault=DeviceFault.COMMUNICATION,
+            )
+        info = self._infos[name]
+
+        def make_signal(inputs: Sequence[InputSettings], chunk_samples: int) -> Signal:
+            keys = [(name, each.input) for each in inputs]
+            return BoardSignal(
+                [range_in_force(info, each) for each in inputs],
+                {row: self._sources[key] for row, key in enumerate(keys) if key in self._sources},
+                rows=["/".join(key) for key in keys],
+                chunk_samples=chunk_samples,
+                seed=self._seed,
+            )
+
+        return SimulatedBoard(info, self._clock, self.faults, make_signal)
