@@ -1,0 +1,77 @@
+"""A straight line through a measured curve, with how sure it is."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.daqco.core.recording_format import RecordingError
+
+Values = npt.NDArray[np.float64]
+FEWEST_SAMPLES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Slope:
+    """A line fitted by least squares, such as force over position.
+
+    Attributes
+    ----------
+    value : float
+        Rise per unit of position, in `unit`.
+    standard_error : float
+        Of `value`, same unit; wider where neighbouring residuals resemble each other.
+    offset : float
+        Value of the line at position 0.
+    residual : float
+        Standard deviation of the values around the line.
+    samples : int
+        How many were used.
+    """
+
+    value: float
+    standard_error: float
+    unit: str
+    offset: float
+    residual: float
+    samples: int
+
+
+def fit_slope(positions: Values, values: Values, unit: str = "") -> Slope:
+    """Fit a line through `values` over `positions`, both shape (n,), in the order of time.
+
+    Raises
+    ------
+    RecordingError
+        Fewer than three samples, or all at one position.
+    """
+    count = positions.size
+    if count < FEWEST_SAMPLES:
+        raise RecordingError(f"a slope needs at least {FEWEST_SAMPLES} samples, there are {count}")
+    middle = float(positions.mean())
+    way = positions - middle
+    spread = float(way @ way)
+    if not spread > 0.0:
+        raise RecordingError(f"a slope needs a way; all {count} samples lie at {middle:g}")
+    value = float(way @ values) / spread
+    level = float(values.mean())
+    residuals = values - level - value * way
+    squares = float(residuals @ residuals)
+    variance = squares / (count - 2)
+    return Slope(
+        value=value,
+        standard_error=float(np.sqrt(variance / spread * _widening(residuals, squares))),
+        unit=unit,
+        offset=level - value * middle,
+        residual=float(np.sqrt(variance)),
+        samples=count,
+    )
+
+
+def _widening(residuals: Values, squares: float) -> float:
+    """Return by how much fewer independent samples there are, seen from neighbours."""
+    if not squares > 0.0:
+        return 1.0
+    alike = float(residuals[1:] @ residuals[:-1]) / squares
+    alike = min(max(alike, 0.0), 1.0 - 1.0 / residuals.size)
+    return (1.0 + alike) / (1.0 - alike)

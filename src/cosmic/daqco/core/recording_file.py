@@ -1,0 +1,250 @@
+"""`RecordingFile`: a recording being written, without a thread of its own."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Final
+
+import h5py
+import numpy as np
+
+from cosmic.daqco.core import recording_format as form
+from cosmic.daqco.core.chunk import DataChunk
+from cosmic.daqco.core.recording_format import (
+    AxisPosition,
+    Overrun,
+    RecordedEvent,
+    RecordingError,
+    RecordingExistsError,
+    RecordingHeader,
+)
+from cosmic.daqco.core.scale import Scale
+
+BLOCK_S: Final = 0.5
+SMALLEST_BLOCK: Final = 256
+LARGEST_BLOCK: Final = 8192
+ROWS_A_CHUNK: Final = 512
+WRITE_ERRORS: Final = (OSError, RuntimeError, ValueError)
+"""What h5py raises when a file cannot be written."""
+
+
+def block_samples(rate_hz: float) -> int:
+    """Return how many samples of one channel lie together in the file."""
+    wanted = max(SMALLEST_BLOCK, min(LARGEST_BLOCK, round(rate_hz * BLOCK_S)))
+    return 1 << (wanted - 1).bit_length()
+
+
+def _gap_samples(chunk: DataChunk, *, sample: int, time_s: float) -> int:
+    if chunk.first_sample >= sample:
+        return chunk.first_sample - sample
+    # Acquisition began again, and counts from zero: only the clock knows what is missing.
+    return max(0, round((chunk.time_s - time_s) * chunk.rate_hz))
+
+
+class RecordingFile:
+    """One HDF5 file in SWMR mode: readable while it grows, and after a crash; one thread.
+
+    Blocks of each channel are laid into the file past HDF5's caches and conversions; a block
+    begun is written with every `flush`, padded, and again when there is more of it. All tables
+    exist before SWMR begins, since nothing can be created afterwards.
+
+    Raises
+    ------
+    RecordingExistsError
+        There is such a file, and `overwrite` is False.
+    RecordingError
+        It cannot be created.
+    """
+
+    def __init__(self, path: Path, header: RecordingHeader, *, overwrite: bool = False) -> None:
+        self._path = path
+        self._header = header
+        self._names = header.names
+        self._block = np.full((len(self._names), block_samples(header.rate_hz)), np.nan)
+        self._filled = 0
+        self._flushed = 0
+        self._columns = 0
+        self._next: tuple[int, float] | None = None
+        self._scales: tuple[Scale, ...] = ()
+        self._version = -1
+        self._axes: dict[str, int] = {}
+        self._rows: dict[str, list[Any]] = {name: [] for name in form.GROWING}
+        self._lost = 0
+        try:
+            self._file = h5py.File(path, "w" if overwrite else "x", libver=("v110", "v110"))
+        except FileExistsError:
+            raise RecordingExistsError(
+                f"{path}: there is such a file; choose another name, or say that it may be replaced"
+            ) from None
+        except WRITE_ERRORS as exc:
+            raise RecordingError(
+                f"{path}: cannot be created ({exc}); close what reads it, or choose another "
+                "name or directory"
+            ) from exc
+        self._create()
+
+    @property
+    def path(self) -> Path:
+        """Where it lies."""
+        return self._path
+
+    @property
+    def samples(self) -> int:
+        """How many samples a channel were given so far."""
+        return self._columns + self._filled
+
+    @property
+    def lost(self) -> int:
+        """How many samples a channel are missing between those."""
+        return self._lost
+
+    @property
+    def end_s(self) -> float:
+        """Platform time after the last sample given so far."""
+        return self._next[1] if self._next is not None else self._header.start_s
+
+    def append(self, chunk: DataChunk) -> None:
+        """Add the samples of `chunk`.
+
+        Raises
+        ------
+        RecordingError
+            Its channels or its rate are others than at the start.
+        """
+        if chunk.channels != self._names or chunk.rate_hz != self._header.rate_hz:
+            raise RecordingError(
+                f"{self._path}: the channels and the rate of a recording cannot change; it was "
+                f"ended at {self._header.rate_hz:g} Hz with {len(self._names)} channels, "
+                "so start another"
+            )
+        self._note_gap(chunk)
+        if chunk.scales != self._scales:
+            self._note_scales(chunk.scales, chunk.time_s)
+        row = (chunk.first_sample, self.samples, chunk.samples, chunk.time_s, self._version)
+        self._fill(chunk)
+        self._rows["chunks"].append(row)
+
+    def add_event(self, event: RecordedEvent) -> None:
+        """Add an event."""
+        self._rows["events"].append(
+            (
+                event.time_s,
+                event.sample,
+                form.encoded(event.kind, form.NAME_BYTES),
+                form.encoded(event.channel, form.NAME_BYTES),
+                event.value,
+                form.encoded(event.text, form.TEXT_BYTES),
+            )
+        )
+
+    def add_positions(self, positions: Iterable[AxisPosition]) -> None:
+        """Add where axes were; an axis is known from its first row on."""
+        for each in positions:
+            if each.axis not in self._axes:
+                self._axes[each.axis] = len(self._axes)
+                name = form.encoded(each.axis, form.NAME_BYTES)
+                self._rows["axes"].append((name, form.encoded(each.unit, form.NAME_BYTES)))
+            confidence = form.CONFIDENCES[each.confidence]
+            row = (each.time_s, self._axes[each.axis], each.position, confidence)
+            self._rows["positions"].append(row)
+
+    def add_overrun(self, overrun: Overrun) -> None:
+        """Say that samples are missing."""
+        self._lost += overrun.lost
+        self._rows["overruns"].append((overrun.sample, overrun.lost, overrun.time_s))
+
+    def flush(self) -> None:
+        """Make everything given so far visible to readers, and safe from the end of the process."""
+        if self._filled > self._flushed:
+            self._write_block()
+            self._flushed = self._filled
+        for name, rows in self._rows.items():
+            if rows:
+                table = self._file[name]
+                old = table.shape[0]
+                table.resize(old + len(rows), axis=0)
+                table[old:] = np.array(rows, dtype=form.GROWING[name])
+                rows.clear()
+        self._file.flush()
+
+    def close(self, *, complete: bool) -> None:
+        """Write what is left and close the file; harmless the second time."""
+        if not self._file:
+            return
+        try:
+            self.flush()
+            if complete:
+                self._file["complete"][()] = 1
+        finally:
+            self._file.close()
+
+    def abandon(self) -> None:
+        """Close the file as it is; what was flushed before stays readable."""
+        for rows in self._rows.values():
+            rows.clear()
+        self._flushed = self._filled
+        if self._file:
+            self._file.close()
+
+    def _create(self) -> None:
+        file, header = self._file, self._header
+        file.attrs["format"] = form.FORMAT
+        file.attrs["format_version"] = form.VERSION
+        file.attrs["software"] = header.software
+        file.attrs["rate_hz"] = header.rate_hz
+        file.attrs["start_utc"] = header.start_utc.isoformat()
+        file.attrs["start_s"] = header.start_s
+        channels, block = self._block.shape
+        self._volts = file.create_dataset(
+            "volts", (channels, 0), "<f8", maxshape=(channels, None), chunks=(1, block),
+            fillvalue=np.nan,
+        )  # fmt: skip
+        for name, dtype in form.GROWING.items():
+            file.create_dataset(name, (0,), dtype, maxshape=(None,), chunks=(ROWS_A_CHUNK,))
+        pairs = zip(header.channels, header.scales, strict=True)
+        file["channels"] = np.array([form.channel_row(*pair) for pair in pairs], dtype=form.CHANNEL)
+        text = header.configuration.encode("utf-8")
+        kind = form.text_type(len(text))
+        file.create_dataset("configuration", data=np.array(text, dtype=kind), dtype=kind)
+        file.create_dataset("complete", data=np.uint8(0))
+        self._note_scales(header.scales, header.start_s)
+        file.swmr_mode = True
+        self.flush()
+
+    def _note_gap(self, chunk: DataChunk) -> None:
+        if self._next is not None and chunk.first_sample != self._next[0]:
+            sample, time_s = self._next
+            lost = _gap_samples(chunk, sample=sample, time_s=time_s)
+            self.add_overrun(Overrun(chunk.first_sample, lost, time_s))
+        self._next = (chunk.first_sample + chunk.samples, chunk.end_time_s)
+
+    def _note_scales(self, scales: tuple[Scale, ...], time_s: float) -> None:
+        self._version += 1
+        self._scales = scales
+        for channel, scale in enumerate(scales):
+            self._rows["scales"].append(
+                form.scale_row(
+                    scale,
+                    version=self._version,
+                    channel=channel,
+                    column=self.samples,
+                    time_s=time_s,
+                )
+            )
+
+    def _fill(self, chunk: DataChunk) -> None:
+        taken, width = 0, self._block.shape[1]
+        while taken < chunk.samples:
+            count = min(width - self._filled, chunk.samples - taken)
+            end = self._filled + count
+            self._block[:, self._filled : end] = chunk.volts[:, taken : taken + count]
+            self._filled, taken = end, taken + count
+            if self._filled == width:
+                self._write_block()
+                self._columns += width
+                self._filled = self._flushed = 0
+                self._block[:] = np.nan
+
+    def _write_block(self) -> None:
+        self._volts.resize(self.samples, axis=1)
+        for channel, row in enumerate(self._block):
+            self._volts.id.write_direct_chunk((channel, self._columns), row)

@@ -1,0 +1,186 @@
+"""Reading the HDF5 file of a recording, finished, running or killed."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final
+
+import h5py
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.daqco.core import recording_format as form
+from cosmic.daqco.core.recording_format import RecordingError
+
+READ_ERRORS: Final = (OSError, RuntimeError, ValueError, KeyError)
+"""What h5py raises over a file that is damaged."""
+
+Table = npt.NDArray[np.void]
+Values = npt.NDArray[np.float64]
+
+
+def open_file(path: Path) -> h5py.File:
+    """Open `path` for reading, also while it is written and after its writer was killed.
+
+    Raises
+    ------
+    RecordingError
+        There is none, it is none, or it cannot be read.
+    """
+    if not path.is_file():
+        raise RecordingError(f"{path}: there is no such file")
+    reasons = []
+    for swmr in (False, True):  # a file that was never closed opens in the second way alone
+        try:
+            file = h5py.File(path, "r", swmr=swmr, locking="best-effort")
+        except READ_ERRORS as exc:
+            reasons.append(str(exc))
+            continue
+        if file.attrs.get("format") == form.FORMAT:
+            return file
+        file.close()
+        raise RecordingError(f"{path}: is an HDF5 file, but no recording by CoSMic")
+    raise RecordingError(
+        f"{path}: cannot be read ({reasons[-1]}); it is no recording, or damaged beyond what "
+        "its writer could prevent. Look for a copy"
+    )
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Which samples of a recording are meant: columns `first` to before `last`."""
+
+    first: int
+    last: int
+
+    @property
+    def count(self) -> int:
+        """How many."""
+        return max(0, self.last - self.first)
+
+
+class RecordingSource:
+    """The tables of a recording in memory, and its volts on demand; one thread.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be read, or was written by a newer CoSMic.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.file = open_file(path)
+        try:
+            version = int(self.file.attrs["format_version"])
+            if version > form.VERSION:
+                raise RecordingError(
+                    f"{path}: has format {version}, this CoSMic reads up to {form.VERSION}; "
+                    "use a newer one"
+                )
+            self.rate_hz = float(self.file.attrs["rate_hz"])
+            self.channels: Table = self.file["channels"][:]
+            self.names = tuple(form.decoded(each) for each in self.channels["name"])
+            self.refresh()
+        except READ_ERRORS as exc:
+            self.file.close()
+            raise self._broken(exc) from exc
+        except RecordingError:
+            self.file.close()
+            raise
+
+    def refresh(self) -> None:
+        """Look again at a file that is still being written."""
+        try:
+            tables = {}
+            # Backwards: what a row of `chunks` speaks of was written before it.
+            for name in reversed(form.GROWING):
+                self._renew(name)
+                tables[name] = self.file[name][:]
+            self._renew("volts")
+            self._renew("complete")
+            self.tables: dict[str, Table] = tables
+            self.volts = self.file["volts"]
+            self.complete = bool(self.file["complete"][()])
+        except READ_ERRORS as exc:
+            raise self._broken(exc) from exc
+        self._trim()
+
+    def read_volts(self, channel: int, columns: Columns) -> Values:
+        """Return volts of one channel."""
+        try:
+            volts: Values = self.volts[channel, columns.first : columns.last]
+        except READ_ERRORS as exc:
+            raise self._broken(exc) from exc
+        return volts
+
+    def close(self) -> None:
+        """Give the file back; harmless the second time."""
+        if self.file:
+            self.file.close()
+
+    def times(self, columns: Columns) -> Values:
+        """Return the platform time of samples."""
+        chunks = self.tables["chunks"]
+        if not columns.count:
+            return np.empty(0)
+        low, high = self._chunks_of(columns)
+        starts, times = chunks["column"][low:high], chunks["time_s"][low:high]
+        counts = chunks["samples"][low:high]
+        column = np.arange(starts[0], starts[-1] + counts[-1], dtype=np.float64)
+        found: Values = np.repeat(times, counts) + (column - np.repeat(starts, counts)) / (
+            self.rate_hz
+        )
+        return found[columns.first - starts[0] : columns.last - starts[0]]
+
+    def columns(self, start_s: float | None, end_s: float | None) -> Columns:
+        """Return the samples from `start_s` to before `end_s`, platform time."""
+        first = 0 if start_s is None else self._column_at(start_s)
+        last = self.samples if end_s is None else self._column_at(end_s)
+        return Columns(first, max(first, last))
+
+    def versions(self, columns: Columns) -> list[tuple[int, Columns]]:
+        """Return the versions of the scales in force, each with the samples it goes for."""
+        chunks = self.tables["chunks"]
+        if not columns.count:
+            return []
+        low, high = self._chunks_of(columns)
+        version, starts = chunks["scale_version"][low:high], chunks["column"][low:high]
+        cuts = [0, *(np.flatnonzero(np.diff(version)) + 1)]
+        edges = [columns.first, *(int(starts[cut]) for cut in cuts[1:]), columns.last]
+        return [
+            (int(version[cut]), Columns(begin, end))
+            for cut, (begin, end) in zip(cuts, pairwise(edges), strict=True)
+        ]
+
+    def _chunks_of(self, columns: Columns) -> tuple[int, int]:
+        starts = self.tables["chunks"]["column"]
+        low = int(np.searchsorted(starts, columns.first, "right")) - 1
+        return low, int(np.searchsorted(starts, columns.last, "left"))
+
+    def _column_at(self, time_s: float) -> int:
+        if not -np.inf < time_s < np.inf:
+            raise ValueError(f"a time is a finite number of seconds, got {time_s!r}")
+        chunks = self.tables["chunks"]
+        index = int(np.searchsorted(chunks["time_s"], time_s, "right")) - 1
+        if index < 0:
+            return 0
+        row = chunks[index]
+        # The times of samples are sums of floats; a sample asked for by its own time is meant.
+        into = np.ceil((time_s - row["time_s"]) * self.rate_hz - 1e-6)
+        return int(row["column"]) + min(max(0, int(into)), int(row["samples"]))
+
+    def _trim(self) -> None:
+        """Leave out what a killed process had not written whole."""
+        chunks, columns = self.tables["chunks"], self.volts.shape[1]
+        whole = chunks[chunks["column"] + chunks["samples"] <= columns]
+        self.tables["chunks"] = whole
+        self.samples = int(whole["column"][-1] + whole["samples"][-1]) if len(whole) else 0
+
+    def _renew(self, name: str) -> None:
+        dataset: Any = self.file[name]
+        if self.file.swmr_mode:
+            dataset.refresh()
+
+    def _broken(self, exc: Exception) -> RecordingError:
+        return RecordingError(f"{self.path}: is damaged ({exc}); look for a copy")
