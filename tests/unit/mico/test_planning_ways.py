@@ -1,10 +1,12 @@
 """Ways round what is in the way, on small scenes."""
 
+import math
 import pickle
 from dataclasses import replace
 
 import pytest
 
+from cosmic.mico.core.collision.answer import AxisSpan
 from cosmic.mico.core.collision.sweep import Sweep
 from cosmic.mico.core.planning.planner import plan
 from cosmic.mico.core.planning.problem import NoWay, Plan, Problem
@@ -121,6 +123,20 @@ def test_problems_and_answers_go_through_a_pipe() -> None:
     refused = plan(Sweep(arms()), Problem(at(), {"left.x": 3000.0}, LIMITS))
     assert isinstance(refused, NoWay)
     assert pickle.loads(pickle.dumps(refused)) == refused
+
+
+def test_axes_that_may_be_anywhere_are_kept_clear_of_wherever_they_are() -> None:
+    start = {axis: place for axis, place in at().items() if axis != "right.y"}
+    anywhere = {"right.y": AxisSpan(-math.inf, math.inf), "stranger": AxisSpan(0.0, 0.0, 0.0)}
+    found = solved(Sweep(arms()), Problem(start, {"left.x": 1900.0}, LIMITS, anywhere))
+    assert found.clearance_um is not None
+    assert math.isfinite(found.clearance_um)
+    assert isinstance(plan(Sweep(arms()), Problem(start, {"left.x": 2100.0}, LIMITS)), NoWay)
+
+
+def test_a_plan_tells_the_least_distance_at_its_corners() -> None:
+    found = solved(Sweep(arms()), Problem(at(), {"left.x": 1900.0}, LIMITS))
+    assert found.clearance_um == pytest.approx(100.0)
 
 
 def test_looking_on_makes_the_way_no_longer() -> None:

@@ -1,5 +1,6 @@
 """Asks the gate about legs of a way: each is a box of all places that its axes can have."""
 
+import math
 from collections import Counter, deque
 from dataclasses import replace
 from typing import Final
@@ -7,7 +8,7 @@ from typing import Final
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import refusal
 from cosmic.mico.core.collision.answer import Approach, AxisSpan, Spans
-from cosmic.mico.core.collision.model import BodyPair
+from cosmic.mico.core.collision.model import BodyPair, SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
 from cosmic.mico.core.collision.words import cannot_judge
 from cosmic.mico.core.planning.problem import Problem
@@ -86,6 +87,20 @@ class Boxes:
         for axis, value, point in zip(self.space.axes, place, self._point, strict=True):
             spans[axis] = AxisSpan(value - point, value + point, moving=True)
         return spans
+
+    def gap_at(self, place: Place) -> float | None:
+        """Return the least distance of two watched bodies with the axes at a place, um.
+
+        The other axes stand where they rest, or in the middle of where they may be.
+        """
+        model = self._sweep.model
+        pose = {
+            axis: _middle(model, axis, span)
+            for axis, span in self._others.items()
+            if axis in model.axes
+        }
+        near = self._sweep.nearest({**pose, **self.space.named(place)})
+        return None if near is None else near.distance_um
 
     # Legs
 
@@ -180,3 +195,12 @@ class Boxes:
             raise refusal(cannot_judge(answer.reason or "no reason given"))
         self.refused[answer.approach.bodies] += 1
         return answer.approach
+
+
+def _middle(model: SceneModel, axis: str, span: AxisSpan) -> float:
+    """Return where an axis stands, or the middle of where it may be."""
+    if span.now is not None:
+        return span.now
+    low, high = model.travel(axis)
+    middle = (max(span.low, low) + min(span.high, high)) / 2.0
+    return middle if math.isfinite(middle) else 0.0

@@ -21,6 +21,13 @@ GOOD: Final = 1.1
 """A way not longer than this many times the straight one is left as it is."""
 WORTH_LEGS: Final = 0.95
 """Cutting the corners of a simple way makes more legs; it must save this much of its length."""
+CHECKS_NEAR: Final = 80
+CHECKS_SEARCHED: Final = 400
+"""Questions to the gate that cutting corners may cost, for a simple way and for one searched."""
+MOST_CORNERS: Final = 20
+"""Of a way with more corners the clearance is not worked out."""
+FEW_STEPS: Final = 8
+"""An edge that cuts the corner of a simple way is driven in at most so many legs."""
 MOST_STEPS: Final = 16
 """The straight way is driven in at most so many legs."""
 
@@ -49,7 +56,7 @@ def plan(sweep: Sweep, problem: Problem) -> Plan | NoWay:
     space = Space(sweep.model, problem)
     boxes = Boxes(sweep, problem, space, Effort(problem.budget_s))
     if space.start == space.goal:
-        return _plan(problem, space, _Found("straight", (space.start,), 0.0))
+        return _plan(problem, boxes, _Found("straight", (space.start,), 0.0))
     ends = _ends(boxes)
     if isinstance(ends, NoWay):
         return ends
@@ -62,7 +69,7 @@ def plan(sweep: Sweep, problem: Problem) -> Plan | NoWay:
     whole = _Found(found.method, before + found.way + after, found.found_length)
     if not _certified(boxes, whole.way, leaving=bool(before), arriving=bool(after)):
         return no_way(boxes, here, there)
-    return _plan(problem, space, whole)
+    return _plan(problem, boxes, whole)
 
 
 def _ends(boxes: Boxes) -> tuple[Place, Place] | NoWay:
@@ -126,14 +133,14 @@ def _searched(boxes: Boxes, here: Place, there: Place, seed: int) -> _Found | No
     if corners is None:
         return None
     raw = (here, *corners)
-    way = shorten(boxes, raw, seed, MOST_LEGS)
+    way = shorten(boxes, raw, seed, MOST_LEGS, CHECKS_SEARCHED)
     return _in_legs(boxes, "search", way, MOST_LEGS, boxes.space.length(raw))
 
 
 def _shortened(boxes: Boxes, found: _Found, seed: int) -> _Found:
     """Return the way with its corners cut, where that saves enough to be worth more legs."""
-    way = shorten(boxes, found.way, seed, MOST_STEPS)
-    cut = _in_legs(boxes, found.method, way, MOST_STEPS, found.found_length)
+    way = shorten(boxes, found.way, seed, FEW_STEPS, CHECKS_NEAR)
+    cut = _in_legs(boxes, found.method, way, FEW_STEPS, found.found_length)
     length = boxes.space.length(found.way)
     worthwhile = cut is not None and boxes.space.length(cut.way) < WORTH_LEGS * length
     return cut if cut is not None and worthwhile else found
@@ -160,7 +167,8 @@ def _certified(boxes: Boxes, way: Way, *, leaving: bool, arriving: bool) -> bool
     return True
 
 
-def _plan(problem: Problem, space: Space, found: _Found) -> Plan:
+def _plan(problem: Problem, boxes: Boxes, found: _Found) -> Plan:
+    space = boxes.space
     pairs = pairwise(found.way)
     return Plan(
         start=dict(problem.start),
@@ -169,7 +177,15 @@ def _plan(problem: Problem, space: Space, found: _Found) -> Plan:
         length=space.length(found.way),
         straight_length=space.distance(space.start, space.goal),
         found_length=found.found_length,
+        clearance_um=_clearance_um(boxes, found.way),
     )
+
+
+def _clearance_um(boxes: Boxes, way: Way) -> float | None:
+    if len(way) > MOST_CORNERS:
+        return None
+    gaps = [gap for place in way if (gap := boxes.gap_at(place)) is not None]
+    return min(gaps, default=None)
 
 
 def _segment(space: Space, one: Place, other: Place) -> Segment:
