@@ -30,6 +30,21 @@ class BoxCase:
         """Whether no joint turns."""
         return all(joint.kind is JointKind.PRISMATIC for joint in self.model.joints)
 
+    def shrunk(self, share: float) -> "BoxCase":
+        """Return the case with `share` of the ways from the start."""
+        low = {axis: here + share * (self.low[axis] - here) for axis, here in self.start.items()}
+        high = {axis: here + share * (self.high[axis] - here) for axis, here in self.start.items()}
+        return BoxCase(self.model, self.start, low, high)
+
+    @property
+    def within_travel(self) -> bool:
+        """Whether no axis would have to go beyond its stops."""
+        travels = {axis: self.model.travel(axis) for axis in self.start}
+        return all(
+            low <= self.low[axis] and self.high[axis] <= high
+            for axis, (low, high) in travels.items()
+        )
+
     def gap_um(self, positions: dict[str, float]) -> float:
         """Return the exact distance with the axes at `positions`."""
         one, other = world_pieces(self.model, positions)

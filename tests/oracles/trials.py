@@ -162,3 +162,31 @@ def two_arm_trial(model: SceneModel, seed: int, count: int, replays: int = 4) ->
             found["replays that pass near"] += worst < math.inf
             found["replays that collide"] += worst < -CLOSE_UM
     return found
+
+
+def widest_trial(seed: int, count: int, *, turning: float, samples: int = 150) -> Counter[str]:
+    """Widen boxes until they are just clear, and look there for poses that are too close."""
+    found: Counter[str] = Counter()
+    rng = np.random.default_rng(seed)
+    for case in boxes.cases(seed, count, turning=turning, axes=(1, 3)):
+        if case.gap_um(case.start) <= boxes.MARGIN_UM:
+            continue
+        sweep = Sweep(case.model)
+        clear, not_clear = 0.0, 1.0
+        while not_clear < 1e3 and sweep.check(spans_of(case.shrunk(not_clear), known=False)).clear:
+            clear, not_clear = not_clear, 1.5 * not_clear
+        if not case.shrunk(not_clear).within_travel:
+            continue
+        for _ in range(12):
+            middle = (clear + not_clear) / 2.0
+            if sweep.check(spans_of(case.shrunk(middle), known=False)).clear:
+                clear = middle
+            else:
+                not_clear = middle
+        found["boxes"] += 1
+        found["unsound"] += case.shrunk(clear).sampled_um(rng, samples) < boxes.MARGIN_UM - CLOSE_UM
+        wider = case.shrunk(not_clear)
+        found["seen too close just beyond"] += (
+            wider.sampled_um(rng, samples) < boxes.MARGIN_UM + FLOOR_UM
+        )
+    return found

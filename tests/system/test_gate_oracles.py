@@ -52,6 +52,13 @@ def test_no_pose_in_a_clear_joint_box_is_closer_than_the_margin(turning, count) 
     assert found["too careful"] == 0
 
 
+@pytest.mark.parametrize("turning", [0.4, 1.0])
+def test_boxes_as_wide_as_they_may_be_hold_no_pose_closer_than_the_margin(turning) -> None:
+    found = trials.widest_trial(18, 12, turning=turning, samples=50)
+    assert found["boxes"] > 2
+    assert found["unsound"] == 0
+
+
 @pytest.mark.parametrize("turning", [0.0, 0.4])
 def test_what_begins_inside_the_margin_never_comes_closer(turning) -> None:
     found = trials.retreat_trial(13, 50, turning=turning)

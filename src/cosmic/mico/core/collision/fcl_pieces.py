@@ -80,8 +80,8 @@ class ConvexPiece:
         self.fcl_object.setTranslation(place_um)
 
     def world_um(self) -> Floats:
-        """Return the vertices, shape (n, 3), where the piece stands."""
-        return np.asarray(self._vertices @ self._rotation.T + self._place_um)
+        """Return the vertices, shape (3, n), where the piece stands."""
+        return np.asarray(self._rotation @ self._across + self._place_um[:, np.newaxis])
 
     def support(self, direction: Floats) -> float:
         """Return how far the piece reaches along `direction`, in world coordinates."""

@@ -100,9 +100,7 @@ def smallest_gap(slide: Slide, margin_um: float, guess: Floats | None = None) ->
     """Decide whether the gap stays above `margin_um` over the whole box."""
     first, second = slide.first, slide.second
     second.put(slide.rotation, slide.place_um)
-    answer = decide(
-        first.world_um().T, second.world_um().T, slide.ways, slide.half, margin_um, guess
-    )
+    answer = decide(first.world_um(), second.world_um(), slide.ways, slide.half, margin_um, guess)
     if answer is not None and answer[0]:
         return Finding(clear=True, normal=answer[1])
     if slide.known:

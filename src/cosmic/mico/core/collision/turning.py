@@ -38,8 +38,6 @@ class _Rider:
         1 for the second piece, -1 for the first: which way brings the two apart.
     firm : bool
         No other joint of the box turns the joint's own direction.
-    beyond : tuple of int
-        Joints of the box between this one and the piece.
     """
 
     joint: int
@@ -47,7 +45,6 @@ class _Rider:
     body: int
     sign: float
     firm: bool
-    beyond: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,9 +121,7 @@ class TurningPairs:
         # Joints of one chain are numbered from the root outwards.
         joints, turning = wide.tolist(), self._arrangement.turning
         return [
-            _Rider(
-                joint, piece, body, sign, not turning[joints[:place]].any(), (*joints[place + 1 :],)
-            )
+            _Rider(joint, piece, body, sign, not turning[joints[:place]].any())
             for place, joint in enumerate(joints)
         ]
 
@@ -178,7 +173,8 @@ class TurningPairs:
     def _losses(self, riders: list[_Rider], part: _Part, normal: Floats) -> list[float]:
         """Return the most that each joint of a part can take from the gap along `normal`.
 
-        The pieces stand at the `values` of the part.
+        The pieces stand at the `values` of the part. Joints are thought to move one after the
+        other, from the root outwards: each then carries the piece as it stands now.
         """
         span = np.maximum(-part.lowest, part.highest)
         losses = []
@@ -189,13 +185,10 @@ class TurningPairs:
             elif not self._arrangement.turning[rider.joint]:
                 slope = rider.sign * float(normal @ self._axis(rider.joint)[0])
                 losses.append(-min(slope * lowest, slope * highest))
-            elif not rider.beyond:
+            else:
                 points, axis, _ = self._about(rider)
                 towards = rider.sign * normal
                 losses.append(circling_loss(points, axis, towards, lowest, highest))
-            else:
-                along = float(normal @ self._axis(rider.joint)[0])
-                losses.append(max(0.0, 1.0 - along * along) ** 0.5 * self._reach(rider, span))
         return losses
 
     def _axis(self, joint: int) -> tuple[Floats, Floats]:
@@ -206,21 +199,15 @@ class TurningPairs:
     def _about(self, rider: _Rider) -> tuple[Floats, Floats, Floats]:
         """Return the vertices from a place on the axis, the axis, and that place."""
         axis, place = self._axis(rider.joint)
-        return self._pieces[rider.piece].world_um() - place, axis, place
+        return self._pieces[rider.piece].world_um().T - place, axis, place
 
     def _reach(self, rider: _Rider, span: Floats) -> float:
-        """Return how far one joint can carry any point of a piece, others moving as well."""
+        """Return how far one joint can carry any point of a piece, in any direction."""
         far = float(span[rider.joint])
         if not self._arrangement.turning[rider.joint]:
             return far
         points, axis, _ = self._about(rider)
-        radius = radius_about(points, axis)
-        for place, number in enumerate(rider.beyond):
-            outer = _Rider(
-                number, rider.piece, rider.body, rider.sign, False, rider.beyond[place + 1 :]
-            )
-            radius += self._reach(outer, span)
-        return chord(radius, far)
+        return chord(radius_about(points, axis), far)
 
 
 def _part(low: Floats, high: Floats) -> _Part:
