@@ -134,6 +134,7 @@ class TopBar(QWidget):
     def set_menu_bar(self, menu_bar: QMenuBar) -> None:
         """Put `menu_bar` into the first row, at the left."""
         menu_bar.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
+        menu_bar.setFixedHeight(3 * STEP_PX)  # it wants another one whenever it is styled anew
         self._first_row.insertWidget(0, menu_bar)
 
     @property
