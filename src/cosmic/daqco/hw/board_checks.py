@@ -57,8 +57,13 @@ def range_in_force(info: BoardInfo, each: InputSettings) -> tuple[float, float]:
     return min(fitting, key=lambda pair: pair[1] - pair[0])
 
 
-def check_inputs(info: BoardInfo, inputs: Sequence[InputSettings]) -> None:
+def check_inputs(info: BoardInfo, inputs: Sequence[InputSettings], *, paired: bool = True) -> None:
     """Refuse inputs that are not there, used twice, not pairable or out of every range.
+
+    Parameters
+    ----------
+    paired : bool
+        A differential channel takes two inputs; False where each input has two wires of its own.
 
     Raises
     ------
@@ -77,7 +82,7 @@ def check_inputs(info: BoardInfo, inputs: Sequence[InputSettings]) -> None:
         )
     used: dict[str, str] = {}
     for each in inputs:
-        for wire in _wires(info, each):
+        for wire in _wires(info, each, paired=paired):
             if wire in used:
                 raise DeviceError(
                     f"{info.name}/{each.input}: {wire} is already used by {used[wire]}; "
@@ -96,7 +101,7 @@ def check_rate(info: BoardInfo, active: int, rate_hz: float) -> None:
     LimitError
         Not positive, not finite, or too high; the text says what is possible.
     """
-    highest = info.highest_rate_hz(active)
+    highest = min(info.max_single_rate_hz, info.highest_rate_hz(active))
     if not 0.0 < rate_hz <= highest:
         raise _limit(
             f"{info.name}: {active} inputs at {rate_hz:g} Hz asked; a {info.product} makes up to "
@@ -116,14 +121,14 @@ def check_chunk(info: BoardInfo, chunk_samples: int) -> None:
         )
 
 
-def _wires(info: BoardInfo, each: InputSettings) -> tuple[str, ...]:
+def _wires(info: BoardInfo, each: InputSettings, *, paired: bool) -> tuple[str, ...]:
     if each.input not in info.inputs:
         raise DeviceError(
             f"{info.name}: there is no input {each.input!r}; a {info.product} has "
             f"{info.inputs[0]} to {info.inputs[-1]}",
             fault=DeviceFault.NO_CHANNEL,
         )
-    if each.mode is not InputMode.DIFFERENTIAL:
+    if not paired or each.mode is not InputMode.DIFFERENTIAL:
         return (each.input,)
     partner = negative_input(info, each.input)
     if partner is None:

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Literal
 
 from cosmic.daqco.hw.interface import BoardLibrary
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errors import NotAvailable
 
 if TYPE_CHECKING:
     from cosmic.daqco.hw.sim_signal import Source
@@ -38,7 +37,9 @@ def make_library(
     """
     # Imported here, so that each platform loads its own backend only.
     if backend == "nidaqmx":
-        raise NotAvailable(f"boards of National Instruments are not built yet ({clock_sources})")
+        from cosmic.daqco.hw.nidaqmx_board import NidaqmxLibrary
+
+        return NidaqmxLibrary(clock or WALL, clock_sources=clock_sources)
     from cosmic.daqco.hw.sim_board import SimulatedLibrary
 
     return SimulatedLibrary(clock or WALL, scene_sources, seed=seed)

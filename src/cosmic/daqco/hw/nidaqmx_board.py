@@ -1,0 +1,291 @@
+"""Boards of National Instruments through NI-DAQmx."""
+
+import logging
+from collections.abc import Mapping, Sequence
+from queue import Empty
+from threading import RLock
+from typing import Any
+
+import nidaqmx
+import nidaqmx.stream_readers
+import nidaqmx.system
+from nidaqmx.constants import TerminalConfiguration
+from nidaqmx.errors import DaqNotFoundError, Error
+from typing_extensions import override
+
+from cosmic.daqco.hw.board_checks import check_chunk, check_inputs, check_rate
+from cosmic.daqco.hw.interface import (
+    Board,
+    BoardChunk,
+    BoardInfo,
+    BoardLibrary,
+    InputSettings,
+)
+from cosmic.daqco.hw.nidaqmx_errors import board_error
+from cosmic.daqco.hw.nidaqmx_task import TERMINALS, InputTask, Run, TaskSettings
+from cosmic.frame.clock import WALL, Clock
+from cosmic.frame.errors import CosmicError, DeviceError, DeviceFault, NotConnectedError
+
+logger = logging.getLogger(__name__)
+
+Wiring = Mapping[str, Sequence[TerminalConfiguration]]
+
+
+class NidaqmxBoard(Board):
+    """One board; made by its library.
+
+    Parameters
+    ----------
+    api : module
+        nidaqmx.
+    wiring : mapping of str to sequence of TerminalConfiguration
+        How each input can be wired.
+    clock_source : str
+        Terminal of the sample clock, such as "/Dev1/ai/SampleClock"; empty is the board's own.
+        Start the board that takes its clock from another before that other.
+    """
+
+    def __init__(
+        self, api: Any, info: BoardInfo, wiring: Wiring, clock: Clock, *, clock_source: str = ""
+    ) -> None:
+        self._api = api
+        self._info = info
+        self._wiring = wiring
+        self._clock = clock
+        self._clock_source = clock_source
+        # Orders configure, start, stop and close; the driver's thread never takes it.
+        self._lock = RLock()
+        self._settings: TaskSettings | None = None
+        self._task: InputTask | None = None
+        self._run: Run | None = None
+        self._heard_s = 0.0
+        self._closed = False
+
+    @property
+    @override
+    def info(self) -> BoardInfo:
+        return self._info
+
+    @override
+    def configure(
+        self, inputs: Sequence[InputSettings], rate_hz: float, chunk_samples: int
+    ) -> float:
+        with self._lock:
+            self._check_idle("configure")
+            self._check_wiring(inputs)
+            check_rate(self._info, len(inputs), rate_hz)
+            check_chunk(self._info, chunk_samples)
+            self._drop_task()
+            settings = TaskSettings(
+                self._info.name, tuple(inputs), rate_hz, chunk_samples, self._clock_source
+            )
+            self._task = InputTask(self._api, settings)
+            self._settings = settings
+            logger.debug("%s: %d inputs at %g Hz", settings.board, len(inputs), self._task.rate_hz)
+            return self._task.rate_hz
+
+    @override
+    def start(self) -> None:
+        with self._lock:
+            self._check_idle("start")
+            if self._settings is None:
+                raise self._error("start: it was not configured", DeviceFault.STATE)
+            if self._task is None:
+                # The last one died with an error; a board that was lost may be back.
+                self._task = InputTask(self._api, self._settings)
+            run = Run()
+            before_s = self._clock.now_s()
+            try:
+                self._task.start(run)
+            except CosmicError:
+                self._drop_task()
+                raise
+            run.start_s = 0.5 * (before_s + self._clock.now_s())
+            self._heard_s = WALL.now_s()
+            self._run = run
+
+    @override
+    def receive(self, timeout_s: float) -> BoardChunk | None:
+        run, task = self._run, self._task
+        if run is None or task is None:
+            return None
+        try:
+            item = run.items.get(timeout=max(timeout_s, 0.0))
+        except Empty:
+            self._check_heard(run, task)
+            return None
+        if item is None or self._run is not run:
+            return None
+        if isinstance(item, BaseException):
+            error = task.translated(item, run)
+            self._give_up(run)
+            raise error from (None if error is item else item)
+        self._heard_s = WALL.now_s()
+        first, volts = item
+        return BoardChunk(first, run.start_s + first / task.rate_hz, volts)
+
+    @override
+    def stop(self) -> None:
+        with self._lock:
+            run, self._run = self._run, None
+            if run is None:
+                return
+            run.end(None)
+            if self._task is not None and not self._task.stop():
+                self._drop_task()
+
+    @override
+    def close(self) -> None:
+        with self._lock:
+            self.stop()
+            self._drop_task()
+            self._closed = True
+
+    def _check_heard(self, run: Run, task: InputTask) -> None:
+        """Ask the driver whether it still acquires, when it has been silent for long."""
+        assert self._settings is not None
+        silence_s = max(1.0, 4.0 * self._settings.chunk_samples / task.rate_hz)
+        if WALL.now_s() - self._heard_s < silence_s:
+            return
+        self._heard_s = WALL.now_s()
+        logger.warning("%s: no samples for %g s", self._info.name, silence_s)
+        try:
+            task.check_alive()
+        except CosmicError:
+            if self._run is not run:
+                return
+            self._give_up(run)
+            raise
+
+    def _give_up(self, run: Run) -> None:
+        with self._lock:
+            if self._run is run:
+                run.over = True
+                self._run = None
+                self._drop_task()
+
+    def _drop_task(self) -> None:
+        task, self._task = self._task, None
+        if task is not None:
+            task.close()
+
+    def _check_idle(self, call: str) -> None:
+        if self._closed:
+            raise self._error(f"{call}: it was closed; open it again", DeviceFault.STATE)
+        if self._run is not None:
+            raise self._error(f"{call}: it is acquiring; stop it first", DeviceFault.STATE)
+
+    def _check_wiring(self, inputs: Sequence[InputSettings]) -> None:
+        # Boards with differential inputs only have no pairs.
+        paired = any(TerminalConfiguration.RSE in modes for modes in self._wiring.values())
+        check_inputs(self._info, inputs, paired=paired)
+        for each in inputs:
+            possible = [
+                mode for mode, term in TERMINALS.items() if term in self._wiring[each.input]
+            ]
+            if each.mode not in possible:
+                raise self._error(
+                    f"{each.input} cannot be wired {each.mode}; it can: {', '.join(possible)}",
+                    DeviceFault.PARAMETER,
+                )
+
+    def _error(self, text: str, fault: DeviceFault) -> DeviceError:
+        return DeviceError(f"{self._info.name}: {text}", fault=fault)
+
+
+class NidaqmxLibrary(BoardLibrary):
+    """The NI-DAQmx driver; any thread.
+
+    Parameters
+    ----------
+    clock : Clock
+        Stamps the samples: the platform's.
+    clock_sources : mapping of str to str, or None
+        Terminal of the sample clock by board; the others use their own.
+    api : module
+        nidaqmx, or what tests put in its place.
+    """
+
+    def __init__(
+        self,
+        clock: Clock = WALL,
+        *,
+        clock_sources: Mapping[str, str] | None = None,
+        api: Any = nidaqmx,
+    ) -> None:
+        self._clock = clock
+        self._clock_sources = dict(clock_sources or {})
+        self._api = api
+
+    @property
+    @override
+    def name(self) -> str:
+        try:
+            version = self._api.system.System.local().driver_version
+        except DaqNotFoundError:
+            return "NI-DAQmx (not installed)"
+        except Error:
+            return "NI-DAQmx"
+        return f"NI-DAQmx {version.major_version}.{version.minor_version}"
+
+    @override
+    def list_boards(self) -> tuple[BoardInfo, ...]:
+        return tuple(info for info, _ in self._found())
+
+    @override
+    def open(self, name: str) -> NidaqmxBoard:
+        found = {info.name: (info, device) for info, device in self._found()}
+        if name not in found:
+            raise NotConnectedError(
+                f"NI-DAQmx knows no board {name!r} with analogue inputs; it lists: "
+                f"{', '.join(found) or 'none'}. Names are given in NI MAX",
+                fault=DeviceFault.COMMUNICATION,
+            )
+        info, device = found[name]
+        try:
+            wiring = {_short(each.name): each.ai_term_cfgs for each in device.ai_physical_chans}
+        except Error as exc:
+            raise board_error(exc, "open", name) from exc
+        return NidaqmxBoard(
+            self._api, info, wiring, self._clock, clock_source=self._clock_sources.get(name, "")
+        )
+
+    def _found(self) -> list[tuple[BoardInfo, Any]]:
+        try:
+            devices = list(self._api.system.System.local().devices)
+        except Error as exc:
+            raise board_error(exc, "list the boards", "NI-DAQmx") from exc
+        found = []
+        for device in devices:
+            try:
+                info = _info(device)
+            except Error as exc:
+                # A chassis, or a board that is listed but not plugged in.
+                logger.info("NI-DAQmx: %s is left out: %s", device.name, exc)
+                continue
+            if info is not None:
+                found.append((info, device))
+        return found
+
+
+def _info(device: Any) -> BoardInfo | None:
+    """Return what a device is; None when it has no analogue inputs."""
+    inputs = tuple(_short(each.name) for each in device.ai_physical_chans)
+    if not inputs:
+        return None
+    flat = [float(end) for end in device.ai_voltage_rngs]
+    ranges = sorted(zip(flat[::2], flat[1::2], strict=True), key=lambda pair: pair[0] - pair[1])
+    return BoardInfo(
+        name=str(device.name),
+        product=str(device.product_type),
+        simulated=bool(device.is_simulated),
+        serial=int(device.serial_num),
+        inputs=inputs,
+        max_single_rate_hz=float(device.ai_max_single_chan_rate),
+        max_multi_rate_hz=float(device.ai_max_multi_chan_rate),
+        ranges_v=tuple(ranges),
+    )
+
+
+def _short(physical: str) -> str:
+    return physical.rpartition("/")[2]

@@ -1,0 +1,249 @@
+"""One NI-DAQmx task: analogue inputs, continuous, with a callback for each chunk."""
+
+import logging
+import math
+from dataclasses import dataclass, field
+from queue import SimpleQueue
+from typing import Any, Final
+
+import numpy as np
+from nidaqmx.constants import AcquisitionType, TaskMode, TerminalConfiguration, VoltageUnits
+from nidaqmx.errors import DaqError, Error
+
+from cosmic.daqco.hw.interface import InputMode, InputSettings, Volts
+from cosmic.daqco.hw.nidaqmx_errors import board_error, status_error
+from cosmic.frame.errors import DeviceError, DeviceFault, DeviceTimeout
+
+logger = logging.getLogger(__name__)
+
+BUFFER_S: Final = 10.0
+READ_TIMEOUT_S: Final = 1.0
+TERMINALS: Final = {
+    InputMode.RSE: TerminalConfiguration.RSE,
+    InputMode.NRSE: TerminalConfiguration.NRSE,
+    InputMode.DIFFERENTIAL: TerminalConfiguration.DIFF,
+}
+
+Item = tuple[int, Volts] | BaseException | None
+
+
+@dataclass(frozen=True, slots=True)
+class TaskSettings:
+    """What a task acquires.
+
+    Attributes
+    ----------
+    clock_source : str
+        Terminal of the sample clock; empty is the board's own.
+    """
+
+    board: str
+    inputs: tuple[InputSettings, ...]
+    rate_hz: float
+    chunk_samples: int
+    clock_source: str
+
+    @property
+    def buffer_samples(self) -> int:
+        """Samples a channel of the driver's buffer, of whole chunks: boards with DMA insist."""
+        chunks = math.ceil(BUFFER_S * self.rate_hz / self.chunk_samples)
+        return max(chunks, 4) * self.chunk_samples
+
+
+@dataclass(eq=False)
+class Run:
+    """What comes between one start and the stop.
+
+    Attributes
+    ----------
+    items : SimpleQueue
+        Number of the first sample and volts; or what went wrong; or None: it was stopped.
+    over : bool
+        Nothing more is put in.
+    """
+
+    items: SimpleQueue[Item] = field(default_factory=SimpleQueue)
+    start_s: float = 0.0
+    next_sample: int = 0
+    over: bool = False
+
+    def end(self, item: BaseException | None) -> None:
+        """Put the last item in, once; any thread."""
+        if not self.over:
+            self.over = True
+            self.items.put(item)
+
+
+class InputTask:
+    """A task of the driver, reserved and ready to start.
+
+    Parameters
+    ----------
+    api : module
+        nidaqmx.
+
+    Raises
+    ------
+    CosmicError
+        The driver refused; nothing is reserved then.
+    """
+
+    def __init__(self, api: Any, settings: TaskSettings) -> None:
+        self._settings = settings
+        self._run: Run | None = None
+        self._most = settings.buffer_samples // settings.chunk_samples
+        try:
+            self._task = api.Task()
+        except Error as exc:
+            raise board_error(exc, "create a task", settings.board) from exc
+        try:
+            self._prepare()
+            self._reader = api.stream_readers.AnalogMultiChannelReader(self._task.in_stream)
+            # The arrays are made here, so that their shape need not be checked at each chunk.
+            self._reader.verify_array_shape = False
+            self.rate_hz = float(self._task.timing.samp_clk_rate)
+        except BaseException as exc:
+            self.close()
+            if isinstance(exc, Error):
+                raise board_error(exc, "configure", settings.board) from exc
+            raise
+
+    def _prepare(self) -> None:
+        settings, task = self._settings, self._task
+        for each in settings.inputs:
+            task.ai_channels.add_ai_voltage_chan(
+                f"{settings.board}/{each.input}",
+                terminal_config=TERMINALS[each.mode],
+                min_val=each.low_v,
+                max_val=each.high_v,
+                units=VoltageUnits.VOLTS,
+            )
+        task.timing.cfg_samp_clk_timing(
+            settings.rate_hz,
+            source=settings.clock_source,
+            sample_mode=AcquisitionType.CONTINUOUS,
+            samps_per_chan=settings.buffer_samples,
+        )
+        # The driver takes the line above for a hint and may make a buffer of another size.
+        task.in_stream.input_buf_size = settings.buffer_samples
+        task.register_every_n_samples_acquired_into_buffer_event(
+            settings.chunk_samples, self._on_samples
+        )
+        task.register_done_event(self._on_done)
+        # Taken by another program, or wrong? Better told here than at the start.
+        task.control(TaskMode.TASK_COMMIT)
+
+    def start(self, run: Run) -> None:
+        """Begin to acquire into `run`; raises what the driver says."""
+        self._run = run
+        try:
+            self._task.start()
+        except Error as exc:
+            run.over = True
+            raise board_error(exc, "start", self._settings.board) from exc
+
+    def stop(self) -> bool:
+        """End acquiring; False when the task cannot be used again."""
+        try:
+            self._task.stop()
+        except Error as exc:
+            logger.warning("%s: stop: %s", self._settings.board, exc)
+            return False
+        return True
+
+    def close(self) -> None:
+        """Give the board back; a driver that fails here is logged."""
+        try:
+            self._task.close()
+        except Error as exc:
+            logger.warning("%s: close: %s", self._settings.board, exc)
+
+    def check_alive(self) -> None:
+        """Raise when the task has ended, which a lost board does not always report."""
+        board = self._settings.board
+        try:
+            done = self._task.is_task_done()
+        except Error as exc:
+            raise board_error(exc, "acquire", board) from exc
+        if done:
+            raise DeviceError(
+                f"{board}: the acquisition ended by itself; check the board in NI MAX, then start "
+                f"again",
+                fault=DeviceFault.COMMUNICATION,
+            )
+
+    def translated(self, exc: BaseException, run: Run) -> BaseException:
+        """Return what `exc`, put in by a callback, means."""
+        if isinstance(exc, Error):
+            return board_error(exc, "read", self._settings.board, lost=self._lost(exc, run))
+        return exc
+
+    # --- the driver's thread: an exception or anything but an int would be garbage in C ----------
+
+    def _on_samples(self, _handle: object, _kind: object, _count: object, _data: object) -> int:
+        run = self._run
+        if run is not None and not run.over:
+            try:
+                self._fetch(run)
+            except BaseException as exc:  # noqa: BLE001
+                run.end(exc)
+        return 0
+
+    def _on_done(self, _handle: object, status: int, _data: object) -> int:
+        run = self._run
+        if run is not None and status < 0:
+            run.end(status_error(status, "acquire", self._settings.board))
+        return 0
+
+    def _fetch(self, run: Run) -> None:
+        """Read all whole chunks: several events may have become one, or one come late."""
+        stream, count = self._task.in_stream, self._settings.chunk_samples
+        while not run.over and stream.avail_samp_per_chan >= count:
+            if run.items.qsize() >= self._most:
+                raise self._too_slow(run)
+            volts = self._read()
+            run.items.put((run.next_sample, volts))
+            run.next_sample += count
+
+    def _read(self) -> Volts:
+        inputs, count = len(self._settings.inputs), self._settings.chunk_samples
+        volts = np.empty((inputs, count))
+        got = self._reader.read_many_sample(volts, count, READ_TIMEOUT_S)
+        if got == count:
+            return volts
+        # After a short read the driver leaves the samples packed at the start of the array.
+        parts: list[Volts] = []
+        while True:
+            if got <= 0:
+                raise DeviceTimeout(
+                    f"{self._settings.board}: read brought "
+                    f"{sum(part.shape[1] for part in parts)} of {count} samples, then none",
+                    fault=DeviceFault.TIMEOUT,
+                )
+            parts.append(volts.ravel()[: inputs * got].reshape(inputs, got))
+            missing = count - sum(part.shape[1] for part in parts)
+            if not missing:
+                return np.concatenate(parts, axis=1)
+            volts = np.empty((inputs, missing))
+            got = self._reader.read_many_sample(volts, missing, READ_TIMEOUT_S)
+
+    def _too_slow(self, run: Run) -> DeviceError:
+        return DeviceError(
+            f"{self._settings.board}: CoSMic did not take its samples for {BUFFER_S:g} s; all "
+            f"after sample {run.next_sample} were lost ({self._behind(run)} of each channel so "
+            f"far); close what slows the computer, or lower the rate, and start again",
+            fault=DeviceFault.OVERRUN,
+        )
+
+    def _behind(self, run: Run) -> int:
+        return int(self._task.in_stream.total_samp_per_chan_acquired) - run.next_sample
+
+    def _lost(self, exc: Error, run: Run) -> int | None:
+        """Return how many samples a channel an overrun cost, as far as the driver knows."""
+        try:
+            behind = self._behind(run)
+        except Error:
+            return None
+        overwritten = isinstance(exc, DaqError) and exc.error_code == -200279
+        lost = behind - self._settings.buffer_samples if overwritten else behind
+        return lost if lost > 0 else None

@@ -1,0 +1,386 @@
+"""What DAQCo relies on in any `Board`: simulated, and NI's over a fake driver."""
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from math import inf, nan
+
+import numpy as np
+import pytest
+
+from contract.board_rig import (
+    BoardRig,
+    NidaqmxRig,
+    SimulatedRig,
+    failure_of,
+    one_input,
+    received,
+    some_inputs,
+)
+from cosmic.daqco.hw.interface import BoardChunk, InputMode, InputSettings
+from cosmic.frame.errors import (
+    CosmicError,
+    DeviceError,
+    DeviceFault,
+    LimitError,
+    NotConnectedError,
+)
+
+DIFFERENTIAL = InputMode.DIFFERENTIAL
+
+
+@pytest.fixture(params=[SimulatedRig, NidaqmxRig])
+def rig(request: pytest.FixtureRequest) -> Iterator[BoardRig]:
+    made: BoardRig = request.param()
+    yield made
+    made.close()
+
+
+# --- which boards there are -------------------------------------------------------------------
+
+
+def test_the_library_lists_its_boards_with_what_they_can(rig: BoardRig) -> None:
+    boards = rig.library.list_boards()
+    assert [(each.name, each.product) for each in boards] == [
+        ("Dev1", "PCI-6229"),
+        ("Dev2", "PCI-6229"),
+    ]
+    board = boards[0]
+    assert board.inputs == tuple(f"ai{number}" for number in range(32))
+    assert board.ranges_v == ((-10.0, 10.0), (-5.0, 5.0), (-1.0, 1.0), (-0.2, 0.2))
+    assert board.highest_rate_hz(1) == 250_000.0
+    assert board.highest_rate_hz(32) == 7812.5
+    assert len({each.serial for each in boards}) == 2
+    assert rig.open().info == board
+    assert rig.library.name
+
+
+def test_a_board_that_is_not_there_is_named_with_those_that_are(rig: BoardRig) -> None:
+    with pytest.raises(NotConnectedError, match=r"'Dev7'.*Dev1, Dev2"):
+        rig.library.open("Dev7")
+
+
+def test_a_missing_driver_is_named(rig: BoardRig) -> None:
+    rig.uninstall()
+    for attempt in (rig.library.list_boards, lambda: rig.library.open("Dev1")):
+        with pytest.raises(NotConnectedError, match=r"driver .*not installed"):
+            attempt()
+    assert rig.library.name
+
+
+# --- chunks -----------------------------------------------------------------------------------
+
+
+def test_chunks_follow_each_other_without_a_gap(rig: BoardRig) -> None:
+    board = rig.open()
+    rate_hz = board.configure(some_inputs(4), 1000.0, 10)
+    rig.clock.advance(3.0)
+    board.start()
+    rig.go_on(50)
+    chunks = received(board, 5)
+    assert [each.first_sample for each in chunks] == [0, 10, 20, 30, 40]
+    times_s = [3.0 + number / rate_hz for number in (0, 10, 20, 30, 40)]
+    assert [each.time_s for each in chunks] == pytest.approx(times_s, abs=1e-9)
+    assert board.receive(0.0) is None
+
+
+def test_the_rate_that_is_told_is_near_the_one_asked(rig: BoardRig) -> None:
+    made_hz = rig.open().configure(some_inputs(16), 14_000.0, 140)
+    assert made_hz == pytest.approx(14_000.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("count", [1, 2, 32])
+def test_a_chunk_has_a_row_for_each_input_even_for_one(rig: BoardRig, count: int) -> None:
+    board = rig.running(inputs=count)
+    rig.go_on(10)
+    volts = received(board, 1)[0].volts
+    assert volts.shape == (count, 10)
+    assert volts.dtype == np.float64
+
+
+def test_rows_stand_in_the_order_configured(rig: BoardRig) -> None:
+    board = rig.open()
+    numbers = (7, 0, 31, 3)
+    board.configure([one_input(f"ai{number}") for number in numbers], 1000.0, 10)
+    board.start()
+    rig.go_on(10)
+    levels_v = received(board, 1)[0].volts.mean(axis=1)
+    assert levels_v == pytest.approx([0.1 * number for number in numbers], abs=5e-3)
+
+
+def test_each_chunk_is_a_fresh_array_of_the_receiver(rig: BoardRig) -> None:
+    board = rig.running()
+    rig.go_on(20)
+    one, other = received(board, 2)
+    assert one.volts.flags.writeable and other.volts.flags.c_contiguous
+    assert not np.shares_memory(one.volts, other.volts)
+    one.volts[:] = 99.0
+    one.volts.flags.writeable = False
+    rig.go_on(10)
+    assert received(board, 1)[0].volts.max() < 1.0
+
+
+def test_several_boards_acquire_at_once(rig: BoardRig) -> None:
+    boards = [rig.running(name, inputs=16) for name in ("Dev1", "Dev2")]
+    rig.go_on(30)
+    boards[0].stop()
+    assert [each.first_sample for each in received(boards[1], 3)] == [0, 10, 20]
+    rig.go_on(10)
+    assert received(boards[1], 1)[0].first_sample == 30
+    assert boards[0].receive(0.0) is None
+
+
+def test_two_boards_together_carry_32_channels_at_15_khz(rig: BoardRig) -> None:
+    boards = [
+        rig.running(name, inputs=16, rate_hz=15_000.0, chunk=150) for name in ("Dev1", "Dev2")
+    ]
+    rig.go_on(1501, rate_hz=14_990.0)
+    for board in boards:
+        assert sum(each.volts.shape[1] for each in received(board, 10)) == 1500
+
+
+# --- order of calls ---------------------------------------------------------------------------
+
+
+def test_receiving_in_vain_gives_none_after_the_time_given(rig: BoardRig) -> None:
+    board = rig.running()
+    assert board.receive(0.0) is None
+    assert board.receive(0.01) is None
+
+
+def test_a_board_that_is_not_started_gives_nothing(rig: BoardRig) -> None:
+    board = rig.open()
+    assert board.receive(0.0) is None
+    board.configure(some_inputs(1), 1000.0, 10)
+    rig.go_on(20)
+    assert board.receive(0.0) is None
+
+
+def test_starting_needs_a_configuration(rig: BoardRig) -> None:
+    with pytest.raises(DeviceError, match=r"Dev1.*configured") as caught:
+        rig.open().start()
+    assert caught.value.fault is DeviceFault.STATE
+
+
+def test_a_running_board_is_neither_configured_nor_started(rig: BoardRig) -> None:
+    board = rig.running()
+    for attempt in (board.start, lambda: board.configure(some_inputs(1), 100.0, 10)):
+        with pytest.raises(DeviceError, match=r"Dev1.*acquiring") as caught:
+            attempt()
+        assert caught.value.fault is DeviceFault.STATE
+    rig.go_on(10)
+    assert received(board, 1)[0].volts.shape == (4, 10)
+
+
+def test_after_a_stop_nothing_comes_and_a_start_begins_at_zero(rig: BoardRig) -> None:
+    board = rig.running()
+    rig.go_on(30)
+    received(board, 1)
+    board.stop()
+    board.stop()
+    assert board.receive(0.0) is None
+    board.start()
+    rig.go_on(10)
+    assert [each.first_sample for each in received(board, 1)] == [0]
+    assert board.receive(0.0) is None
+
+
+def test_a_board_can_be_configured_anew_between_runs(rig: BoardRig) -> None:
+    board = rig.running(inputs=4)
+    board.stop()
+    board.configure(some_inputs(9), 1000.0, 5)
+    board.configure(some_inputs(2), 1000.0, 5)
+    board.start()
+    rig.go_on(5)
+    assert received(board, 1)[0].volts.shape == (2, 5)
+
+
+def test_a_stop_wakes_whoever_waits(rig: BoardRig) -> None:
+    board = rig.running()
+    got: list[BoardChunk | None] = []
+    waiting = threading.Thread(target=lambda: got.append(board.receive(30.0)))
+    waiting.start()
+    board.stop()
+    waiting.join(10.0)
+    assert got == [None]
+
+
+def test_a_closed_board_stays_closed_and_another_can_be_opened(rig: BoardRig) -> None:
+    board = rig.running()
+    board.close()
+    board.close()
+    board.stop()
+    assert board.receive(0.0) is None
+    for attempt in (board.start, lambda: board.configure(some_inputs(1), 100.0, 10)):
+        with pytest.raises(DeviceError, match=r"Dev1.*closed"):
+            attempt()
+    again = rig.running()
+    rig.go_on(10)
+    received(again, 1)
+
+
+def test_starting_and_stopping_a_hundred_times_leaves_nothing_behind(rig: BoardRig) -> None:
+    board = rig.running()
+    threads = threading.active_count()
+    for _ in range(100):
+        board.stop()
+        board.start()
+        rig.go_on(10)
+        assert received(board, 1)[0].first_sample == 0
+    assert threading.active_count() == threads
+
+
+# --- what is refused --------------------------------------------------------------------------
+
+TOO_MUCH: list[tuple[Sequence[InputSettings], float]] = [
+    (some_inputs(32), 7813.0),
+    (some_inputs(16), 15_626.0),
+    (some_inputs(1), 250_001.0),
+    (some_inputs(1), 0.0),
+    (some_inputs(1), -1000.0),
+    (some_inputs(1), nan),
+    (some_inputs(1), inf),
+    ([], 1000.0),
+    ([one_input(low_v=-10.5)], 1000.0),
+    ([one_input(high_v=11.0)], 1000.0),
+    ([one_input(low_v=1.0, high_v=1.0)], 1000.0),
+    ([one_input(low_v=2.0, high_v=1.0)], 1000.0),
+    ([one_input(low_v=nan)], 1000.0),
+    ([one_input(high_v=inf)], 1000.0),
+]
+IMPOSSIBLE: list[tuple[Sequence[InputSettings], DeviceFault]] = [
+    ([one_input("ai32")], DeviceFault.NO_CHANNEL),
+    ([one_input("port0")], DeviceFault.NO_CHANNEL),
+    ([one_input("ai1"), one_input("ai1")], DeviceFault.PARAMETER),
+    ([one_input("ai8", DIFFERENTIAL)], DeviceFault.PARAMETER),
+    ([one_input("ai31", DIFFERENTIAL)], DeviceFault.PARAMETER),
+    ([one_input("ai0", DIFFERENTIAL), one_input("ai8")], DeviceFault.PARAMETER),
+    ([one_input("ai24"), one_input("ai16", DIFFERENTIAL)], DeviceFault.PARAMETER),
+]
+
+
+@pytest.mark.parametrize(("inputs", "rate_hz"), TOO_MUCH)
+def test_what_is_beyond_the_board_is_refused_and_it_stays_usable(
+    rig: BoardRig, inputs: Sequence[InputSettings], rate_hz: float
+) -> None:
+    board = rig.open()
+    with pytest.raises(LimitError, match="Dev1"):
+        board.configure(inputs, rate_hz, 10)
+    board.configure(some_inputs(1), 1000.0, 10)
+    board.start()
+    rig.go_on(10)
+    received(board, 1)
+
+
+@pytest.mark.parametrize(("inputs", "fault"), IMPOSSIBLE)
+def test_what_cannot_be_wired_is_refused(
+    rig: BoardRig, inputs: Sequence[InputSettings], fault: DeviceFault
+) -> None:
+    with pytest.raises(DeviceError, match=r"Dev1.*ai|Dev1.*port0") as caught:
+        rig.open().configure(inputs, 1000.0, 10)
+    assert caught.value.fault is fault
+
+
+def test_a_chunk_without_samples_is_refused(rig: BoardRig) -> None:
+    with pytest.raises(DeviceError, match=r"Dev1.*0 samples"):
+        rig.open().configure(some_inputs(1), 1000.0, 0)
+
+
+def test_sixteen_inputs_can_be_differential(rig: BoardRig) -> None:
+    board = rig.open()
+    numbers = [*range(8), *range(16, 24)]
+    board.configure([one_input(f"ai{each}", DIFFERENTIAL) for each in numbers], 15_000.0, 10)
+
+
+def test_modes_and_ranges_can_be_mixed(rig: BoardRig) -> None:
+    board = rig.open()
+    board.configure(
+        [
+            one_input("ai0", DIFFERENTIAL, -0.2, 0.2),
+            one_input("ai1", InputMode.NRSE, 0.0, 5.0),
+            one_input("ai9", InputMode.RSE, -3.0, 10.0),
+        ],
+        1000.0,
+        10,
+    )
+    board.start()
+    rig.go_on(10)
+    assert received(board, 1)[0].volts.shape == (3, 10)
+
+
+# --- trouble ----------------------------------------------------------------------------------
+
+
+def test_a_board_that_another_program_has_is_told_and_works_once_it_is_free(rig: BoardRig) -> None:
+    board = rig.open()
+    rig.take_away("Dev1", taken=True)
+    with pytest.raises(DeviceError, match=r"Dev1.*another program") as caught:
+        board.configure(some_inputs(1), 1000.0, 10)
+    assert caught.value.fault is DeviceFault.STATE
+    rig.take_away("Dev1", taken=False)
+    board.configure(some_inputs(1), 1000.0, 10)
+
+
+def test_a_receiver_that_is_too_late_hears_of_an_overrun_and_can_start_again(
+    rig: BoardRig,
+) -> None:
+    board = rig.running()
+    rig.go_on(25_000)
+    error = failure_of(board)
+    assert error.fault is DeviceFault.OVERRUN
+    assert "Dev1" in str(error)
+    assert any(word.isdigit() and int(word) > 0 for word in str(error).split())
+    assert board.receive(0.0) is None
+    board.start()
+    rig.go_on(10)
+    assert received(board, 1)[0].first_sample == 0
+
+
+def test_a_lost_board_ends_the_acquisition_and_works_when_it_is_back(rig: BoardRig) -> None:
+    board = rig.running()
+    rig.go_on(10)
+    received(board, 1)
+    rig.unplug("Dev1")
+    error = failure_of(board)
+    assert isinstance(error, NotConnectedError)
+    assert error.fault is DeviceFault.COMMUNICATION
+    assert "Dev1" in str(error) and "cable" in str(error)
+    assert board.receive(0.0) is None
+    with pytest.raises(NotConnectedError):
+        board.start()
+    with pytest.raises(NotConnectedError):
+        rig.library.open("Dev1")
+    rig.plug_in("Dev1")
+    board.start()
+    rig.go_on(10)
+    assert received(board, 1)[0].first_sample == 0
+
+
+def test_a_lost_board_can_be_closed_and_opened_again(rig: BoardRig) -> None:
+    board = rig.running()
+    rig.unplug("Dev1")
+    board.stop()
+    board.close()
+    rig.plug_in("Dev1")
+    again = rig.running()
+    rig.go_on(10)
+    received(again, 1)
+
+
+def test_a_lost_board_does_not_disturb_the_other(rig: BoardRig) -> None:
+    lost, other = rig.running("Dev1"), rig.running("Dev2")
+    rig.unplug("Dev1")
+    rig.go_on(20)
+    failure_of(lost)
+    assert [each.first_sample for each in received(other, 2)] == [0, 10]
+
+
+def test_every_error_names_the_board(rig: BoardRig) -> None:
+    attempts: list[Callable[[], object]] = [
+        lambda: rig.open("Dev2").start(),
+        lambda: rig.open("Dev2").configure([], 1.0, 1),
+        lambda: rig.open("Dev2").configure(some_inputs(32), 1e6, 1),
+        lambda: rig.open("Dev2").configure([one_input("ai99")], 1.0, 1),
+    ]
+    for attempt in attempts:
+        with pytest.raises(CosmicError, match="Dev2"):
+            attempt()
