@@ -4,9 +4,12 @@ import random
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final, Self
 
 from cosmic.frame.clock import Clock
+from cosmic.frame.config import shipped_config_dir
+from cosmic.twin.force_side import ForceSide
 from cosmic.twin.settings import StageKind, TwinSettings
 from cosmic.twin.stage import Stage
 
@@ -56,6 +59,8 @@ class Scene:
         Name of the stage at each device and channel; None where nothing is connected.
     at_power_up : mapping of str to AtPowerUp
         What the controllers know of each stage.
+    force_side : ForceSide or None
+        Fibres, tools and force sensors; None in a scene of bare stages.
     """
 
     def __init__(
@@ -67,6 +72,7 @@ class Scene:
         stages: Mapping[str, Stage],
         wiring: Wiring,
         at_power_up: Mapping[str, AtPowerUp],
+        force_side: ForceSide | None = None,
     ) -> None:
         self.settings = settings
         self.clock = clock
@@ -74,10 +80,17 @@ class Scene:
         self.stages = dict(stages)
         self.wiring = wiring
         self.at_power_up = dict(at_power_up)
+        self.force_side = force_side
 
     @classmethod
     def from_settings(
-        cls, settings: TwinSettings, clock: Clock, seed: int = 0, *, cold: bool = False
+        cls,
+        settings: TwinSettings,
+        clock: Clock,
+        seed: int = 0,
+        *,
+        cold: bool = False,
+        folder: Path | None = None,
     ) -> Self:
         """Make the platform that `settings` describes.
 
@@ -87,6 +100,13 @@ class Scene:
             False: powered and referenced, every stage at its configured start, and the
             controllers' positions are true ones. True: just switched on, every stage somewhere,
             positions read zero; a reference run brings the true positions back.
+        folder : Path or None
+            Where twin.toml was read, for the files it names; None: what ships with CoSMic.
+
+        Raises
+        ------
+        ConfigError
+            A file that `settings` names is missing, broken or does not fit.
         """
         stages: dict[str, Stage] = {}
         at_power_up: dict[str, AtPowerUp] = {}
@@ -104,7 +124,13 @@ class Scene:
             )
         wiring = tuple(tuple(name or None for name in d.channels) for d in settings.devices)
         return cls(
-            settings, clock, seed=seed, stages=stages, wiring=wiring, at_power_up=at_power_up
+            settings,
+            clock,
+            seed=seed,
+            stages=stages,
+            wiring=wiring,
+            at_power_up=at_power_up,
+            force_side=ForceSide(settings, folder or shipped_config_dir(), stages, seed),
         )
 
     @classmethod

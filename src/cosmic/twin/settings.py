@@ -7,6 +7,12 @@ from pydantic import Field, model_validator
 
 from cosmic.frame.config import StrictModel, load_model, shipped_config_dir
 from cosmic.frame.units import AxisUnit
+from cosmic.twin.force_settings import (
+    ContactSettings,
+    FibreSettings,
+    ForceSensorSettings,
+    GeometrySettings,
+)
 
 
 class StageKind(StrictModel):
@@ -125,6 +131,33 @@ class TwinSettings(StrictModel):
     controller: ControllerSettings
     devices: tuple[DeviceWiring, ...] = Field(strict=False, min_length=1)
     stages: dict[str, StagePlace]
+    geometry: GeometrySettings
+    contact: ContactSettings
+    fibres: tuple[FibreSettings, ...] = Field(default=(), strict=False)
+    force_sensors: dict[str, ForceSensorSettings]
+    sensor_wiring: dict[str, str] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _tools_fit_together(self) -> Self:
+        joints, grippers = self.geometry.joints, self.geometry.grippers
+        used = {f"geometry.joints.{name}": drive.stage for name, drive in joints.items()}
+        used |= {f"geometry.grippers.{name}": each.stage for name, each in grippers.items()}
+        for key, stage in used.items():
+            if stage not in self.stages:
+                raise ValueError(f"{key} names {stage!r}, which is no stage")
+        for number, fibre in enumerate(self.fibres):
+            if fibre.held_by and fibre.held_by not in grippers:
+                raise ValueError(
+                    f"fibres[{number}] is held by {fibre.held_by!r}, which is no gripper; "
+                    f"known: {', '.join(grippers)}"
+                )
+        for place, name in self.sensor_wiring.items():
+            if name not in self.force_sensors:
+                raise ValueError(f"sensor_wiring.{place}: there is no force sensor {name!r}")
+        for name, sensor in self.force_sensors.items():
+            if sensor.mounted_on not in ("probe", ""):
+                raise ValueError(f'force_sensors.{name}.mounted_on must be "probe" or ""')
+        return self
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:

@@ -16,6 +16,9 @@ from cosmic.twin.settings import StageKind
 ENDLESS_S: Final = 1e9
 """How far ahead a movement without end is planned, s."""
 
+PATHS_KEPT: Final = 64
+"""So many movements back, instruments that report late still see where a stage was."""
+
 
 @dataclass(frozen=True, slots=True)
 class Path:
@@ -86,7 +89,7 @@ class Stage:
         self.name = name
         self.kind = kind
         self.random = random.Random(f"stage {name} {seed}")
-        self._path = Path((0.0,), (start,))
+        self._paths: tuple[Path, ...] = (Path((0.0,), (start,)),)
         self._wall: tuple[float, int] | None = None
         creep_per_min = self.random.uniform(kind.drift_per_min_low, kind.drift_per_min_high)
         self._creep_per_s = creep_per_min * self.random.choice((-1, 1)) / 60.0
@@ -99,12 +102,27 @@ class Stage:
     @property
     def path(self) -> Path:
         """The movement planned last; ended long ago when the stage stands."""
-        return self._path
+        return self._paths[-1]
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """The last movements, the newest at the end; a new tuple whenever one is planned."""
+        return self._paths
 
     def position(self, time_s: float) -> float:
         """Return where the stage truly is at `time_s`."""
         low, high = self.bounds
-        return min(max(self._path.at(time_s), low), high)
+        return min(max(self.path.at(time_s), low), high)
+
+    def position_then(self, time_s: float) -> float:
+        """Return where the stage was at `time_s`, though newer movements began since."""
+        for path in reversed(self._paths):
+            if path.times_s[0] <= time_s:
+                break
+        else:
+            path = self._paths[0]
+        low, high = self.bounds
+        return min(max(path.at(time_s), low), high)
 
     def step_size(self, amplitude_v: float, direction: int) -> float:
         """Return the mean length of one step, positive, at `amplitude_v` in `direction` (+-1)."""
@@ -155,11 +173,7 @@ class Stage:
     def follow(self, route: "Route", *, held_until_s: float) -> None:
         """Move along `route`, and creep once it is over and the stage is not held any more."""
         path = route.path()
-        self._path = replace(
-            path,
-            creep_from_s=max(path.end_s, held_until_s),
-            creep_per_s=self._creep_per_s,
-        )
+        self._plan(replace(path, creep_from_s=max(path.end_s, held_until_s)))
 
     def halt(self, time_s: float, *, coast_s: float, within_s: float) -> float:
         """Leave the path at `time_s`, finish the step in hand, and return when it stands.
@@ -173,9 +187,13 @@ class Stage:
         """
         end = self.position(time_s + coast_s)
         end_s = time_s + min(coast_s, within_s)
-        cut = self._path.cut(time_s, end_s=end_s, end=end)
-        self._path = replace(cut, creep_from_s=end_s, creep_per_s=self._creep_per_s)
+        cut = self.path.cut(time_s, end_s=end_s, end=end)
+        self._plan(replace(cut, creep_from_s=end_s))
         return end_s
+
+    def _plan(self, path: Path) -> None:
+        path = replace(path, creep_per_s=self._creep_per_s)
+        self._paths = (*self._paths[1 - PATHS_KEPT :], path)
 
 
 class Route:

@@ -1,0 +1,135 @@
+"""A capacitive force sensor: a force in, a voltage out, as an acquisition board sees it."""
+
+import math
+from collections.abc import Callable
+from threading import Lock
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.twin.force_settings import ForceSensorSettings
+
+Floats = npt.NDArray[np.float64]
+
+LONGEST_RUN: Final = 300.0
+"""Time constants filtered in one go; exp of more than 700 would overflow."""
+
+
+class ForceSensor:
+    """One sensor and its amplifier: bandwidth, noise, drift, saturation.
+
+    Parameters
+    ----------
+    name : str
+        Its name in twin.toml.
+    settings : ForceSensorSettings
+        Constants.
+    force_un : callable
+        The true force at rising times, uN; None for a sensor that nothing touches.
+    seed : int
+        Of noise, drift, and how far it is from its data sheet.
+
+    Notes
+    -----
+    Any thread may ask, for times that rise from call to call. The same times in other portions
+    give the same volts, but for rounding.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        settings: ForceSensorSettings,
+        force_un: Callable[[Floats], Floats] | None,
+        seed: int,
+    ) -> None:
+        self.name = name
+        self.settings = settings
+        self._force_un = force_un
+        streams = np.random.SeedSequence([seed, *name.encode()]).spawn(3)
+        mounting, self._noise, self._drift = (np.random.default_rng(each) for each in streams)
+        self.true_gain_v_un = settings.gain_v_un * (
+            1.0 + settings.gain_error * float(mounting.standard_normal())
+        )
+        self.true_zero_v = settings.zero_v + settings.zero_error_v * float(
+            mounting.standard_normal()
+        )
+        self._lock = Lock()
+        self._time_s = -math.inf
+        self._state_un = 0.0
+        self._walk_un = 0.0
+
+    def volts(self, times_s: Floats) -> Floats:
+        """Return the output, shape (n,), float64, V.
+
+        Parameters
+        ----------
+        times_s : ndarray, shape (n,), float64
+            Times of the samples, rising.
+
+        Raises
+        ------
+        ValueError
+            The times are not finite or fall.
+        """
+        times_s = np.asarray(times_s, dtype=np.float64)
+        if not times_s.size:
+            return np.empty(0)
+        with self._lock:
+            steps_s = self._steps_s(times_s)
+            force = np.zeros_like(times_s) if self._force_un is None else self._force_un(times_s)
+            felt = self._filtered(steps_s, force) + self._wandered(steps_s)
+            self._time_s = max(self._time_s, float(times_s[-1]))
+        half_v = self.settings.gain_v_un * self.settings.range_un
+        out = self.true_zero_v + self.true_gain_v_un * felt
+        return np.clip(out, self.settings.zero_v - half_v, self.settings.zero_v + half_v)
+
+    def _steps_s(self, times_s: Floats) -> Floats:
+        """Return how much time passed before each sample; for ever before the very first."""
+        steps_s = np.empty_like(times_s)
+        np.subtract(times_s[1:], times_s[:-1], out=steps_s[1:])
+        steps_s[0] = max(float(times_s[0]) - self._time_s, 0.0)
+        # Written so that NaN is caught; an infinite time leaves one too.
+        if not (steps_s.min() >= 0.0 and math.isfinite(float(times_s[-1]))):
+            raise ValueError(f"sensor {self.name}: the times of samples must rise")
+        return steps_s
+
+    def _filtered(self, steps_s: Floats, force_un: Floats) -> Floats:
+        """Pass force and white noise through the one pole of the amplifier.
+
+        x[k] = r[k] x[k-1] + (1 - r[k]) force[k] + sqrt(1 - r[k]^2) noise[k], r = exp(-step/tau)
+        """
+        per_s = 2.0 * math.pi * self.settings.bandwidth_hz
+        decay = np.minimum(steps_s * per_s, LONGEST_RUN)
+        kept = np.exp(-decay)
+        noise = self.settings.noise_un * self._noise.standard_normal(force_un.size)
+        return self._recur(decay, (1.0 - kept) * force_un + np.sqrt(1.0 - kept * kept) * noise)
+
+    def _recur(self, decay: Floats, drive: Floats) -> Floats:
+        """Return x[k] = exp(-decay[k]) x[k-1] + drive[k], in runs that a float can hold."""
+        age = np.cumsum(decay)
+        out = np.empty_like(drive)
+        start = 0
+        while start < drive.size:
+            base = age[start]
+            # The first of a run may follow any pause: it is taken on its own.
+            first = math.exp(-decay[start]) * self._state_un + float(drive[start])
+            end = int(np.searchsorted(age, base + LONGEST_RUN, side="right"))
+            end = max(end, start + 1)
+            growth = np.exp(age[start:end] - base)
+            grown = drive[start:end] * growth
+            grown[0] = first
+            out[start:end] = np.cumsum(grown) / growth
+            self._state_un = float(out[end - 1])
+            start = end
+        return out
+
+    def _wandered(self, steps_s: Floats) -> Floats:
+        """Return the zero's random walk, uN."""
+        steps = self.settings.drift_un_sqrt_s * np.sqrt(steps_s)
+        steps *= self._drift.standard_normal(steps.size)
+        if self._time_s == -math.inf:
+            steps[0] = 0.0  # it was zeroed just before
+        walk = self._walk_un + np.cumsum(steps)
+        self._walk_un = float(walk[-1])
+        return np.asarray(walk)

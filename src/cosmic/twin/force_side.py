@@ -1,0 +1,76 @@
+"""The force side of the scene in one piece: tools, fibres, contact, force sensors."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+from cosmic.twin.force_sensor import ForceSensor
+from cosmic.twin.kinematics import Point
+from cosmic.twin.settings import TwinSettings
+from cosmic.twin.stage import Stage
+from cosmic.twin.timeline import Floats, Timeline
+from cosmic.twin.tools import make_skeleton
+from cosmic.twin.workplace import Moment, Workplace
+
+RIGID_UN_UM: Final = 1e9
+"""Stiffness of a probe without a sensor."""
+
+
+class ForceSide:
+    """What touches what on the platform; any thread.
+
+    Parameters
+    ----------
+    settings : TwinSettings
+        Constants.
+    folder : Path
+        Of twin.toml.
+    stages : mapping of str to Stage
+        All stages by name.
+    seed : int
+        Of noise, drift and how fibres are held.
+
+    Attributes
+    ----------
+    sensors : dict of str to ForceSensor
+        As twin.toml names them. Reading one is all that an acquisition board may do here; the
+        rest is the truth, for pictures, logs and tests.
+
+    Raises
+    ------
+    ConfigError
+        The URDF is missing, broken or does not fit the settings.
+    """
+
+    def __init__(
+        self, settings: TwinSettings, folder: Path, stages: Mapping[str, Stage], seed: int
+    ) -> None:
+        self._stages = stages
+        self.skeleton = make_skeleton(settings, folder)
+        on_probe = [each for each in settings.force_sensors.values() if each.mounted_on]
+        stiffness = on_probe[0].stiffness_un_um if on_probe else RIGID_UN_UM
+        self._workplace = Workplace(settings, self.skeleton, sensor_un_um=stiffness, seed=seed)
+        self._timeline = Timeline(self._workplace, stages, settings.contact.step_s)
+        self.sensors = {
+            name: ForceSensor(name, each, self.force_un if each.mounted_on else None, seed)
+            for name, each in settings.force_sensors.items()
+        }
+
+    def force_un(self, times_s: Floats) -> Floats:
+        """Return the true force on the probe, uN, positive when it is pushed back.
+
+        Parameters
+        ----------
+        times_s : ndarray, shape (n,), float64
+            Rising; not later than now, and not more than some seconds ago.
+        """
+        return self._timeline.force_un(times_s)
+
+    def moment(self, now_s: float) -> Moment:
+        """Return the whole truth now: force, what touches where, each fibre's state."""
+        return self._timeline.moment(now_s)
+
+    def tips(self, now_s: float) -> dict[str, Point]:
+        """Return where the tips of the tools are, um, world; see `Workplace.tips`."""
+        values = {name: each.position_then(now_s) for name, each in self._stages.items()}
+        return self._workplace.tips(values)

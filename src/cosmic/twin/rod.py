@@ -1,0 +1,208 @@
+"""A fibre as a thin elastic rod, pushed sideways at one point; quasi-static.
+
+Units that fit together without factors: um, uN, hence uN um2 for a bending stiffness, and uN/um,
+the same number as N/m, for a spring. The probe has no friction, a round edge, and stays at one
+abscissa; what its sensor feels is the force along its own axis.
+
+Two cases, each solved as far as algebra goes:
+
+- Clamped at one end: the elastica, with the fibre sliding over the probe; exact for any bow.
+- Held at both ends: the beam under axial tension (stability functions), tension and deflection
+  tied by the stretching of fibre and grippers. Good for slopes below about 0.2.
+"""
+
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+EI_UN_UM2_PER_N_M2: Final = 1e18
+"""1e6 uN in a newton, 1e12 um2 in a square metre."""
+
+UN_PER_N: Final = 1e6
+
+STEEPEST_RAD: Final = 1.0
+"""Slope of a cantilever at the probe up to which its curve is laid out."""
+
+HIGHEST_TENSION_UN: Final = 2e5
+"""Tension up to which a curve is laid out: a dry fibre breaks at 50 to 200 mN."""
+
+
+@dataclass(frozen=True)
+class PushCurve:
+    """Force of a fibre on the probe over its way, for one grasp and one abscissa.
+
+    Attributes
+    ----------
+    ways_um : ndarray, shape (n,), float64
+        How far the probe's holder went since contact; rises from 0.
+    deflections_um : ndarray, shape (n,), float64
+        How far the fibre gave way; the rest is the sensor's own spring.
+    forces_un : ndarray, shape (n,), float64
+    """
+
+    ways_um: Floats
+    deflections_um: Floats
+    forces_un: Floats
+
+    @property
+    def reach_um(self) -> float:
+        """Way at which the fibre slides off, or the end of what is laid out."""
+        return float(self.ways_um[-1])
+
+    def force_un(self, way_um: float) -> float:
+        """Return the force at a way; the same with the opposite sign on the other side."""
+        force = float(np.interp(abs(way_um), self.ways_um, self.forces_un))
+        return force if way_um >= 0.0 else -force
+
+    def deflection_um(self, way_um: float) -> float:
+        """Return how far the fibre itself gives way."""
+        deflection = float(np.interp(abs(way_um), self.ways_um, self.deflections_um))
+        return deflection if way_um >= 0.0 else -deflection
+
+
+@cache
+def _elastica() -> tuple[Floats, Floats, Floats, Floats]:
+    """Return slope, deflection/a, force a^2/EI and arc length/a of a cantilever, rising from 0.
+
+    With the slope angle psi counted from the contact, where the moment is zero, the first
+    integral of the elastica is (psi')^2 = 2 k sin(psi), k = N/EI, N normal to the fibre there.
+    Integrals over psi up to the slope at the contact give arc length and both coordinates.
+    """
+    slopes = np.linspace(0.0, STEEPEST_RAD**0.5, 241)[1:] ** 2
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    # psi = t^2 takes the root out of both integrands.
+    top = np.sqrt(slopes)[:, None]
+    t = 0.5 * top * (nodes + 1.0)
+    ratio = np.sqrt(np.sin(t * t)) / t
+    step = 0.5 * top * weights
+    arc = (2.0 / ratio * step).sum(axis=1)  # sqrt(2 k) times arc length
+    rise = (2.0 * t * t * ratio * step).sum(axis=1)  # sqrt(2 k) times the way across
+    along = 2.0 * np.sqrt(np.sin(slopes))
+    a = along * np.cos(slopes) + rise * np.sin(slopes)
+    d = along * np.sin(slopes) - rise * np.cos(slopes)
+    force = 0.5 * a * a * np.cos(slopes)  # k a^2 cos(beta), as a still holds sqrt(2 k)
+    zero = np.zeros(1)
+    return (
+        np.concatenate([zero, slopes]),
+        np.concatenate([zero, d / a]),
+        np.concatenate([zero, force]),
+        np.concatenate([zero + 1.0, arc / a]),
+    )
+
+
+@lru_cache(maxsize=4096)
+def clamped_at_one_end(
+    *, ei_un_um2: float, span_um: float, free_um: float, radius_um: float, sensor_un_um: float
+) -> PushCurve:
+    """Return the curve of a fibre clamped at one end.
+
+    Parameters
+    ----------
+    ei_un_um2 : float
+        Bending stiffness.
+    span_um : float
+        From the clamp to the middle of the probe, along the straight fibre.
+    free_um : float
+        Length of fibre beyond the clamp; it slides off when the bow needs more.
+    radius_um : float
+        Of the probe's edge and half the fibre together: as the fibre slopes, it touches the
+        probe nearer to the clamp.
+    sensor_un_um : float
+        Stiffness of the sensor behind the probe.
+    """
+    slope, bow, force, arc = _elastica()
+    touched = span_um - radius_um * np.sin(slope)
+    held = (touched > 0.0) & (touched * arc <= free_um)
+    last = len(slope) if held.all() else int(np.argmin(held))
+    touched = touched[:last]
+    deflections = touched * bow[:last] + radius_um * (1.0 - np.cos(slope[:last]))
+    return _curve(deflections, force[:last] * (ei_un_um2 / touched**2), sensor_un_um)
+
+
+@lru_cache(maxsize=1024)
+def held_at_both_ends(
+    *,
+    ei_un_um2: float,
+    ea_un: float,
+    span_um: float,
+    distance_um: float,
+    slack_um: float,
+    gripper_un_um: float,
+    sensor_un_um: float,
+) -> PushCurve:
+    """Return the curve of a fibre clamped at both ends.
+
+    Parameters
+    ----------
+    ea_un : float
+        Axial stiffness of the fibre.
+    span_um, distance_um : float
+        From the first clamp to the probe, and to the other clamp.
+    slack_um : float
+        Length of fibre between the clamps beyond their distance; negative: it is stretched.
+        A slack fibre bends as if straight until the slack is used up.
+    gripper_un_um : float
+        Stiffness of each gripper along the fibre; inf: rigid.
+    """
+    axial_un_um = 1.0 / (distance_um / ea_un + 2.0 / gripper_un_um)
+    lowest = max(0.0, -slack_um * axial_un_um)
+    tension = np.concatenate([[0.0], np.geomspace(1e-3, HIGHEST_TENSION_UN, 240)]) + lowest
+    stiffness = _stiffness_un_um(tension, ei_un_um2, span_um, distance_um - span_um)
+    # Half of d(stiffness)/d(tension) is the lengthening for a deflection of one.
+    change = 1e-4 * tension + 1e-6
+    slope = (
+        _stiffness_un_um(tension + change, ei_un_um2, span_um, distance_um - span_um) - stiffness
+    ) / change
+    stretch = np.maximum(tension / axial_un_um + slack_um, 0.0)
+    deflections = np.sqrt(2.0 * stretch / slope)
+    if deflections[0] > 0.0:  # slack: the linear part before any tension
+        deflections = np.concatenate([[0.0], deflections])
+        stiffness = np.concatenate([stiffness[:1], stiffness])
+    return _curve(deflections, stiffness * deflections, sensor_un_um)
+
+
+def tension_un(*, ea_un: float, distance_um: float, slack_um: float, gripper_un_um: float) -> float:
+    """Return the tension of a straight fibre held at both ends; 0 while it is slack."""
+    return max(0.0, -slack_um / (distance_um / ea_un + 2.0 / gripper_un_um))
+
+
+def _curve(deflections: Floats, forces: Floats, sensor_un_um: float) -> PushCurve:
+    ways = deflections + forces / sensor_un_um
+    rising = np.concatenate([[True], np.diff(np.maximum.accumulate(ways)) > 0.0])
+    curve = PushCurve(ways[rising], deflections[rising], forces[rising])
+    for array in (curve.ways_um, curve.deflections_um, curve.forces_un):
+        array.flags.writeable = False
+    return curve
+
+
+def _stiffness_un_um(tension_un: Floats, ei: float, left_um: float, right_um: float) -> Floats:
+    """Return force per deflection at the probe of a beam under tension, clamped at both ends.
+
+    Each side is one exact element of the beam-column; the slope at the probe is free.
+    """
+    left = _element(tension_un, ei, left_um)
+    right = _element(tension_un, ei, right_um)
+    across = left[0] + right[0]
+    mixed = right[1] - left[1]
+    turning = left[2] + right[2]
+    return np.asarray(across - mixed * mixed / turning)
+
+
+def _element(tension_un: Floats, ei: float, length_um: float) -> tuple[Floats, Floats, Floats]:
+    """Return force/way, moment/way (= force/turn) and moment/turn at the end of one element."""
+    root = length_um * np.sqrt(tension_un / ei)
+    x = np.clip(root, 0.3, None)  # the closed form cancels below; a series serves there
+    e1, e2 = np.exp(-x), np.exp(-2.0 * x)
+    cosh, sinh = 0.5 * (1.0 + e2), 0.5 * (1.0 - e2)  # times exp(-x), so that nothing overflows
+    phi = 2.0 * e1 - 2.0 * cosh + x * sinh
+    small = root < 0.3
+    square = root * root
+    across = np.where(small, 12.0 + 1.2 * square, x**3 * sinh / phi)
+    mixed = np.where(small, 6.0 + 0.1 * square, x * x * (cosh - e1) / phi)
+    turning = np.where(small, 4.0 + 2.0 / 15.0 * square, x * (x * cosh - sinh) / phi)
+    return across * (ei / length_um**3), mixed * (ei / length_um**2), turning * (ei / length_um)

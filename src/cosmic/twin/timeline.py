@@ -1,0 +1,108 @@
+"""Takes the workplace through time whenever somebody looks, and remembers the last seconds."""
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from threading import Lock
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.twin.stage import Stage
+from cosmic.twin.workplace import Felt, Moment, Workplace
+
+Floats = npt.NDArray[np.float64]
+
+KEPT: Final = 20_000
+"""So many looks are remembered: 20 s while something moves, much longer while nothing does."""
+
+MOST_LOOKS: Final = 50_000
+"""Looks for one question; after a long time unseen they lie further apart."""
+
+LONGEST_REST_S: Final = 0.5
+"""Stages that stand creep by nanometres; they are looked at again after this time."""
+
+
+class Timeline:
+    """What the probe felt and feels; any thread.
+
+    Looks lie on a fixed grid of time, so that the answer does not depend on who asked when.
+    """
+
+    def __init__(self, workplace: Workplace, stages: Mapping[str, Stage], step_s: float) -> None:
+        self._workplace = workplace
+        self._stages = tuple(stages[name] for name in sorted(workplace.stages))
+        self._step_s = step_s
+        self._lock = Lock()
+        self._felt = Felt()
+        self._values: dict[str, float] = {}
+        self._at = -1
+        self._times_s: deque[float] = deque(maxlen=KEPT)
+        self._forces_un: deque[float] = deque(maxlen=KEPT)
+
+    def force_un(self, times_s: Floats) -> Floats:
+        """Return the force on the probe, uN, positive when it is pushed back.
+
+        Parameters
+        ----------
+        times_s : ndarray, shape (n,), float64
+            Rising; not later than now, and not more than some seconds ago.
+        """
+        if not times_s.size:
+            return np.empty(0)
+        with self._lock:
+            self._advance(float(times_s[-1]))
+            times, forces = self._looks_since(float(times_s[0]))
+        return np.asarray(np.interp(times_s, times, forces))
+
+    def moment(self, time_s: float) -> Moment:
+        """Return the whole truth at `time_s`, or at the latest look if that is later."""
+        with self._lock:
+            self._advance(time_s)
+            return self._workplace.moment(self._times_s[-1], self._values, self._felt)
+
+    def _looks_since(self, time_s: float) -> tuple[list[float], list[float]]:
+        """Return times and forces from the last look before `time_s` on."""
+        times: list[float] = []
+        forces: list[float] = []
+        for look_s, force in zip(reversed(self._times_s), reversed(self._forces_un), strict=True):
+            times.append(look_s)
+            forces.append(force)
+            if look_s <= time_s:
+                break
+        return times[::-1], forces[::-1]
+
+    def _advance(self, time_s: float) -> None:
+        if self._at < 0:
+            self._look(0)
+        last = math.ceil(time_s / self._step_s - 1e-9)
+        stride = 1 + (last - self._at) // MOST_LOOKS
+        while self._at < last:
+            rest_s = self._rest_until_s()
+            if rest_s > time_s:
+                break  # what was felt last is felt still
+            further = math.floor(rest_s / self._step_s)
+            self._look(max(further, min(self._at + stride, last)))
+
+    def _look(self, number: int) -> None:
+        self._at = number
+        time_s = number * self._step_s
+        self._values = {each.name: each.position_then(time_s) for each in self._stages}
+        self._felt = self._workplace.look(self._values)
+        self._times_s.append(time_s)
+        self._forces_un.append(self._felt.total_un)
+
+    def _rest_until_s(self) -> float:
+        """Return until when no stage moves; before now where one does."""
+        now_s = self._at * self._step_s
+        until_s = now_s + LONGEST_REST_S
+        for stage in self._stages:
+            for path in reversed(stage.paths):
+                if path.times_s[0] > now_s:
+                    until_s = min(until_s, path.times_s[0])
+                    continue
+                if path.end_s > now_s:
+                    return now_s
+                break
+        return until_s

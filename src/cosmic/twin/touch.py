@@ -1,0 +1,55 @@
+"""Contact of the probe with one body, kept over time so that nothing tunnels."""
+
+from dataclasses import dataclass
+
+
+@dataclass(slots=True)
+class Touch:
+    """Whether the probe pushes against a body.
+
+    A stage can carry the probe right through a fibre between two looks. What counts is therefore
+    not where the probe is, but from where it came: once in front of the body and within its
+    reach, it stays on that side until it goes back or leaves sideways. A probe that comes in from
+    the side, past the body's face, stands beside it and pushes nothing.
+
+    Attributes
+    ----------
+    pressed : bool
+        They push against each other, or stick.
+    """
+
+    pressed: bool = False
+    _reach: float | None = None
+    _way: float = 0.0
+
+    def look(self, reach_um: float, way_um: float) -> bool:
+        """Take note of where the probe is now, and return whether they touch.
+
+        Parameters
+        ----------
+        reach_um : float
+            How far inside the body's reach the probe is, in x and z; negative: outside.
+        way_um : float
+            How far the probe's tip is past the body's face; negative: in front of it.
+        """
+        before, way_before = self._reach, self._way
+        self._reach, self._way = reach_um, way_um
+        if reach_um <= 0.0:
+            self.pressed = False
+        elif not self.pressed and way_um > 0.0:
+            self.pressed = before is not None and self._came_from_front(before, way_before)
+        return self.pressed
+
+    def lose(self) -> None:
+        """End the contact: it came off, or slid off."""
+        self.pressed = False
+
+    def _came_from_front(self, before: float, way_before: float) -> bool:
+        if way_before > 0.0 or self._reach is None:
+            return False
+        if before >= 0.0:
+            return True
+        # Both crossed between two looks: which first?
+        into_reach = -before / (self._reach - before)
+        past_face = -way_before / (self._way - way_before)
+        return into_reach <= past_face
