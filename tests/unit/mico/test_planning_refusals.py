@@ -73,6 +73,15 @@ def test_a_start_inside_the_margin_is_left_first_by_moving_apart() -> None:
     assert after["left.x"] <= 1994.0 or abs(after["left.y"]) > 100.0
 
 
+def test_a_start_inside_the_margin_is_not_left_by_coming_closer() -> None:
+    model = arms()
+    start = at(left_x=1997.0)
+    goal = {"left.x": 2500.0, "left.y": -300.0}
+    found = solved(Sweep(model), Problem(start, goal, LIMITS, budget_s=20.0))
+    assert corners(found)[1]["left.x"] <= 1997.0
+    assert certified(model, found)
+
+
 def test_a_start_without_a_way_out_says_what_is_too_close() -> None:
     start = at(left_z=-1500.0, left_x=0.0)
     limits = {**LIMITS, "left.z": (-1520.0, -1480.0)}
@@ -148,6 +157,27 @@ class Failing(Sweep):
         if self._left < 0:
             raise RuntimeError("broken in the middle")
         return super().check(spans, ignored)  # type: ignore[arg-type]
+
+
+class Forgetful(Sweep):
+    """A gate that refuses what it has let pass before."""
+
+    def __init__(self, model: SceneModel) -> None:
+        super().__init__(model)
+        self._passed: set[str] = set()
+
+    def check(self, spans: object, ignored: object = frozenset()) -> SweepAnswer:
+        answer = super().check(spans, ignored)  # type: ignore[arg-type]
+        if answer.clear and repr(spans) in self._passed:
+            nearest = self.nearest(dict.fromkeys(self.model.axes, 0.0))
+            return SweepAnswer(clear=False, approach=nearest)
+        self._passed.add(repr(spans))
+        return answer
+
+
+def test_every_leg_of_a_plan_is_asked_about_once_more_before_it_is_told() -> None:
+    problem = Problem(at(), {"left.x": 1000.0, "left.y": 500.0}, LIMITS)
+    assert isinstance(plan(Forgetful(arms()), problem), NoWay)
 
 
 @pytest.mark.parametrize("good", [0, 1, 5, 40, 60, 80])

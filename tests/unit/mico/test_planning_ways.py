@@ -16,6 +16,7 @@ from unit.mico.planning_problems import (
     at,
     certified,
     corners,
+    holds_with_sloppy_stages,
     least_gap,
     solved,
     table_and_arm,
@@ -50,6 +51,14 @@ def test_a_straight_line_that_is_free_is_driven_in_steps_where_its_box_is_not() 
     assert found.length == pytest.approx(found.straight_length)
 
 
+def test_a_height_that_is_too_low_for_axes_that_stop_short_is_not_used() -> None:
+    model = arms(overshoot=20.0, lift=60.0)
+    limits = LIMITS | {"left.x": (2400.0, 4000.0)}
+    found = solved(Sweep(model), replace(BEHIND, limits=limits))
+    assert max(place["left.z"] for place in corners(found)) > 75.0
+    assert holds_with_sloppy_stages(model, found, 20.0)
+
+
 def test_axes_go_one_after_the_other_where_together_they_would_touch() -> None:
     start = at(left_x=1900.0, left_y=0.0)
     found = solved(Sweep(arms()), Problem(start, {"left.x": 2100.0, "left.y": 120.0}, LIMITS))
@@ -76,6 +85,13 @@ def test_a_way_round_the_other_arm_is_short_and_every_leg_is_clear(lift: float |
     assert found.length <= found.found_length
     assert certified(model, found)
     assert least_gap(model, found) > 5.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_legs_stay_clear_where_axes_stop_short_or_go_too_far(seed: int) -> None:
+    model = arms(overshoot=20.0, lift=None)
+    found = solved(Sweep(model), replace(BEHIND, seed=seed))
+    assert holds_with_sloppy_stages(model, found, 20.0)
 
 
 def test_two_arms_swap_sides() -> None:

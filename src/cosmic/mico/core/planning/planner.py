@@ -21,7 +21,7 @@ GOOD: Final = 1.1
 """A way not longer than this many times the straight one is left as it is."""
 WORTH_LEGS: Final = 0.95
 """Cutting the corners of a simple way makes more legs; it must save this much of its length."""
-CHECKS_NEAR: Final = 80
+CHECKS_NEAR: Final = 60
 CHECKS_SEARCHED: Final = 400
 """Questions to the gate that cutting corners may cost, for a simple way and for one searched."""
 MOST_CORNERS: Final = 20
