@@ -1,0 +1,1 @@
+"""The picture of `UDaqPlotter`: history, columns, strip, axes, cursors."""

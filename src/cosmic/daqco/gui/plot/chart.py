@@ -1,0 +1,269 @@
+"""`Chart`: the picture itself, live or frozen; knows samples, not the application."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QEvent, Signal
+
+from cosmic.daqco.core.chunk import DataChunk, Values
+from cosmic.daqco.gui.colours import readable
+from cosmic.daqco.gui.plot.axes import Axes
+from cosmic.daqco.gui.plot.columns import Columns, column_of
+from cosmic.daqco.gui.plot.history import History, HistoryView
+from cosmic.daqco.gui.plot.live_columns import LiveColumns
+from cosmic.daqco.gui.plot.raster import Look, Raster
+from cosmic.daqco.gui.plot.strip import StripChartItem
+from cosmic.daqco.gui.plot.time_box import TimeBox
+from cosmic.daqco.gui.plot.units import AxisRange
+from cosmic.frame.gui.palette import blend
+from cosmic.frame.gui.theme import current_palette
+from cosmic.frame.overrides import override
+
+HISTORY_S: Final = 60.0
+FEWEST_SAMPLES: Final = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """One channel as it is drawn."""
+
+    name: str
+    unit: str
+    colour: str
+    shown: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Frozen:
+    """What a chart shows while it does not follow; times in s before the last sample held."""
+
+    view: HistoryView
+    begin_s: float
+    end_s: float
+
+
+class Chart(pg.GraphicsView):  # type: ignore[misc]
+    """Draws channels over time; new samples cost new columns only. GUI thread.
+
+    Signals
+    -------
+    frozen_changed(bool)
+        It stopped following, or follows again.
+    time_changed()
+        Another stretch of time is shown.
+    value_zoom_requested(float, float)
+        The wheel was turned with Ctrl held: factor, and the height that stays (0 to 1).
+    """
+
+    frozen_changed = Signal(bool)
+    time_changed = Signal()
+    value_zoom_requested = Signal(float, float)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.rate_hz, self.span_s = 1000.0, 10.0
+        self._traces: tuple[Trace, ...] = ()
+        self._ranges: dict[str, AxisRange] = {}
+        self._history = History(0, self.rate_hz, HISTORY_S)
+        self._frozen: Frozen | None = None
+        self._live = LiveColumns(1.0)
+        self.raster = Raster(self._look())
+        layout = pg.GraphicsLayout()
+        self.setCentralItem(layout)
+        self.box = TimeBox()
+        self.axes = Axes(layout, self.box)
+        self.strip = StripChartItem(self.raster, self.box)
+        self.box.sigResized.connect(self._on_resized)
+        self.box.time_zoom_requested.connect(self.zoom_time)
+        self.box.time_pan_requested.connect(self.pan_time)
+        self.box.value_zoom_requested.connect(self.value_zoom_requested)
+        self.box.live_requested.connect(self.follow)
+        self._restyle()
+
+    # What is drawn
+
+    @property
+    def frozen(self) -> bool:
+        """True while it does not follow the newest sample."""
+        return self._frozen is not None
+
+    @property
+    def traces(self) -> tuple[Trace, ...]:
+        """The channels, in the order of the chunks."""
+        return self._traces
+
+    def begin(self, traces: Sequence[Trace], rate_hz: float) -> None:
+        """Draw these channels from now on, with an empty history."""
+        self._traces, self.rate_hz = tuple(traces), rate_hz
+        self._history = History(len(traces), rate_hz, HISTORY_S)
+        self._apply_look()
+        self.follow()
+        self.rebuild()
+
+    def set_traces(self, traces: Sequence[Trace]) -> None:
+        """Change colours or what is shown of the same channels."""
+        self._traces = tuple(traces)
+        self._apply_look()
+
+    def set_ranges(self, ranges: dict[str, AxisRange]) -> None:
+        """Show one axis for each of these units; the first has the lines across."""
+        self._ranges = dict(ranges)
+        self.axes.show(ranges)
+        self._apply_look()
+
+    def set_span(self, span_s: float) -> None:
+        """Follow with that much time in the picture."""
+        self.span_s = span_s
+        self._frozen = None
+        self.frozen_changed.emit(False)
+        self.rebuild()
+
+    def clear(self) -> None:
+        """Forget the history."""
+        self._history.clear()
+        self.follow()
+        self.rebuild()
+
+    # Samples
+
+    def feed(self, chunks: Sequence[DataChunk]) -> None:
+        """Add samples; while frozen they only go into the history."""
+        for first_sample, values in _joined(chunks):
+            if first_sample < self._history.end:  # acquisition began anew
+                self._history.clear()
+                self.rebuild()
+            self._history.append(first_sample, values)
+            if self._frozen is not None:
+                continue
+            found = self._live.feed(first_sample, values)
+            if found is not None:
+                self.raster.put(*found)
+                self.strip.update()
+
+    def now_view(self) -> HistoryView:
+        """Return what is held: frozen, as it was then."""
+        return self._frozen.view if self._frozen is not None else self._history.view()
+
+    # Time
+
+    def window_s(self) -> tuple[float, float]:
+        """Return begin and end of what is shown, s after the last sample held (so below 0)."""
+        if self._frozen is not None:
+            return self._frozen.begin_s, self._frozen.end_s
+        return -self.span_s, 0.0
+
+    def freeze(self) -> None:
+        """Stop following; what is shown stays, and samples still come into the history."""
+        if self._frozen is None:
+            self._frozen = Frozen(self._history.view(), *self.window_s())
+            self.rebuild()
+            self.frozen_changed.emit(True)
+
+    def follow(self) -> None:
+        """Show the newest samples again."""
+        if self._frozen is not None:
+            self._frozen = None
+            self.rebuild()
+            self.frozen_changed.emit(False)
+
+    def show_time(self, begin_s: float, end_s: float) -> None:
+        """Show a stretch of the history, as far as there is one."""
+        self.freeze()
+        frozen = self._frozen
+        if frozen is None or not self._traces:
+            return
+        held_s = max((frozen.view.end - frozen.view.first) / self.rate_hz, self.span_s)
+        width = min(max(end_s - begin_s, FEWEST_SAMPLES / self.rate_hz), held_s)
+        end = min(0.0, max(end_s, -held_s + width))
+        self._frozen = Frozen(frozen.view, end - width, end)
+        self.rebuild()
+
+    def zoom_time(self, factor: float, share: float) -> None:
+        """Show `factor` as much time; the place `share` (0 left, 1 right) stays."""
+        begin, end = self.window_s()
+        fixed, width = begin + share * (end - begin), (end - begin) * factor
+        self.show_time(fixed - share * width, fixed + (1.0 - share) * width)
+
+    def pan_time(self, share: float) -> None:
+        """Pull the picture to the right by a part of its width."""
+        begin, end = self.window_s()
+        self.show_time(begin - share * (end - begin), end - share * (end - begin))
+
+    # Painting
+
+    def rebuild(self) -> None:
+        """Paint the whole picture from the history."""
+        begin_s, end_s = self.window_s()
+        self.box.setXRange(begin_s, end_s, padding=0.0)
+        raster, view = self.raster, self.now_view()
+        per_column = (end_s - begin_s) * self.rate_hz / raster.width
+        self._live = LiveColumns(per_column)
+        last = view.end - 1 + round(end_s * self.rate_hz)
+        if view.end > 0:
+            newest = column_of(last, per_column) - (1 if per_column < 1.0 else 0)
+            first = newest - raster.width + 1
+            raster.show(first, view.columns(first, raster.width, per_column))
+            if self._frozen is None:
+                self._live.prime(*view.samples(view.end - 1, view.end))
+        else:
+            raster.clear()
+        self.strip.set_uprights(self.axes.time_shares())
+        self.time_changed.emit()
+
+    def visible_columns(self) -> Columns:
+        """Return the extremes of what is in the picture, in any order."""
+        return self.raster.ring
+
+    def _look(self) -> Look:
+        palette = current_palette()
+        ranges = [self._ranges.get(each.unit, AxisRange(-10.0, 10.0, 5.0)) for each in self._traces]
+        first = next(iter(self._ranges.values()), None)
+        return Look(
+            colours=tuple(readable(each.colour) for each in self._traces),
+            shown=np.array([each.shown for each in self._traces], dtype=np.bool_),
+            low=np.array([each.low for each in ranges]),
+            high=np.array([each.high for each in ranges]),
+            grid=tuple(first.share(value) for value in first.lines()) if first else (),
+            ground=palette.field,
+            line=blend(palette.border_strong, palette.field, 0.45),
+        )
+
+    def _apply_look(self) -> None:
+        self.raster.set_look(self._look())
+        self.strip.update()
+
+    def _on_resized(self) -> None:
+        ratio = self.devicePixelRatioF()
+        width, height = self.box.width(), self.box.height()
+        self.strip.set_size(width, height)
+        self.raster.resize(round(width * ratio), round(height * ratio))
+        self.rebuild()
+
+    def _restyle(self) -> None:
+        self.setBackground(current_palette().panel)
+        self.axes.restyle()
+        self._apply_look()
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "axes"):
+            self._restyle()
+            self.raster.set_look(self._look())
+
+
+def _joined(chunks: Sequence[DataChunk]) -> list[tuple[int, Values]]:
+    """Return values of chunks, those without a gap between them in one piece."""
+    pieces: list[list[DataChunk]] = []
+    for chunk in chunks:
+        if pieces and chunk.first_sample == pieces[-1][-1].first_sample + pieces[-1][-1].samples:
+            pieces[-1].append(chunk)
+        else:
+            pieces.append([chunk])
+    return [
+        (piece[0].first_sample, np.concatenate([each.values for each in piece], axis=1))
+        for piece in pieces
+    ]
