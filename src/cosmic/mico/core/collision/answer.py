@@ -2,8 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
 from cosmic.mico.core.collision.model import BodyPair
+
+INSIDE_TEXT: Final = "closer than the margin already; they may only move apart"
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,14 @@ class AxisSpan:
     moving: bool = False
     estimated: bool = False
     free: bool = False
+
+    @property
+    def end(self) -> float | None:
+        """Where a movement goes; None when it has two ends or nobody knows where it starts."""
+        if self.now is None or not self.low <= self.now <= self.high:
+            return None
+        ends = [end for end in (self.low, self.high) if end != self.now]
+        return ends[0] if len(ends) == 1 else None
 
 
 Spans = Mapping[str, AxisSpan]

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Final
 
 from cosmic.frame.clock import WALL
-from cosmic.mico.core.collision.answer import AxisSpan, Spans
+from cosmic.mico.core.collision.answer import Spans
 from cosmic.mico.core.collision.model import BodyPair
 from cosmic.mico.core.collision.sweep import Sweep
 
@@ -14,14 +14,6 @@ RESOLUTION: Final = 1.0
 """How closely the end of the free way is found, um or degrees; a thousandth of short ways."""
 BUDGET_S: Final = 0.05
 """A refusal must not keep others waiting: what was proved until then is told."""
-
-
-def refused_end(span: AxisSpan) -> float | None:
-    """Return the end a movement goes to, None when it has two or nobody knows where it starts."""
-    if span.now is None or not span.low <= span.now <= span.high:
-        return None
-    ends = [end for end in (span.low, span.high) if end != span.now]
-    return ends[0] if len(ends) == 1 else None
 
 
 def free_way(
@@ -37,7 +29,7 @@ def free_way(
     movement has no single end, or when time ran out before anything was known.
     """
     span = spans[axis]
-    end = _reachable(sweep, axis, refused_end(span))
+    end = _reachable(sweep, axis, span.end)
     if span.now is None or end is None:
         return None
     until_s = WALL.now_s() + budget_s

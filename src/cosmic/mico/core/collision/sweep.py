@@ -2,12 +2,11 @@
 
 from collections.abc import Mapping, Set
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
+from cosmic.mico.core.collision.answer import INSIDE_TEXT, Approach, Spans, SweepAnswer
 from cosmic.mico.core.collision.arrangement import Arrangement, Turned
 from cosmic.mico.core.collision.fcl_pieces import ConvexPiece, separation
 from cosmic.mico.core.collision.model import BodyPair, Floats, SceneModel
@@ -21,8 +20,6 @@ from cosmic.mico.core.collision.sliding import Slide, guess_holds, smallest_gap
 from cosmic.mico.core.collision.turning import Turn, TurningPairs
 
 _Numbers = npt.NDArray[np.intp]
-
-INSIDE_TEXT: Final = "closer than the margin already; they may only move apart"
 
 
 @dataclass(frozen=True, eq=False)

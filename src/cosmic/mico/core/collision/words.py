@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from cosmic.frame.units import DISPLAY
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision.answer import Approach, AxisSpan, Spans
-from cosmic.mico.core.collision.free_way import refused_end
 from cosmic.mico.core.collision.model import BodyPair, JointKind, SceneModel
 
 
@@ -57,7 +56,7 @@ def collision(
     axis = axes[0] if len(axes) == 1 else ""
     unit = unit_of(model, axis)
     limit = _rounded_towards(spans[axis], free_to) if axis and free_to is not None else None
-    value = refused_end(spans[axis]) if axis else None
+    value = spans[axis].end if axis else None
     story = _already(model, axes, approach) if inside else _would(model, axes, approach)
     return MoveVerdict(
         allowed=False,
