@@ -9,7 +9,7 @@ from typing_extensions import override
 from contract.fake_nidaqmx import FakeNidaqmx
 from cosmic.daqco.hw.interface import Board, BoardChunk, BoardLibrary, InputMode, InputSettings
 from cosmic.daqco.hw.nidaqmx_board import NidaqmxLibrary
-from cosmic.daqco.hw.sim_board import SimulatedLibrary
+from cosmic.daqco.hw.sim_library import SimulatedLibrary
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import DeviceError
 
@@ -123,6 +123,9 @@ class NidaqmxRig(BoardRig):
     @override
     def unplug(self, name: str) -> None:
         self.driver.unplug(name)
+
+    def unplug_silently(self, name: str) -> None:
+        self.driver.unplug(name, told=False)
 
     @override
     def plug_in(self, name: str) -> None:

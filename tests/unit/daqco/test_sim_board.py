@@ -8,8 +8,9 @@ import numpy.typing as npt
 import pytest
 
 from cosmic.daqco.hw.interface import BoardChunk, InputMode, InputSettings
-from cosmic.daqco.hw.sim_board import SimulatedBoard, SimulatedLibrary
+from cosmic.daqco.hw.sim_board import SimulatedBoard
 from cosmic.daqco.hw.sim_fast import FastLibrary
+from cosmic.daqco.hw.sim_library import SimulatedLibrary
 from cosmic.frame.clock import ManualClock, RatedClock
 from cosmic.frame.errors import (
     ConfigError,

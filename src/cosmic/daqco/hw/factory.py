@@ -40,6 +40,6 @@ def make_library(
         from cosmic.daqco.hw.nidaqmx_board import NidaqmxLibrary
 
         return NidaqmxLibrary(clock or WALL, clock_sources=clock_sources)
-    from cosmic.daqco.hw.sim_board import SimulatedLibrary
+    from cosmic.daqco.hw.sim_library import SimulatedLibrary
 
     return SimulatedLibrary(clock or WALL, scene_sources, seed=seed)

@@ -49,7 +49,8 @@ _GONE: Final = Status(
 )
 _OVERRUN: Final = Status(
     _F.OVERRUN,
-    "samples were lost; close what slows the computer, or lower the rate, and start again",
+    "they were not fetched in time; close what slows the computer, or lower the rate, and start "
+    "again",
 )
 _TAKEN: Final = Status(
     _F.STATE,
@@ -62,15 +63,15 @@ STATUS: Final[dict[int, Status]] = {
     -200222: _OVERRUN,
     -200361: Status(
         _F.OVERRUN,
-        "the memory on the board overflowed and samples were lost; lower the rate, use fewer "
-        "inputs, or connect a USB board without a hub, and start again",
+        "the memory on the board overflowed; lower the rate, use fewer inputs, or connect a USB "
+        "board without a hub, and start again",
     ),
     -200010: _OVERRUN,
     -209829: _OVERRUN,
     -200019: Status(
         _F.OVERRUN,
-        "the converter was asked for samples faster than it makes them; lower the rate, or check "
-        "the external sample clock",
+        "the converter was asked for them faster than it makes them; lower the rate, or check the "
+        "external sample clock",
     ),
     -200284: Status(
         _F.TIMEOUT,
@@ -181,8 +182,8 @@ def status_error(
         return DeviceError(f"{where}, which CoSMic does not know{driver}", code=code)
     text = known.text
     if known.fault is DeviceFault.OVERRUN:
-        text = f"{'an unknown number of' if lost is None else lost} {text}"
-        text = text.replace("samples were", "samples of each channel were", 1)
+        amount = "an unknown number of" if lost is None else lost
+        text = f"{amount} samples of each channel were lost: {text}"
     return known.kind(f"{where}: {text}{driver}", fault=known.fault, code=code)
 
 

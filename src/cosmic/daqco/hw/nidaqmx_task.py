@@ -18,6 +18,7 @@ logger = logging.getLogger(__name__)
 
 BUFFER_S: Final = 10.0
 READ_TIMEOUT_S: Final = 1.0
+OVERWRITTEN: Final = -200279
 TERMINALS: Final = {
     InputMode.RSE: TerminalConfiguration.RSE,
     InputMode.NRSE: TerminalConfiguration.NRSE,
@@ -48,6 +49,14 @@ class TaskSettings:
         """Samples a channel of the driver's buffer, of whole chunks: boards with DMA insist."""
         chunks = math.ceil(BUFFER_S * self.rate_hz / self.chunk_samples)
         return max(chunks, 4) * self.chunk_samples
+
+
+class _EndedWithError(Exception):
+    """The driver's Done event, with an error."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__(code)
+        self.code = code
 
 
 @dataclass(eq=False)
@@ -174,9 +183,12 @@ class InputTask:
 
     def translated(self, exc: BaseException, run: Run) -> BaseException:
         """Return what `exc`, put in by a callback, means."""
-        if isinstance(exc, Error):
-            return board_error(exc, "read", self._settings.board, lost=self._lost(exc, run))
-        return exc
+        board = self._settings.board
+        if isinstance(exc, _EndedWithError):
+            return status_error(exc.code, "acquire", board, lost=self._lost(exc.code, run))
+        if isinstance(exc, DaqError):
+            return board_error(exc, "read", board, lost=self._lost(exc.error_code, run))
+        return board_error(exc, "read", board) if isinstance(exc, Error) else exc
 
     # --- the driver's thread: an exception or anything but an int would be garbage in C ----------
 
@@ -192,7 +204,7 @@ class InputTask:
     def _on_done(self, _handle: object, status: int, _data: object) -> int:
         run = self._run
         if run is not None and status < 0:
-            run.end(status_error(status, "acquire", self._settings.board))
+            run.end(_EndedWithError(status))
         return 0
 
     def _fetch(self, run: Run) -> None:
@@ -238,12 +250,11 @@ class InputTask:
     def _behind(self, run: Run) -> int:
         return int(self._task.in_stream.total_samp_per_chan_acquired) - run.next_sample
 
-    def _lost(self, exc: Error, run: Run) -> int | None:
+    def _lost(self, code: int, run: Run) -> int | None:
         """Return how many samples a channel an overrun cost, as far as the driver knows."""
         try:
             behind = self._behind(run)
         except Error:
             return None
-        overwritten = isinstance(exc, DaqError) and exc.error_code == -200279
-        lost = behind - self._settings.buffer_samples if overwritten else behind
+        lost = behind - self._settings.buffer_samples if code == OVERWRITTEN else behind
         return lost if lost > 0 else None
