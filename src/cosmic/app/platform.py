@@ -1,11 +1,18 @@
 """A platform as its files describe it: configuration in, running applications out."""
 
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import Field
 
+from cosmic.autonomy.interlocks import join_force_limits, join_positions
+from cosmic.daqco.api.application import DaqcoApplication
+from cosmic.daqco.api.recorder import Recorder
+from cosmic.daqco.core.settings import DaqcoSettings
+from cosmic.daqco.hw.factory import make_library
+from cosmic.daqco.hw.sim_signal import Source
 from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import Clock, RatedClock
 from cosmic.frame.config import StrictModel, load_model, shipped_config_dir
@@ -25,7 +32,7 @@ if TYPE_CHECKING:
     from cosmic.mico.hw.sim_scu3d_faults import Faults
 
 KNOWN_APPLICATIONS: Final = ("mico", "daqco", "vico")
-BUILT_APPLICATIONS: Final = ("mico",)
+BUILT_APPLICATIONS: Final = ("mico", "daqco")
 
 
 class PlatformSettings(StrictModel):
@@ -43,6 +50,7 @@ class PlatformFile(StrictModel):
 
     platform: PlatformSettings
     mico: MicoSettings
+    daqco: DaqcoSettings | None = None
 
 
 @dataclass(frozen=True)
@@ -55,6 +63,8 @@ class Platform:
     policy: FailurePolicy
     mico: MicoApplication | None
     faults: "Faults | None" = None
+    daqco: DaqcoApplication | None = None
+    recorder: Recorder | None = None
 
     @property
     def simulated(self) -> bool:
@@ -65,11 +75,17 @@ class Platform:
         """Open the hardware of every application."""
         if self.mico is not None:
             self.mico.initialize()
+        if self.daqco is not None:
+            self.daqco.initialize()
 
     def shut_down(self) -> None:
-        """Stop and close every application; any state."""
+        """Stop and close every application; any state. Motion ends first."""
         if self.mico is not None:
             self.mico.shut_down()
+        if self.recorder is not None:
+            self.recorder.stop()
+        if self.daqco is not None:
+            self.daqco.shut_down()
 
 
 def platform_path(config: str | Path | None) -> Path:
@@ -156,6 +172,7 @@ def build_platform(
     cold: bool = False,
     seed: int = 0,
     mico_gui: GuiFactory | None = None,
+    daqco_gui: GuiFactory | None = None,
 ) -> Platform:
     """Read the configuration and make the applications; opens no hardware yet.
 
@@ -167,8 +184,8 @@ def build_platform(
         Which to make, as far as the platform file names them.
     rate, cold, seed
         Of the simulated platform; see `cosmic.connect`.
-    mico_gui : callable or None
-        Makes MiCo's GUI component, where there is a window.
+    mico_gui, daqco_gui : callable or None
+        Make the applications' GUI components, where there is a window.
 
     Raises
     ------
@@ -186,14 +203,14 @@ def build_platform(
     except (TypeError, ValueError) as exc:
         raise ConfigError(f"rate: {exc}") from None
     policy = FailurePolicy()
-    mico, faults = None, None
+    mico, faults, scene = None, None, None
+    if simulated:
+        twin = load_twin(file, path)
+        scene = Scene.from_settings(twin, clock, seed=seed, cold=cold, folder=path.parent)
     if "mico" in applications and "mico" in file.platform.applications:
         controller: Controller
-        if simulated:
-            twin = load_twin(file, path)
-            controller, faults = make_simulated(
-                Scene.from_settings(twin, clock, seed=seed, cold=cold)
-            )
+        if scene is not None:
+            controller, faults = make_simulated(scene)
         else:
             controller = make_controller(file.mico.backend, library_path=file.mico.library)
         mico = MicoApplication(
@@ -204,4 +221,49 @@ def build_platform(
             checker=load_checker(file, path),
             gui_factory=mico_gui,
         )
-    return Platform(file=file, path=path, clock=clock, policy=policy, mico=mico, faults=faults)
+    daqco, recorder = None, None
+    if "daqco" in applications and "daqco" in file.platform.applications and file.daqco:
+        daqco = DaqcoApplication(
+            make_library(
+                file.daqco.backend,
+                clock=clock,
+                scene_sources=_sources(scene),
+                clock_sources=file.daqco.clock_sources,
+                seed=seed,
+            ),
+            file.daqco,
+            clock=clock,
+            policy=policy,
+            gui_factory=daqco_gui,
+        )
+        recorder = Recorder(
+            daqco,
+            policy,
+            software=f"CoSMic {version('cosmic')}",
+            configuration=path.read_text(encoding="utf-8"),
+        )
+    if daqco is not None and recorder is not None and mico is not None:
+        join_force_limits(daqco, mico)
+        join_positions(recorder, mico, clock)
+    return Platform(
+        file=file,
+        path=path,
+        clock=clock,
+        policy=policy,
+        mico=mico,
+        faults=faults,
+        daqco=daqco,
+        recorder=recorder,
+    )
+
+
+def _sources(scene: Scene | None) -> dict[tuple[str, str], Source]:
+    """Return what the twin connects to the inputs of the simulated boards."""
+    if scene is None or scene.force_side is None:
+        return {}
+    sensors = scene.force_side.sensors
+    sources: dict[tuple[str, str], Source] = {}
+    for place, name in scene.settings.sensor_wiring.items():
+        board, _, number = place.partition("/")
+        sources[board, number] = sensors[name]
+    return sources

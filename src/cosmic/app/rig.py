@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NoReturn, Self
 from typing_extensions import override
 
 from cosmic.app.platform import KNOWN_APPLICATIONS, Platform, build_platform
+from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.errors import ConfigError, NotAvailable, NotConnectedError
 from cosmic.mico.api.mico import Mico
 
@@ -29,6 +30,11 @@ class Rig:
     def __init__(self, platform: Platform, source: str = "script") -> None:
         self._platform = platform
         self._mico = Mico(platform.mico, source) if platform.mico is not None else None
+        self._daqco = (
+            Daqco(platform.daqco, platform.recorder)
+            if platform.daqco is not None and platform.recorder is not None
+            else None
+        )
         self._closed = False
 
     @override
@@ -49,9 +55,11 @@ class Rig:
         return self._mico
 
     @property
-    def daqco(self) -> NoReturn:
-        """Data acquisition; raises `NotAvailable`: it is not built yet."""
-        raise NotAvailable("daqco is not built yet")
+    def daqco(self) -> Daqco:
+        """Data acquisition; raises `NotAvailable` where it is not hosted."""
+        if self._daqco is None:
+            raise NotAvailable("daqco is not hosted here; name it in the platform file")
+        return self._daqco
 
     @property
     def vico(self) -> NoReturn:

@@ -1,6 +1,11 @@
 """Interlocks between subsystems: what one sees stops the other (D7, thesis 5.2)."""
 
+from collections.abc import Iterator
+
 from cosmic.daqco.api.application import DaqcoApplication
+from cosmic.daqco.api.recorder import Recorder
+from cosmic.daqco.core.recording_format import AxisPosition
+from cosmic.frame.clock import WALL, Clock
 from cosmic.mico.api.application import MicoApplication
 
 
@@ -11,3 +16,25 @@ def join_force_limits(daqco: DaqcoApplication, mico: MicoApplication) -> None:
     this process, limits are watched and told, and stop nothing.
     """
     daqco.guard.trip = mico.manager.stop
+
+
+def join_positions(recorder: Recorder, mico: MicoApplication, clock: Clock) -> None:
+    """Have the positions of all axes written into every recording, on its clock.
+
+    Positions are gate coordinates, at the moment they were read.
+    """
+
+    def positions() -> Iterator[AxisPosition]:
+        now_s, now_wall_s = clock.now_s(), WALL.now_s()
+        rate = clock.rate or 1.0
+        for state in mico.manager.states().values():
+            age_s = max(0.0, now_wall_s - state.read_wall_s) * rate if state.in_motion else 0.0
+            yield AxisPosition(
+                time_s=now_s - age_s,
+                axis=state.name,
+                position=float("nan") if state.position is None else state.position,
+                unit=state.unit,
+                confidence=str(state.confidence),
+            )
+
+    recorder.position_source = positions

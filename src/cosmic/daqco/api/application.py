@@ -161,11 +161,20 @@ class DaqcoApplication(TaskApplication):
             if self.end_requested:
                 raise NotAvailable("DAQCo is closed")
             settings = self._settings
-            plan = make_plan(settings.channel, settings.rate_hz, settings.chunk_s, self._infos)
+            # Chunks as long on the wall as they were asked for, however fast a simulation runs.
+            chunk_s = settings.chunk_s * max(1.0, self.clock.rate or 1.0)
+            plan = make_plan(settings.channel, settings.rate_hz, chunk_s, self._infos)
             for name in plan.boards:
                 if name not in self._boards:
                     self._boards[name] = self.library.open(name)
-            core = UDaqCore(plan, self._boards, self.scales(), self._take, self._policy)
+            core = UDaqCore(
+                plan,
+                self._boards,
+                self.scales(),
+                self._take,
+                self._policy,
+                clocked=tuple(settings.clock_sources),
+            )
             core.failed.connect(self._on_core_failed, Qt.ConnectionType.DirectConnection)
             self.buffer.clear()
             core.open()

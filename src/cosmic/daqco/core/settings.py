@@ -80,6 +80,7 @@ class DaqcoSettings(StrictModel):
     refresh_hz: float = Field(default=20.0, ge=1.0, le=300.0)
     chunk_s: float = Field(default=0.01, ge=0.005, le=0.1)
     directory: str = ""
+    clock_sources: dict[str, str] = Field(default_factory=dict)
     scale: Annotated[tuple[ScaleSettings, ...], Field(strict=False)] = ()
     channel: Annotated[tuple[ChannelSettings, ...], Field(strict=False, min_length=1)]
     limit: Annotated[tuple[LimitSettings, ...], Field(strict=False)] = ()

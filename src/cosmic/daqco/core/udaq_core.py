@@ -1,6 +1,6 @@
 """`UDaqCore`: acquires from all boards in a thread of its own (thesis 6.2.1, Fig. 6.12)."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -24,6 +24,11 @@ class UDaqCore(WorkerThread):
     One object is one acquisition. The chunks of several boards are joined by number; boards that
     are to stay in step over hours need a common sample clock.
 
+    Parameters
+    ----------
+    clocked : sequence of str
+        Boards that take their sample clock from another; they are started first.
+
     Signals
     -------
     failed(DeviceError)
@@ -41,12 +46,15 @@ class UDaqCore(WorkerThread):
         scales: Mapping[str, Scale],
         put: Callable[[DataChunk], None],
         policy: FailurePolicy,
+        *,
+        clocked: Sequence[str] = (),
         parent: QObject | None = None,
     ) -> None:
         super().__init__("acquisition", policy, parent)
         self.plan = plan
         self._boards = [boards[name] for name in plan.boards]
         self._put = put
+        self._clocked = tuple(clocked)
         self._scales = tuple(scales[each.name] for each in plan.channels)
         self._names = tuple(each.name for each in plan.channels)
         self._rows = np.array(plan.rows)
@@ -75,7 +83,9 @@ class UDaqCore(WorkerThread):
             raise DeviceError(f"the boards make different rates of this one: {given}")
         self.rate_hz = rates.pop()
         try:
-            for board in self._boards:
+            # Who waits for another's sample clock must listen before that clock begins.
+            waiting = [each for each in self._boards if each.info.name in self._clocked]
+            for board in (*waiting, *(each for each in self._boards if each not in waiting)):
                 board.start()
         except DeviceError:
             self._stop_boards()

@@ -1,0 +1,225 @@
+"""`Recorder`: begins and ends recordings, and joins to them what belongs in the file."""
+
+import logging
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from threading import RLock
+from typing import Final
+
+from PySide6.QtCore import Qt
+
+from cosmic.daqco.api.application import DaqcoApplication, restarts
+from cosmic.daqco.core.chunk import DataChunk
+from cosmic.daqco.core.file_writer import RecordingStats, UDaqFileWriter
+from cosmic.daqco.core.limits import Crossing
+from cosmic.daqco.core.recording_format import AxisPosition, RecordedEvent, RecordingHeader
+from cosmic.daqco.core.settings import DaqcoSettings
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.listeners import tell
+
+logger = logging.getLogger(__name__)
+
+POSITIONS_S: Final = 0.05
+"""How often the positions of all axes are written, in wall time."""
+
+PositionSource = Callable[[], Iterable[AxisPosition]]
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingState:
+    """The recording that runs, or the last one.
+
+    Attributes
+    ----------
+    active : bool
+        Samples are being written.
+    path : Path or None
+        None before the first recording.
+    duration_s : float
+        How much is in the file.
+    lost : int
+        Samples a channel missing in it.
+    backlog : int
+        Samples a channel acquired and not yet written.
+    left_s : float
+        How long it may go on before the disk is full.
+    failure : str
+        Why it ended by itself; empty when it did not.
+    """
+
+    active: bool = False
+    path: Path | None = None
+    duration_s: float = 0.0
+    size_bytes: int = 0
+    lost: int = 0
+    backlog: int = 0
+    left_s: float = 0.0
+    failure: str = ""
+
+
+class Recorder:
+    """One recording at a time of what an application acquires; any thread.
+
+    Attributes
+    ----------
+    position_source : callable or None
+        Returns where every axis is; what it returns is written about 20 times a second. Called
+        in the acquisition thread, it must return at once.
+    """
+
+    def __init__(
+        self,
+        application: DaqcoApplication,
+        policy: FailurePolicy,
+        *,
+        software: str = "",
+        configuration: str = "",
+    ) -> None:
+        self._application = application
+        self._policy = policy
+        self._software, self._configuration = software, configuration
+        self._lock = RLock()
+        self._writer: UDaqFileWriter | None = None
+        self._unsubscribe: Callable[[], None] | None = None
+        self._stats: RecordingStats | None = None
+        self._failure = ""
+        self._positions_due_s = 0.0
+        self._listeners: tuple[Callable[[], object], ...] = ()
+        self.position_source: PositionSource | None = None
+        application.guard.subscribe(self._on_crossing)
+        application.before_change(self._forbid)
+
+    def on_change(self, listener: Callable[[], object]) -> None:
+        """Call `listener()` when a recording begins, goes on or ends, in any thread."""
+        self._listeners = (*self._listeners, listener)
+
+    @property
+    def state(self) -> RecordingState:
+        """How the recording stands."""
+        writer, stats = self._writer, self._stats
+        return RecordingState(
+            active=writer is not None and writer.isRunning() and writer.error is None,
+            path=writer.path if writer is not None else stats.path if stats else None,
+            duration_s=stats.duration_s if stats else 0.0,
+            size_bytes=stats.file_bytes if stats else 0,
+            lost=stats.lost if stats else 0,
+            backlog=writer.backlog if writer is not None else 0,
+            left_s=stats.left_s if stats else 0.0,
+            failure=self._failure,
+        )
+
+    def start(self, path: Path, *, overwrite: bool = False) -> None:
+        """Begin to write what is acquired to `path`.
+
+        Raises
+        ------
+        NotAvailable
+            Nothing is acquired, or a recording runs already.
+        RecordingError
+            The name, the directory or the disk forbid it, or there is such a file and
+            `overwrite` is False.
+        """
+        with self._lock:
+            if self.state.active:
+                raise NotAvailable(f"{self.state.path} is being recorded; stop it first")
+            self.stop()
+            if not self._application.running:
+                raise NotAvailable("nothing is acquired; start the acquisition first")
+            writer = UDaqFileWriter(path, self._header(), self._policy, overwrite=overwrite)
+            direct = Qt.ConnectionType.DirectConnection
+            writer.recorded.connect(self._on_recorded, direct)
+            writer.failed.connect(self._on_failed, direct)
+            self._failure, self._stats, self._writer = "", None, writer
+            writer.start()
+            self._unsubscribe = self._application.buffer.subscribe(self._write)
+        logger.info("recording to %s", writer.path)
+        tell(self._listeners)
+
+    def stop(self) -> None:
+        """Close the file and wait until it is closed; harmless when nothing is recorded."""
+        with self._lock:
+            writer, self._writer = self._writer, None
+            if self._unsubscribe is not None:
+                self._unsubscribe()
+                self._unsubscribe = None
+            if writer is None:
+                return
+            writer.request_end()
+            writer.join()
+            duration_s = self._stats.duration_s if self._stats else 0.0
+            logger.info("recorded %.1f s to %s", duration_s, writer.path)
+        tell(self._listeners)
+
+    def mark(self, text: str) -> None:
+        """Write a mark with the present time into the recording; nothing where none runs."""
+        self._add_event("mark", text, self._application.clock.now_s())
+
+    def _header(self) -> RecordingHeader:
+        application = self._application
+        channels = tuple(each for each in application.settings.channel if each.active)
+        scales = application.scales()
+        return RecordingHeader(
+            rate_hz=application.rate_hz,
+            channels=channels,
+            scales=tuple(scales[each.name] for each in channels),
+            start_utc=datetime.now(UTC),
+            start_s=application.clock.now_s(),
+            software=self._software,
+            configuration=self._configuration,
+        )
+
+    def _forbid(self, settings: DaqcoSettings) -> None:
+        if self.state.active and restarts(self._application.settings, settings):
+            raise NotAvailable(
+                "rate and channels stay as they are while recording; stop the recording first"
+            )
+
+    # What is written
+
+    def _write(self, chunk: DataChunk) -> None:
+        writer = self._writer
+        if writer is None:
+            return
+        writer.put(chunk)
+        now_s = WALL.now_s()
+        if self.position_source is not None and now_s >= self._positions_due_s:
+            self._positions_due_s = now_s + POSITIONS_S
+            writer.add_positions(self.position_source())
+
+    def _on_crossing(self, crossing: Crossing) -> None:
+        self._add_event(
+            "limit",
+            crossing.text,
+            crossing.time_s,
+            sample=crossing.sample,
+            channel=crossing.channel,
+            value=crossing.value,
+        )
+
+    def _add_event(
+        self,
+        kind: str,
+        text: str,
+        time_s: float,
+        *,
+        sample: int = -1,
+        channel: str = "",
+        value: float = float("nan"),
+    ) -> None:
+        writer = self._writer
+        if writer is not None:
+            at = self._application.buffer.samples if sample < 0 else sample
+            writer.add_event(RecordedEvent(time_s, at, kind, text, channel, value))
+
+    def _on_recorded(self, stats: RecordingStats) -> None:
+        self._stats = stats
+        tell(self._listeners)
+
+    def _on_failed(self, error: CosmicError) -> None:
+        self._failure = str(error)
+        logger.error("the recording ended: %s", error)
+        tell(self._listeners)
