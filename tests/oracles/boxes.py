@@ -37,6 +37,11 @@ class BoxCase:
         return BoxCase(self.model, self.start, low, high)
 
     @property
+    def still(self) -> bool:
+        """Whether the box is a single pose."""
+        return self.low == self.high
+
+    @property
     def within_travel(self) -> bool:
         """Whether no axis would have to go beyond its stops."""
         travels = {axis: self.model.travel(axis) for axis in self.start}
