@@ -1,0 +1,299 @@
+"""`UDaqFileWidget`: records what is acquired (thesis, Table F.2)."""
+
+import os
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import Final
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QFileDialog,
+    QGridLayout,
+    QLabel,
+    QLineEdit,
+    QMessageBox,
+    QRadioButton,
+    QWidget,
+)
+
+from cosmic.daqco.gui.amounts import duration_text, size_text
+from cosmic.daqco.gui.file_naming import Append, file_name, name_pattern, name_problem
+from cosmic.daqco.gui.overwrite_question import overwrite_question
+from cosmic.daqco.gui.ports import DaqPort
+from cosmic.daqco.gui.relay import PortRelay
+from cosmic.daqco.gui.value_field import show_refusal
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.build import named, push_button, tight_row, tipped
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.state_badge import StateBadge
+from cosmic.frame.gui.theme import STEP_PX, State, number_font
+
+LOOK_MS: Final = 500
+BYTES_A_SAMPLE: Final = 8
+LITTLE_ROOM_S: Final = 600.0
+
+_OPTIONS: Final = {
+    Append.TIME: ("Append with time", "Append date, hour, minute and second of the start"),
+    Append.NUMBER: ("Append with number", "Append the next number that is free"),
+    Append.NOTHING: ("Don't append", "Keep the name as it is"),
+}
+
+
+class UDaqFileWidget(QWidget):
+    """Asks for a file name and a directory, starts and stops recordings, and tells of them.
+
+    Parameters
+    ----------
+    now : callable
+        Returns the local time that a name is stamped with.
+    """
+
+    def __init__(
+        self,
+        port: DaqPort,
+        parent: QWidget | None = None,
+        *,
+        now: Callable[[], datetime] = datetime.now,
+    ) -> None:
+        super().__init__(parent)
+        self._port, self._now = port, now
+        self._asking: QMessageBox | None = None
+        self._error = ""
+        self.base = tipped(QLineEdit("recording"), "Base of the file name")
+        self.full_name = tipped(QLineEdit(), "")
+        self.full_name.setReadOnly(True)
+        self.directory = tipped(QLineEdit(str(port.directory)), "Where the file is stored")
+        self.browse = push_button("Browse…", "Choose the directory")
+        self.start = named(push_button("Start recording", ""), "startRecording")
+        self.stop = named(push_button("Stop recording", ""), "stopRecording")
+        self.badge, self.told, self.room = StateBadge(State.UNKNOWN), ElidedLabel(), ElidedLabel()
+        self.options = QButtonGroup(self)
+        self._build()
+        self._connect()
+        self._look = QTimer(self, interval=LOOK_MS)
+        self._look.timeout.connect(self.refresh)
+        self._look.start()
+        self._relay = PortRelay(port, self)
+        self._relay.changed.connect(self.refresh)
+        self.refresh()
+
+    def _build(self) -> None:
+        options, in_row = tight_row(2 * STEP_PX)
+        for append, (text, tip) in _OPTIONS.items():
+            button = tipped(QRadioButton(text), tip)
+            button.setProperty("append", append.value)
+            button.setChecked(append is Append.TIME)
+            self.options.addButton(button)
+            in_row.addWidget(button)
+        in_row.addStretch(1)
+        where, beside = tight_row(STEP_PX)
+        beside.addWidget(self.directory, 1)
+        beside.addWidget(self.browse)
+        buttons, below = tight_row(STEP_PX)
+        below.addWidget(self.start)
+        below.addWidget(self.stop)
+        below.addWidget(self.badge)
+        below.addWidget(self.told, 1)
+        self.told.setFont(number_font())
+        self.room.setProperty("role", "dim")
+        grid = QGridLayout(self)
+        grid.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
+        grid.setHorizontalSpacing(STEP_PX)
+        grid.setVerticalSpacing(STEP_PX // 2)
+        rows = (
+            ("Base name", self.base),
+            ("Save options", options),
+            ("Full file name", self.full_name),
+            ("Directory", where),
+        )
+        for number, (text, widget) in enumerate(rows):
+            grid.addWidget(QLabel(text), number, 0)
+            grid.addWidget(widget, number, 1)
+        grid.addWidget(buttons, len(rows), 0, 1, 2)
+        grid.addWidget(self.room, len(rows) + 1, 0, 1, 2)
+
+    def _connect(self) -> None:
+        self.base.textEdited.connect(self._on_edited)
+        self.directory.textEdited.connect(self._on_edited)
+        self.options.buttonClicked.connect(self.refresh)
+        self.browse.clicked.connect(self._on_browse)
+        self.start.clicked.connect(self._on_start)
+        self.stop.clicked.connect(self._on_stop)
+
+    # What is chosen
+
+    @property
+    def append(self) -> Append:
+        """What is appended to the base name."""
+        chosen = self.options.checkedButton()
+        return Append.NOTHING if chosen is None else Append(chosen.property("append"))
+
+    @property
+    def folder(self) -> Path:
+        """The directory as it stands in its field."""
+        return Path(self.directory.text()).expanduser()
+
+    def _directory_problem(self) -> str:
+        if not self.directory.text().strip():
+            return "type a directory"
+        folder = self.folder
+        try:
+            if not folder.is_dir():
+                return f"{folder}: there is no such directory"
+        except (OSError, ValueError) as exc:
+            return f"{folder}: {exc}"
+        return "" if os.access(folder, os.W_OK) else f"{folder} cannot be written to"
+
+    # Looking
+
+    def refresh(self) -> None:
+        """Show what is being recorded, what may be done now and how much room there is."""
+        recording = self._port.recording
+        wrong_name = "" if recording.active else name_problem(self.base.text())
+        wrong_folder = "" if recording.active else self._directory_problem()
+        _mark(self.base, wrong_name)
+        _mark(self.directory, wrong_folder)
+        self._show_name(wrong_name)
+        for widget in (self.base, self.directory, self.browse, *self.options.buttons()):
+            widget.setEnabled(not recording.active)
+        self._enable(wrong_name or wrong_folder)
+        self._tell()
+        self._show_room(wrong_folder)
+
+    def _show_name(self, wrong: str) -> None:
+        recording = self._port.recording
+        if recording.active and recording.path is not None:
+            text, tip = recording.path.name, str(recording.path)
+        elif wrong:
+            text, tip = "", wrong
+        else:
+            text, tip = name_pattern(self.base.text(), self.append), self._example()
+        if self.full_name.text() != text:
+            self.full_name.setText(text)
+        self.full_name.setToolTip(tip)
+
+    def _example(self) -> str:
+        try:
+            return f"Now: {file_name(self.base.text(), self.append, self._now(), self.folder)}"
+        except OSError as exc:
+            return str(exc)
+
+    def _enable(self, wrong: str) -> None:
+        recording, asking = self._port.recording, self._asking is not None
+        reasons = (
+            (recording.active, "A recording is running"),
+            (asking, "Answer the question first"),
+            (not self._port.running, "Nothing is being acquired: start the acquisition first"),
+            (bool(wrong), wrong),
+        )
+        reason = next((text for applies, text in reasons if applies), "")
+        self.start.setEnabled(not reason)
+        self.start.setToolTip(reason or "Record what is acquired into the file named above")
+        self.stop.setEnabled(recording.active)
+        self.stop.setToolTip(
+            "Stop recording and close the file" if recording.active else "Nothing is being recorded"
+        )
+
+    def _tell(self) -> None:
+        recording = self._port.recording
+        error = self._error or ("" if recording.active else recording.failure)
+        state = State.ERROR if error else State.BUSY if recording.active else State.OK
+        self.badge.set_state(state, error)
+        self.badge.setVisible(bool(error) or recording.active or recording.path is not None)
+        amount = f"{duration_text(recording.duration_s)}, {size_text(recording.size_bytes)}"
+        if error:
+            self.told.set_text(error)
+        elif recording.active:
+            backlog = self._port.counters.backlog
+            behind = f", {backlog} chunks waiting" if backlog > 1 else ""
+            self.told.set_text(f"recording: {amount}{behind}")
+        else:
+            path = recording.path
+            self.told.set_text(f"{path.name}: {amount}" if path is not None else "")
+
+    def _show_room(self, wrong: str) -> None:
+        text, little = wrong, False
+        if not wrong:
+            try:
+                free = self._port.free_bytes(self.folder)
+            except CosmicError as exc:
+                text = str(exc)
+            else:
+                left_s = free / max(1.0, self._bytes_a_second())
+                little = left_s < LITTLE_ROOM_S
+                text = f"{size_text(free)} free on the disk: {duration_text(left_s)} at this rate"
+        self.room.set_text(f"◆ little room: {text}" if little else text)
+
+    def _bytes_a_second(self) -> float:
+        active = sum(each.active for each in self._port.settings.channel)
+        return active * self._port.rate_hz * BYTES_A_SAMPLE
+
+    # Reactions
+
+    def _on_edited(self) -> None:
+        self._error = ""
+        self.refresh()
+
+    def _on_browse(self) -> None:
+        dialog = QFileDialog(self, "Directory for recordings", self.directory.text())
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.setOption(QFileDialog.Option.ShowDirsOnly)
+        dialog.fileSelected.connect(self._on_chosen)
+        dialog.finished.connect(dialog.deleteLater)
+        dialog.open()
+
+    def _on_chosen(self, folder: str) -> None:
+        self.directory.setText(folder)
+        self._on_edited()
+
+    def _on_start(self) -> None:
+        self.start.setEnabled(False)
+        self._error = ""
+        try:
+            name = file_name(self.base.text(), self.append, self._now(), self.folder)
+            path = self.folder / name
+            there = path.stat() if path.exists() else None
+        except OSError as exc:
+            self._error = str(exc)
+            self.refresh()
+            return
+        if there is not None:
+            self._ask(path, there.st_size)
+        else:
+            self._record(path)
+
+    def _ask(self, path: Path, size_bytes: int) -> None:
+        box = overwrite_question(self, path, size_bytes, lambda: self._record(path, overwrite=True))
+        box.finished.connect(self._on_answered)
+        self._asking = box
+        box.open()
+        self.refresh()
+
+    def _on_answered(self) -> None:
+        if self._asking is not None:
+            self._asking.deleteLater()
+        self._asking = None
+        self.refresh()
+
+    def _record(self, path: Path, *, overwrite: bool = False) -> None:
+        try:
+            self._port.start_recording(path, overwrite=overwrite)
+        except CosmicError as exc:
+            self._error = str(exc)
+        self.refresh()
+
+    def _on_stop(self) -> None:
+        self.stop.setEnabled(False)
+        self._error = ""
+        try:
+            self._port.stop_recording()
+        except CosmicError as exc:
+            self._error = str(exc)
+        self.refresh()
+
+
+def _mark(field: QLineEdit, reason: str) -> None:
+    if field.accessibleDescription() != reason:
+        show_refusal(field, reason)
