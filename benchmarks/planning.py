@@ -17,8 +17,12 @@ from cosmic.mico.core.collision.answer import AxisSpan, Spans
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.collision.scene_loader import load_scene
 from cosmic.mico.core.collision.sweep import Sweep
-from cosmic.mico.core.planning.planner import plan
+from cosmic.mico.core.planning.boxes import Boxes, Effort
+from cosmic.mico.core.planning.planner import CHECKS_SEARCHED, plan
 from cosmic.mico.core.planning.problem import NoWay, Plan, Problem
+from cosmic.mico.core.planning.rrt import MOST_LEGS, search
+from cosmic.mico.core.planning.simplify import shorten
+from cosmic.mico.core.planning.space import Space
 
 NAME = "planning"
 SCENE = Path(__file__).resolve().parents[1] / "config" / "scenes" / "fiberstation.toml"
@@ -39,6 +43,7 @@ class Run:
     problem: Problem
     found: Plan | NoWay
     took_s: float
+    cpu_s: float
 
 
 def standing(
@@ -171,16 +176,50 @@ def solve(model: SceneModel, count: int, *, six: bool) -> list[Run]:
     """Solve blocked problems, one gate for all."""
     sweep, runs = Sweep(model), []
     for problem in problems(model, count, 6 if six else 3, six=six):
-        began_s = time.perf_counter()
+        began_s, began_cpu_s = time.perf_counter(), time.process_time()
         found = plan(sweep, problem)
-        runs.append(Run(problem, found, time.perf_counter() - began_s))
+        took_s, cpu_s = time.perf_counter() - began_s, time.process_time() - began_cpu_s
+        runs.append(Run(problem, found, took_s, cpu_s))
     return runs
+
+
+def searched(model: SceneModel, runs: Sequence[Run]) -> tuple[list[float], list[float]]:
+    """Solve the problems by the search alone; return CPU times, ms, and lengths to straight."""
+    sweep = Sweep(model)
+    cpu_ms: list[float] = []
+    ratios: list[float] = []
+    for run in runs:
+        space = Space(model, run.problem)
+        boxes = Boxes(sweep, run.problem, space, Effort(run.problem.budget_s))
+        if not (boxes.free(space.start) and boxes.free(space.goal)):
+            continue
+        began_s = time.process_time()
+        corners = search(boxes, space.start, space.goal, run.problem.seed)
+        if corners is not None:
+            way = (space.start, *corners)
+            way = shorten(boxes, way, run.problem.seed, MOST_LEGS, CHECKS_SEARCHED)
+            ratios.append(space.length(way) / space.distance(space.start, space.goal))
+        cpu_ms.append(1e3 * (time.process_time() - began_s))
+    return cpu_ms, ratios
+
+
+def search_figures(name: str, model: SceneModel, runs: Sequence[Run]) -> list[Figure]:
+    """Return the figures of the search alone."""
+    cpu_ms, ratios = searched(model, runs)
+    unsolved = 100.0 * (1 - len(ratios) / len(cpu_ms))
+    return [
+        Figure(NAME, f"{name}: search alone, not solved", unsolved, "%"),
+        Figure(NAME, f"{name}: search alone, CPU time, p50", percentile(cpu_ms, 50), "ms"),
+        Figure(NAME, f"{name}: search alone, CPU time, p95", percentile(cpu_ms, 95), "ms"),
+        Figure(NAME, f"{name}: search alone, length, p50", statistics.median(ratios), ""),
+    ]
 
 
 def figures_of(name: str, runs: Sequence[Run], safe: int, limit_ms: float) -> list[Figure]:
     """Return the figures of one kind of problem."""
     solved = [run.found for run in runs if isinstance(run.found, Plan)]
     times_ms = [1e3 * run.took_s for run in runs]
+    cpu_ms = [1e3 * run.cpu_s for run in runs]
     ratios = [each.length / each.straight_length for each in solved]
     before = [each.found_length / each.straight_length for each in solved]
     legs = [float(len(each.segments)) for each in solved]
@@ -191,6 +230,8 @@ def figures_of(name: str, runs: Sequence[Run], safe: int, limit_ms: float) -> li
         Figure(NAME, f"{name}: time, p50", percentile(times_ms, 50), "ms"),
         Figure(NAME, f"{name}: time, p95", percentile(times_ms, 95), "ms", limit_ms),
         Figure(NAME, f"{name}: time, worst", max(times_ms), "ms"),
+        Figure(NAME, f"{name}: CPU time, p50", percentile(cpu_ms, 50), "ms"),
+        Figure(NAME, f"{name}: CPU time, p95", percentile(cpu_ms, 95), "ms"),
         Figure(NAME, f"{name}: length to straight, p50", statistics.median(ratios), "", 1.2),
         Figure(NAME, f"{name}: length to straight, p95", percentile(ratios, 95), ""),
         Figure(NAME, f"{name}: the same before cutting, p50", statistics.median(before), ""),
@@ -208,6 +249,7 @@ def measure(quick: bool = False) -> list[Figure]:
         runs, rng = solve(model, count, six=six), random.Random(1)
         safe = sum(is_safe(model, run, rng) for run in runs if isinstance(run.found, Plan))
         figures += figures_of(name, runs, safe, limit_ms)
+        figures += search_figures(name, model, runs)
     return figures
 
 
