@@ -36,6 +36,10 @@ class Axes:
         """Units that have an axis, from the outermost."""
         return tuple(self._values)
 
+    def axis(self, unit: str) -> pg.AxisItem:
+        """Return the axis of a unit that has one."""
+        return self._values[unit]
+
     def show(self, ranges: dict[str, AxisRange]) -> None:
         """Have one axis for each unit, with its range."""
         if tuple(ranges) != self.units:
