@@ -78,7 +78,8 @@ class ForceSensor:
         with self._lock:
             steps_s = self._steps_s(times_s)
             force = np.zeros_like(times_s) if self._force_un is None else self._force_un(times_s)
-            felt = self._filtered(steps_s, force) + self._wandered(steps_s)
+            felt = self._filtered(steps_s, force)
+            felt += self._wandered(steps_s)
             self._time_s = max(self._time_s, float(times_s[-1]))
         half_v = self.settings.gain_v_un * self.settings.range_un
         out = self.true_zero_v + self.true_gain_v_un * felt
@@ -126,10 +127,10 @@ class ForceSensor:
 
     def _wandered(self, steps_s: Floats) -> Floats:
         """Return the zero's random walk, uN."""
+        if self._time_s == -math.inf:
+            steps_s[0] = 0.0  # it was zeroed just before
         steps = self.settings.drift_un_sqrt_s * np.sqrt(steps_s)
         steps *= self._drift.standard_normal(steps.size)
-        if self._time_s == -math.inf:
-            steps[0] = 0.0  # it was zeroed just before
         walk = self._walk_un + np.cumsum(steps)
         self._walk_un = float(walk[-1])
         return np.asarray(walk)

@@ -181,12 +181,14 @@ def _joint(path: Path, element: ET.Element, drives: Mapping[str, Drive]) -> tupl
         place[:3, :3] = _from_rpy(*_numbers(origin.get("rpy", "0 0 0")))
         place[:3, 3] = np.array(_numbers(origin.get("xyz", "0 0 0"))) * UM_PER_M
     vector = np.array(_numbers("1 0 0" if axis is None else axis.attrib["xyz"]))
+    length = float(np.linalg.norm(vector))
+    if not 0.0 < length < math.inf:
+        raise ConfigError(f"{path}: joint {name}: its axis has no direction")
     drive = drives.get(name)
     if drive is not None and kind == "fixed":
         raise ConfigError(f"{path}: joint {name} is fixed; no stage can drive it")
-    unit = vector / np.linalg.norm(vector)
     parent = _link(element, "parent")
-    return _link(element, "child"), Joint(name, kind, parent, place, unit, drive)
+    return _link(element, "child"), Joint(name, kind, parent, place, vector / length, drive)
 
 
 def _link(element: ET.Element, which: str) -> str:

@@ -118,7 +118,7 @@ def clamped_at_one_end(
     slope, bow, force, arc = _elastica()
     touched = span_um - radius_um * np.sin(slope)
     held = (touched > 0.0) & (touched * arc <= free_um)
-    last = len(slope) if held.all() else int(np.argmin(held))
+    last = len(slope) if held.all() else max(int(np.argmin(held)), 1)
     touched = touched[:last]
     deflections = touched * bow[:last] + radius_um * (1.0 - np.cos(slope[:last]))
     return _curve(deflections, force[:last] * (ei_un_um2 / touched**2), sensor_un_um)

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.twin.stage import Stage
+from cosmic.twin.stage import Path, Stage
 from cosmic.twin.workplace import Felt, Moment, Workplace
 
 Floats = npt.NDArray[np.float64]
@@ -17,8 +17,8 @@ Floats = npt.NDArray[np.float64]
 KEPT: Final = 20_000
 """So many looks are remembered: 20 s while something moves, much longer while nothing does."""
 
-MOST_LOOKS: Final = 50_000
-"""Looks for one question; after a long time unseen they lie further apart."""
+MOST_LOOKS: Final = 20_000
+"""Looks for one question; after a long journey unseen they lie further apart."""
 
 LONGEST_REST_S: Final = 0.5
 """Stages that stand creep by nanometres; they are looked at again after this time."""
@@ -37,6 +37,8 @@ class Timeline:
         self._lock = Lock()
         self._felt = Felt()
         self._values: dict[str, float] = {}
+        self._resting: dict[str, Path] = {}
+        self._creep_from_s = 0.0
         self._at = -1
         self._times_s: deque[float] = deque(maxlen=KEPT)
         self._forces_un: deque[float] = deque(maxlen=KEPT)
@@ -88,7 +90,15 @@ class Timeline:
     def _look(self, number: int) -> None:
         self._at = number
         time_s = number * self._step_s
-        self._values = {each.name: each.position_then(time_s) for each in self._stages}
+        if time_s >= self._creep_from_s:
+            self._resting.clear()
+            self._creep_from_s = time_s + LONGEST_REST_S
+        for stage in self._stages:
+            path = stage.path
+            if self._resting.get(stage.name) is not path:
+                self._values[stage.name] = stage.position_then(time_s)
+                if path.end_s <= time_s:
+                    self._resting[stage.name] = path
         self._felt = self._workplace.look(self._values)
         self._times_s.append(time_s)
         self._forces_un.append(self._felt.total_un)

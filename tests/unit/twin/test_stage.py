@@ -128,3 +128,22 @@ def test_cutting_a_path_keeps_what_was_before(
     cut = path.cut(cut_s, end_s=cut_s, end=path.at(cut_s))
     assert list(cut.times_s) == sorted(cut.times_s)
     assert cut.at(look_s) == pytest.approx(path.at(min(look_s, cut_s)), abs=1e-6)
+
+
+def test_the_past_stays_as_it_was_while_newer_movements_begin() -> None:
+    moved = stage()
+    go(moved, 1.0, 100.0, 100.0)
+    go(moved, 1.5, -100.0, 100.0)
+    moved.halt(2.0, coast_s=0.0, within_s=0.0)
+    go(moved, 3.0, 500.0, 100.0)
+    seen = [moved.position_then(time_s) for time_s in (0.5, 1.25, 1.5, 1.75, 2.5, 3.5)]
+    assert seen == pytest.approx([0.0, 25.0, 50.0, 25.0, 0.0, 50.0], abs=0.01)
+    assert moved.position_then(9.0) == moved.position(9.0)
+
+
+def test_the_past_is_forgotten_in_the_end() -> None:
+    moved = stage()
+    for number in range(1000):
+        go(moved, float(number), float(number % 7), 100.0)
+    assert len(moved.paths) <= 64
+    assert moved.position_then(999.5) == moved.position(999.5)
