@@ -44,7 +44,7 @@ def watch(event, args):
         if args[1] not in (None, "r", "rb") or (args[0].startswith(root) and not code):
             seen.append(f"{current}: opened {args[0]}")
 
-import ctypes, logging, numpy, pydantic, PySide6.QtCore  # what they do is their affair
+import ctypes, h5py, logging, numpy, pydantic, PySide6.QtCore  # what they do is their affair
 sys.addaudithook(watch)
 for current in modules:
     importlib.import_module(current)

@@ -84,6 +84,7 @@ class ScenePanel(QWidget):
     def _connect(self) -> None:
         self._panel.refreshed.connect(self._follow_axes)
         self._panel.verdict_given.connect(self._on_refused)
+        self._mico.application.manager.group_refused.connect(self._on_refused)
         self._panel.collision.changed.connect(self._on_collision_changed)
         self._feed.flushed.connect(self._on_flushed)
         watch = self._mico.application.clearance_watch

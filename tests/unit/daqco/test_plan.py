@@ -20,7 +20,7 @@ def channel(number: int, board: str = "Dev1", **changes: object) -> ChannelSetti
 def test_thirty_two_channels_at_15_khz_need_two_boards() -> None:
     one = [channel(number) for number in range(32)]
     two = [channel(number, board) for board in BOARDS for number in range(16)]
-    with pytest.raises(LimitError, match="7812.5 Hz"):
+    with pytest.raises(LimitError, match=r"7812\.5 Hz"):
         make_plan(one, 15_000.0, 0.01, BOARDS)
     plan = make_plan(two, 15_000.0, 0.01, BOARDS)
     assert plan.chunk_samples == 150

@@ -62,10 +62,13 @@ class DeviceManager(QObject):
         Mode, devices or the list of what is missing changed.
     device_lost(DeviceLost)
         A device cannot be reached any more.
+    group_refused(MoveVerdict)
+        Movements that were to begin together were refused; in the thread of who asked.
     """
 
     changed = Signal()
     device_lost = Signal(object)
+    group_refused = Signal(object)
 
     def __init__(
         self,
@@ -390,6 +393,7 @@ class DeviceManager(QObject):
         verdict, grants = self.gate.decide(requests)
         if not verdict.allowed:
             logger.warning("refused (%s): %s", source, verdict)
+            self.group_refused.emit(verdict)
             raise refusal(verdict)
         token = self.lease.holder.token
         orders = {

@@ -86,6 +86,7 @@ class ChannelPilot(ChannelFollower):
             return grants[self.name]
         if self.flight is not None and self.flight.order is order:
             self._end_jog(refusal(verdict))
+            self._context.on_refused(verdict)
         else:
             self.turn_away(order, verdict)
         return None

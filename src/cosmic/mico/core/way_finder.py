@@ -81,7 +81,7 @@ class WayFinder:
         states = {name: self._manager.state(name) for name in targets}
         for name in self._companions(targets):
             state = self._manager.state(name)
-            if state.confidence is Confidence.KNOWN and state.limits is not None:
+            if _can_help(state):
                 states.setdefault(name, state)
         start = {name: _known(state) for name, state in states.items()}
         spans = self._manager.gate.spans()
@@ -101,6 +101,14 @@ class WayFinder:
             for axis, bodies in carried.items()
             if any(bodies & carried.get(target, frozenset()) for target in targets)
         }
+
+
+def _can_help(state: PositionerState) -> bool:
+    """Return True for an axis that may be moved aside and back: known, and inside its limits."""
+    if state.limits is None or state.position is None:
+        return False
+    low, high = state.limits
+    return state.confidence is Confidence.KNOWN and low <= state.position <= high
 
 
 def _known(state: PositionerState) -> float:

@@ -22,6 +22,10 @@ logger = logging.getLogger(__name__)
 _NOBODY: Final[frozenset[BodyPair]] = frozenset()
 
 
+JUST_BEHIND: Final = 2.0
+"""How far behind the free part of a way its end is looked at, um or degrees."""
+
+
 class Answering(Protocol):
     """What the manager asks: `GateProcess`, or something in its place."""
 
@@ -121,6 +125,13 @@ class CollisionManager(Exemptions, CollisionChecker):
 
     def _judge(self, spans: Spans, *, advice: bool) -> MoveVerdict:
         ignored = self.ignored_pairs
+        responses: dict[BodyPair, Response] = {}
+
+        def waved_through(found: Approach) -> bool:
+            if found.bodies not in responses:
+                responses[found.bodies] = self._respond(found, spans)
+            return responses[found.bodies] is Response.IGNORE
+
         while True:
             answer = self._process.check(spans, ignored)
             if answer.clear is True:
@@ -130,8 +141,17 @@ class CollisionManager(Exemptions, CollisionChecker):
                 return words.cannot_judge(answer.reason or "it gave no reason")
             if approach.bodies in ignored:
                 return words.no_answer(f"it does not leave {approach.bodies} aside")
-            if self._respond(approach, spans) is not Response.IGNORE:
-                return self._refuse(spans, answer, approach, ignored if advice else None)
+            free_to = None
+            if not waved_through(approach):
+                inside = answer.reason == INSIDE_TEXT
+                if advice and not inside:
+                    free_to, first = self._free_part(spans, ignored)
+                    approach = first or approach
+                if not waved_through(approach):
+                    approach = replace(approach, pose=_with_resting(approach.pose, spans))
+                    return words.collision(
+                        self.model, spans, approach, inside=inside, free_to=free_to
+                    )
             ignored = ignored | {approach.bodies}
 
     def _allow(self, spans: Spans) -> MoveVerdict:
@@ -143,19 +163,25 @@ class CollisionManager(Exemptions, CollisionChecker):
         text = f"allowed; {', '.join(unwatched)}: taken out of collision detection"
         return MoveVerdict(allowed=True, reason=Reason.ALLOWED, text=text)
 
-    def _refuse(
-        self, spans: Spans, answer: SweepAnswer, approach: Approach, ignored: Set[BodyPair] | None
-    ) -> MoveVerdict:
-        """Put a refusal into words; with None for `ignored`, without looking for a free part."""
-        inside = answer.reason == INSIDE_TEXT
+    def _free_part(
+        self, spans: Spans, ignored: Set[BodyPair]
+    ) -> tuple[float | None, Approach | None]:
+        """Return how far the only axis that moves may go, and what comes too close behind that."""
         axes = words.moving_axes(spans)
-        free_to = None
-        if len(axes) == 1 and not inside and ignored is not None:
-            try:
-                free_to = self._process.free_way(spans, axes[0], ignored)
-            except NoAnswerError as exc:  # the refusal stands without it
-                logger.warning("no answer about the free way of %s: %s", axes[0], exc)
-        return words.collision(self.model, spans, approach, inside=inside, free_to=free_to)
+        if len(axes) != 1:
+            return None, None
+        axis, span = axes[0], spans[axes[0]]
+        try:
+            free_to = self._process.free_way(spans, axis, ignored)
+            if free_to is None or span.now is None or span.end is None:
+                return free_to, None
+            sign = 1.0 if span.end > span.now else -1.0
+            beyond = free_to + sign * JUST_BEHIND
+            part = replace(span, low=min(span.now, beyond), high=max(span.now, beyond))
+            return free_to, self._process.check({**spans, axis: part}, ignored).approach
+        except NoAnswerError as exc:  # the refusal stands without it
+            logger.warning("no answer about the free way of %s: %s", axis, exc)
+            return None, None
 
     def _respond(self, approach: Approach, spans: Spans) -> Response:
         callback = self._callbacks.get(pair_of(*approach.bodies), self._default_callback)
@@ -186,3 +212,11 @@ class CollisionManager(Exemptions, CollisionChecker):
     def set_default_callback(self, callback: CollisionCallbackBase) -> None:
         """Set the response of all pairs without their own."""
         self._default_callback = callback
+
+
+def _with_resting(pose: Mapping[str, float], spans: Spans) -> dict[str, float]:
+    """Return `pose` with axes at rest where they are believed to be, not somewhere they could."""
+    rest = {
+        axis: span.now for axis, span in spans.items() if not span.moving and span.now is not None
+    }
+    return {axis: rest.get(axis, place) for axis, place in pose.items()}

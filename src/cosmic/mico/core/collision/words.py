@@ -135,5 +135,5 @@ def _length(length_um: float) -> str:
 
 
 def _place(approach: Approach) -> str:
-    x, y, z = (f"{value / 1000.0:.2f}" for value in approach.place_um)
+    x, y, z = (f"{round(value / 1000.0, 2) + 0.0:.2f}" for value in approach.place_um)
     return f"({x}, {y}, {z}) mm"
