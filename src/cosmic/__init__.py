@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from cosmic.app.rig import Rig, connect
+    from cosmic.daqco.api.recording import Recording, open_recording
     from cosmic.frame.errors import (
         CollisionError,
         ConfigError,
@@ -39,6 +40,7 @@ logging.getLogger(__name__).addHandler(logging.NullHandler())
 
 _HOMES = {
     "cosmic.app.rig": ("Rig", "connect"),
+    "cosmic.daqco.api.recording": ("Recording", "open_recording"),
     "cosmic.frame.errors": (
         "CollisionError",
         "ConfigError",
@@ -82,11 +84,13 @@ __all__ = [
     "NotConnectedError",
     "Progress",
     "Reason",
+    "Recording",
     "Rig",
     "StoppedError",
     "Task",
     "UnknownAxisError",
     "connect",
+    "open_recording",
 ]
 
 

@@ -19,6 +19,7 @@ from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import ConfigError, CosmicError, DeviceError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.task import Task
 from cosmic.frame.task_application import TaskApplication
 from cosmic.frame.threads import WorkerThread
 
@@ -113,6 +114,20 @@ class DaqcoApplication(TaskApplication):
         """Open the boards and begin to acquire; stays open with `problem` set where it cannot."""
         self.start()
         self._silence.start()
+        self._open()
+
+    def initialize_later(self) -> Task:
+        """Do what `initialize` does in the application's thread; returns at once."""
+        self.start()
+        self._silence.start()
+
+        def job(task: Task) -> None:
+            self._open()
+            task.finish()
+
+        return self.begin("Opening the boards", job)
+
+    def _open(self) -> None:
         try:
             self.look_for_boards()
             self.start_acquisition()

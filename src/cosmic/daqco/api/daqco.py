@@ -323,6 +323,23 @@ class Daqco:
         )
         self._tell()
 
+    def arm_limit(
+        self,
+        channel: str,
+        *,
+        low: float | None = None,
+        high: float | None = None,
+        hysteresis: float = 0.0,
+    ) -> None:
+        """Stop every actuator when `channel` leaves `low` to `high`; raises as `set_limit`."""
+        try:
+            limit = LimitSettings(
+                channel=channel, low=low, high=high, hysteresis=hysteresis, armed=True
+            )
+        except ValueError as exc:
+            raise ConfigError(f"limit of {channel}: {exc}") from None
+        self.set_limit(limit)
+
     def remove_limit(self, channel: str) -> None:
         """Take away the limit of a channel."""
         self._application.guard.remove(channel)

@@ -1,0 +1,56 @@
+"""Push the probe into a fibre, record the force, read a stiffness, and be stopped by a limit."""
+
+import tempfile
+from pathlib import Path
+
+import cosmic
+
+
+def push(rig: cosmic.Rig, file: Path) -> None:
+    """Drive the probe against the fibre in the left gripper, step by step, and record it."""
+    probe = rig.mico["probe.y"]
+    rig.mico.move({"left.z": -800.0, "left.x": 3600.0})
+    probe.move_to(-4940.0)
+    with rig.daqco.record(file, overwrite=True):
+        for target_um in range(-4950, -5051, -10):
+            probe.move_to(float(target_um))
+    print(f"force at the end: {rig.daqco.latest()['force']:.0f} {rig.daqco.units['force']}")
+
+
+def read_stiffness(file: Path) -> None:
+    """Fit a line to force over position, where the probe touches."""
+    with cosmic.open_recording(file) as recording:
+        position_um, force_un = recording.curve("force", "probe.y")
+        touching = force_un > 20.0
+        travel_um = position_um[touching].max() - position_um[touching].min()
+        rise_un = force_un[touching].max() - force_un[touching].min()
+        print(f"{recording.rate_hz:g} Hz, complete: {recording.complete}")
+        print(f"stiffness: about {rise_un / travel_um:.1f} uN/um")
+
+
+def be_stopped(rig: cosmic.Rig) -> None:
+    """Go on pushing with a limit armed: the actuators stop by themselves."""
+    rig.daqco.arm_limit("force", high=140.0, hysteresis=10.0)
+    probe = rig.mico["probe.y"]
+    probe.set_closed_loop_frequency(30)  # slowly: what overshoots the limit is speed times delay
+    try:
+        probe.move_to(-5200.0)
+    except cosmic.StoppedError as stopped:
+        print(f"stopped: {stopped}")
+    limit = rig.daqco.limits[0]
+    print(f"crossed: {limit.crossed}, after {limit.reaction_ms:.0f} ms")
+    rig.reset_stop()
+    probe.move_to(-4900.0)
+
+
+def main() -> None:
+    """Do all of it on the simulated platform, in real time."""
+    with tempfile.TemporaryDirectory() as folder, cosmic.connect() as rig:
+        file = Path(folder) / "push.h5"
+        push(rig, file)
+        read_stiffness(file)
+        be_stopped(rig)
+
+
+if __name__ == "__main__":
+    main()
