@@ -242,6 +242,25 @@ def test_a_driver_that_fails_at_the_end_is_logged_and_the_board_works_again(
     rig.running()
 
 
+def test_a_stop_keeps_the_board_for_the_next_start(rig: NidaqmxRig) -> None:
+    board = rig.running()
+    task = task_of(rig)
+    board.stop()
+    board.start()
+    assert task_of(rig) is task
+
+
+def test_after_a_stop_that_failed_the_next_start_begins_anew(rig: NidaqmxRig) -> None:
+    board = rig.running()
+    task = task_of(rig)
+    rig.driver.fail_in["stop"] = -200452
+    board.stop()
+    assert not rig.driver.tasks
+    rig.driver.fail_in.clear()
+    board.start()
+    assert task_of(rig) is not task
+
+
 # --- callbacks --------------------------------------------------------------------------------
 
 

@@ -1,11 +1,12 @@
 """What is true of the simulated boards alone."""
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+from typing_extensions import override
 
 from cosmic.daqco.hw.interface import BoardChunk, InputMode, InputSettings
 from cosmic.daqco.hw.sim_board import SimulatedBoard
@@ -255,7 +256,7 @@ def test_on_a_fast_clock_the_buffer_lasts_as_long_by_the_wall() -> None:
     board = SimulatedLibrary(clock).open("Dev1")
     board.configure(inputs(1), 100.0, 10)
     board.start()
-    clock.sleep(50.0)
+    clock.sleep(100.0)
     assert chunks(board, 1)[0].first_sample == 0
 
 
@@ -291,24 +292,60 @@ def test_an_unplugged_board_fails_alone_and_works_again_when_it_is_back() -> Non
     chunks(again, 2)
 
 
-def test_a_board_that_is_unplugged_while_somebody_waits_is_told_at_once() -> None:
-    library = SimulatedLibrary(ManualClock())
+def waiting_board(library: SimulatedLibrary) -> SimulatedBoard:
+    """Return a board in real time whose first chunk comes in a minute."""
     board = library.open("Dev1")
-    board.configure(inputs(1), 1000.0, 10)
+    board.configure(inputs(1), 10.0, 600)
     board.start()
-    seen: list[BaseException] = []
+    return board
+
+
+def outcome_of_waiting(board: SimulatedBoard, meanwhile: Callable[[], None]) -> object:
+    """Return what a `receive` of another thread comes to when something happens meanwhile."""
+    outcome: list[object] = []
 
     def receive() -> None:
         try:
-            board.receive(20.0)
+            outcome.append(board.receive(60.0))
         except DeviceError as exc:
-            seen.append(exc)
+            outcome.append(exc)
 
     waiting = threading.Thread(target=receive)
     waiting.start()
-    library.faults.inject("unplugged")
+    meanwhile()
     waiting.join(10.0)
-    assert isinstance(seen[0], NotConnectedError)
+    assert outcome, "it still waits"
+    return outcome[0]
+
+
+def test_a_board_that_is_unplugged_while_somebody_waits_is_told_at_once() -> None:
+    library = SimulatedLibrary(RatedClock(1.0))
+    board = waiting_board(library)
+    told = outcome_of_waiting(board, lambda: library.faults.inject("unplugged"))
+    assert isinstance(told, NotConnectedError)
+
+
+def test_a_stop_ends_a_wait_in_real_time_at_once() -> None:
+    board = waiting_board(SimulatedLibrary(RatedClock(1.0)))
+    assert outcome_of_waiting(board, board.stop) is None
+
+
+@pytest.mark.timeout(20)
+def test_receiving_waits_no_longer_than_told_though_the_chunk_comes_later() -> None:
+    assert waiting_board(SimulatedLibrary(RatedClock(1.0))).receive(0.01) is None
+
+
+def test_a_chunk_that_is_being_made_when_the_board_is_stopped_is_not_handed_out() -> None:
+    class Stopper(Level):
+        @override
+        def volts(self, times_s: Array) -> Array:
+            board.stop()
+            return super().volts(times_s)
+
+    board = SimulatedLibrary(stepping(), {("Dev1", "ai0"): Stopper(0.0)}).open("Dev1")
+    board.configure(inputs(1), 1000.0, 10)
+    board.start()
+    assert board.receive(1.0) is None
 
 
 def test_a_stalled_board_is_silent_until_it_is_cleared() -> None:

@@ -52,6 +52,11 @@ _OVERRUN: Final = Status(
     "they were not fetched in time; close what slows the computer, or lower the rate, and start "
     "again",
 )
+_OVERFLOW: Final = Status(
+    _F.OVERRUN,
+    "the memory on the board overflowed; lower the rate, use fewer inputs, or connect a USB "
+    "board without a hub, and start again",
+)
 _TAKEN: Final = Status(
     _F.STATE,
     "another program uses the board; close it (NI MAX test panels, LabVIEW), then try again",
@@ -61,13 +66,9 @@ _SETTING: Final = Status(_F.PARAMETER, "the board does not accept a setting")
 STATUS: Final[dict[int, Status]] = {
     -200279: _OVERRUN,
     -200222: _OVERRUN,
-    -200361: Status(
-        _F.OVERRUN,
-        "the memory on the board overflowed; lower the rate, use fewer inputs, or connect a USB "
-        "board without a hub, and start again",
-    ),
-    -200010: _OVERRUN,
-    -209829: _OVERRUN,
+    -200361: _OVERFLOW,
+    -200010: _OVERFLOW,
+    -209829: _OVERFLOW,
     -200019: Status(
         _F.OVERRUN,
         "the converter was asked for them faster than it makes them; lower the rate, or check the "

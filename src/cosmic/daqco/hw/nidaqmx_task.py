@@ -194,7 +194,7 @@ class InputTask:
 
     def _on_samples(self, _handle: object, _kind: object, _count: object, _data: object) -> int:
         run = self._run
-        if run is not None and not run.over:
+        if run is not None:
             try:
                 self._fetch(run)
             except BaseException as exc:  # noqa: BLE001
