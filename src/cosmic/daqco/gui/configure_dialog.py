@@ -1,0 +1,268 @@
+"""`UDaqConfigureDialog`: rates, channels and scales (thesis, Table F.3)."""
+
+from typing import Final
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QMenu,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from cosmic.daqco.core.scale import VOLTS
+from cosmic.daqco.core.settings import HIGHEST_RATE_HZ, LOWEST_RATE_HZ
+from cosmic.daqco.gui.channel_form import ChannelForm
+from cosmic.daqco.gui.channel_tree import ChannelTree
+from cosmic.daqco.gui.draft import Draft
+from cosmic.daqco.gui.ports import DaqPort
+from cosmic.daqco.gui.relay import PortRelay
+from cosmic.daqco.gui.scale_editor import ScaleEditor, ScaleView
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.build import named, push_button
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.quantity_field import QuantityField
+from cosmic.frame.gui.theme import STEP_PX
+
+REFRESH_HZ: Final = (1.0, 300.0)
+_RECORDING: Final = "A recording is running: rate, channels and their ranges stay until it ends"
+Button = QDialogButtonBox.StandardButton
+
+
+class UDaqConfigureDialog(QDialog):
+    """Edits a draft; Apply and OK put it in force, Cancel forgets what was not applied."""
+
+    def __init__(self, port: DaqPort, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Configure acquisition")
+        self._port = port
+        self._draft = Draft(port.settings)
+        self._row = -1
+        draft = self._draft
+        self.rate = QuantityField(
+            "Hz",
+            low=LOWEST_RATE_HZ,
+            high=HIGHEST_RATE_HZ,
+            value=draft.rate_hz,
+            decimals=2,
+            name="Sampling frequency",
+        )
+        self.refresh = QuantityField(
+            "Hz",
+            low=REFRESH_HZ[0],
+            high=REFRESH_HZ[1],
+            value=draft.refresh_hz,
+            decimals=2,
+            name="Refresh rate of the plotter",
+        )
+        self.highest = QLabel()
+        self.tree = ChannelTree()
+        self.add = push_button("Add input", "Acquire another input of a board")
+        self.add.setMenu(QMenu(self.add))
+        self.remove = push_button("Remove", "Acquire this input no more")
+        self.form = ChannelForm()
+        self.message = ElidedLabel()
+        self.buttons = QDialogButtonBox(Button.Apply | Button.Ok | Button.Cancel)
+        self._build()
+        self._connect()
+        self._relay = PortRelay(port, self)
+        self._relay.changed.connect(self._on_changed)
+        self._fill(0)
+
+    def _build(self) -> None:
+        top = QGridLayout()
+        top.setHorizontalSpacing(STEP_PX)
+        top.addWidget(QLabel("Sampling frequency"), 0, 0)
+        top.addWidget(self.rate, 0, 1)
+        top.addWidget(self.highest, 0, 2)
+        top.addWidget(QLabel("Plotter refresh rate"), 1, 0)
+        top.addWidget(self.refresh, 1, 1)
+        top.setColumnStretch(2, 1)
+        under = QHBoxLayout()
+        under.addWidget(QLabel("Channel settings"))
+        under.addStretch(1)
+        under.addWidget(self.add)
+        under.addWidget(self.remove)
+        self.highest.setProperty("role", "dim")
+        named(self.button(Button.Apply), "apply")
+        column = QVBoxLayout(self)
+        column.setSpacing(STEP_PX)
+        column.addLayout(top)
+        column.addLayout(under)
+        column.addWidget(self.tree, 1)
+        column.addWidget(self.form)
+        column.addWidget(self.message)
+        column.addWidget(self.buttons)
+        self.resize(92 * STEP_PX, 84 * STEP_PX)
+
+    def _connect(self) -> None:
+        self.tree.chosen.connect(self._on_chosen)
+        self.remove.clicked.connect(self._on_remove)
+        self.form.view_requested.connect(self._on_view)
+        self.form.edit_requested.connect(self._on_edit)
+        self.form.active.clicked.connect(self._on_active)
+        self.button(Button.Apply).clicked.connect(self.apply)
+        self.buttons.accepted.connect(self._on_ok)
+        self.buttons.rejected.connect(self.reject)
+        # Enter in a field judges that field; it does not close the dialog.
+        for each in self.findChildren(QPushButton):
+            each.setAutoDefault(False)
+        self.button(Button.Ok).setDefault(False)
+
+    def button(self, which: Button) -> QPushButton:
+        """Return Apply, OK or Cancel."""
+        return self.buttons.button(which)
+
+    # Showing
+
+    def _fill(self, row: int) -> None:
+        """Show the draft, with one channel selected."""
+        draft = self._draft
+        self._row = min(row, len(draft.channels) - 1)
+        self.tree.fill(self._port.boards(), draft.channels, self._row)
+        self._show_form()
+        self._fill_menu()
+        self._show_highest()
+
+    def _show_form(self) -> None:
+        channel = self._draft.channels[self._row] if self._row >= 0 else None
+        self.form.show_channel(channel, self._draft.scale_names)
+        self._lock()
+
+    def _fill_menu(self) -> None:
+        menu = self.add.menu()
+        menu.clear()
+        for info in self._port.boards():
+            under = menu.addMenu(f"{info.name}, {info.product}")
+            free = self._draft.free_inputs(info)
+            under.setEnabled(bool(free))
+            for input_ in free:
+                action = under.addAction(input_)
+                action.triggered.connect(
+                    lambda _=False, board=info.name, chosen=input_: self.add_input(board, chosen)
+                )
+
+    def _show_highest(self) -> None:
+        active = self._draft.active
+        what = "1 active channel" if active == 1 else f"{active} active channels"
+        self.highest.setText(f"highest for {what}: {self._highest_hz():g} Hz")
+
+    def _highest_hz(self) -> float:
+        return min(HIGHEST_RATE_HZ, self._port.highest_rate_hz(self._draft.channels))
+
+    def _lock(self) -> None:
+        reason = _RECORDING if self._port.recording.active else ""
+        self.form.lock(reason)
+        self.rate.setEnabled(not reason)
+        for widget, tip in (
+            (self.add, "Acquire another input of a board"),
+            (self.remove, "Acquire this input no more"),
+        ):
+            widget.setEnabled(not reason)
+            widget.setToolTip(reason or tip)
+        if reason:
+            self.message.set_text(reason)
+        elif self.message.text() == _RECORDING:
+            self.message.set_text("")
+
+    def _on_changed(self) -> None:
+        self._lock()
+
+    # Editing
+
+    def _take_form(self) -> bool:
+        """Put what the fields have into the draft; False when one was refused."""
+        if self._row < 0:
+            return True
+        draft, row = self._draft, self._row
+        others = [each.name for number, each in enumerate(draft.channels) if number != row]
+        channel = self.form.take(others)
+        if channel is None:
+            return False
+        if channel != draft.channels[row]:
+            draft.replace(row, channel)
+            self.tree.fill(self._port.boards(), draft.channels, row)
+            self._show_highest()
+        return True
+
+    def add_input(self, board: str, input_: str) -> None:
+        """Add a channel for an input of a board, and select it."""
+        if self._take_form():
+            self._fill(self._draft.add(board, input_))
+
+    def _on_chosen(self, row: int) -> None:
+        if row < 0 or row == self._row:
+            self.tree.select(self._row)
+        elif self._take_form():
+            self._row = row
+            self.tree.select(row)
+            self._show_form()
+        else:
+            self.tree.select(self._row)
+
+    def _on_active(self) -> None:
+        self._take_form()
+
+    def _on_remove(self) -> None:
+        if self._row >= 0:
+            self._draft.remove(self._row)
+            self._fill(max(0, self._row - 1))
+
+    def _on_view(self, name: str) -> None:
+        view = ScaleView(self._draft.scale(name), self)
+        view.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        view.open()
+
+    def _on_edit(self, name: str) -> None:
+        if not self._take_form():
+            return
+        editor = ScaleEditor(self._draft.scales, self._draft.scale_users(), self, chosen=name)
+        editor.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        editor.scales_accepted.connect(self._on_scales_accepted)
+        editor.open()
+
+    def _on_scales_accepted(self, scales: object, renamed: object) -> None:
+        assert isinstance(scales, tuple)
+        assert isinstance(renamed, dict)
+        self._draft.set_scales(scales, {**renamed, VOLTS.name: VOLTS.name})
+        self._fill(self._row)
+
+    # Putting it in force
+
+    def _take_rates(self) -> bool:
+        if not all([self.rate.commit(), self.refresh.commit()]):
+            return False
+        highest = self._highest_hz()
+        if not self.rate.value() <= highest:
+            self.rate.refuse(
+                f"{self._draft.active} active channels allow at most {highest:g} Hz: "
+                "take a lower rate or fewer channels"
+            )
+            return False
+        self._draft.rate_hz, self._draft.refresh_hz = self.rate.value(), self.refresh.value()
+        return True
+
+    def apply(self) -> bool:
+        """Put the draft in force; False when it was refused, and the dialog then says why."""
+        self.message.set_text("")
+        if not (self._take_form() and self._take_rates()):
+            self.message.set_text("◆ REFUSED: see the field")
+            return False
+        try:
+            settings = self._draft.settings()
+            if settings != self._port.settings:
+                self._port.apply(settings)
+        except CosmicError as exc:
+            self.message.set_text(f"◆ REFUSED: {exc}")
+            return False
+        self._fill(self._row)
+        return True
+
+    def _on_ok(self) -> None:
+        if self.apply():
+            self.accept()

@@ -1,0 +1,122 @@
+"""Sets the force limit of a channel: crossing it stops every actuator."""
+
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDialog,
+    QDialogButtonBox,
+    QFormLayout,
+    QLabel,
+    QVBoxLayout,
+    QWidget,
+)
+
+from cosmic.daqco.core.settings import LimitSettings
+from cosmic.daqco.gui.ports import DaqPort, LimitState
+from cosmic.daqco.gui.value_field import ValueField
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.build import push_button, tipped
+from cosmic.frame.gui.theme import STEP_PX
+
+Button = QDialogButtonBox.StandardButton
+
+
+class LimitDialog(QDialog):
+    """Low, high, hysteresis and armed, for one channel at a time; OK puts them in force."""
+
+    def __init__(self, port: DaqPort, channel: str = "", parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Limits")
+        self._port = port
+        self.channel = tipped(QComboBox(), "The channel that is watched")
+        self.channel.addItems([each.name for each in port.settings.channel if each.active])
+        self.low, self.high = (
+            ValueField("Low limit", empty=True),
+            ValueField("High limit", empty=True),
+        )
+        self.hysteresis = ValueField("How far the value must come back before a reset")
+        self.armed = tipped(QCheckBox("Armed"), "Crossing the limit stops every actuator at once")
+        self.remove = push_button("Remove limit", "Watch this channel no more")
+        self.message = QLabel()
+        self.message.setWordWrap(True)
+        self.buttons = QDialogButtonBox(Button.Ok | Button.Cancel)
+        self._build()
+        self.channel.setCurrentText(channel)
+        self._show()
+
+    def _build(self) -> None:
+        form = QFormLayout()
+        form.setVerticalSpacing(STEP_PX)
+        form.addRow("Channel", self.channel)
+        form.addRow("Low limit", self.low)
+        form.addRow("High limit", self.high)
+        form.addRow("Hysteresis", self.hysteresis)
+        form.addRow("", self.armed)
+        column = QVBoxLayout(self)
+        column.addLayout(form)
+        column.addWidget(self.message)
+        column.addWidget(self.buttons)
+        self.buttons.addButton(self.remove, QDialogButtonBox.ButtonRole.ActionRole)
+        self.channel.currentTextChanged.connect(self._show)
+        self.remove.clicked.connect(self._on_remove)
+        self.buttons.accepted.connect(self._on_ok)
+        self.buttons.rejected.connect(self.reject)
+
+    def _limit(self) -> LimitState | None:
+        name = self.channel.currentText()
+        return next((each for each in self._port.limits if each.settings.channel == name), None)
+
+    def _show(self) -> None:
+        name, scales = self.channel.currentText(), self._port.settings.scales()
+        units = {each.name: scales[each.scale].unit for each in self._port.settings.channel}
+        limit = self._limit()
+        given = limit.settings if limit else None
+        for field in (self.low, self.high, self.hysteresis):
+            field.set_unit(units.get(name, ""))
+        self.low.set_value(given.low if given else None)
+        self.high.set_value(given.high if given else None)
+        self.hysteresis.set_value(given.hysteresis if given else 0.0)
+        self.armed.setChecked(given.armed if given else True)
+        self.remove.setEnabled(limit is not None)
+        self.message.setText(f"◆ {limit.reason}" if limit and limit.reason else "")
+
+    def _read(self) -> LimitSettings | None:
+        taken = [field.take() for field in (self.low, self.high, self.hysteresis)]
+        if not all(taken):
+            return None
+        low, high = self.low.optional(), self.high.optional()
+        if low is None and high is None:
+            self.high.refuse("give a low limit, a high limit or both")
+            return None
+        if low is not None and high is not None and not low < high:
+            self.high.refuse(f"the high limit must lie above the low one, {low:g}")
+            return None
+        if not self.hysteresis.value() >= 0.0:
+            self.hysteresis.refuse("give 0 or more")
+            return None
+        return LimitSettings(
+            channel=self.channel.currentText(),
+            low=low,
+            high=high,
+            hysteresis=self.hysteresis.value(),
+            armed=self.armed.isChecked(),
+        )
+
+    def _on_ok(self) -> None:
+        wanted = self._read()
+        if wanted is None:
+            return
+        try:
+            self._port.set_limit(wanted)
+        except CosmicError as exc:
+            self.message.setText(f"◆ REFUSED: {exc}")
+        else:
+            self.accept()
+
+    def _on_remove(self) -> None:
+        try:
+            self._port.remove_limit(self.channel.currentText())
+        except CosmicError as exc:
+            self.message.setText(f"◆ REFUSED: {exc}")
+        else:
+            self.accept()

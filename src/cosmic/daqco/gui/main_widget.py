@@ -1,0 +1,199 @@
+"""`UDaqMainWidget`: plotter and file widget under the menus of DAQCo (thesis, Appendix F)."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import (
+    QDialog,
+    QFileDialog,
+    QHBoxLayout,
+    QMenu,
+    QMenuBar,
+    QVBoxLayout,
+    QWidget,
+)
+
+from cosmic.daqco.gui.configure_dialog import UDaqConfigureDialog
+from cosmic.daqco.gui.export_bar import ExportBar
+from cosmic.daqco.gui.file_widget import UDaqFileWidget
+from cosmic.daqco.gui.limit_dialog import LimitDialog
+from cosmic.daqco.gui.plotter import UDaqPlotter
+from cosmic.daqco.gui.ports import DaqPort
+from cosmic.daqco.gui.relay import PortRelay
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.chip import Chip
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.theme import STEP_PX, number_font
+
+RECORDINGS: Final = "Recordings (*.h5)"
+EXPORTS: Final = "CSV (*.csv);;TDMS (*.tdms)"
+
+
+class UDaqMainWidget(QWidget):
+    """Everything of DAQCo in one widget; content of a dock, or a window of its own.
+
+    Signals
+    -------
+    close_requested()
+        File > Stop DAQCo was chosen: acquisition was stopped; whoever hosts the widget closes it.
+    """
+
+    close_requested = Signal()
+
+    def __init__(self, port: DaqPort, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("DAQCo")
+        self._port = port
+        self.plotter = UDaqPlotter(port)
+        self.files = UDaqFileWidget(port)
+        self.export_bar = ExportBar()
+        self.state = Chip("STOPPED", tip="Whether samples are acquired")
+        self.rate_text, self.error = ElidedLabel(), ElidedLabel()
+        self.rate_text.setFont(number_font())
+        self.menu_bar = QMenuBar()
+        self.menu_bar.setNativeMenuBar(False)
+        self._build_menus()
+        self._build()
+        self.plotter.limit_requested.connect(self.edit_limit)
+        self._relay = PortRelay(port, self)
+        self._relay.changed.connect(self._on_changed)
+        self._on_changed()
+
+    def _build(self) -> None:
+        head = QHBoxLayout()
+        head.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, 0)
+        head.setSpacing(STEP_PX)
+        head.addWidget(self.menu_bar)
+        head.addWidget(self.state)
+        head.addWidget(self.rate_text, 1)
+        head.addWidget(self.error, 2)
+        self.menu_bar.setSizePolicy(
+            self.menu_bar.sizePolicy().Policy.Fixed, self.menu_bar.sizePolicy().Policy.Fixed
+        )
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addLayout(head)
+        column.addWidget(self.plotter, 1)
+        column.addWidget(self.export_bar)
+        column.addWidget(self.files)
+
+    def _build_menus(self) -> None:
+        file = self._menu("&File")
+        self.start_recording = self._action(file, "Start &recording", self.files.start.click)
+        self.stop_recording = self._action(file, "Stop r&ecording", self.files.stop.click)
+        file.addSeparator()
+        self.export = self._action(file, "E&xport a recording…", self._on_export)
+        file.addSeparator()
+        self.quit = self._action(file, "&Stop DAQCo", self._on_quit)
+        acquisition = self._menu("&Acquisition")
+        self.start = self._action(acquisition, "&Start", self._on_start)
+        self.stop = self._action(acquisition, "S&top", self._on_stop)
+        acquisition.addSeparator()
+        self.configure = self._action(acquisition, "&Configure…", self._on_configure)
+        self.limits = self._action(acquisition, "&Limits…", self.edit_limit)
+        view = self._menu("&View")
+        self.show_files = self._action(view, "&File widget")
+        self.show_channels = self._action(view, "&Channel list")
+        for action, widget in (
+            (self.show_files, self.files),
+            (self.show_channels, self.plotter.channels),
+        ):
+            action.setCheckable(True)
+            action.setChecked(True)
+            action.toggled.connect(widget.setVisible)
+
+    def _menu(self, title: str) -> QMenu:
+        menu = self.menu_bar.addMenu(title)
+        menu.setToolTipsVisible(True)
+        return menu
+
+    def _action(self, menu: QMenu, text: str, do: Callable[[], object] | None = None) -> QAction:
+        action = menu.addAction(text)
+        if do is not None:
+            action.triggered.connect(lambda: do())
+        return action
+
+    # Following the application
+
+    def _on_changed(self) -> None:
+        port = self._port
+        running, recording = port.running, port.recording.active
+        self.state.setText("ACQUIRING" if running else "STOPPED")
+        self.state.set_tone("quiet" if running else "warning")
+        active = sum(each.active for each in port.settings.channel)
+        self.rate_text.set_text(f"{active} × {port.rate_hz:g} Hz")
+        self.start.setEnabled(not running)
+        self.stop.setEnabled(running)
+        self.start_recording.setEnabled(running and not recording)
+        self.stop_recording.setEnabled(recording)
+        self.export.setEnabled(True)
+        self._say(port.problem)
+
+    def _say(self, text: str) -> None:
+        self.error.set_text(f"■ {text}" if text else "")
+
+    def _do(self, action: Callable[[], object]) -> None:
+        try:
+            action()
+        except CosmicError as exc:
+            self._say(str(exc))
+        else:
+            self._on_changed()
+
+    # Menus
+
+    def _on_start(self) -> None:
+        self._do(self._port.start)
+
+    def _on_stop(self) -> None:
+        self._do(self._port.stop)
+
+    def _on_quit(self) -> None:
+        if self._port.running:
+            self._do(self._port.stop)
+        self.close_requested.emit()
+        if self.isWindow():
+            self.close()
+
+    def _on_configure(self) -> None:
+        self._open(UDaqConfigureDialog(self._port, self))
+
+    def edit_limit(self, channel: str = "") -> None:
+        """Open the dialog for limits, at a channel."""
+        self._open(LimitDialog(self._port, channel, self))
+
+    def _open(self, dialog: QDialog) -> None:
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.open()
+
+    # Export
+
+    def _on_export(self) -> None:
+        dialog = QFileDialog(self, "Recording to export", str(self.files.folder), RECORDINGS)
+        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+        dialog.fileSelected.connect(self._on_source_chosen)
+        self._open(dialog)
+
+    def _on_source_chosen(self, source: str) -> None:
+        dialog = QFileDialog(self, "Export to", str(Path(source).with_suffix(".csv")), EXPORTS)
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setDefaultSuffix("csv")
+        dialog.selectFile(Path(source).with_suffix(".csv").name)
+        dialog.filterSelected.connect(
+            lambda chosen: dialog.setDefaultSuffix("tdms" if "tdms" in chosen else "csv")
+        )
+        dialog.fileSelected.connect(
+            lambda target: self.export_recording(Path(source), Path(target))
+        )
+        self._open(dialog)
+
+    def export_recording(self, source: Path, target: Path) -> None:
+        """Export a recording to CSV or TDMS, by the suffix of `target`, and show how far it is."""
+        try:
+            self.export_bar.follow(self._port.export(source, target))
+        except CosmicError as exc:
+            self.export_bar.say(f"◆ {exc}")
