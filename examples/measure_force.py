@@ -20,12 +20,9 @@ def push(rig: cosmic.Rig, file: Path) -> None:
 def read_stiffness(file: Path) -> None:
     """Fit a line to force over position, where the probe touches."""
     with cosmic.open_recording(file) as recording:
-        position_um, force_un = recording.curve("force", "probe.y")
-        touching = force_un > 20.0
-        travel_um = position_um[touching].max() - position_um[touching].min()
-        rise_un = force_un[touching].max() - force_un[touching].min()
+        slope = recording.slope("force", "probe.y", high=-5000.0)
         print(f"{recording.rate_hz:g} Hz, complete: {recording.complete}")
-        print(f"stiffness: about {rise_un / travel_um:.1f} uN/um")
+        print(f"stiffness: {-slope.value:.2f} +- {slope.standard_error:.2f} {slope.unit}")
 
 
 def be_stopped(rig: cosmic.Rig) -> None:
