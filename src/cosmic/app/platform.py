@@ -1,15 +1,14 @@
 """A platform as its files describe it: configuration in, running applications out."""
 
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import Field
 
+import cosmic
 from cosmic.autonomy.interlocks import join_force_limits, join_positions
 from cosmic.daqco.api.application import DaqcoApplication
-from cosmic.daqco.api.recorder import Recorder
 from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.daqco.hw.factory import make_library
 from cosmic.daqco.hw.sim_signal import Source
@@ -64,7 +63,6 @@ class Platform:
     mico: MicoApplication | None
     faults: "Faults | None" = None
     daqco: DaqcoApplication | None = None
-    recorder: Recorder | None = None
 
     @property
     def simulated(self) -> bool:
@@ -82,8 +80,6 @@ class Platform:
         """Stop and close every application; any state. Motion ends first."""
         if self.mico is not None:
             self.mico.shut_down()
-        if self.recorder is not None:
-            self.recorder.stop()
         if self.daqco is not None:
             self.daqco.shut_down()
 
@@ -221,7 +217,7 @@ def build_platform(
             checker=load_checker(file, path),
             gui_factory=mico_gui,
         )
-    daqco, recorder = None, None
+    daqco = None
     if "daqco" in applications and "daqco" in file.platform.applications and file.daqco:
         daqco = DaqcoApplication(
             make_library(
@@ -234,17 +230,13 @@ def build_platform(
             file.daqco,
             clock=clock,
             policy=policy,
+            software=f"CoSMic {cosmic.__version__}",
+            configuration=path.read_text(encoding="utf-8"),
             gui_factory=daqco_gui,
         )
-        recorder = Recorder(
-            daqco,
-            policy,
-            software=f"CoSMic {version('cosmic')}",
-            configuration=path.read_text(encoding="utf-8"),
-        )
-    if daqco is not None and recorder is not None and mico is not None:
+    if daqco is not None and mico is not None:
         join_force_limits(daqco, mico)
-        join_positions(recorder, mico, clock)
+        join_positions(daqco.recorder, mico, clock)
     return Platform(
         file=file,
         path=path,
@@ -253,7 +245,6 @@ def build_platform(
         mico=mico,
         faults=faults,
         daqco=daqco,
-        recorder=recorder,
     )
 
 

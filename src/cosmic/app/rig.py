@@ -30,11 +30,7 @@ class Rig:
     def __init__(self, platform: Platform, source: str = "script") -> None:
         self._platform = platform
         self._mico = Mico(platform.mico, source) if platform.mico is not None else None
-        self._daqco = (
-            Daqco(platform.daqco, platform.recorder)
-            if platform.daqco is not None and platform.recorder is not None
-            else None
-        )
+        self._daqco = Daqco(platform.daqco) if platform.daqco is not None else None
         self._closed = False
 
     @override

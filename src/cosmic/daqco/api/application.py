@@ -7,9 +7,10 @@ from threading import RLock
 from PySide6.QtCore import QObject, Qt
 from typing_extensions import override
 
+from cosmic.daqco.api.recorder import Recorder
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.limits import Limit, LimitGuard
-from cosmic.daqco.core.plan import make_plan
+from cosmic.daqco.core.plan import make_plan, restarts
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings, ScaleSettings
 from cosmic.daqco.core.udaq_buffer import UDaqBuffer
@@ -46,6 +47,8 @@ class DaqcoApplication(TaskApplication):
     ----------
     library : BoardLibrary
         The driver behind the boards.
+    software, configuration : str
+        Version and platform file, for the recordings.
     """
 
     def __init__(
@@ -55,6 +58,8 @@ class DaqcoApplication(TaskApplication):
         *,
         clock: Clock,
         policy: FailurePolicy,
+        software: str = "",
+        configuration: str = "",
         gui_factory: GuiFactory | None = None,
         parent: QObject | None = None,
     ) -> None:
@@ -72,6 +77,7 @@ class DaqcoApplication(TaskApplication):
         self._problem = ""
         self._silence = SilenceWatch(self.guard, policy)
         self._before_change: tuple[Callable[[DaqcoSettings], None], ...] = ()
+        self.recorder = Recorder(self, policy, software=software, configuration=configuration)
 
     # What there is
 
@@ -292,25 +298,12 @@ class DaqcoApplication(TaskApplication):
 
     @override
     def shut_down(self) -> None:
-        """End acquisition, close the boards, end all threads; any state."""
+        """Close the recording, end acquisition, close the boards, end all threads; any state."""
         self.request_end()
+        self.recorder.stop()
         self._silence.request_end()
         self._silence.join()
         self.stop_acquisition()
         with self._lock:
             self._close_boards()
         self.join()
-
-
-def restarts(before: DaqcoSettings, after: DaqcoSettings) -> bool:
-    """Return True when acquisition must begin anew for `after`, not only scale differently."""
-
-    def wiring(settings: DaqcoSettings) -> object:
-        inputs = [
-            (each.name, each.board, each.input, each.mode, each.low_v, each.high_v)
-            for each in settings.channel
-            if each.active
-        ]
-        return settings.rate_hz, settings.chunk_s, inputs
-
-    return wiring(before) != wiring(after)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cosmic.daqco.api.application import DaqcoApplication
-from cosmic.daqco.api.recorder import Recorder, RecordingState
+from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.file_names import space_left
 from cosmic.daqco.core.limits import LOWEST_RATE_HZ, Crossing, Limit
@@ -43,12 +43,12 @@ class DaqLimit:
 class Daqco:
     """Channels, recordings and limits of the platform; any thread."""
 
-    def __init__(self, application: DaqcoApplication, recorder: Recorder) -> None:
+    def __init__(self, application: DaqcoApplication) -> None:
         self._application = application
-        self._recorder = recorder
+        self._recorder = application.recorder
         self._listeners: tuple[Callable[[], object], ...] = ()
         application.status_changed.connect(self._tell)
-        recorder.on_change(self._tell)
+        self._recorder.on_change(self._tell)
         application.guard.subscribe(self._on_crossing)
 
     # What is in force

@@ -6,20 +6,23 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from threading import RLock
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from PySide6.QtCore import Qt
 
-from cosmic.daqco.api.application import DaqcoApplication, restarts
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.file_writer import RecordingStats, UDaqFileWriter
 from cosmic.daqco.core.limits import Crossing
+from cosmic.daqco.core.plan import restarts
 from cosmic.daqco.core.recording_format import AxisPosition, RecordedEvent, RecordingHeader
 from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.listeners import tell
+
+if TYPE_CHECKING:
+    from cosmic.daqco.api.application import DaqcoApplication
 
 logger = logging.getLogger(__name__)
 
@@ -73,7 +76,7 @@ class Recorder:
 
     def __init__(
         self,
-        application: DaqcoApplication,
+        application: "DaqcoApplication",
         policy: FailurePolicy,
         *,
         software: str = "",

@@ -71,8 +71,11 @@ class Recording:
 
     @property
     def units(self) -> dict[str, str]:
-        """Unit of each channel's values, by name; of the newest scale."""
-        return {name: versions[-1].unit for name, versions in self.scales.items()}
+        """Unit of each channel's values, by name; "uN|mN" where it was changed on the way."""
+        return {
+            name: "|".join(dict.fromkeys(scale.unit for scale in scales))
+            for name, scales in self.scales.items()
+        }
 
     @property
     def colours(self) -> dict[str, str]:
@@ -202,6 +205,15 @@ class Recording:
             There is no such channel, or the file is damaged.
         """
         return self._values(channel, self._source.columns(start_s, end_s))
+
+    def block(self, first: int, last: int) -> list[Values]:
+        """Return the times of samples `first` to before `last`, then the values of each channel.
+
+        Counted in the file from 0; for going through a long recording piece by piece.
+        """
+        columns = Columns(max(0, first), min(last, self.samples))
+        values = [self._values(channel, columns) for channel in self.channels]
+        return [self._source.times(columns), *values]
 
     def positions(self, axis: str) -> tuple[Values, Values, npt.NDArray[np.str_]]:
         """Return where an axis was: times, positions in its unit, and how well they were known.

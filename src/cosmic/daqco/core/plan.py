@@ -3,7 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from cosmic.daqco.core.settings import HIGHEST_RATE_HZ, LOWEST_RATE_HZ, ChannelSettings
+from cosmic.daqco.core.settings import (
+    HIGHEST_RATE_HZ,
+    LOWEST_RATE_HZ,
+    ChannelSettings,
+    DaqcoSettings,
+)
 from cosmic.daqco.hw.interface import BoardInfo, InputMode, InputSettings
 from cosmic.frame.errors import LimitError, NotConnectedError
 from cosmic.frame.verdict import Reason, refuse
@@ -134,3 +139,17 @@ def _taken(channel: ChannelSettings, board: BoardInfo, half: int) -> tuple[str, 
 
 def _limit(text: str, *, value: float | None = None, limit: float | None = None) -> LimitError:
     return LimitError(refuse(Reason.LIMIT, text, value=value, limit=limit, unit="Hz"))
+
+
+def restarts(before: DaqcoSettings, after: DaqcoSettings) -> bool:
+    """Return True when acquisition must begin anew for `after`, not only scale differently."""
+
+    def wiring(settings: DaqcoSettings) -> object:
+        inputs = [
+            (each.name, each.board, each.input, each.mode, each.low_v, each.high_v)
+            for each in settings.channel
+            if each.active
+        ]
+        return settings.rate_hz, settings.chunk_s, inputs
+
+    return wiring(before) != wiring(after)

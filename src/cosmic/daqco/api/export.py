@@ -1,0 +1,170 @@
+"""Recordings as CSV and TDMS, for programs that do not read HDF5."""
+
+import csv
+import os
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.daqco.api.export_targets import (
+    CsvTarget,
+    Target,
+    TdmsTarget,
+    event_lines,
+    position_lines,
+)
+from cosmic.daqco.api.recording import Recording, open_recording
+from cosmic.daqco.core.recording_format import (
+    ExportCancelled,
+    RecordingError,
+    RecordingExistsError,
+)
+
+FORMATS: Final = ("csv", "tdms")
+READ_SAMPLES: Final = 32_768
+
+Values = npt.NDArray[np.float64]
+Progress = Callable[[float], object]
+
+
+def export_file(
+    recording_path: "str | os.PathLike[str]",
+    to: str,
+    out_path: "str | os.PathLike[str] | None" = None,
+    progress: Progress | None = None,
+    *,
+    overwrite: bool = False,
+) -> Path:
+    """Export a recording and return the path of the new file; see `export_csv`, `export_tdms`.
+
+    Parameters
+    ----------
+    to : str
+        "csv" or "tdms".
+    out_path : path, optional
+        Without it the file lies beside the recording, under the same name.
+
+    Raises
+    ------
+    RecordingError
+        The recording cannot be read, there is no such format, or the file cannot be written.
+    RecordingExistsError
+        There is such a file, and `overwrite` is False.
+    ExportCancelled
+        `progress` returned False.
+    """
+    if to not in FORMATS:
+        raise RecordingError(f"cannot export to {to!r}; there are {' and '.join(FORMATS)}")
+    export = export_csv if to == "csv" else export_tdms
+    source = Path(recording_path)
+    target = source.with_suffix(f".{to}") if out_path is None else Path(out_path)
+    with open_recording(source) as recording:
+        return export(recording, target, progress, overwrite=overwrite)
+
+
+def export_csv(
+    recording: Recording,
+    path: Path,
+    progress: Progress | None = None,
+    *,
+    overwrite: bool = False,
+) -> Path:
+    """Write physical values as CSV: a line of names with units, then a line a sample.
+
+    Positions of axes and events go to files of their own beside it, ``NAME.positions.csv`` and
+    ``NAME.events.csv``, where there are any.
+
+    Parameters
+    ----------
+    progress : callable, optional
+        Told the fraction done, 0 to 1; returns False to end it, and nothing is left.
+
+    Raises
+    ------
+    RecordingError, RecordingExistsError, ExportCancelled
+        As `export_file`.
+    """
+    beside = {
+        path.with_name(f"{path.stem}.positions.csv"): position_lines(recording),
+        path.with_name(f"{path.stem}.events.csv"): event_lines(recording),
+    }
+    tables = {target: lines for target, lines in beside.items() if len(lines) > 1}
+    for target in (path, *tables):
+        _check_free(target, overwrite=overwrite)
+    _export(recording, path, CsvTarget, progress)
+    for target, lines in tables.items():
+        with _replacing(target) as part, part.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows(lines)
+    return path
+
+
+def export_tdms(
+    recording: Recording,
+    path: Path,
+    progress: Progress | None = None,
+    *,
+    overwrite: bool = False,
+) -> Path:
+    """Write physical values as TDMS, with groups ``samples``, ``positions`` and ``events``.
+
+    Parameters, Raises
+    ------------------
+    As `export_csv`.
+    """
+    _check_free(path, overwrite=overwrite)
+    _export(recording, path, TdmsTarget, progress)
+    return path
+
+
+@contextmanager
+def _replacing(path: Path) -> Iterator[Path]:
+    """Write under another name, which becomes `path` only when all went well."""
+    part = path.with_name(path.name + ".part")
+    try:
+        yield part
+        part.replace(path)
+    except OSError as exc:
+        raise RecordingError(
+            f"{path}: cannot be written ({exc.strerror or exc}); nothing of it is left. "
+            "Make room, or choose another directory"
+        ) from exc
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _export(
+    recording: Recording,
+    path: Path,
+    kind: Callable[[Recording, Path], Target],
+    progress: Progress | None,
+) -> None:
+    def told(fraction: float) -> None:
+        if progress is not None and progress(fraction) is False:
+            raise ExportCancelled(f"{path}: the export was cancelled")
+
+    with _replacing(path) as part, closing(kind(recording, part)) as target:
+        told(0.0)
+        for block, fraction in _blocks(recording):
+            target.write(block)
+            told(fraction)
+        target.finish()
+
+
+def _blocks(recording: Recording) -> Iterator[tuple[list[Values], float]]:
+    total = recording.samples
+    for first in range(0, total, READ_SAMPLES):
+        last = min(total, first + READ_SAMPLES)
+        yield recording.block(first, last), last / total
+
+
+def _check_free(path: Path, *, overwrite: bool) -> None:
+    if not path.parent.is_dir():
+        raise RecordingError(f"directory {path.parent} does not exist; create it or choose another")
+    if path.exists() and not overwrite:
+        raise RecordingExistsError(
+            f"{path}: there is such a file; choose another name, or say that it may be replaced"
+        )
