@@ -11,7 +11,7 @@ Two cases, each solved as far as algebra goes:
   tied by the stretching of fibre and grippers. Good for slopes below about 0.2.
 """
 
-from dataclasses import dataclass
+from bisect import bisect_right
 from functools import cache, lru_cache
 from typing import Final
 
@@ -32,48 +32,61 @@ HIGHEST_TENSION_UN: Final = 2e5
 """Tension up to which a curve is laid out: a dry fibre breaks at 50 to 200 mN."""
 
 
-@dataclass(frozen=True)
 class PushCurve:
     """Force of a fibre on the probe over its way, for one grasp and one abscissa.
 
+    Parameters
+    ----------
+    deflections_um, forces_un : ndarray, shape (n,), float64
+        Of the fibre at the probe; both begin at 0.
+    sensor_un_um : float
+        Stiffness of the sensor behind the probe, which takes its part of the way.
+
     Attributes
     ----------
-    ways_um : ndarray, shape (n,), float64
+    ways_um : list of float
         How far the probe's holder went since contact; rises from 0.
-    deflections_um : ndarray, shape (n,), float64
-        How far the fibre gave way; the rest is the sensor's own spring.
-    forces_un : ndarray, shape (n,), float64
+    forces_un : list of float
+    reach_um : float
+        Way at which the fibre slides off, or the end of what is laid out.
     """
 
-    ways_um: Floats
-    deflections_um: Floats
-    forces_un: Floats
+    __slots__ = ("forces_un", "reach_um", "ways_um")
 
-    @property
-    def reach_um(self) -> float:
-        """Way at which the fibre slides off, or the end of what is laid out."""
-        return float(self.ways_um[-1])
+    def __init__(self, deflections_um: Floats, forces_un: Floats, sensor_un_um: float) -> None:
+        ways = deflections_um + forces_un / sensor_un_um
+        rises = ways[1:] > np.maximum.accumulate(ways)[:-1]
+        if not rises.all():
+            kept = np.concatenate([[True], rises])
+            ways, forces_un = ways[kept], forces_un[kept]
+        self.ways_um: list[float] = ways.tolist()
+        self.forces_un: list[float] = forces_un.tolist()
+        self.reach_um = self.ways_um[-1]
 
     def force_un(self, way_um: float) -> float:
         """Return the force at a way; the same with the opposite sign on the other side."""
-        force = float(np.interp(abs(way_um), self.ways_um, self.forces_un))
+        ways, forces, way = self.ways_um, self.forces_un, abs(way_um)
+        if way >= self.reach_um:
+            force = forces[-1]
+        else:
+            # A curve is used for few ways, one after another: no array is worth its call.
+            after = bisect_right(ways, way)
+            part = (way - ways[after - 1]) / (ways[after] - ways[after - 1])
+            force = forces[after - 1] + part * (forces[after] - forces[after - 1])
         return force if way_um >= 0.0 else -force
-
-    def deflection_um(self, way_um: float) -> float:
-        """Return how far the fibre itself gives way."""
-        deflection = float(np.interp(abs(way_um), self.ways_um, self.deflections_um))
-        return deflection if way_um >= 0.0 else -deflection
 
 
 @cache
-def _elastica() -> tuple[Floats, Floats, Floats, Floats]:
-    """Return slope, deflection/a, force a^2/EI and arc length/a of a cantilever, rising from 0.
+def _elastica() -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Return a cantilever's deflection/a, force a^2/EI and arc length/a, rising with the slope.
+
+    Before these come the slope's sine, and one less its cosine.
 
     With the slope angle psi counted from the contact, where the moment is zero, the first
     integral of the elastica is (psi')^2 = 2 k sin(psi), k = N/EI, N normal to the fibre there.
     Integrals over psi up to the slope at the contact give arc length and both coordinates.
     """
-    slopes = np.linspace(0.0, STEEPEST_RAD**0.5, 241)[1:] ** 2
+    slopes = np.linspace(0.0, STEEPEST_RAD**0.5, 121)[1:] ** 2
     nodes, weights = np.polynomial.legendre.leggauss(24)
     # psi = t^2 takes the root out of both integrands.
     top = np.sqrt(slopes)[:, None]
@@ -88,7 +101,8 @@ def _elastica() -> tuple[Floats, Floats, Floats, Floats]:
     force = 0.5 * a * a * np.cos(slopes)  # k a^2 cos(beta), as a still holds sqrt(2 k)
     zero = np.zeros(1)
     return (
-        np.concatenate([zero, slopes]),
+        np.concatenate([zero, np.sin(slopes)]),
+        np.concatenate([zero, 1.0 - np.cos(slopes)]),
         np.concatenate([zero, d / a]),
         np.concatenate([zero, force]),
         np.concatenate([zero + 1.0, arc / a]),
@@ -115,13 +129,13 @@ def clamped_at_one_end(
     sensor_un_um : float
         Stiffness of the sensor behind the probe.
     """
-    slope, bow, force, arc = _elastica()
-    touched = span_um - radius_um * np.sin(slope)
+    sine, flat, bow, force, arc = _elastica()
+    touched = span_um - radius_um * sine
     held = (touched > 0.0) & (touched * arc <= free_um)
-    last = len(slope) if held.all() else max(int(np.argmin(held)), 1)
+    last = len(held) if held.all() else max(int(held.argmin()), 1)
     touched = touched[:last]
-    deflections = touched * bow[:last] + radius_um * (1.0 - np.cos(slope[:last]))
-    return _curve(deflections, force[:last] * (ei_un_um2 / touched**2), sensor_un_um)
+    deflections = touched * bow[:last] + radius_um * flat[:last]
+    return PushCurve(deflections, force[:last] * (ei_un_um2 / touched**2), sensor_un_um)
 
 
 @lru_cache(maxsize=1024)
@@ -163,21 +177,12 @@ def held_at_both_ends(
     if deflections[0] > 0.0:  # slack: the linear part before any tension
         deflections = np.concatenate([[0.0], deflections])
         stiffness = np.concatenate([stiffness[:1], stiffness])
-    return _curve(deflections, stiffness * deflections, sensor_un_um)
+    return PushCurve(deflections, stiffness * deflections, sensor_un_um)
 
 
 def tension_un(*, ea_un: float, distance_um: float, slack_um: float, gripper_un_um: float) -> float:
     """Return the tension of a straight fibre held at both ends; 0 while it is slack."""
     return max(0.0, -slack_um / (distance_um / ea_un + 2.0 / gripper_un_um))
-
-
-def _curve(deflections: Floats, forces: Floats, sensor_un_um: float) -> PushCurve:
-    ways = deflections + forces / sensor_un_um
-    rising = np.concatenate([[True], np.diff(np.maximum.accumulate(ways)) > 0.0])
-    curve = PushCurve(ways[rising], deflections[rising], forces[rising])
-    for array in (curve.ways_um, curve.deflections_um, curve.forces_un):
-        array.flags.writeable = False
-    return curve
 
 
 def _stiffness_un_um(tension_un: Floats, ei: float, left_um: float, right_um: float) -> Floats:

@@ -57,6 +57,17 @@ class Path:
         part = (time_s - start_s) / (times_s[after] - start_s)
         return start + part * (positions[after] - start)
 
+    def leg(self, time_s: float) -> tuple[float, float]:
+        """Return the speed at `time_s`, per second, and until when it stays so; creep is none."""
+        times_s, positions = self.times_s, self.positions
+        if time_s >= times_s[-1]:
+            return 0.0, math.inf
+        if time_s < times_s[0]:
+            return 0.0, times_s[0]
+        after = next(index for index, knot_s in enumerate(times_s) if time_s < knot_s)
+        way = abs(positions[after] - positions[after - 1])
+        return way / (times_s[after] - times_s[after - 1]), times_s[after]
+
     def cut(self, time_s: float, *, end_s: float, end: float) -> "Path":
         """Return this path up to `time_s` and from there straight to `end` at `end_s`."""
         kept = [(t, x) for t, x in zip(self.times_s, self.positions, strict=True) if t <= time_s]
@@ -123,6 +134,16 @@ class Stage:
             path = self._paths[0]
         low, high = self.bounds
         return min(max(path.at(time_s), low), high)
+
+    def leg_then(self, time_s: float) -> tuple[float, float]:
+        """Return its speed at `time_s` without sign, and until when it stays so."""
+        until_s = math.inf
+        for path in reversed(self._paths):
+            if path.times_s[0] <= time_s:
+                speed, end_s = path.leg(time_s)
+                return speed, min(end_s, until_s)
+            until_s = min(until_s, path.times_s[0])
+        return 0.0, until_s
 
     def step_size(self, amplitude_v: float, direction: int) -> float:
         """Return the mean length of one step, positive, at `amplitude_v` in `direction` (+-1)."""

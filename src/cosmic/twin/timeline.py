@@ -20,6 +20,9 @@ KEPT: Final = 20_000
 MOST_LOOKS: Final = 20_000
 """Looks for one question; after a long journey unseen they lie further apart."""
 
+LONGEST_WAY: Final = 0.25
+"""A slow stage goes so far between two looks, um or degrees; a fast one as far as it must."""
+
 LONGEST_REST_S: Final = 0.5
 """Stages that stand creep by nanometres; they are looked at again after this time."""
 
@@ -27,7 +30,8 @@ LONGEST_REST_S: Final = 0.5
 class Timeline:
     """What the probe felt and feels; any thread.
 
-    Looks lie on a fixed grid of time, so that the answer does not depend on who asked when.
+    Looks lie on a grid of time, close where something moves fast, so that the answer hardly depends
+    on who asked when. Between two looks the force goes straight.
     """
 
     def __init__(self, workplace: Workplace, stages: Mapping[str, Stage], step_s: float) -> None:
@@ -79,13 +83,13 @@ class Timeline:
         if self._at < 0:
             self._look(0)
         last = math.ceil(time_s / self._step_s - 1e-9)
-        stride = 1 + (last - self._at) // MOST_LOOKS
+        coarse = (last - self._at) // MOST_LOOKS
         while self._at < last:
-            rest_s = self._rest_until_s()
-            if rest_s > time_s:
+            until_s, at_rest = self._next_s()
+            if at_rest and until_s > time_s:
                 break  # what was felt last is felt still
-            further = math.floor(rest_s / self._step_s)
-            self._look(max(further, min(self._at + stride, last)))
+            further = min(math.floor(until_s / self._step_s + 1e-9), last)
+            self._look(max(further, min(self._at + 1 + coarse, last)))
 
     def _look(self, number: int) -> None:
         self._at = number
@@ -103,16 +107,15 @@ class Timeline:
         self._times_s.append(time_s)
         self._forces_un.append(self._felt.total_un)
 
-    def _rest_until_s(self) -> float:
-        """Return until when no stage moves; before now where one does."""
+    def _next_s(self) -> tuple[float, bool]:
+        """Return when to look next, and whether all stages stand until then."""
         now_s = self._at * self._step_s
         until_s = now_s + LONGEST_REST_S
+        at_rest = True
         for stage in self._stages:
-            for path in reversed(stage.paths):
-                if path.times_s[0] > now_s:
-                    until_s = min(until_s, path.times_s[0])
-                    continue
-                if path.end_s > now_s:
-                    return now_s
-                break
-        return until_s
+            speed, end_s = stage.leg_then(now_s)
+            if speed > 0.0:
+                at_rest = False
+                end_s = min(end_s, now_s + LONGEST_WAY / speed)
+            until_s = min(until_s, end_s)
+        return until_s, at_rest

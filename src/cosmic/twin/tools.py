@@ -1,15 +1,16 @@
 """The grippers as the fibres meet them, and the file that says where everything is."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
-from cosmic.twin.kinematics import Drive, Point, Skeleton, Slide
+import numpy as np
+
+from cosmic.twin.kinematics import Drive, Floats, Point, Skeleton, Slide
 from cosmic.twin.settings import TwinSettings
 
 
-@dataclass(frozen=True, slots=True)
-class Tool:
+class Tool(NamedTuple):
     """A gripper at one moment.
 
     Attributes
@@ -37,7 +38,7 @@ class Gripper:
         x, y, _ = skeleton.direction(jaws[0], (1.0, 0.0, 0.0))
         self._forward = x, y
         self._stage = stage
-        self._height = hold_height_um
+        self._hold = _halfway(*self.slides, hold_height_um)
 
     def jaws_at(self, values: Mapping[str, float]) -> tuple[Point, Point]:
         """Return the inner lower edges of both jaws' tips."""
@@ -45,9 +46,20 @@ class Gripper:
 
     def tool(self, name: str, values: Mapping[str, float]) -> Tool:
         """Return the gripper with the stages at `values`."""
-        (ax, ay, az), (bx, by, bz) = self.jaws_at(values)
-        middle = (ax + bx) / 2.0, (ay + by) / 2.0, (az + bz) / 2.0 + self._height
-        return Tool(name, middle, self._forward, values[self._stage])
+        return Tool(name, self._hold.at(values), self._forward, values[self._stage])
+
+
+def _halfway(first: Slide, second: Slide, higher_um: float) -> Slide:
+    """Return the point between two, and higher; what the jaws do alike remains of their ways."""
+    ways: dict[str, Floats] = {}
+    for stage, way in (*first.ways, *second.ways):
+        ways[stage] = ways.get(stage, np.zeros(3)) + 0.5 * np.array(way)
+    x, y, z = 0.5 * (np.array(first.origin) + np.array(second.origin))
+    kept = {stage: way for stage, way in ways.items() if np.abs(way).max() > 1e-12}
+    return Slide(
+        (float(x), float(y), float(z) + higher_um),
+        tuple((stage, (float(w[0]), float(w[1]), float(w[2]))) for stage, w in kept.items()),
+    )
 
 
 def make_skeleton(settings: TwinSettings, folder: Path) -> Skeleton:

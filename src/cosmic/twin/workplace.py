@@ -171,7 +171,7 @@ class Workplace:
         if way > curve.reach_um or force < -self._contact.pull_off_un:
             touch.lose()
             return None
-        return Push(number, force, along, curve.deflection_um(way))
+        return Push(number, force, along, way - force / self._sensor)
 
     def _reach(self, fibre: Fibre, line: Line, along_um: float, probe_z_um: float) -> float:
         height = line.start[2] + line.rise * along_um

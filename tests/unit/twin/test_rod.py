@@ -76,14 +76,12 @@ def test_the_force_is_odd_and_starts_at_nothing() -> None:
     curve = one_end()
     assert curve.force_un(0.0) == 0.0
     assert curve.force_un(-13.0) == -curve.force_un(13.0) < 0.0
-    assert curve.deflection_um(-13.0) == pytest.approx(-13.0)
 
 
 def test_the_spring_of_the_sensor_takes_its_part_of_the_way() -> None:
     stiff = 3.0 * EI / 200.0**3
     curve = one_end(200.0, sensor_un_um=stiff)
     assert curve.force_un(2.0) == pytest.approx(stiff * 1.0, rel=0.01)
-    assert curve.deflection_um(2.0) == pytest.approx(1.0, rel=0.01)
 
 
 def test_a_fibre_slides_off_when_the_bow_needs_more_than_there_is() -> None:
@@ -174,11 +172,11 @@ def test_a_stretched_fibre_pulls_and_is_stiff_from_the_start() -> None:
     assert soft.force_un(0.1) == pytest.approx(pull * 0.1 * 4.0 / 975.0, rel=0.02)
 
 
-def test_curves_are_finite_rise_and_cannot_be_written_to() -> None:
-    curves = [one_end(), one_end(radius_um=25.0), both_ends(), both_ends(ei=0.01)]
+def test_curves_are_finite_and_rise() -> None:
+    curves = [one_end(), one_end(radius_um=25.0), one_end(free_um=399.9), both_ends()]
     curves += [both_ends(slack_um=3.0), both_ends(slack_um=-2.0), both_ends(span_um=5.0)]
-    for curve in curves:
-        for array in (curve.ways_um, curve.deflections_um, curve.forces_un):
-            assert np.isfinite(array).all() and array[0] == 0.0
-            assert not array.flags.writeable
+    for curve in (*curves, both_ends(ei=0.01)):
+        assert curve.ways_um[0] == curve.forces_un[0] == 0.0
+        assert np.isfinite(curve.forces_un).all()
         assert (np.diff(curve.ways_um) > 0.0).all()
+        assert math.isfinite(curve.force_un(1e6))
