@@ -1,6 +1,6 @@
 """`UDaqFileWriter`: writes what is acquired into a file, in a thread of its own (thesis 6.2)."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -10,13 +10,14 @@ from PySide6.QtCore import Signal
 from typing_extensions import override
 
 from cosmic.daqco.core.chunk import DataChunk
-from cosmic.daqco.core.file_names import check_base_name, check_directory, check_space
+from cosmic.daqco.core.file_names import check_base_name, check_directory, check_space, space_left
 from cosmic.daqco.core.recording_file import WRITE_ERRORS, RecordingFile
 from cosmic.daqco.core.recording_format import (
     AxisPosition,
     RecordedEvent,
     RecordingError,
     RecordingHeader,
+    reason,
 )
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError
@@ -100,9 +101,10 @@ class UDaqFileWriter(WorkerThread):
     ) -> None:
         check_base_name(path.name)
         directory = check_directory(path.parent)
-        check_space(directory, header.bytes_per_s)
+        space = check_space(directory, header.bytes_per_s)
         super().__init__(f"recorder {path.name}", policy)
         self._header = header
+        self._left_s = space.left_s
         self._file = RecordingFile(directory / path.name, header, overwrite=overwrite)
         self._queue: SimpleQueue[_Item] = SimpleQueue()
         self._limit = int(
@@ -173,22 +175,29 @@ class UDaqFileWriter(WorkerThread):
     @override
     def run_body(self) -> None:
         try:
-            self._write_all()
-            self._close()
-        except RecordingError as exc:
-            self._fail(exc)
-            self._close()
-        except WRITE_ERRORS as exc:
-            self._fail(
-                RecordingError(
-                    f"{self.path}: writing failed ({exc}); the recording ends here with what was "
-                    "written before, and acquisition goes on. Is the disk full, or gone?"
-                )
-            )
+            if self._survived(self._write_all):
+                self._survived(self._close)
         finally:
             self._ended = True
             self._abandon()
+            self.recorded.emit(self._stats())
             self.closed.emit(self.path)
+
+    def _survived(self, action: Callable[[], None]) -> bool:
+        """Do it; return whether the file can still be written to."""
+        try:
+            action()
+        except RecordingError as exc:
+            self._fail(exc)
+        except WRITE_ERRORS as exc:
+            self._fail(
+                RecordingError(
+                    f"{self.path}: writing failed ({reason(exc)}); the recording ends here with "
+                    "what was written before, and acquisition goes on. Is the disk full, or gone?"
+                )
+            )
+            return False
+        return True
 
     def _write_all(self) -> None:
         due_s = WALL.now_s() + FLUSH_S
@@ -216,18 +225,25 @@ class UDaqFileWriter(WorkerThread):
 
     def _flush(self) -> None:
         self._file.flush()
-        space = check_space(self.path.parent, self._header.bytes_per_s * FLUSH_S)
-        self.recorded.emit(self._stats(space.left_s))
+        self.path.stat()  # a file that was deleted takes everything without a word
+        directory, a_while = self.path.parent, self._header.bytes_per_s * FLUSH_S
+        self._left_s = space_left(directory, self._header.bytes_per_s).left_s
+        check_space(directory, a_while)
+        self.recorded.emit(self._stats())
 
-    def _stats(self, left_s: float) -> RecordingStats:
+    def _stats(self) -> RecordingStats:
+        try:
+            file_bytes = self.path.stat().st_size
+        except OSError:
+            file_bytes = 0
         return RecordingStats(
             path=self.path,
             samples=self._file.samples,
             duration_s=self._file.samples / self._header.rate_hz,
             lost=self._file.lost,
             backlog=self.backlog,
-            file_bytes=self.path.stat().st_size,
-            left_s=left_s,
+            file_bytes=file_bytes,
+            left_s=self._left_s,
         )
 
     def _close(self) -> None:
@@ -244,8 +260,8 @@ class UDaqFileWriter(WorkerThread):
             self._file.abandon()
         except WRITE_ERRORS as exc:
             error = RecordingError(
-                f"{self.path}: could not be closed ({exc}); open_recording() reads what was "
-                f"written up to {FLUSH_S:g} s before"
+                f"{self.path}: could not be closed ({reason(exc)}); open_recording() reads what "
+                f"was written up to {FLUSH_S:g} s before"
             )
             self._policy.report(error, self.name)
 

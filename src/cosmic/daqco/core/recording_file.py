@@ -77,8 +77,8 @@ class RecordingFile:
             ) from None
         except WRITE_ERRORS as exc:
             raise RecordingError(
-                f"{path}: cannot be created ({exc}); close what reads it, or choose another "
-                "name or directory"
+                f"{path}: cannot be created ({form.reason(exc)}); close what reads it, "
+                "or choose another name or directory"
             ) from exc
         self._create()
 

@@ -1,5 +1,6 @@
 """How a recording lies in its HDF5 file; described in docs/reference/recording-file.md."""
 
+import os
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Final
@@ -124,6 +125,12 @@ class AxisPosition:
     position: float
     unit: str = "um"
     confidence: str = "known"
+
+
+def reason(exc: BaseException) -> str:
+    """Return why a file could not be written or read; HDF5 tells it in a page of its own."""
+    number = exc.errno if isinstance(exc, OSError) else None
+    return os.strerror(number) if number else str(exc).partition("\n")[0]
 
 
 def text_type(text_bytes: int) -> "np.dtype[np.bytes_]":

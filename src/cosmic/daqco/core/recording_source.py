@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import h5py
 import numpy as np
@@ -11,9 +11,14 @@ import numpy.typing as npt
 
 from cosmic.daqco.core import recording_format as form
 from cosmic.daqco.core.recording_format import RecordingError
+from cosmic.daqco.core.unclosed_file import UnclosedFile, is_unclosed
+from cosmic.frame.clock import WALL
 
 READ_ERRORS: Final = (OSError, RuntimeError, ValueError, KeyError)
 """What h5py raises over a file that is damaged."""
+
+ATTEMPTS: Final = 5
+PAUSE_S: Final = 0.002
 
 Table = npt.NDArray[np.void]
 Values = npt.NDArray[np.float64]
@@ -29,21 +34,20 @@ def open_file(path: Path) -> h5py.File:
     """
     if not path.is_file():
         raise RecordingError(f"{path}: there is no such file")
-    reasons = []
-    for swmr in (False, True):  # a file that was never closed opens in the second way alone
-        try:
-            file = h5py.File(path, "r", swmr=swmr, locking="best-effort")
-        except READ_ERRORS as exc:
-            reasons.append(str(exc))
-            continue
-        if file.attrs.get("format") == form.FORMAT:
-            return file
-        file.close()
-        raise RecordingError(f"{path}: is an HDF5 file, but no recording by CoSMic")
-    raise RecordingError(
-        f"{path}: cannot be read ({reasons[-1]}); it is no recording, or damaged beyond what "
-        "its writer could prevent. Look for a copy"
-    )
+    try:
+        if is_unclosed(path):
+            file = h5py.File(UnclosedFile(path), "r")
+        else:
+            file = h5py.File(path, "r", locking="best-effort")
+    except READ_ERRORS as exc:
+        raise RecordingError(
+            f"{path}: cannot be read ({form.reason(exc)}); it is no recording, or damaged beyond "
+            "what its writer could prevent. Look for a copy"
+        ) from exc
+    if file.attrs.get("format") == form.FORMAT:
+        return file
+    file.close()
+    raise RecordingError(f"{path}: is an HDF5 file, but no recording by CoSMic")
 
 
 @dataclass(frozen=True)
@@ -72,46 +76,28 @@ class RecordingSource:
         self.path = path
         self.file = open_file(path)
         try:
-            version = int(self.file.attrs["format_version"])
-            if version > form.VERSION:
-                raise RecordingError(
-                    f"{path}: has format {version}, this CoSMic reads up to {form.VERSION}; "
-                    "use a newer one"
-                )
-            self.rate_hz = float(self.file.attrs["rate_hz"])
-            self.channels: Table = self.file["channels"][:]
-            self.names = tuple(form.decoded(each) for each in self.channels["name"])
-            self.refresh()
+            self._load()
         except READ_ERRORS as exc:
             self.file.close()
-            raise self._broken(exc) from exc
+            self._open_again(exc)
         except RecordingError:
             self.file.close()
             raise
 
     def refresh(self) -> None:
         """Look again at a file that is still being written."""
-        try:
-            tables = {}
-            # Backwards: what a row of `chunks` speaks of was written before it.
-            for name in reversed(form.GROWING):
-                self._renew(name)
-                tables[name] = self.file[name][:]
-            self._renew("volts")
-            self._renew("complete")
-            self.tables: dict[str, Table] = tables
-            self.volts = self.file["volts"]
-            self.complete = bool(self.file["complete"][()])
-        except READ_ERRORS as exc:
-            raise self._broken(exc) from exc
-        self._trim()
+        self._open_again()
 
     def read_volts(self, channel: int, columns: Columns) -> Values:
         """Return volts of one channel."""
         try:
-            volts: Values = self.volts[channel, columns.first : columns.last]
+            volts: Values = self._volts[channel, columns.first : columns.last]
         except READ_ERRORS as exc:
-            raise self._broken(exc) from exc
+            self._open_again(exc)
+            try:
+                volts = self._volts[channel, columns.first : columns.last]
+            except READ_ERRORS as again:
+                raise self._broken(again) from again
         return volts
 
     def close(self) -> None:
@@ -170,17 +156,45 @@ class RecordingSource:
         into = np.ceil((time_s - row["time_s"]) * self.rate_hz - 1e-6)
         return int(row["column"]) + min(max(0, int(into)), int(row["samples"]))
 
+    def _open_again(self, error: Exception | None = None) -> None:
+        """Open the file again; what was half written a moment ago is whole then."""
+        for _ in range(ATTEMPTS):
+            self.file.close()
+            self.file = open_file(self.path)
+            try:
+                self._load()
+            except READ_ERRORS as exc:
+                error = exc
+                self.file.close()
+                WALL.sleep(PAUSE_S)
+            else:
+                return
+        raise self._broken(error or OSError("unknown")) from error
+
+    def _load(self) -> None:
+        version = int(self.file.attrs["format_version"])
+        if version > form.VERSION:
+            raise RecordingError(
+                f"{self.path}: has format {version}, this CoSMic reads up to {form.VERSION}; "
+                "use a newer one"
+            )
+        self.rate_hz = float(self.file.attrs["rate_hz"])
+        self.channels: Table = self.file["channels"][:]
+        self.names = tuple(form.decoded(each) for each in self.channels["name"])
+        self.complete = bool(self.file["complete"][()])
+        # Backwards: what a row of `chunks` speaks of was written before it.
+        self.tables: dict[str, Table] = {
+            name: self.file[name][:] for name in reversed(form.GROWING)
+        }
+        self._volts = self.file["volts"]
+        self._trim()
+
     def _trim(self) -> None:
         """Leave out what a killed process had not written whole."""
-        chunks, columns = self.tables["chunks"], self.volts.shape[1]
+        chunks, columns = self.tables["chunks"], self._volts.shape[1]
         whole = chunks[chunks["column"] + chunks["samples"] <= columns]
         self.tables["chunks"] = whole
         self.samples = int(whole["column"][-1] + whole["samples"][-1]) if len(whole) else 0
 
-    def _renew(self, name: str) -> None:
-        dataset: Any = self.file[name]
-        if self.file.swmr_mode:
-            dataset.refresh()
-
     def _broken(self, exc: Exception) -> RecordingError:
-        return RecordingError(f"{self.path}: is damaged ({exc}); look for a copy")
+        return RecordingError(f"{self.path}: is damaged ({form.reason(exc)}); look for a copy")
