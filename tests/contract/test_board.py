@@ -320,6 +320,18 @@ def test_a_board_that_another_program_has_is_told_and_works_once_it_is_free(rig:
     board.configure(some_inputs(1), 1000.0, 10)
 
 
+def test_a_board_that_was_opened_twice_belongs_to_who_configured_it_first(rig: BoardRig) -> None:
+    board, other = rig.running(), rig.open()
+    with pytest.raises(DeviceError, match=r"Dev1.*another program") as caught:
+        other.configure(some_inputs(1), 1000.0, 10)
+    assert caught.value.fault is DeviceFault.STATE
+    other.close()
+    rig.go_on(10)
+    received(board, 1)
+    board.close()
+    rig.running()
+
+
 def test_a_receiver_that_is_too_late_hears_of_an_overrun_and_can_start_again(
     rig: BoardRig,
 ) -> None:

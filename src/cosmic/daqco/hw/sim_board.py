@@ -56,6 +56,8 @@ class SimulatedBoard(Board):
         The rate is this over a whole number, as on the real board; 0 allows any rate.
     paced : bool
         False: chunks are due at once, however many are asked for.
+    owners : dict of str to SimulatedBoard
+        Of the library: who has configured each board; nobody else can until it is closed.
     """
 
     def __init__(
@@ -65,6 +67,7 @@ class SimulatedBoard(Board):
         faults: BoardFaults,
         make_signal: MakeSignal,
         *,
+        owners: dict[str, "SimulatedBoard"],
         timebase_hz: float = TIMEBASE_HZ,
         paced: bool = True,
     ) -> None:
@@ -72,6 +75,7 @@ class SimulatedBoard(Board):
         self._clock = clock
         self._faults = faults
         self._make_signal = make_signal
+        self._owners = owners
         self._timebase_hz = timebase_hz
         self._paced = paced
         self._setup: _Setup | None = None
@@ -93,6 +97,9 @@ class SimulatedBoard(Board):
         check_inputs(self._info, inputs)
         check_rate(self._info, len(inputs), rate_hz)
         check_chunk(self._info, chunk_samples)
+        with self._faults.changed:
+            if self._owners.setdefault(self._info.name, self) is not self:
+                raise self._taken("configure")
         real_hz = self._nearest_rate_hz(rate_hz)
         signal = self._make_signal(inputs, chunk_samples)
         self._setup = _Setup(tuple(inputs), real_hz, chunk_samples, signal)
@@ -133,6 +140,9 @@ class SimulatedBoard(Board):
     def close(self) -> None:
         self.stop()
         self._closed = True
+        with self._faults.changed:
+            if self._owners.get(self._info.name) is self:
+                del self._owners[self._info.name]
 
     def _wait_until_due(self, timeout_s: float) -> _Run | None:
         """Return the acquisition whose next chunk is due, or None; raises `DeviceError`."""
@@ -203,10 +213,12 @@ class SimulatedBoard(Board):
                 fault=DeviceFault.COMMUNICATION,
             )
         if self._faults.hit("reserved", name) and call in ("configure", "start"):
-            raise self._error(
-                f"{call}: another program uses the board; close it, then try again",
-                DeviceFault.STATE,
-            )
+            raise self._taken(call)
+
+    def _taken(self, call: str) -> DeviceError:
+        return self._error(
+            f"{call}: another program uses the board; close it, then try again", DeviceFault.STATE
+        )
 
     def _error(self, text: str, fault: DeviceFault) -> DeviceError:
         return DeviceError(f"{self._info.name}: {text}", fault=fault)

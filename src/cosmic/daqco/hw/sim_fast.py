@@ -64,6 +64,7 @@ class FastLibrary(BoardLibrary):
             ranges_v=((-10.0, 10.0),),
         )
         self.faults = BoardFaults()
+        self._owners: dict[str, SimulatedBoard] = {}
 
     @property
     @override
@@ -84,5 +85,11 @@ class FastLibrary(BoardLibrary):
             return RepeatedSignal(self._buffer_v[rows], chunk_samples)
 
         return SimulatedBoard(
-            self._info, self._clock, self.faults, make_signal, timebase_hz=0.0, paced=self._paced
+            self._info,
+            self._clock,
+            self.faults,
+            make_signal,
+            owners=self._owners,
+            timebase_hz=0.0,
+            paced=self._paced,
         )

@@ -72,6 +72,7 @@ class SimulatedLibrary(BoardLibrary):
             )
         }
         self.faults = BoardFaults()
+        self._owners: dict[str, SimulatedBoard] = {}
         for board, name in self._sources:
             if board not in self._infos or name not in self._infos[board].inputs:
                 raise ConfigError(
@@ -115,4 +116,4 @@ class SimulatedLibrary(BoardLibrary):
                 seed=self._seed,
             )
 
-        return SimulatedBoard(info, self._clock, self.faults, make_signal)
+        return SimulatedBoard(info, self._clock, self.faults, make_signal, owners=self._owners)
