@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from cosmic.app.run_window import WindowOptions
 
 NOT_BUILT: Final = {
-    "daqco": "data acquisition in a window of its own",
     "vico": "vision in a window of its own",
     "serve": "a station without a window",
     "export": "export of recordings",
@@ -156,6 +155,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     commands.add_parser("mico", help="the window of MiCo alone", parents=[window])
+    commands.add_parser("daqco", help="the window of DAQCo alone", parents=[window])
     check = commands.add_parser("check", help="check a platform file and the twin it names")
     check.add_argument("platform", type=Path, metavar="PLATFORM.toml")
     init = commands.add_parser("init", help="copy the shipped configuration out, to change it")

@@ -12,6 +12,7 @@ from cosmic.app.hint_bar import HintBar, first_steps
 from cosmic.app.platform import Platform
 from cosmic.app.rig import Rig
 from cosmic.app.scene_panel import ScenePanel
+from cosmic.daqco.gui.main_widget import UDaqMainWidget
 from cosmic.frame.failure import Failure
 from cosmic.frame.gui.console_panel import ConsolePanel
 from cosmic.frame.gui.log_panel import LogPanel
@@ -26,6 +27,7 @@ from cosmic.mico.gui.mico_widget import MicoWidget
 logger = logging.getLogger(__name__)
 
 MICO: Final = "MiCo"
+DAQCO: Final = "DAQCo"
 CONSOLE: Final = "Console"
 SCENE: Final = "Scene"
 
@@ -83,6 +85,7 @@ class OperatorWindow(CosmicServerGui):
         self._forget_policy = platform.policy.subscribe(self._bridge.tell_failure)
         self._stop_filter = StopKeyFilter(_application(), stop_key, self)
         self._add_mico(settings)
+        self._add_daqco()
         self._add_log(ring, console=console)
         self._connect_all()
         self._show_platform()
@@ -109,6 +112,13 @@ class OperatorWindow(CosmicServerGui):
         self.add_panel(SCENE, self._scene, Qt.DockWidgetArea.RightDockWidgetArea, scroll=False)
         self.resizeDocks([self.dock(MICO), self.dock(SCENE)], _SHARES, Qt.Orientation.Horizontal)
         self._collision_bar = CollisionBar(self.top_bar, gui, self)
+
+    def _add_daqco(self) -> None:
+        application = self._platform.daqco
+        gui = application.get_gui() if application is not None else None
+        if isinstance(gui, UDaqMainWidget):
+            self.add_panel(DAQCO, gui, Qt.DockWidgetArea.RightDockWidgetArea, scroll=False)
+            gui.close_requested.connect(self.dock(DAQCO).close)
 
     def _add_log(self, ring: RingBufferHandler, *, console: bool) -> None:
         below = Qt.DockWidgetArea.BottomDockWidgetArea
@@ -180,6 +190,8 @@ class OperatorWindow(CosmicServerGui):
         self.setFocus()  # else the first button has it, and Space would press that
         if self._platform.mico is not None:
             self._platform.mico.initialize_later()
+        if self._platform.daqco is not None:
+            self._platform.daqco.initialize_later()
 
     def stop(self, reason: str) -> None:
         """Stop everything and keep it stopped."""

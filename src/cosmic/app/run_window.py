@@ -17,6 +17,7 @@ from PySide6.QtWidgets import QApplication
 from cosmic.app.check import key_mistakes
 from cosmic.app.operator_window import OperatorWindow
 from cosmic.app.platform import KNOWN_APPLICATIONS, Platform, build_platform
+from cosmic.daqco.gui.main_widget import make_daqco_gui
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.gui.palette import ThemeName
 from cosmic.frame.hooks import install_hooks
@@ -129,6 +130,7 @@ def _build(options: WindowOptions) -> Platform:
         rate=options.rate,
         cold=options.cold,
         mico_gui=make_mico_gui,
+        daqco_gui=make_daqco_gui,
     )
     mistakes = key_mistakes(platform.file, platform.path)
     if mistakes:

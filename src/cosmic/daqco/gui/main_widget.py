@@ -16,6 +16,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from cosmic.daqco.api.application import DaqcoApplication
+from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.gui.configure_dialog import UDaqConfigureDialog
 from cosmic.daqco.gui.export_bar import ExportBar
 from cosmic.daqco.gui.file_widget import UDaqFileWidget
@@ -23,6 +25,7 @@ from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.plotter import UDaqPlotter
 from cosmic.daqco.gui.ports import DaqPort
 from cosmic.daqco.gui.relay import PortRelay
+from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.elided_label import ElidedLabel
@@ -197,3 +200,10 @@ class UDaqMainWidget(QWidget):
             self.export_bar.follow(self._port.export(source, target))
         except CosmicError as exc:
             self.export_bar.say(f"◆ {exc}")
+
+
+def make_daqco_gui(application: CosmicApplicationBase) -> UDaqMainWidget:
+    """Return the GUI component of a `DaqcoApplication`; its `gui_factory`."""
+    if not isinstance(application, DaqcoApplication):
+        raise TypeError(f"{application!r} is no DaqcoApplication")
+    return UDaqMainWidget(Daqco(application))
