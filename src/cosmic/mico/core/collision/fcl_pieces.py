@@ -12,7 +12,6 @@ from typing import Final
 
 import fcl
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from cosmic.mico.core.collision.model import Floats, Shape
 
@@ -98,6 +97,9 @@ class ConvexPiece:
         """Return the convex hull of the piece shifted by each of `shifts_um`, shape (n, 3)."""
         world = self._vertices @ self._rotation.T + self._place_um
         points = (world[np.newaxis, :, :] + shifts_um[:, np.newaxis, :]).reshape(-1, 3)
+        # Imported here: it is seldom needed, and half of the time that the process takes to start.
+        from scipy.spatial import ConvexHull
+
         hull = ConvexHull(points)
         used, faces = np.unique(hull.simplices, return_inverse=True)
         corners = np.array(faces.reshape(-1, 3), dtype=np.int32)

@@ -21,6 +21,8 @@ from cosmic.mico.core.collision.sweep import Sweep
 
 Handler = Callable[[Sweep, Any], object]
 
+IDLE_S: Final = 0.3
+"""So long without a first question, and what is seldom needed is loaded."""
 ORPHAN_S: Final = 5.0
 """How long after the question's time limit it ends itself, should nobody be left to end it."""
 
@@ -59,6 +61,8 @@ def load_handlers(arguments: Sequence[str]) -> dict[str, Handler]:
 
 def serve(pipe: End, sweep: Sweep, handlers: Mapping[str, Handler]) -> None:
     """Answer until the other end closes."""
+    if not pipe.poll(IDLE_S):
+        import_module("scipy.spatial")  # seldom needed, slow to load: now nobody waits for it
     while True:
         number, kind, payload, limit_s = pickle.loads(pipe.recv_bytes())
         _end_after(limit_s + ORPHAN_S)
