@@ -8,7 +8,7 @@ from typing_extensions import override
 
 from contract.fake_nidaqmx import FakeNidaqmx
 from cosmic.daqco.hw.interface import Board, BoardChunk, BoardLibrary, InputMode, InputSettings
-from cosmic.daqco.hw.nidaqmx_board import NidaqmxLibrary
+from cosmic.daqco.hw.nidaqmx_library import NidaqmxLibrary
 from cosmic.daqco.hw.sim_library import SimulatedLibrary
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import DeviceError

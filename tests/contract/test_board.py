@@ -271,6 +271,15 @@ def test_what_is_beyond_the_board_is_refused_and_it_stays_usable(
     received(board, 1)
 
 
+def test_what_was_configured_before_a_refusal_is_not_started_in_its_place(rig: BoardRig) -> None:
+    board = rig.running()
+    board.stop()
+    with pytest.raises(LimitError):
+        board.configure(some_inputs(32), 9000.0, 10)
+    with pytest.raises(DeviceError, match="configured"):
+        board.start()
+
+
 @pytest.mark.parametrize(("inputs", "fault"), IMPOSSIBLE)
 def test_what_cannot_be_wired_is_refused(
     rig: BoardRig, inputs: Sequence[InputSettings], fault: DeviceFault

@@ -2,7 +2,7 @@
 
 import inspect
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import nidaqmx
 import nidaqmx.stream_readers
@@ -15,9 +15,9 @@ from nidaqmx.task.collections import AIChannelCollection
 from contract import fake_nidaqmx
 from contract.board_rig import NidaqmxRig, failure_of, one_input, received, some_inputs
 from cosmic.daqco.hw import nidaqmx_board
-from cosmic.daqco.hw.interface import Board, BoardChunk, InputMode
-from cosmic.daqco.hw.nidaqmx_board import NidaqmxLibrary
+from cosmic.daqco.hw.interface import BoardChunk, InputMode
 from cosmic.daqco.hw.nidaqmx_errors import STATUS, board_error, status_error
+from cosmic.daqco.hw.nidaqmx_library import NidaqmxLibrary
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import (
     CosmicError,
@@ -196,6 +196,23 @@ def test_a_board_takes_its_sample_clock_from_another_when_told(rig: NidaqmxRig) 
     ]
     for board in boards:
         board.close()
+
+
+def test_a_board_on_another_s_clock_dates_its_samples_from_when_that_clock_began(
+    rig: NidaqmxRig,
+) -> None:
+    library = NidaqmxLibrary(
+        rig.clock, api=rig.driver, clock_sources={"Dev1": "/Dev2/ai/SampleClock"}
+    )
+    board = library.open("Dev1")
+    rate_hz = board.configure(some_inputs(1), 1000.0, 10)
+    board.start()
+    rig.clock.advance(5.0)
+    rig.go_on(10)
+    rig.go_on(10)
+    times_s = [each.time_s for each in received(board, 2)]
+    assert times_s == pytest.approx([5.0, 5.0 + 10 / rate_hz])
+    board.close()
 
 
 @pytest.mark.parametrize(
@@ -500,20 +517,17 @@ def test_the_codes_are_the_driver_s() -> None:
     assert set(STATUS) <= known
 
 
-@pytest.mark.parametrize("call", ["configure", "start"])
-def test_a_rate_that_only_the_driver_knows_to_be_too_high_is_a_limit(
-    rig: NidaqmxRig, call: str
-) -> None:
+def test_a_rate_that_only_the_driver_knows_to_be_too_high_is_a_limit(rig: NidaqmxRig) -> None:
     board = rig.open()
-    device = rig.driver.device("Dev1")
-    attempts: dict[str, Callable[[Board], object]] = {
-        "configure": lambda board: board.configure(some_inputs(4), 10_000.0, 10),
-        "start": lambda board: board.start(),
-    }
-    if call == "start":
-        attempts["configure"](board)
-        rig.driver.fail_in["start"] = -200332
-    else:
-        device.ai_max_multi_chan_rate = 30_000.0
+    rig.driver.device("Dev1").ai_max_multi_chan_rate = 30_000.0
     with pytest.raises(LimitError, match="-200332"):
-        attempts[call](board)
+        board.configure(some_inputs(4), 10_000.0, 10)
+
+
+def test_a_start_that_the_driver_refuses_is_an_error_of_the_board(rig: NidaqmxRig) -> None:
+    board = rig.open()
+    board.configure(some_inputs(4), 10_000.0, 10)
+    rig.driver.fail_in["start"] = -200332
+    with pytest.raises(DeviceError, match="-200332") as caught:
+        board.start()
+    assert caught.value.fault is DeviceFault.PARAMETER

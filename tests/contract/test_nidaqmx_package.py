@@ -9,7 +9,7 @@ from nidaqmx import _lib
 from contract.board_rig import failure_of, one_input, received
 from contract.fake_nicai import FakeLibrary
 from cosmic.daqco.hw.interface import InputMode
-from cosmic.daqco.hw.nidaqmx_board import NidaqmxLibrary
+from cosmic.daqco.hw.nidaqmx_library import NidaqmxLibrary
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import DeviceError, DeviceFault
 

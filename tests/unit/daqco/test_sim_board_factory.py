@@ -9,7 +9,7 @@ import pytest
 
 from cosmic.daqco.hw.factory import make_library
 from cosmic.daqco.hw.interface import InputMode, InputSettings
-from cosmic.daqco.hw.nidaqmx_board import NidaqmxLibrary
+from cosmic.daqco.hw.nidaqmx_library import NidaqmxLibrary
 from cosmic.frame.clock import ManualClock
 
 

@@ -37,7 +37,7 @@ def make_library(
     """
     # Imported here, so that each platform loads its own backend only.
     if backend == "nidaqmx":
-        from cosmic.daqco.hw.nidaqmx_board import NidaqmxLibrary
+        from cosmic.daqco.hw.nidaqmx_library import NidaqmxLibrary
 
         return NidaqmxLibrary(clock or WALL, clock_sources=clock_sources)
     from cosmic.daqco.hw.sim_library import SimulatedLibrary

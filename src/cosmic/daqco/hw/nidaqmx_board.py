@@ -1,4 +1,4 @@
-"""Boards of National Instruments through NI-DAQmx."""
+"""A board of National Instruments through NI-DAQmx."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -6,25 +6,14 @@ from queue import Empty
 from threading import RLock
 from typing import Any
 
-import nidaqmx
-import nidaqmx.stream_readers
-import nidaqmx.system
 from nidaqmx.constants import TerminalConfiguration
-from nidaqmx.errors import DaqNotFoundError, Error
 from typing_extensions import override
 
 from cosmic.daqco.hw.board_checks import check_chunk, check_inputs, check_rate
-from cosmic.daqco.hw.interface import (
-    Board,
-    BoardChunk,
-    BoardInfo,
-    BoardLibrary,
-    InputSettings,
-)
-from cosmic.daqco.hw.nidaqmx_errors import board_error
+from cosmic.daqco.hw.interface import Board, BoardChunk, BoardInfo, InputSettings
 from cosmic.daqco.hw.nidaqmx_task import TERMINALS, InputTask, Run, TaskSettings
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errors import CosmicError, DeviceError, DeviceFault, NotConnectedError
+from cosmic.frame.errors import CosmicError, DeviceError, DeviceFault, LimitError
 
 logger = logging.getLogger(__name__)
 
@@ -72,6 +61,7 @@ class NidaqmxBoard(Board):
     ) -> float:
         with self._lock:
             self._check_idle("configure")
+            self._settings = None
             self._check_wiring(inputs)
             check_rate(self._info, len(inputs), rate_hz)
             check_chunk(self._info, chunk_samples)
@@ -90,17 +80,11 @@ class NidaqmxBoard(Board):
             self._check_idle("start")
             if self._settings is None:
                 raise self._error("start: it was not configured", DeviceFault.STATE)
-            if self._task is None:
-                # The last one died with an error; a board that was lost may be back.
-                self._task = InputTask(self._api, self._settings)
-            run = Run()
-            before_s = self._clock.now_s()
+            run = Run(self._clock.now_s, clocked=bool(self._clock_source))
             try:
-                self._task.start(run)
-            except CosmicError:
-                self._drop_task()
-                raise
-            run.start_s = 0.5 * (before_s + self._clock.now_s())
+                self._begin(run)
+            except LimitError as exc:
+                raise self._error(f"start: {exc}", DeviceFault.PARAMETER) from exc
             self._heard_s = WALL.now_s()
             self._run = run
 
@@ -140,6 +124,20 @@ class NidaqmxBoard(Board):
             self.stop()
             self._drop_task()
             self._closed = True
+
+    def _begin(self, run: Run) -> None:
+        assert self._settings is not None
+        if self._task is None:
+            # The last one died with an error; a board that was lost may be back.
+            self._task = InputTask(self._api, self._settings)
+        run.start_s = self._clock.now_s()
+        try:
+            self._task.start(run)
+        except CosmicError:
+            self._drop_task()
+            raise
+        if not run.clocked:
+            run.start_s = 0.5 * (run.start_s + self._clock.now_s())
 
     def _check_heard(self, run: Run, task: InputTask) -> None:
         """Ask the driver whether it still acquires, when it has been silent for long."""
@@ -191,101 +189,3 @@ class NidaqmxBoard(Board):
 
     def _error(self, text: str, fault: DeviceFault) -> DeviceError:
         return DeviceError(f"{self._info.name}: {text}", fault=fault)
-
-
-class NidaqmxLibrary(BoardLibrary):
-    """The NI-DAQmx driver; any thread.
-
-    Parameters
-    ----------
-    clock : Clock
-        Stamps the samples: the platform's.
-    clock_sources : mapping of str to str, or None
-        Terminal of the sample clock by board; the others use their own.
-    api : module
-        nidaqmx, or what tests put in its place.
-    """
-
-    def __init__(
-        self,
-        clock: Clock = WALL,
-        *,
-        clock_sources: Mapping[str, str] | None = None,
-        api: Any = nidaqmx,
-    ) -> None:
-        self._clock = clock
-        self._clock_sources = dict(clock_sources or {})
-        self._api = api
-
-    @property
-    @override
-    def name(self) -> str:
-        try:
-            version = self._api.system.System.local().driver_version
-        except DaqNotFoundError:
-            return "NI-DAQmx (not installed)"
-        except Error:
-            return "NI-DAQmx"
-        return f"NI-DAQmx {version.major_version}.{version.minor_version}"
-
-    @override
-    def list_boards(self) -> tuple[BoardInfo, ...]:
-        return tuple(info for info, _ in self._found())
-
-    @override
-    def open(self, name: str) -> NidaqmxBoard:
-        found = {info.name: (info, device) for info, device in self._found()}
-        if name not in found:
-            raise NotConnectedError(
-                f"NI-DAQmx knows no board {name!r} with analogue inputs; it lists: "
-                f"{', '.join(found) or 'none'}. Names are given in NI MAX",
-                fault=DeviceFault.COMMUNICATION,
-            )
-        info, device = found[name]
-        try:
-            wiring = {_short(each.name): each.ai_term_cfgs for each in device.ai_physical_chans}
-        except Error as exc:
-            raise board_error(exc, "open", name) from exc
-        return NidaqmxBoard(
-            self._api, info, wiring, self._clock, clock_source=self._clock_sources.get(name, "")
-        )
-
-    def _found(self) -> list[tuple[BoardInfo, Any]]:
-        try:
-            devices = list(self._api.system.System.local().devices)
-        except Error as exc:
-            raise board_error(exc, "list the boards", "NI-DAQmx") from exc
-        found = []
-        for device in devices:
-            try:
-                info = _info(device)
-            except Error as exc:
-                # A chassis, or a board that is listed but not plugged in.
-                logger.info("NI-DAQmx: %s is left out: %s", device.name, exc)
-                continue
-            if info is not None:
-                found.append((info, device))
-        return found
-
-
-def _info(device: Any) -> BoardInfo | None:
-    """Return what a device is; None when it has no analogue inputs."""
-    inputs = tuple(_short(each.name) for each in device.ai_physical_chans)
-    if not inputs:
-        return None
-    flat = [float(end) for end in device.ai_voltage_rngs]
-    ranges = sorted(zip(flat[::2], flat[1::2], strict=True), key=lambda pair: pair[0] - pair[1])
-    return BoardInfo(
-        name=str(device.name),
-        product=str(device.product_type),
-        simulated=bool(device.is_simulated),
-        serial=int(device.serial_num),
-        inputs=inputs,
-        max_single_rate_hz=float(device.ai_max_single_chan_rate),
-        max_multi_rate_hz=float(device.ai_max_multi_chan_rate),
-        ranges_v=tuple(ranges),
-    )
-
-
-def _short(physical: str) -> str:
-    return physical.rpartition("/")[2]

@@ -2,6 +2,7 @@
 
 import logging
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from queue import SimpleQueue
 from typing import Any, Final
@@ -67,10 +68,16 @@ class Run:
     ----------
     items : SimpleQueue
         Number of the first sample and volts; or what went wrong; or None: it was stopped.
+    start_s : float
+        Platform time of sample 0.
+    clocked : bool
+        By another board, which decides when sample 0 is taken.
     over : bool
         Nothing more is put in.
     """
 
+    now_s: Callable[[], float]
+    clocked: bool = False
     items: SimpleQueue[Item] = field(default_factory=SimpleQueue)
     start_s: float = 0.0
     next_sample: int = 0
@@ -210,7 +217,9 @@ class InputTask:
     def _fetch(self, run: Run) -> None:
         """Read all whole chunks: several events may have become one, or one come late."""
         stream, count = self._task.in_stream, self._settings.chunk_samples
-        while not run.over and stream.avail_samp_per_chan >= count:
+        while not run.over and (there := stream.avail_samp_per_chan) >= count:
+            if run.clocked and not run.next_sample:
+                run.start_s = run.now_s() - there / self.rate_hz
             if run.items.qsize() >= self._most:
                 raise self._too_slow(run)
             volts = self._read()

@@ -94,6 +94,7 @@ class SimulatedBoard(Board):
         self._check_there("configure")
         if self._run is not None:
             raise self._error("configure: it is acquiring; stop it first", DeviceFault.STATE)
+        self._setup = None
         check_inputs(self._info, inputs)
         check_rate(self._info, len(inputs), rate_hz)
         check_chunk(self._info, chunk_samples)
