@@ -1,0 +1,156 @@
+"""The whole simulated platform: the probe pushes a fibre, the force is seen, kept and guarded."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cosmic
+from cosmic.daqco.core.scale import Scale
+from unit.mico.rigs import wait_until
+
+
+@pytest.fixture(scope="module")
+def rig() -> Iterator[cosmic.Rig]:
+    with cosmic.connect(rate=4.0) as rig:
+        rig.mico.move({"left.z": -800.0, "left.x": 3600.0})
+        rig.mico["probe.y"].move_to(-4900.0)
+        yield rig
+
+
+def force(rig: cosmic.Rig) -> float:
+    return rig.daqco.latest()["force"]
+
+
+def settled(rig: cosmic.Rig, target_um: float) -> float:
+    rig.mico["probe.y"].move_to(target_um)
+    seen = rig.daqco.counters.samples
+    wait_until(lambda: rig.daqco.counters.samples > seen + 200)
+    return force(rig)
+
+
+def test_the_force_rises_while_the_probe_goes_into_the_fibre_and_falls_back(
+    rig: cosmic.Rig,
+) -> None:
+    before = settled(rig, -4940.0)
+    pushed = settled(rig, -5020.0)
+    further = settled(rig, -5040.0)
+    back = settled(rig, -4900.0)
+    assert abs(before) < 10.0
+    assert 40.0 < pushed < further < 170.0
+    assert abs(back) < 10.0
+
+
+def test_a_recording_gives_force_over_position_and_a_stiffness(
+    rig: cosmic.Rig, tmp_path: Path
+) -> None:
+    file = tmp_path / "push.h5"
+    with rig.daqco.record(file):
+        for target_um in range(-4940, -5051, -10):
+            rig.mico["probe.y"].move_to(float(target_um))
+        rig.daqco.mark("pushed")
+        settled(rig, -4940.0)
+    with cosmic.open_recording(file) as recording:
+        assert recording.complete
+        assert recording.channels == rig.daqco.channels
+        assert recording.units["force"] == "uN"
+        assert not recording.overruns
+        assert [event.kind for event in recording.events] == ["mark"]
+        times = np.diff(recording.time_s)
+        assert times == pytest.approx(np.full(times.shape, 1.0 / recording.rate_hz), rel=1e-3)
+        volts, values = recording.volts("force"), recording.values("force")
+        assert values == pytest.approx(-250.0 + 100.0 * volts)
+        slope = recording.slope("force", "probe.y", high=-5000.0)
+        assert 1.0 < -slope.value < 4.0
+        assert slope.unit == "uN/um"
+        assert set(recording.axes) == set(rig.mico.names)
+
+
+def test_a_limit_that_is_crossed_stops_the_axes_and_stands_in_the_file(
+    rig: cosmic.Rig, tmp_path: Path
+) -> None:
+    probe, file = rig.mico["probe.y"], tmp_path / "limit.h5"
+    settled(rig, -4940.0)
+    rig.daqco.arm_limit("force", high=100.0, hysteresis=10.0)
+    probe.set_closed_loop_frequency(40)
+    try:
+        with rig.daqco.record(file):
+            with pytest.raises(cosmic.StoppedError, match="force reached"):
+                probe.move_to(-5300.0)
+            assert rig.stopped is not None
+            assert "force" in rig.stopped
+    finally:
+        rig.reset_stop()
+        probe.set_closed_loop_frequency(5000)
+    (limit,) = [each for each in rig.daqco.limits if each.settings.channel == "force"]
+    assert limit.crossed
+    assert limit.value is not None
+    assert limit.value >= 100.0
+    assert limit.reaction_ms is not None
+    assert 0.0 < limit.reaction_ms < 1000.0
+    with pytest.raises(cosmic.NotAvailable, match="still beyond"):
+        rig.daqco.reset_limit("force")
+    settled(rig, -4900.0)
+    rig.daqco.reset_limit("force")
+    rig.daqco.remove_limit("force")
+    with cosmic.open_recording(file) as recording:
+        (event,) = [each for each in recording.events if each.kind == "limit"]
+        assert event.channel == "force"
+        assert event.value == pytest.approx(limit.value)
+        assert event.sample > 0
+
+
+def test_scales_change_while_recording_but_not_rate_or_channels(
+    rig: cosmic.Rig, tmp_path: Path
+) -> None:
+    file = tmp_path / "scales.h5"
+    before = rig.daqco.settings
+    with rig.daqco.record(file):
+        with pytest.raises(cosmic.NotAvailable, match="while recording"):
+            rig.daqco.configure(rate_hz=500.0)
+        seen = rig.daqco.counters.samples
+        wait_until(lambda: rig.daqco.counters.samples > seen + 300)
+        rig.daqco.set_scale("aux", Scale("doubled", "mV", (0.0, 2000.0)))
+        seen = rig.daqco.counters.samples
+        wait_until(lambda: rig.daqco.counters.samples > seen + 300)
+    rig.daqco.apply(before)
+    with cosmic.open_recording(file) as recording:
+        assert len(recording.scales["aux"]) == 2
+        volts, values = recording.volts("aux"), recording.values("aux")
+        assert values[:50] == pytest.approx(volts[:50])
+        assert values[-50:] == pytest.approx(2000.0 * volts[-50:])
+
+
+def test_rates_and_recordings_that_cannot_be_are_refused(rig: cosmic.Rig, tmp_path: Path) -> None:
+    daqco = rig.daqco
+    for rate_hz in (9.0, 15_001.0, math.nan):
+        with pytest.raises(cosmic.CosmicError):
+            daqco.configure(rate_hz=rate_hz)
+    assert daqco.running
+    assert daqco.rate_hz == pytest.approx(1000.0)
+    with pytest.raises(cosmic.CosmicError, match="does not exist"):
+        daqco.start_recording(tmp_path / "nowhere" / "x.h5")
+    (tmp_path / "there.h5").write_text("mine", encoding="utf-8")
+    with pytest.raises(cosmic.CosmicError, match=r"there\.h5"):
+        daqco.start_recording(tmp_path / "there.h5")
+    assert (tmp_path / "there.h5").read_text(encoding="utf-8") == "mine"
+    with pytest.raises(cosmic.ConfigError, match="no active channel"):
+        daqco.arm_limit("nothing", high=1.0)
+
+
+def test_a_limit_needs_a_rate_that_is_fast_enough() -> None:
+    with cosmic.connect(rate=2.0, applications=("daqco",)) as rig:
+        rig.daqco.configure(rate_hz=100.0)
+        with pytest.raises(cosmic.NotAvailable, match="200 Hz"):
+            rig.daqco.arm_limit("force", high=100.0)
+        with pytest.raises(cosmic.NotAvailable):
+            _ = rig.mico
+        rig.daqco.configure(rate_hz=1000.0)
+        rig.daqco.arm_limit("force", high=100.0)
+        rig.daqco.stop()
+        assert not rig.daqco.running
+        rig.daqco.start()
+        wait_until(lambda: bool(rig.daqco.application.buffer.get_latest_data()))
+        assert "force" in rig.daqco.latest()
