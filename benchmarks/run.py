@@ -1,7 +1,8 @@
 """Run all benchmarks and print one table in Markdown.
 
 `python -m benchmarks.run --repeat 3` starts each benchmark three times, in turn, each time in a
-process of its own, and prints the medians with the range. The long soak is a command of its own.
+process of its own, and prints the medians with the range. The long ones, `soak` and
+`collision_oracles`, are commands of their own.
 """
 
 import argparse
@@ -17,8 +18,20 @@ import PySide6
 
 from benchmarks.figures import Figure, from_json, medians, table
 
-NAMES = ("commander", "stop", "completion", "load", "start", "simulator")
-ALL = (*NAMES, "soak")
+NAMES = (
+    "commander",
+    "stop",
+    "completion",
+    "load",
+    "start",
+    "simulator",
+    "collision_gate",
+    "gate_process",
+    "planning",
+    "scene_view",
+    "twin_force",
+)
+ALL = (*NAMES, "collision_oracles", "soak")
 ROOT = Path(__file__).resolve().parents[1]
 
 
