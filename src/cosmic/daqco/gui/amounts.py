@@ -1,5 +1,11 @@
 """Amounts of data and of time as the operator reads them."""
 
+from typing import Final
+
+from cosmic.daqco.gui.ports import Recording
+
+LITTLE_ROOM_S: Final = 600.0
+
 
 def size_text(size_bytes: float) -> str:
     """Return an amount of data, such as "12.3 MB"."""
@@ -22,3 +28,17 @@ def duration_text(duration_s: float) -> str:
     if seconds >= 60:
         return f"{seconds // 60} min {seconds % 60:02d} s"
     return f"{duration_s:.1f} s"
+
+
+def recording_text(recording: Recording, backlog: int) -> str:
+    """Return how long and how large a recording is; empty when there has been none."""
+    amount = f"{duration_text(recording.duration_s)}, {size_text(recording.size_bytes)}"
+    if recording.active:
+        return f"recording: {amount}" + (f", {backlog} chunks waiting" if backlog > 1 else "")
+    return f"{recording.path.name}: {amount}" if recording.path is not None else ""
+
+
+def room_text(free_bytes: float, left_s: float) -> str:
+    """Return how much room there is, and for how long."""
+    text = f"{size_text(free_bytes)} free on the disk: {duration_text(left_s)} at this rate"
+    return f"◆ little room: {text}" if left_s < LITTLE_ROOM_S else text

@@ -4,7 +4,6 @@ from typing import Final
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
-    QDialog,
     QDialogButtonBox,
     QGridLayout,
     QHBoxLayout,
@@ -19,6 +18,7 @@ from cosmic.daqco.core.scale import VOLTS
 from cosmic.daqco.core.settings import HIGHEST_RATE_HZ, LOWEST_RATE_HZ
 from cosmic.daqco.gui.channel_form import ChannelForm
 from cosmic.daqco.gui.channel_tree import ChannelTree
+from cosmic.daqco.gui.dialog import FieldDialog
 from cosmic.daqco.gui.draft import Draft
 from cosmic.daqco.gui.ports import DaqPort
 from cosmic.daqco.gui.relay import PortRelay
@@ -34,7 +34,7 @@ _RECORDING: Final = "A recording is running: rate, channels and their ranges sta
 Button = QDialogButtonBox.StandardButton
 
 
-class UDaqConfigureDialog(QDialog):
+class UDaqConfigureDialog(FieldDialog):
     """Edits a draft; Apply and OK put it in force, Cancel forgets what was not applied."""
 
     def __init__(self, port: DaqPort, parent: QWidget | None = None) -> None:
@@ -109,10 +109,6 @@ class UDaqConfigureDialog(QDialog):
         self.button(Button.Apply).clicked.connect(self.apply)
         self.buttons.accepted.connect(self._on_ok)
         self.buttons.rejected.connect(self.reject)
-        # Enter in a field judges that field; it does not close the dialog.
-        for each in self.findChildren(QPushButton):
-            each.setAutoDefault(False)
-        self.button(Button.Ok).setDefault(False)
 
     def button(self, which: Button) -> QPushButton:
         """Return Apply, OK or Cancel."""

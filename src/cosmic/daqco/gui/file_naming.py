@@ -1,5 +1,6 @@
 """How a recording is called: base name, and a time stamp or a number behind it."""
 
+import os
 import re
 from datetime import datetime
 from enum import StrEnum
@@ -37,6 +38,19 @@ def name_problem(base: str) -> str:
     if len(base.encode("utf-8")) > LONGEST:
         return f"the name is longer than {LONGEST} bytes"
     return ""
+
+
+def directory_problem(text: str) -> str:
+    """Return why recordings cannot go into the directory typed; empty when they can."""
+    if not text.strip():
+        return "type a directory"
+    folder = Path(text).expanduser()
+    try:
+        if not folder.is_dir():
+            return f"{folder}: there is no such directory"
+    except (OSError, ValueError) as exc:
+        return f"{folder}: {exc}"
+    return "" if os.access(folder, os.W_OK) else f"{folder} cannot be written to"
 
 
 def name_pattern(base: str, append: Append) -> str:

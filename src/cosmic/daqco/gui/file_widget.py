@@ -1,12 +1,12 @@
 """`UDaqFileWidget`: records what is acquired (thesis, Table F.2)."""
 
-import os
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import QTimer
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QFileDialog,
@@ -14,12 +14,18 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QMessageBox,
-    QRadioButton,
     QWidget,
 )
 
-from cosmic.daqco.gui.amounts import duration_text, size_text
-from cosmic.daqco.gui.file_naming import Append, file_name, name_pattern, name_problem
+from cosmic.daqco.gui.amounts import recording_text, room_text
+from cosmic.daqco.gui.append_row import append_row
+from cosmic.daqco.gui.file_naming import (
+    Append,
+    directory_problem,
+    file_name,
+    name_pattern,
+    name_problem,
+)
 from cosmic.daqco.gui.overwrite_question import overwrite_question
 from cosmic.daqco.gui.ports import DaqPort
 from cosmic.daqco.gui.relay import PortRelay
@@ -29,16 +35,11 @@ from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, number_font
+from cosmic.frame.overrides import override
 
 LOOK_MS: Final = 500
 BYTES_A_SAMPLE: Final = 8
-LITTLE_ROOM_S: Final = 600.0
-
-_OPTIONS: Final = {
-    Append.TIME: ("Append with time", "Append date, hour, minute and second of the start"),
-    Append.NUMBER: ("Append with number", "Append the next number that is free"),
-    Append.NOTHING: ("Don't append", "Keep the name as it is"),
-}
+WIDE_PX: Final = 110 * STEP_PX
 
 
 class UDaqFileWidget(QWidget):
@@ -60,7 +61,7 @@ class UDaqFileWidget(QWidget):
         super().__init__(parent)
         self._port, self._now = port, now
         self._asking: QMessageBox | None = None
-        self._error = ""
+        self._error, self._columns = "", 0
         self.base = tipped(QLineEdit("recording"), "Base of the file name")
         self.full_name = tipped(QLineEdit(), "")
         self.full_name.setReadOnly(True)
@@ -68,7 +69,9 @@ class UDaqFileWidget(QWidget):
         self.browse = push_button("Browse…", "Choose the directory")
         self.start = named(push_button("Start recording", ""), "startRecording")
         self.stop = named(push_button("Stop recording", ""), "stopRecording")
-        self.badge, self.told, self.room = StateBadge(State.UNKNOWN), ElidedLabel(), ElidedLabel()
+        self.badge, self.told = StateBadge(State.UNKNOWN), ElidedLabel()
+        self.room = ElidedLabel()
+        self.room.setProperty("role", "dim")
         self.options = QButtonGroup(self)
         self._build()
         self._connect()
@@ -80,14 +83,7 @@ class UDaqFileWidget(QWidget):
         self.refresh()
 
     def _build(self) -> None:
-        options, in_row = tight_row(2 * STEP_PX)
-        for append, (text, tip) in _OPTIONS.items():
-            button = tipped(QRadioButton(text), tip)
-            button.setProperty("append", append.value)
-            button.setChecked(append is Append.TIME)
-            self.options.addButton(button)
-            in_row.addWidget(button)
-        in_row.addStretch(1)
+        options = append_row(self.options)
         where, beside = tight_row(STEP_PX)
         beside.addWidget(self.directory, 1)
         beside.addWidget(self.browse)
@@ -97,22 +93,39 @@ class UDaqFileWidget(QWidget):
         below.addWidget(self.badge)
         below.addWidget(self.told, 1)
         self.told.setFont(number_font())
-        self.room.setProperty("role", "dim")
-        grid = QGridLayout(self)
-        grid.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
-        grid.setHorizontalSpacing(STEP_PX)
-        grid.setVerticalSpacing(STEP_PX // 2)
-        rows = (
-            ("Base name", self.base),
-            ("Save options", options),
-            ("Full file name", self.full_name),
-            ("Directory", where),
+        self._cells = (
+            (QLabel("Base name"), self.base),
+            (QLabel("Full file name"), self.full_name),
+            (QLabel("Save options"), options),
+            (QLabel("Directory"), where),
         )
-        for number, (text, widget) in enumerate(rows):
-            grid.addWidget(QLabel(text), number, 0)
-            grid.addWidget(widget, number, 1)
-        grid.addWidget(buttons, len(rows), 0, 1, 2)
-        grid.addWidget(self.room, len(rows) + 1, 0, 1, 2)
+        self._buttons = buttons
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX)
+        self._grid.setHorizontalSpacing(STEP_PX)
+        self._grid.setVerticalSpacing(STEP_PX // 2)
+        self._arrange()
+
+    def _arrange(self) -> None:
+        """Put the fields into two columns where there is room, so that the picture keeps it."""
+        columns = 2 if self.width() >= WIDE_PX else 1
+        if columns == self._columns:
+            return
+        self._columns = columns
+        for number, (label, widget) in enumerate(self._cells):
+            row, column = divmod(number, columns)
+            self._grid.addWidget(label, row, 2 * column)
+            self._grid.addWidget(widget, row, 2 * column + 1)
+        self._grid.setColumnStretch(3, columns - 1)
+        rows = len(self._cells) // columns
+        self._grid.addWidget(self._buttons, rows, 0, 1, 2)
+        room = (rows, 2, 1, 2) if columns == 2 else (rows + 1, 0, 1, 2)
+        self._grid.addWidget(self.room, *room)
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._arrange()
 
     def _connect(self) -> None:
         self.base.textEdited.connect(self._on_edited)
@@ -135,24 +148,13 @@ class UDaqFileWidget(QWidget):
         """The directory as it stands in its field."""
         return Path(self.directory.text()).expanduser()
 
-    def _directory_problem(self) -> str:
-        if not self.directory.text().strip():
-            return "type a directory"
-        folder = self.folder
-        try:
-            if not folder.is_dir():
-                return f"{folder}: there is no such directory"
-        except (OSError, ValueError) as exc:
-            return f"{folder}: {exc}"
-        return "" if os.access(folder, os.W_OK) else f"{folder} cannot be written to"
-
     # Looking
 
     def refresh(self) -> None:
         """Show what is being recorded, what may be done now and how much room there is."""
         recording = self._port.recording
         wrong_name = "" if recording.active else name_problem(self.base.text())
-        wrong_folder = "" if recording.active else self._directory_problem()
+        wrong_folder = "" if recording.active else directory_problem(self.directory.text())
         _mark(self.base, wrong_name)
         _mark(self.directory, wrong_folder)
         self._show_name(wrong_name)
@@ -202,33 +204,20 @@ class UDaqFileWidget(QWidget):
         state = State.ERROR if error else State.BUSY if recording.active else State.OK
         self.badge.set_state(state, error)
         self.badge.setVisible(bool(error) or recording.active or recording.path is not None)
-        amount = f"{duration_text(recording.duration_s)}, {size_text(recording.size_bytes)}"
-        if error:
-            self.told.set_text(error)
-        elif recording.active:
-            backlog = self._port.counters.backlog
-            behind = f", {backlog} chunks waiting" if backlog > 1 else ""
-            self.told.set_text(f"recording: {amount}{behind}")
-        else:
-            path = recording.path
-            self.told.set_text(f"{path.name}: {amount}" if path is not None else "")
+        self.told.set_text(error or recording_text(recording, self._port.counters.backlog))
 
     def _show_room(self, wrong: str) -> None:
-        text, little = wrong, False
-        if not wrong:
-            try:
-                free = self._port.free_bytes(self.folder)
-            except CosmicError as exc:
-                text = str(exc)
-            else:
-                left_s = free / max(1.0, self._bytes_a_second())
-                little = left_s < LITTLE_ROOM_S
-                text = f"{size_text(free)} free on the disk: {duration_text(left_s)} at this rate"
-        self.room.set_text(f"◆ little room: {text}" if little else text)
-
-    def _bytes_a_second(self) -> float:
-        active = sum(each.active for each in self._port.settings.channel)
-        return active * self._port.rate_hz * BYTES_A_SAMPLE
+        if wrong:
+            self.room.set_text(wrong)
+            return
+        try:
+            free = self._port.free_bytes(self.folder)
+        except CosmicError as exc:
+            self.room.set_text(str(exc))
+        else:
+            active = sum(each.active for each in self._port.settings.channel)
+            bytes_a_second = max(1.0, active * self._port.rate_hz * BYTES_A_SAMPLE)
+            self.room.set_text(room_text(free, free / bytes_a_second))
 
     # Reactions
 

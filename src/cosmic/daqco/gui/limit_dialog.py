@@ -3,7 +3,6 @@
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
-    QDialog,
     QDialogButtonBox,
     QFormLayout,
     QLabel,
@@ -12,6 +11,7 @@ from PySide6.QtWidgets import (
 )
 
 from cosmic.daqco.core.settings import LimitSettings
+from cosmic.daqco.gui.dialog import FieldDialog
 from cosmic.daqco.gui.ports import DaqPort, LimitState
 from cosmic.daqco.gui.value_field import ValueField
 from cosmic.frame.errors import CosmicError
@@ -21,7 +21,7 @@ from cosmic.frame.gui.theme import STEP_PX
 Button = QDialogButtonBox.StandardButton
 
 
-class LimitDialog(QDialog):
+class LimitDialog(FieldDialog):
     """Low, high, hysteresis and armed, for one channel at a time; OK puts them in force."""
 
     def __init__(self, port: DaqPort, channel: str = "", parent: QWidget | None = None) -> None:

@@ -5,7 +5,6 @@ from typing import Final
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
-    QDialog,
     QDialogButtonBox,
     QGridLayout,
     QHBoxLayout,
@@ -18,6 +17,7 @@ from PySide6.QtWidgets import (
 
 from cosmic.daqco.core.scale import LARGEST_DEGREE, VOLTS
 from cosmic.daqco.core.settings import ScaleSettings
+from cosmic.daqco.gui.dialog import FieldDialog
 from cosmic.daqco.gui.polynomial import checked, coefficient_problem
 from cosmic.daqco.gui.scale_plot import ScalePlot
 from cosmic.daqco.gui.value_field import ValueField, show_refusal
@@ -29,7 +29,7 @@ _RAISED: Final = "⁰¹²³⁴⁵⁶⁷⁸⁹"
 Button = QDialogButtonBox.StandardButton
 
 
-class ScaleView(QDialog):
+class ScaleView(FieldDialog):
     """Shows the structure of one scale."""
 
     def __init__(self, scale: ScaleSettings, parent: QWidget | None = None) -> None:
@@ -44,7 +44,7 @@ class ScaleView(QDialog):
         column.addWidget(buttons)
 
 
-class ScaleEditor(QDialog):
+class ScaleEditor(FieldDialog):
     """Lists the named polynomials; adds, edits and removes them. OK hands them over.
 
     Parameters

@@ -20,27 +20,9 @@ class ScalePlot(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._scale: ScaleSettings | None = None
-        palette = current_palette()
         self.formula = ElidedLabel()
         self.formula.setFont(number_font())
-        self.plot = pg.PlotWidget(background=palette.field)
-        self.plot.setMinimumSize(36 * STEP_PX, 22 * STEP_PX)
-        self.plot.setMouseEnabled(x=False, y=False)
-        self.plot.setMenuEnabled(False)
-        self.plot.hideButtons()
-        self.plot.setAccessibleName("Curve of the scale")
-        self.plot.setXRange(*EXTREMES_V)
-        self.plot.showGrid(x=True, y=True, alpha=0.25)
-        for name in ("left", "bottom"):
-            axis = self.plot.getAxis(name)
-            axis.setPen(palette.border_strong)
-            axis.setTextPen(palette.text)
-            axis.enableAutoSIPrefix(False)
-        self.plot.setLabel("bottom", "input, V", color=palette.dim)
-        self.curve = self.plot.plot(pen=pg.mkPen(palette.accent, width=2))
-        self.point = self.plot.plot(
-            pen=None, symbol="o", symbolSize=9, symbolBrush=palette.refused, symbolPen=palette.field
-        )
+        self._draw_axes()
         self.volts = QuantityField(
             "V", low=EXTREMES_V[0], high=EXTREMES_V[1], value=1.0, decimals=3, name="Try a voltage"
         )
@@ -59,6 +41,35 @@ class ScalePlot(QWidget):
         column.addWidget(self.hint)
         self.volts.value_committed.connect(self._try)
 
+    def _draw_axes(self) -> None:
+        palette = current_palette()
+        self.plot = pg.GraphicsView(background=palette.field)
+        self.plot.setMinimumSize(36 * STEP_PX, 22 * STEP_PX)
+        self.plot.setAccessibleName("Curve of the scale")
+        layout = pg.GraphicsLayout()
+        self.plot.setCentralItem(layout)
+        # A PlotItem would make menus that outlive it.
+        box = pg.ViewBox(enableMenu=False, enableMouse=False)
+        self._left = pg.AxisItem("left")
+        below = pg.AxisItem("bottom")
+        for axis in (self._left, below):
+            axis.linkToView(box)
+            axis.setPen(palette.border_strong)
+            axis.setTextPen(palette.text)
+            axis.enableAutoSIPrefix(False)
+            axis.setGrid(60)
+        below.setLabel("input, V", color=palette.dim)
+        layout.addItem(self._left, row=0, col=0)
+        layout.addItem(box, row=0, col=1)
+        layout.addItem(below, row=1, col=1)
+        self.curve = pg.PlotCurveItem(pen=pg.mkPen(palette.accent, width=2))
+        self.point = pg.ScatterPlotItem(
+            size=9, brush=pg.mkBrush(palette.refused), pen=pg.mkPen(palette.field)
+        )
+        box.addItem(self.curve)
+        box.addItem(self.point)
+        box.setXRange(*EXTREMES_V)
+
     def show_scale(self, scale: ScaleSettings | None) -> None:
         """Draw a scale; None draws nothing."""
         self._scale = scale
@@ -73,7 +84,7 @@ class ScalePlot(QWidget):
             odd = oddity(scale)
             self.hint.set_text(f"◆ {odd}" if odd else "")
             label = f"{scale.name}, {display_unit(scale.unit)}"
-            self.plot.setLabel("left", label, color=current_palette().dim)
+            self._left.setLabel(label, color=current_palette().dim)
         self._try()
 
     def _try(self) -> None:

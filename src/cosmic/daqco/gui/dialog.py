@@ -1,0 +1,22 @@
+"""A dialog in which Enter judges the field it is pressed in, and nothing more."""
+
+from typing import Final
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QDialog
+
+from cosmic.frame.overrides import override
+
+_ENTER: Final = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+
+
+class FieldDialog(QDialog):
+    """Is not closed by Enter: a button box would make OK the default again at every show."""
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in _ENTER:
+            event.accept()
+            return
+        super().keyPressEvent(event)
