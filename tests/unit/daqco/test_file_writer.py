@@ -250,7 +250,7 @@ def test_a_file_taken_away_while_recording_is_told(tmp_path, writers, told):
     writer = writers(tmp_path / "run.h5")
     (tmp_path / "run.h5").unlink()
     assert writer.join()
-    assert "writing failed" in str(told.errors[0])
+    assert "was taken away" in str(told.errors[0])
     assert told.stops == []
 
 
@@ -284,13 +284,13 @@ import resource, sys
 sys.path.insert(0, sys.argv[2])
 from pathlib import Path
 from unit.daqco.recording_helpers import chunks, header, volts_of
+from cosmic.daqco.core import room
 from cosmic.daqco.core.file_writer import UDaqFileWriter
 from cosmic.frame.clock import WALL
 from cosmic.frame.failure import FailurePolicy
 
-limit = int(sys.argv[3])
-if limit:
-    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+room.STEP_BYTES = 1024 * 1024
+limit, limited_from = int(sys.argv[3]), int(sys.argv[4])
 head = header(tuple(f"c{number}" for number in range(32)), rate_hz=15_000.0)
 volts = volts_of(32, 15_000)
 policy, stops = FailurePolicy(), []
@@ -299,6 +299,8 @@ writer = UDaqFileWriter(Path(sys.argv[1]), head, policy)
 writer.start()
 began_s = WALL.now_s()
 for number in range(400):
+    if limit and number == limited_from:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
     WALL.sleep(began_s + number * 0.01 - WALL.now_s())
     at = number * 150
     part = volts[:, at % 15_000 :][:, :150]
@@ -315,7 +317,7 @@ TESTS = str(Path(__file__).resolve().parents[2])
 def test_a_process_killed_at_full_rate_loses_at_most_half_a_second(tmp_path):
     path = tmp_path / "run.h5"
     put = 0
-    command = [sys.executable, "-c", FULL_RATE, str(path), TESTS, "0"]
+    command = [sys.executable, "-c", FULL_RATE, str(path), TESTS, "0", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         for line in process.stdout:
             put = int(line)
@@ -334,17 +336,40 @@ def test_a_process_killed_at_full_rate_loses_at_most_half_a_second(tmp_path):
         assert file["volts"].shape[1] >= found.samples
 
 
+def limited(path, limit, limited_from):
+    """Record in a process whose files may be `limit` bytes long; return its last words."""
+    command = [sys.executable, "-c", FULL_RATE, str(path), TESTS, str(limit), str(limited_from)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()[-1]
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such limit")
-def test_a_disk_that_takes_no_more_ends_the_recording_and_nothing_else(tmp_path):
+def test_a_file_that_cannot_grow_is_closed_in_order(tmp_path):
     path = tmp_path / "run.h5"
-    command = [sys.executable, "-c", FULL_RATE, str(path), TESTS, "6000000"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
-    last = done.stdout.splitlines()[-1]
+    last = limited(path, 12_000_000, 0)
     assert last.startswith("joined True stopped [] error ")
-    assert f"{path}: writing failed" in last
-    assert "File too large" in last
+    assert f"{path}: cannot grow (File too large); make room" in last
+    assert path.stat().st_size < 6_000_000  # without the room that was taken ahead
+    h5py.File(path, "r").close()
     with open_recording(path) as found:
         assert not found.complete
-        assert found.samples > 7500
-        volts = np.tile(volts_of(32, 15_000), 4)
-        np.testing.assert_array_equal(found.volts("c31"), volts[31, : found.samples])
+        assert found.events[-1].kind == "error"
+        assert_what_is_there_is_right(found)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such limit")
+def test_a_disk_that_fails_ends_the_recording_and_nothing_else(tmp_path):
+    path = tmp_path / "run.h5"
+    last = limited(path, 1_000_000, 100)
+    assert last.startswith("joined True stopped [] error ")
+    assert f"{path}: writing failed (File too large)" in last
+    with open_recording(path) as found:
+        assert not found.complete
+        assert_what_is_there_is_right(found)
+
+
+def assert_what_is_there_is_right(found):
+    assert found.samples > 7500
+    volts = np.tile(volts_of(32, 15_000), 4)
+    np.testing.assert_array_equal(found.volts("c31"), volts[31, : found.samples])

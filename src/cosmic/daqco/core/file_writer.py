@@ -179,7 +179,7 @@ class UDaqFileWriter(WorkerThread):
                 self._survived(self._close)
         finally:
             self._ended = True
-            self._abandon()
+            self._file.abandon()
             self.recorded.emit(self._stats())
             self.closed.emit(self.path)
 
@@ -225,24 +225,24 @@ class UDaqFileWriter(WorkerThread):
 
     def _flush(self) -> None:
         self._file.flush()
-        self.path.stat()  # a file that was deleted takes everything without a word
+        if not self.path.exists():  # a file that was deleted takes everything without a word
+            raise RecordingError(
+                f"{self.path}: was taken away while it was written; its samples are lost and "
+                "acquisition goes on. Record to another directory"
+            )
         directory, a_while = self.path.parent, self._header.bytes_per_s * FLUSH_S
         self._left_s = space_left(directory, self._header.bytes_per_s).left_s
         check_space(directory, a_while)
         self.recorded.emit(self._stats())
 
     def _stats(self) -> RecordingStats:
-        try:
-            file_bytes = self.path.stat().st_size
-        except OSError:
-            file_bytes = 0
         return RecordingStats(
             path=self.path,
             samples=self._file.samples,
             duration_s=self._file.samples / self._header.rate_hz,
             lost=self._file.lost,
             backlog=self.backlog,
-            file_bytes=file_bytes,
+            file_bytes=self._file.size_bytes,
             left_s=self._left_s,
         )
 
@@ -254,16 +254,6 @@ class UDaqFileWriter(WorkerThread):
                 )
             )
         self._file.close(complete=self._error is None)
-
-    def _abandon(self) -> None:
-        try:
-            self._file.abandon()
-        except WRITE_ERRORS as exc:
-            error = RecordingError(
-                f"{self.path}: could not be closed ({reason(exc)}); open_recording() reads what "
-                f"was written up to {FLUSH_S:g} s before"
-            )
-            self._policy.report(error, self.name)
 
     def _fail(self, error: CosmicError) -> None:
         self._error = error

@@ -17,6 +17,7 @@ from cosmic.daqco.core.recording_format import (
     RecordingExistsError,
     RecordingHeader,
 )
+from cosmic.daqco.core.room import TABLES_BYTES, Room, cut
 from cosmic.daqco.core.scale import Scale
 
 BLOCK_S: Final = 0.5
@@ -25,6 +26,8 @@ LARGEST_BLOCK: Final = 8192
 ROWS_A_CHUNK: Final = 512
 WRITE_ERRORS: Final = (OSError, RuntimeError, ValueError)
 """What h5py raises when a file cannot be written."""
+
+_abandoned: list["RecordingFile"] = []
 
 
 def block_samples(rate_hz: float) -> int:
@@ -69,18 +72,11 @@ class RecordingFile:
         self._axes: dict[str, int] = {}
         self._rows: dict[str, list[Any]] = {name: [] for name in form.GROWING}
         self._lost = 0
-        try:
-            self._file = h5py.File(path, "w" if overwrite else "x", libver=("v110", "v110"))
-        except FileExistsError:
-            raise RecordingExistsError(
-                f"{path}: there is such a file; choose another name, or say that it may be replaced"
-            ) from None
-        except WRITE_ERRORS as exc:
-            raise RecordingError(
-                f"{path}: cannot be created ({form.reason(exc)}); close what reads it, "
-                "or choose another name or directory"
-            ) from exc
-        self._create()
+        self._closing = False
+        self._file = self._created(overwrite=overwrite)
+        self._size_bytes = 0
+        self._room = Room(self._file, path, 2 * self._block.nbytes + TABLES_BYTES)
+        self._begin()
 
     @property
     def path(self) -> Path:
@@ -91,6 +87,11 @@ class RecordingFile:
     def samples(self) -> int:
         """How many samples a channel were given so far."""
         return self._columns + self._filled
+
+    @property
+    def size_bytes(self) -> int:
+        """How long the file is."""
+        return self._room.used_bytes if self._file else self._size_bytes
 
     @property
     def lost(self) -> int:
@@ -157,33 +158,53 @@ class RecordingFile:
         if self._filled > self._flushed:
             self._write_block()
             self._flushed = self._filled
-        for name, rows in self._rows.items():
-            if rows:
-                table = self._file[name]
-                old = table.shape[0]
-                table.resize(old + len(rows), axis=0)
-                table[old:] = np.array(rows, dtype=form.GROWING[name])
-                rows.clear()
+        self._take_room()
+        self._write_tables()
         self._file.flush()
 
     def close(self, *, complete: bool) -> None:
         """Write what is left and close the file; harmless the second time."""
         if not self._file:
             return
-        try:
-            self.flush()
-            if complete:
-                self._file["complete"][()] = 1
-        finally:
-            self._file.close()
+        self._closing = True
+        self.flush()
+        self._size_bytes = self._room.used_bytes
+        if complete:
+            self._file["complete"][()] = 1
+        self._file.close()
+        cut(self._path)
 
     def abandon(self) -> None:
-        """Close the file as it is; what was flushed before stays readable."""
-        for rows in self._rows.values():
-            rows.clear()
-        self._flushed = self._filled
+        """Leave the file as it is after a failed write; harmless after `close`.
+
+        Closing it, or writing anything more, might end the process. It is read as the file of a
+        killed process is.
+        """
         if self._file:
+            _abandoned.append(self)
+
+    def _created(self, *, overwrite: bool) -> h5py.File:
+        path = self._path
+        try:
+            return h5py.File(path, "w" if overwrite else "x", libver=("v110", "v110"))
+        except FileExistsError:
+            raise RecordingExistsError(
+                f"{path}: there is such a file; choose another name, or say that it may be replaced"
+            ) from None
+        except WRITE_ERRORS as exc:
+            raise RecordingError(
+                f"{path}: cannot be created ({form.reason(exc)}); close what reads it, "
+                "or choose another name or directory"
+            ) from exc
+
+    def _begin(self) -> None:
+        try:
+            self._room.need()
+        except OSError as exc:
             self._file.close()
+            self._path.unlink(missing_ok=True)
+            raise self._no_room(exc) from exc
+        self._create()
 
     def _create(self) -> None:
         file, header = self._file, self._header
@@ -245,6 +266,29 @@ class RecordingFile:
                 self._block[:] = np.nan
 
     def _write_block(self) -> None:
+        self._take_room()
         self._volts.resize(self.samples, axis=1)
         for channel, row in enumerate(self._block):
             self._volts.id.write_direct_chunk((channel, self._columns), row)
+
+    def _take_room(self) -> None:
+        if self._closing:  # what the margin is for
+            return
+        try:
+            self._room.need()
+        except OSError as exc:
+            raise self._no_room(exc) from exc
+
+    def _no_room(self, exc: OSError) -> RecordingError:
+        return RecordingError(
+            f"{self._path}: cannot grow ({form.reason(exc)}); make room, or record to another disk"
+        )
+
+    def _write_tables(self) -> None:
+        for name, rows in self._rows.items():
+            if rows:
+                table = self._file[name]
+                old = table.shape[0]
+                table.resize(old + len(rows), axis=0)
+                table[old:] = np.array(rows, dtype=form.GROWING[name])
+                rows.clear()
