@@ -4,7 +4,23 @@ import inspect
 from enum import Enum
 from typing import Any, Final
 
+from pydantic import BaseModel
+
 import cosmic
+from cosmic.daqco.api.daqco import DaqCounters, Daqco, DaqLimit
+from cosmic.daqco.api.recorder import RecordingState
+from cosmic.daqco.core.chunk import DataChunk
+from cosmic.daqco.core.curves import Slope
+from cosmic.daqco.core.recording_format import (
+    AxisPosition,
+    ExportCancelled,
+    Overrun,
+    RecordedEvent,
+    RecordingError,
+    RecordingExistsError,
+)
+from cosmic.daqco.core.scale import Scale
+from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.errors import DeviceFault
 from cosmic.frame.task import Progress, Task
 from cosmic.mico.api.axis import Axis, Jogging
@@ -33,6 +49,18 @@ CLASSES: Final[dict[str, type]] = {
     "Progress": Progress,
     "PositionerState": PositionerState,
     "MoveVerdict": cosmic.MoveVerdict,
+    "Daqco": Daqco,
+    "RecordingState": RecordingState,
+    "DaqCounters": DaqCounters,
+    "DaqLimit": DaqLimit,
+    "LimitSettings": LimitSettings,
+    "Scale": Scale,
+    "DataChunk": DataChunk,
+    "Recording": cosmic.Recording,
+    "Slope": Slope,
+    "RecordedEvent": RecordedEvent,
+    "Overrun": Overrun,
+    "AxisPosition": AxisPosition,
 }
 ENUMS: Final[dict[str, type[Enum]]] = {
     "Reason": cosmic.Reason,
@@ -43,12 +71,15 @@ ENUMS: Final[dict[str, type[Enum]]] = {
     "Direction": Direction,
     "DeviceFault": DeviceFault,
 }
+# Exceptions that a script may want to name and that `cosmic` does not export.
+FURTHER_EXCEPTIONS: Final = (RecordingError, RecordingExistsError, ExportCancelled)
 # Attributes that an object gets when it is made, which the class does not show.
 MADE_LATER: Final = {
     "Axis": ("commander",),
     "Approach": ("bodies", "distance_um", "places_um", "pose"),
     "Way": ("start", "waypoints", "method", "length", "straight_length", "duration_s"),
     "GroupMovement": ("movements",),
+    "DataChunk": ("first_sample", "time_s", "rate_hz", "channels", "volts", "scales"),
     "StepwiseMove": ("planned", "movement"),
 }
 
@@ -56,6 +87,8 @@ MADE_LATER: Final = {
 def names(title: str) -> dict[str, str]:
     """Return the public names of a class with what the first cell of their row must be."""
     cls = CLASSES[title]
+    if issubclass(cls, BaseModel):
+        return {name: f"`{name}`" for name in cls.model_fields}
     found = {name: getattr(cls, name) for name in dir(cls) if not name.startswith("_")}
     found |= dict.fromkeys(MADE_LATER.get(title, ()))
     return {name: f"`{name}{signature(value)}`" for name, value in found.items()}
@@ -71,8 +104,9 @@ def signature(value: Any) -> str:
 
 
 def exceptions() -> dict[str, type[BaseException]]:
-    """Return the exceptions that ``cosmic`` exports."""
+    """Return the exceptions that ``cosmic`` exports, and those of recordings."""
     found = {name: getattr(cosmic, name) for name in cosmic.__all__}
+    found |= {each.__name__: each for each in FURTHER_EXCEPTIONS}
     return {
         name: value
         for name, value in found.items()

@@ -7,6 +7,12 @@ from typing import Any, Final
 from pydantic import BaseModel
 
 from cosmic.app.platform import PlatformFile, PlatformSettings
+from cosmic.daqco.core.settings import (
+    ChannelSettings,
+    DaqcoSettings,
+    LimitSettings,
+    ScaleSettings,
+)
 from cosmic.mico.core.settings import (
     GroupSettings,
     InitialisationSettings,
@@ -15,6 +21,14 @@ from cosmic.mico.core.settings import (
     MotionDefaults,
     PositionerSettings,
     WatchSettings,
+)
+from cosmic.twin.force_settings import (
+    ContactSettings,
+    FibreSettings,
+    ForceSensorSettings,
+    GeometrySettings,
+    GripperGeometry,
+    JointDrive,
 )
 from cosmic.twin.settings import (
     ControllerSettings,
@@ -34,14 +48,30 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[mico.initialisation]": InitialisationSettings,
     "[[mico.group]]": GroupSettings,
     "[[mico.positioner]]": PositionerSettings,
+    "[daqco]": DaqcoSettings,
+    "[[daqco.scale]]": ScaleSettings,
+    "[[daqco.channel]]": ChannelSettings,
+    "[[daqco.limit]]": LimitSettings,
     "[kinds.NAME]": StageKind,
     "[controller]": ControllerSettings,
     "[[devices]]": DeviceWiring,
     "[stages]": StagePlace,
+    "[geometry]": GeometrySettings,
+    "[geometry.joints]": JointDrive,
+    "[geometry.grippers]": GripperGeometry,
+    "[contact]": ContactSettings,
+    "[[fibres]]": FibreSettings,
+    "[force_sensors.NAME]": ForceSensorSettings,
 }
 WHOLE_FILES: Final = (PlatformFile, TwinSettings)
 
 _UNITS: Final = (
+    ("_n_m2", "N m²"),
+    ("_un_sqrt_s", "µN/√s"),
+    ("_un_um", "µN/µm"),
+    ("_v_un", "V/µN"),
+    ("_un", "µN"),
+    ("_n", "N"),
     ("_um_s2", "µm/s²"),
     ("_deg_s2", "°/s²"),
     ("_um_s", "µm/s"),
@@ -67,9 +97,12 @@ def rows(model: type[BaseModel]) -> Iterator[tuple[str, str, str, str]]:
     schema = model.model_json_schema()
     required = schema.get("required", [])
     for key, described in schema["properties"].items():
-        if "$ref" in described or "$ref" in described.get("items", {}):
+        parts = (described, described.get("items", {}), described.get("additionalProperties", {}))
+        if any("$ref" in part for part in parts):
             continue
-        default = "required" if key in required else _toml(described.get("default"))
+        # The schema does not tell what a factory makes; here they make empty tables only.
+        empty = {} if described.get("type") == "object" else None
+        default = "required" if key in required else _toml(described.get("default", empty))
         yield f"`{key}`", _kind(described, schema.get("$defs", {})), _unit(key), default
 
 
@@ -83,6 +116,8 @@ def _kind(described: dict[str, Any], definitions: dict[str, Any]) -> str:
         return ", ".join(f"`{json.dumps(each)}`" for each in described["enum"])
     if described["type"] == "array":
         return _array(described, definitions)
+    if described["type"] == "object":
+        return f"table: {_kind(described['additionalProperties'], definitions)}"
     return f"{_TYPES[described['type']]}{_range(described)}"
 
 

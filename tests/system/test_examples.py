@@ -1,5 +1,6 @@
 """Each example shows what its page says it shows."""
 
+import re
 import runpy
 from pathlib import Path
 
@@ -78,3 +79,15 @@ def test_a_new_type_refuses_what_it_does_not_know(said: str) -> None:
     reached, refused = said.splitlines()
     assert float(reached.split()[-1]) == pytest.approx(30.0, abs=0.01)
     assert refused.startswith("WRONG_KIND: table.rotation")
+
+
+@example("measure_force.py")
+def test_a_force_is_measured_and_a_limit_stops_the_push(said: str) -> None:
+    numbers = {line.split(":")[0]: re.findall(r"[\d.]+", line) for line in said.splitlines()}
+    assert 80.0 < float(numbers["force at the end"][0]) < 178.0
+    assert "1000 Hz, complete: True" in said
+    assert said.count("uN/um") == 1
+    assert 1.0 < float(numbers["stiffness"][0]) < 4.0
+    assert "stopped: stopped: force reached 14" in said
+    assert "crossed: True" in said
+    assert float(numbers["crossed"][-1]) < 500.0
