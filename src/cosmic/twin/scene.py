@@ -10,6 +10,7 @@ from typing import Final, Self
 from cosmic.frame.clock import Clock
 from cosmic.frame.config import shipped_config_dir
 from cosmic.twin.force_side import ForceSide
+from cosmic.twin.kinematics import Point
 from cosmic.twin.settings import StageKind, TwinSettings
 from cosmic.twin.stage import Stage
 
@@ -187,6 +188,13 @@ class Scene:
         """Return where every stage truly is now, in its unit: for views and logs, not control."""
         now_s = self.clock.now_s()
         return {name: stage.position(now_s) for name, stage in self.stages.items()}
+
+    def tips(self, now_s: float) -> dict[str, Point]:
+        """Return where the tips of the tools truly are, um, world; see `Workplace.tips`.
+
+        Empty in a scene of bare stages.
+        """
+        return {} if self.force_side is None else self.force_side.tips(now_s)
 
 
 def parse_layout(layout: str) -> tuple[str, ...]:

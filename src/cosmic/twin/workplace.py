@@ -240,16 +240,16 @@ class Workplace:
             turned = math.atan2(plate[1, 0], plate[0, 0])
             angle = math.atan2(y1 - y0, x1 - x0) - turned
             fibre.plate_pose = float(there[0]), float(there[1]), angle
+            self._touches[self.fibres.index(fibre)] = Touch()
         del fibre.holds[name]
         self._widest[name] = tools[name].gap_um
-        self._touches[self.fibres.index(fibre)].lose()
 
     def _try_to_grasp(
         self, tool: Tool, before_um: float, tools: dict[str, Tool], values: Mapping[str, float]
     ) -> None:
         """Take the first fibre whose width the gap has just come down to."""
         for fibre in self.fibres:
-            if not tool.gap_um <= fibre.settings.width_um < before_um or len(fibre.holds) > 1:
+            if not tool.gap_um <= fibre.settings.width_um < before_um:
                 continue
             first, second = fibre.state(tools, self._lying(fibre, values)).ends_um
             place = self._between_jaws(tool, first, second)

@@ -37,8 +37,11 @@ def test_opening_the_jaws_drops_the_fibre_where_it_is() -> None:
 
 
 def test_a_fibre_that_was_dropped_turns_with_the_table() -> None:
-    bench = Bench().go(left_x=2000.0).go(20.0, table_rotation=30.0).go(left_gripper=100.0)
-    before = bench.moment.fibres[0].ends_um
+    bench = Bench().go(left_x=2000.0).go(20.0, table_rotation=30.0)
+    held = bench.moment.fibres[0].ends_um
+    before = bench.go(left_gripper=100.0).moment.fibres[0].ends_um
+    for (x, y, _), (u, v, _) in zip(held, before, strict=True):
+        assert (u, v) == pytest.approx((x, y), abs=1e-6)
     after = bench.go(20.0, table_rotation=120.0).moment.fibres[0].ends_um
     for (x, y, _), (u, v, _) in zip(before, after, strict=True):
         assert (u, v) == pytest.approx((-y, x), abs=1e-6)
@@ -115,6 +118,14 @@ def test_pulling_the_grippers_apart_stretches_until_the_fibre_slips() -> None:
     bench.go(probe_x=100.0, probe_y=-4950.0).go(20.0, right_x=-3199.0)
     assert bench.moment.fibres[0].tension_un == pytest.approx(5000.0, rel=0.01)
     assert bench.go(10.0, right_x=-3205.0).moment.fibres[0].tension_un < 4900.0
+
+
+def test_the_push_goes_on_when_one_of_two_grippers_lets_go() -> None:
+    bench = both(Bench()).go(probe_x=100.0).go(probe_y=-5005.0)
+    stiff = bench.force_un
+    assert 0.0 < bench.go(right_gripper=60.0).force_un < stiff / 5.0
+    assert bench.push.deflection_um == pytest.approx(20.0, rel=0.01)
+    assert bench.go(left_gripper=60.0).force_un == 0.0
 
 
 def test_a_gripper_holds_one_fibre_at_a_time() -> None:

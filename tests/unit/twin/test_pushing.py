@@ -64,6 +64,14 @@ def test_the_probe_does_not_tunnel_at_any_speed(speed: float) -> None:
     bench.now_s = end_s + 0.01
     assert bench.push.deflection_um == pytest.approx(60.0, rel=0.01)
     assert (np.diff(force) > -1e-9).all(), "it only rises"
+    pushed_um = np.maximum((times - bench.now_s + 0.01) * speed + 60.0, 0.0).clip(max=60.0)
+    expected = np.interp(pushed_um, *some_forces())
+    assert force == pytest.approx(expected, abs=0.3 if speed < 1000.0 else 12.0)
+
+
+def some_forces() -> tuple[list[float], list[float]]:
+    bench, ways = before_the_fibre(Bench()), [10.0 * number for number in range(7)]
+    return ways, [pushed(bench, way).force_un for way in ways]
 
 
 def test_one_step_of_the_clock_through_the_fibre_is_a_push_too() -> None:
@@ -126,6 +134,15 @@ def test_the_clamp_lies_somewhat_inside_the_jaws_and_elsewhere_for_each_seed() -
     ]
     depths = (3.0 * EI * 10.0 / np.array(forces)) ** (1.0 / 3.0) - 400.0
     assert depths.min() >= -1.0 and 3.0 < depths.mean() < 13.0 and depths.std() > 1.0
+
+
+def test_no_clamp_lies_in_front_of_the_jaws() -> None:
+    spread = {"clamp_depth_um": 0.0, "clamp_depth_spread_um": 100.0}
+    forces = [
+        pushed(before_the_fibre(Bench(settings(**spread), seed)), 10.0).force_un
+        for seed in range(6)
+    ]
+    assert max(forces) == pytest.approx(3.0 * EI * 10.0 / 400.0**3, rel=0.01)
 
 
 # --- through the sensor -----------------------------------------------------------------------
