@@ -3,7 +3,8 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
+from threading import Event
 from typing import Final
 
 from PySide6.QtCore import Signal
@@ -25,6 +26,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.threads import WorkerThread
 
 FLUSH_S: Final = 0.25
+WAKE_S: Final = 0.1
 LONGEST_BACKLOG_S: Final = 10.0
 LARGEST_BACKLOG_BYTES: Final = 64 * 1024 * 1024
 
@@ -107,6 +109,9 @@ class UDaqFileWriter(WorkerThread):
         self._left_s = space.left_s
         self._file = RecordingFile(directory / path.name, header, overwrite=overwrite)
         self._queue: SimpleQueue[_Item] = SimpleQueue()
+        self._wake = Event()
+        # Waking this thread for every chunk would cost the one that acquires more than the rest.
+        self._enough = max(1, int(WAKE_S * header.rate_hz))
         self._limit = int(
             min(
                 LONGEST_BACKLOG_S * header.rate_hz,
@@ -149,9 +154,12 @@ class UDaqFileWriter(WorkerThread):
                 )
             )
             self._queue.put(_End())
+            self._wake.set()
             return
         self._given += chunk.samples
         self._queue.put(chunk)
+        if self.backlog >= self._enough and not self._wake.is_set():
+            self._wake.set()
 
     def add_event(self, event: RecordedEvent) -> None:
         """Have `event` written; returns at once. Any thread."""
@@ -171,6 +179,7 @@ class UDaqFileWriter(WorkerThread):
     def request_end(self) -> None:
         super().request_end()
         self._queue.put(_End())
+        self._wake.set()
 
     @override
     def run_body(self) -> None:
@@ -202,17 +211,22 @@ class UDaqFileWriter(WorkerThread):
     def _write_all(self) -> None:
         due_s = WALL.now_s() + FLUSH_S
         while True:
-            try:
-                item = self._queue.get(timeout=max(0.001, due_s - WALL.now_s()))
-            except Empty:
-                item = None
-            if isinstance(item, _End):
+            self._wake.wait(max(0.0, due_s - WALL.now_s()))
+            self._wake.clear()
+            if self._write_waiting():
                 return
-            if item is not None:
-                self._write(item)
             if WALL.now_s() >= due_s:
                 self._flush()
                 due_s = WALL.now_s() + FLUSH_S
+
+    def _write_waiting(self) -> bool:
+        """Write what is in the queue now; return whether the end was among it."""
+        for _ in range(self._queue.qsize()):
+            item = self._queue.get()
+            if isinstance(item, _End):
+                return True
+            self._write(item)
+        return False
 
     def _write(self, item: _Item) -> None:
         if isinstance(item, DataChunk):

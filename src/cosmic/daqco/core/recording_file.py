@@ -47,7 +47,7 @@ class RecordingFile:
     """One HDF5 file in SWMR mode: readable while it grows, and after a crash; one thread.
 
     Blocks of each channel are laid into the file past HDF5's caches and conversions; a block
-    begun is written with every `flush`, padded, and again when there is more of it. All tables
+    begun is written with every `flush`, whole, and again when there is more of it. All tables
     exist before SWMR begins, since nothing can be created afterwards.
 
     Raises
@@ -62,7 +62,7 @@ class RecordingFile:
         self._path = path
         self._header = header
         self._names = header.names
-        self._block = np.full((len(self._names), block_samples(header.rate_hz)), np.nan)
+        self._block = np.zeros((len(self._names), block_samples(header.rate_hz)))
         self._filled = 0
         self._flushed = 0
         self._columns = 0
@@ -263,7 +263,6 @@ class RecordingFile:
                 self._write_block()
                 self._columns += width
                 self._filled = self._flushed = 0
-                self._block[:] = np.nan
 
     def _write_block(self) -> None:
         self._take_room()
