@@ -11,6 +11,7 @@ from cosmic.frame.gui.theme import current_palette, number_font
 AXIS_PX: Final = 60
 _BELOW_PX: Final = 36
 _MOST: Final = 20
+_GAP_PX: Final = 4
 
 
 class Axes:
@@ -27,7 +28,8 @@ class Axes:
         self._names: list[pg.LabelItem] = []
         layout.addItem(box, row=1, col=_MOST)
         layout.addItem(self.time, row=2, col=_MOST)
-        layout.layout.setSpacing(0)
+        # Apart, so that painting the strip does not touch, and so paint, the axes.
+        layout.layout.setSpacing(_GAP_PX)
         layout.layout.setContentsMargins(4, 2, 12, 2)
         self._style(self.time)
 
@@ -85,6 +87,6 @@ class Axes:
         palette = current_palette()
         axis.setPen(palette.border_strong)
         axis.setTextPen(palette.text)
-        axis.setStyle(tickFont=self._font, tickLength=-5, autoExpandTextSpace=False)
+        axis.setStyle(tickFont=self._font, tickLength=4, autoExpandTextSpace=False)
         if axis is self.time:
             axis.setLabel("time before now, s", color=palette.dim)

@@ -9,6 +9,7 @@ import pyqtgraph as pg
 from PySide6.QtCore import QEvent, Signal
 
 from cosmic.daqco.core.chunk import DataChunk, Values
+from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.gui.colours import readable
 from cosmic.daqco.gui.plot.axes import Axes
 from cosmic.daqco.gui.plot.columns import Columns, column_of
@@ -159,7 +160,7 @@ class Chart(pg.GraphicsView):  # type: ignore[misc]
         """Stop following; what is shown stays, and samples still come into the history."""
         if self._frozen is None:
             self._frozen = Frozen(self._history.view(), *self.window_s())
-            self.rebuild()
+            self.time_changed.emit()
             self.frozen_changed.emit(True)
 
     def follow(self) -> None:
@@ -256,7 +257,7 @@ class Chart(pg.GraphicsView):  # type: ignore[misc]
 
 
 def _joined(chunks: Sequence[DataChunk]) -> list[tuple[int, Values]]:
-    """Return values of chunks, those without a gap between them in one piece."""
+    """Return physical values of chunks, those without a gap between them in one piece."""
     pieces: list[list[DataChunk]] = []
     for chunk in chunks:
         if pieces and chunk.first_sample == pieces[-1][-1].first_sample + pieces[-1][-1].samples:
@@ -264,6 +265,21 @@ def _joined(chunks: Sequence[DataChunk]) -> list[tuple[int, Values]]:
         else:
             pieces.append([chunk])
     return [
-        (piece[0].first_sample, np.concatenate([each.values for each in piece], axis=1))
+        (
+            piece[0].first_sample,
+            _scaled(np.concatenate([each.volts for each in piece], axis=1), piece[0].scales),
+        )
         for piece in pieces
     ]
+
+
+def _scaled(volts: Values, scales: Sequence[Scale]) -> Values:
+    """Return physical values; rows of one scale in one go, which `DataChunk.values` cannot."""
+    rows: dict[Scale, list[int]] = {}
+    for row, scale in enumerate(scales):
+        rows.setdefault(scale, []).append(row)
+    if len(rows) == 1:
+        return scales[0].apply(volts)
+    for scale, same in rows.items():
+        volts[same] = scale.apply(volts[same])
+    return volts

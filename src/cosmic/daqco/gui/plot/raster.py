@@ -153,19 +153,24 @@ class Raster:
         at = np.arange(begin, last + 1) % self.width
         tops, heights = self._extents(rows, at, begin)
         painter.setPen(Qt.PenStyle.NoPen)
-        for row, top, height in zip(rows, tops, heights, strict=True):
-            there = np.isfinite(top)
-            count = int(np.count_nonzero(there))
-            if not count:
-                continue
-            self._rects.resize(count)
-            rects = self._rects.ndarray()
-            rects[:, 0] = at if count == len(at) else at[there]
-            rects[:, 1] = top if count == len(at) else top[there]
-            rects[:, 2] = 1.0
-            rects[:, 3] = height if count == len(at) else height[there]
-            painter.setBrush(QColor(look.colours[row]))
-            painter.drawRects(*self._rects.drawargs())
+        colours = [look.colours[row] for row in rows]
+        for colour in dict.fromkeys(colours):
+            same = [place for place, each in enumerate(colours) if each == colour]
+            painter.setBrush(QColor(colour))
+            self._paint_rects(painter, at, tops[same], heights[same])
+
+    def _paint_rects(self, painter: QPainter, at: Places, tops: Reals, heights: Reals) -> None:
+        there = np.isfinite(tops)
+        count = int(np.count_nonzero(there))
+        if not count:
+            return
+        self._rects.resize(count)
+        rects = self._rects.ndarray()
+        rects[:, 0] = np.broadcast_to(at, tops.shape)[there]
+        rects[:, 1] = tops[there]
+        rects[:, 2] = 1.0
+        rects[:, 3] = heights[there]
+        painter.drawRects(*self._rects.drawargs())
 
     def _extents(self, rows: Places, at: Places, begin: int) -> tuple[Reals, Reals]:
         """Return top and height in pixels, each joined to the column before."""
