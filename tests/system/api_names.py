@@ -7,7 +7,7 @@ from typing import Any, Final
 from pydantic import BaseModel
 
 import cosmic
-from cosmic.daqco.api.daqco import DaqCounters, Daqco, DaqLimit
+from cosmic.daqco.api.daqco import Daqco, DaqCounters, DaqLimit
 from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.curves import Slope
