@@ -109,7 +109,7 @@ def _elastica() -> tuple[Floats, Floats, Floats, Floats, Floats]:
     )
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=512)
 def clamped_at_one_end(
     *, ei_un_um2: float, span_um: float, free_um: float, radius_um: float, sensor_un_um: float
 ) -> PushCurve:
@@ -138,7 +138,7 @@ def clamped_at_one_end(
     return PushCurve(deflections, force[:last] * (ei_un_um2 / touched**2), sensor_un_um)
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=128)
 def held_at_both_ends(
     *,
     ei_un_um2: float,
