@@ -8,10 +8,13 @@ from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
 import cosmic
 from cosmic.app.collision_bar import CollisionBar
+from cosmic.app.control_mode import ECM, ControlMode
 from cosmic.app.hint_bar import HintBar, first_steps
 from cosmic.app.platform import Platform
 from cosmic.app.rig import Rig
 from cosmic.app.scene_panel import ScenePanel
+from cosmic.app.way_bar import Stage, WayBar
+from cosmic.app.way_guide import WayGuide
 from cosmic.daqco.gui.main_widget import UDaqMainWidget
 from cosmic.frame.failure import Failure
 from cosmic.frame.gui.console_panel import ConsolePanel
@@ -20,6 +23,7 @@ from cosmic.frame.gui.palette import ThemeName
 from cosmic.frame.gui.server_gui import LOG_TITLE, CosmicServerGui
 from cosmic.frame.gui.stop_key import StopKeyFilter
 from cosmic.frame.gui.theme import State
+from cosmic.frame.gui.top_bar import NO_COLLISION_MODEL
 from cosmic.frame.log import RingBufferHandler
 from cosmic.mico.core.stop_latch import StopState
 from cosmic.mico.gui.mico_widget import MicoWidget
@@ -30,6 +34,8 @@ MICO: Final = "MiCo"
 DAQCO: Final = "DAQCo"
 CONSOLE: Final = "Console"
 SCENE: Final = "Scene"
+
+NO_ECM: Final = f"{NO_COLLISION_MODEL}; name a scene in the platform file"
 
 _SHARES: Final = [3, 2]
 """How panels beside each other share the width at a first start."""
@@ -81,11 +87,13 @@ class OperatorWindow(CosmicServerGui):
         self._console: ConsolePanel | None = None
         self._mico_gui: MicoWidget | None = None
         self._scene: ScenePanel | None = None
+        self._guide: WayGuide | None = None
         self._bridge = _Bridge()
         self._forget_policy = platform.policy.subscribe(self._bridge.tell_failure)
         self._stop_filter = StopKeyFilter(_application(), stop_key, self)
         self._add_mico(settings)
         self._add_daqco()
+        self._mode = self._make_mode(settings)
         self._add_log(ring, console=console)
         self._connect_all()
         self._show_platform()
@@ -112,6 +120,17 @@ class OperatorWindow(CosmicServerGui):
         self.add_panel(SCENE, self._scene, Qt.DockWidgetArea.RightDockWidgetArea, scroll=False)
         self.resizeDocks([self.dock(MICO), self.dock(SCENE)], _SHARES, Qt.Orientation.Horizontal)
         self._collision_bar = CollisionBar(self.top_bar, gui, self)
+        way_bar = WayBar()
+        self._scene.set_bar(way_bar)
+        self._guide = WayGuide(gui, self._scene, way_bar, self)
+        self._guide.offered.connect(self._on_way_offered)
+
+    def _make_mode(self, settings: QSettings) -> ControlMode:
+        watched = self._mico_gui is not None and self._mico_gui.collision.has_model
+        mode = ControlMode(self.top_bar, settings, "" if watched else NO_ECM, self)
+        mode.changed.connect(self._on_mode_changed)
+        mode.restore()
+        return mode
 
     def _add_daqco(self) -> None:
         application = self._platform.daqco
@@ -179,6 +198,11 @@ class OperatorWindow(CosmicServerGui):
         return self._scene
 
     @property
+    def mode(self) -> str:
+        """The control mode in force: MCM or ECM."""
+        return self._mode.mode
+
+    @property
     def console(self) -> ConsolePanel | None:
         """The console, where there is one."""
         return self._console
@@ -220,6 +244,18 @@ class OperatorWindow(CosmicServerGui):
         self.top_bar.set_latched(state.reason)
         if self._mico_gui is not None:
             self._mico_gui.release_keys()
+        if self._guide is not None and state.reason is not None:
+            self._guide.cancel()
+
+    def _on_mode_changed(self, mode: str) -> None:
+        if self._mico_gui is None or self._guide is None:
+            return
+        self._mico_gui.set_seeking_ways(mode == ECM)
+        if self._guide.stage is not Stage.GOING:
+            self._guide.cancel()
+
+    def _on_way_offered(self) -> None:
+        self.raise_panel(SCENE)
 
     def _on_failure(self, failure: Failure) -> None:
         self.top_bar.set_message(f"{failure.where}: {failure.text}", State.ERROR)

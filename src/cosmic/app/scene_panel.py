@@ -2,13 +2,13 @@
 
 import json
 import logging
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Final
 
-from PySide6.QtCore import QSettings, Qt, QTimer
+from PySide6.QtCore import QSettings, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QPaintEvent, QShowEvent
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
+from cosmic.app.scene_facts import bodies_moved_by, far, margin_um
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named
 from cosmic.frame.gui.elided_label import ElidedLabel
@@ -16,21 +16,20 @@ from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.overrides import override
 from cosmic.frame.verdict import MoveVerdict, Reason
 from cosmic.mico.core.collision.answer import Approach
-from cosmic.mico.core.collision.model import SceneModel, pair_of
+from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.device_commander import DeviceCommander
 from cosmic.mico.core.positioner import Confidence, PositionerState
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.mico.gui.state_feed import StateFeed
 
 if TYPE_CHECKING:
+    from cosmic.mico.gui.scene.content import Path
     from cosmic.mico.gui.scene.scene_widget import SceneWidget
 
 logger = logging.getLogger(__name__)
 
 PERIOD_MS: Final = 50
 _STATE: Final = "scene/view"
-_STILL: Final = 1e-3
-"""Share of its travel by which the position of an axis at rest may differ."""
 _THERE: Final = 0.05
 
 
@@ -46,7 +45,14 @@ class ScenePanel(QWidget):
         Whose platform is shown; its refusals are, too.
     settings : QSettings
         Where hidden bodies and the place to look from are kept.
+
+    Signals
+    -------
+    refused_gone()
+        The refused movement was taken out of the picture.
     """
+
+    refused_gone = Signal()
 
     def __init__(
         self, panel: MicoWidget, settings: QSettings, parent: QWidget | None = None
@@ -64,6 +70,7 @@ class ScenePanel(QWidget):
         self._unknown: dict[str, bool] = {}
         self._verdict: MoveVerdict | None = None
         self._stood: dict[str, float | None] = {}
+        self._planned: Path | None = None
         self._commanders: set[DeviceCommander] = set()
         self._feed = StateFeed(self._mico, self, period_ms=PERIOD_MS)
         self._feed.set_paused(True)
@@ -144,6 +151,7 @@ class ScenePanel(QWidget):
         watch = self._mico.application.clearance_watch
         self._on_nearest(watch.latest if watch is not None else None)
         self._show_refused()
+        self.set_planned(self._planned)
 
     # Live
 
@@ -225,7 +233,7 @@ class ScenePanel(QWidget):
             state = self._mico[axis].details
             if stood is None:
                 self._stood[axis] = None if state.in_motion else state.position
-            elif state.in_motion or _far(state, stood):
+            elif state.in_motion or far(state, stood):
                 again = True
         return again
 
@@ -242,7 +250,7 @@ class ScenePanel(QWidget):
             bodies=(one, other),
             distance_um=verdict.clearance_um or 0.0,
             places_um=(verdict.place_um, verdict.place_um),
-            margin_um=_margin_um(self._model, one, other),
+            margin_um=margin_um(self._model, one, other),
             pose=self._ghost_pose(verdict),
         )
 
@@ -270,26 +278,16 @@ class ScenePanel(QWidget):
     def _on_refused_cleared(self) -> None:
         self._verdict = None
         self._stood = {}
+        self.refused_gone.emit()
 
+    # What is planned
 
-def bodies_moved_by(model: SceneModel, axes: Iterable[str]) -> frozenset[str]:
-    """Return the bodies that the axes move, with all that these carry."""
-    wanted = frozenset(axes)
-    driven = {drive.joint for drive in model.drives if drive.axis in wanted}
-    moved: set[str] = set()
-    for joint in model.joints:  # parents come before their children
-        if joint.name in driven or joint.parent in moved:
-            moved.add(joint.child)
-    return frozenset(moved)
+    def set_bar(self, bar: QWidget) -> None:
+        """Have `bar` above the scene."""
+        self._column.insertWidget(0, bar)
 
-
-def _margin_um(model: SceneModel, one: str, other: str) -> float:
-    pair = pair_of(one, other)
-    return next((each.margin_um for each in model.pairs if each.bodies == pair), 0.0)
-
-
-def _far(state: PositionerState, stood: float) -> bool:
-    if state.position is None:
-        return False
-    low, high = state.limits or (0.0, 1000.0)
-    return abs(state.position - stood) > _STILL * (high - low)
+    def set_planned(self, path: "Path | None") -> None:
+        """Draw the way that all axes are about to go, pose by pose; None: none."""
+        self._planned = path
+        if self._scene is not None:
+            self._scene.set_planned(path)

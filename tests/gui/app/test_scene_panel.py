@@ -10,7 +10,8 @@ from pytestqt.qtbot import QtBot
 
 from cosmic.app.operator_window import SCENE, OperatorWindow
 from cosmic.app.platform import build_platform
-from cosmic.app.scene_panel import ScenePanel, bodies_moved_by
+from cosmic.app.scene_facts import bodies_moved_by
+from cosmic.app.scene_panel import ScenePanel
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.log import RingBufferHandler
 from cosmic.mico.core.collision.collision_manager import CollisionManager

@@ -1,16 +1,17 @@
 """From a click to a movement, and from its end back to the field it came from."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
 from cosmic.frame.errors import CosmicError, MoveCancelled, MoveRefused
-from cosmic.frame.verdict import Reason
+from cosmic.frame.verdict import MoveVerdict, Reason
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.gui.movement_relay import MovementRelay
+from cosmic.mico.gui.way_request import HINT, Goal, WayRequest
 
 Make = Callable[[bool], Movement | StepwiseMove]
 """Makes a movement; the argument is the operator's consent to an unknown position."""
@@ -43,6 +44,7 @@ class _Command:
     field: QWidget | None
     movement: Movement
     consented: bool
+    goal: Goal | None = None
 
 
 class AxisCommands(QObject):
@@ -60,6 +62,10 @@ class AxisCommands(QObject):
         It ended; the text says why, and is empty at its target.
     consent_wanted(ConsentRequest)
         It was refused for an unknown position only.
+    way_wanted(WayRequest)
+        Something stands in its way, and a way round may be looked for.
+    noted(str)
+        What to say of it meanwhile.
     """
 
     begun = Signal()
@@ -67,6 +73,8 @@ class AxisCommands(QObject):
     verdict_given = Signal(object)
     ended = Signal(str)
     consent_wanted = Signal(object)
+    way_wanted = Signal(object)
+    noted = Signal(str)
 
     def __init__(self, axis_name: str, parent: QObject) -> None:
         super().__init__(parent)
@@ -76,6 +84,9 @@ class AxisCommands(QObject):
         self._newest: _Command | None = None
         self._series: StepwiseMove | None = None
         self._moved = False
+        self._blocked: _Command | None = None
+        self.seeks_ways = False
+        """Have a way looked for where something stands in the way of a move to a goal."""
 
     @property
     def series(self) -> StepwiseMove | None:
@@ -87,23 +98,28 @@ class AxisCommands(QObject):
         """Say that the axis was seen moving: a stop then interrupts, and refuses nothing."""
         self._moved = True
 
-    def issue(self, what: str, make: Make, field: QWidget | None = None) -> None:
-        """Give a command; how it goes is told by the signals."""
-        self._issue(what, make, field, consent=False)
+    def issue(
+        self, what: str, make: Make, field: QWidget | None = None, *, goal: Goal | None = None
+    ) -> None:
+        """Give a command; how it goes is told by the signals.
 
-    def _issue(self, what: str, make: Make, field: QWidget | None, *, consent: bool) -> None:
+        With a `goal`, a way round may be looked for where something stands in the way.
+        """
+        self._issue(_Command(what, make, field, Movement(), consented=False, goal=goal))
+
+    def _issue(self, command: _Command) -> None:
         self.abandon_series()
-        self._newest = None
+        self._newest = self._blocked = None
         self._moved = False
         try:
-            made = make(consent)
+            made = command.make(command.consented)
         except CosmicError as exc:
-            self._fail(_Command(what, make, field, Movement(), consent), exc)
+            self._fail(command, exc)
             return
         if isinstance(made, StepwiseMove):
             self._series = made
         movement = made.movement if isinstance(made, StepwiseMove) else made
-        self._newest = _Command(what, make, field, movement, consent)
+        self._newest = replace(command, movement=movement)
         self.begun.emit()
         self._relay.follow(movement)
 
@@ -116,6 +132,7 @@ class AxisCommands(QObject):
     def follow(self, what: str, movement: Movement) -> None:
         """Tell how a movement ends that was begun elsewhere, such as a jog."""
         self._newest = _Command(what, lambda _consent: movement, None, movement, consented=True)
+        self._blocked = None
         self._moved = False
         self.begun.emit()
         self._relay.follow(movement)
@@ -134,18 +151,46 @@ class AxisCommands(QObject):
         if not isinstance(error, MoveRefused):
             self.ended.emit("" if isinstance(error, MoveCancelled) else str(error))
             return
-        self.verdict_given.emit(error.verdict)
         reason = error.verdict.reason
+        if reason is Reason.COLLISION and command.goal is not None and self.seeks_ways:
+            self._want_way(command, command.goal, error.verdict)
+            return
+        self.verdict_given.emit(error.verdict)
         if reason is Reason.STOPPED and self._moved:
             self.ended.emit(str(error))
             return
         unknown = reason is Reason.POSITION_UNKNOWN
         if not unknown or command.consented:
-            self.refused.emit(command.field, str(error))
+            helps = reason is Reason.COLLISION and command.goal is not None
+            self.refused.emit(command.field, f"{error}\n{HINT}" if helps else str(error))
             return
         self.consent_wanted.emit(
             ConsentRequest(self._axis_name, command.what, str(error), lambda: self._agree(command))
         )
 
     def _agree(self, command: _Command) -> None:
-        self._issue(command.what, command.make, command.field, consent=True)
+        self._issue(replace(command, consented=True))
+
+    def _want_way(self, command: _Command, goal: Goal, verdict: MoveVerdict) -> None:
+        self._blocked = command
+        request = WayRequest(
+            axis=self._axis_name,
+            target=goal.target,
+            where=goal.text,
+            verdict=verdict,
+            note=lambda text: self._note_way(command, text),
+            refuse=lambda why: self._refuse_way(command, why),
+        )
+        self.way_wanted.emit(request)
+
+    def _note_way(self, command: _Command, text: str) -> None:
+        if command is self._blocked:
+            self.noted.emit(text)
+
+    def _refuse_way(self, command: _Command, verdict: MoveVerdict) -> None:
+        """Refuse it now, unless something newer was commanded meanwhile."""
+        if command is not self._blocked:
+            return
+        self._blocked = None
+        self.verdict_given.emit(verdict)
+        self.refused.emit(command.field, str(verdict))

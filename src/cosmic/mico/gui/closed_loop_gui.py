@@ -134,6 +134,7 @@ class ClosedLoopGUI(PositionerBaseGUI):
                 "move by a distance",
                 lambda consent: self._move.move_by(direction, consent=consent),
                 self._move.distance,
+                goal=self._move.goal_by(direction),
             )
 
     def _on_go_to(self) -> None:
@@ -142,6 +143,7 @@ class ClosedLoopGUI(PositionerBaseGUI):
                 "move to a position",
                 lambda consent: self._move.move_to(consent=consent),
                 self._move.distance,
+                goal=self._move.goal_to(),
             )
 
     def _on_steps_forward(self) -> None:

@@ -43,11 +43,14 @@ class MicoWidget(QWidget):
         There may be other devices now.
     verdict_given(MoveVerdict)
         A command of this panel was refused, or a jog stopped in front of something.
+    way_wanted(WayRequest)
+        Something stands in the way of a move, while ways round are sought.
     """
 
     failure_changed = Signal(str)
     refreshed = Signal()
     verdict_given = Signal(object)
+    way_wanted = Signal(object)
 
     def __init__(self, mico: Mico, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -59,6 +62,7 @@ class MicoWidget(QWidget):
         self._cards: dict[str, PositionerBaseGUI] = {}
         self._shape: list[tuple[str, str]] = []
         self._dialog: ConsentDialog | None = None
+        self._seeks_ways = False
         self._collision = CollisionStatus(self._application.collision)
         self._header = MicoHeader(self._settings.jog)
         self._columns = GroupColumns()
@@ -123,6 +127,12 @@ class MicoWidget(QWidget):
         """Let go of every key that jogs."""
         self._keys.release_all()
 
+    def set_seeking_ways(self, on: bool) -> None:
+        """Ask with `way_wanted` instead of refusing a move that something stands in the way of."""
+        self._seeks_ways = on
+        for card in self._cards.values():
+            card.commands.seeks_ways = on
+
     # What there is
 
     def refresh(self) -> None:
@@ -179,6 +189,8 @@ class MicoWidget(QWidget):
             card = make_card(axis, self._settings_of(name), self._settings.defaults)
             card.consent_wanted.connect(self._on_consent_wanted)
             card.commands.verdict_given.connect(self.verdict_given)
+            card.commands.way_wanted.connect(self.way_wanted)
+            card.commands.seeks_ways = self._seeks_ways
             self._cards[name] = card
             group.add(card)
         return group

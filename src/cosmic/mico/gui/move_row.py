@@ -9,6 +9,7 @@ from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.settings import MotionDefaults
+from cosmic.mico.gui.way_request import Goal
 
 
 class MoveFields:
@@ -64,3 +65,18 @@ class MoveFields:
         if self.split.isChecked():
             return StepwiseMove(self._axis, target, self.largest.value(), consent=consent)
         return self._axis.move_to(target, wait=False, consent=consent)
+
+    def goal_by(self, direction: int) -> Goal | None:
+        """Return where `move_by` leads from here; None before a position was read."""
+        position = self._axis.details.shown_position
+        if position is None:
+            return None
+        return self._goal(position + direction * self.distance.value())
+
+    def goal_to(self) -> Goal:
+        """Return where `move_to` leads."""
+        return self._goal(self.distance.value())
+
+    def _goal(self, shown: float) -> Goal:
+        state = self._axis.details
+        return Goal(target=shown + state.zero, shown=shown, unit=state.unit)

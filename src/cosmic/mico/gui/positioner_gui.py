@@ -91,6 +91,7 @@ class PositionerBaseGUI(Card):
         self.commands.begun.connect(self._on_begun)
         self.commands.refused.connect(self._on_refused)
         self.commands.ended.connect(self._on_ended)
+        self.commands.noted.connect(self._set_note)
         self.commands.consent_wanted.connect(self.consent_wanted)
 
     # Putting it together

@@ -1,0 +1,65 @@
+"""The control mode of a window: MCM, or ECM where there is a collision model (thesis 3.4)."""
+
+import logging
+from typing import Final
+
+from PySide6.QtCore import QObject, QSettings, Signal
+
+from cosmic.frame.gui.top_bar import TopBar
+
+logger = logging.getLogger(__name__)
+
+MCM: Final = "MCM"
+ECM: Final = "ECM"
+_KEY: Final = "window/mode"
+
+
+class ControlMode(QObject):
+    """Keeps the mode of one window, shows it and logs its changes; GUI thread.
+
+    Parameters
+    ----------
+    bar : TopBar
+        Where it is shown and chosen.
+    settings : QSettings
+        Where it is kept for the next start.
+    why_no_ecm : str
+        Why ECM cannot be chosen; empty when it can.
+
+    Signals
+    -------
+    changed(str)
+        Another mode is in force.
+    """
+
+    changed = Signal(str)
+
+    def __init__(
+        self, bar: TopBar, settings: QSettings, why_no_ecm: str, parent: QObject | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._bar = bar
+        self._settings = settings
+        self._mode = MCM
+        self._available = (MCM,) if why_no_ecm else (MCM, ECM)
+        bar.set_mode_available(ECM, why_no_ecm)
+        bar.mode_requested.connect(self.choose)
+
+    @property
+    def mode(self) -> str:
+        """The mode in force."""
+        return self._mode
+
+    def restore(self) -> None:
+        """Choose the mode of the last start, where it is to be had."""
+        self.choose(str(self._settings.value(_KEY, MCM)))
+
+    def choose(self, mode: str) -> None:
+        """Put `mode` in force, if it can be chosen."""
+        if mode not in self._available or mode == self._mode:
+            return
+        logger.info("control mode %s instead of %s", mode, self._mode)
+        self._mode = mode
+        self._settings.setValue(_KEY, mode)
+        self._bar.set_mode(mode)
+        self.changed.emit(mode)
