@@ -1,6 +1,14 @@
 import pytest
 
+from cosmic.frame.gui.theme import apply_theme, current_palette
 from gui.daqco.fake_port import FakePort, settings
+
+
+@pytest.fixture(autouse=True)
+def _dark(qapp):
+    """Colours are those of the dark theme, whatever theme an earlier test put on."""
+    if current_palette().name != "dark":
+        apply_theme(qapp, "dark")
 
 
 @pytest.fixture

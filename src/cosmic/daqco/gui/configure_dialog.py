@@ -18,7 +18,7 @@ from cosmic.daqco.core.scale import VOLTS
 from cosmic.daqco.core.settings import HIGHEST_RATE_HZ, LOWEST_RATE_HZ
 from cosmic.daqco.gui.channel_form import ChannelForm
 from cosmic.daqco.gui.channel_tree import ChannelTree
-from cosmic.daqco.gui.dialog import FieldDialog
+from cosmic.daqco.gui.dialog import FieldDialog, button_box
 from cosmic.daqco.gui.draft import Draft
 from cosmic.daqco.gui.ports import DaqPort
 from cosmic.daqco.gui.relay import PortRelay
@@ -67,7 +67,7 @@ class UDaqConfigureDialog(FieldDialog):
         self.remove = push_button("Remove", "Acquire this input no more")
         self.form = ChannelForm()
         self.message = ElidedLabel()
-        self.buttons = QDialogButtonBox(Button.Apply | Button.Ok | Button.Cancel)
+        self.buttons = button_box(Button.Apply | Button.Ok | Button.Cancel)
         self._build()
         self._connect()
         self._relay = PortRelay(port, self)

@@ -3,8 +3,8 @@
 from typing import Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QDialog
+from PySide6.QtGui import QIcon, QKeyEvent
+from PySide6.QtWidgets import QDialog, QDialogButtonBox
 
 from cosmic.frame.overrides import override
 
@@ -20,3 +20,11 @@ class FieldDialog(QDialog):
             event.accept()
             return
         super().keyPressEvent(event)
+
+
+def button_box(buttons: QDialogButtonBox.StandardButton) -> QDialogButtonBox:
+    """Return the buttons of a dialog, without the pictures that some desktops put on them."""
+    box = QDialogButtonBox(buttons)
+    for each in box.buttons():
+        each.setIcon(QIcon())
+    return box

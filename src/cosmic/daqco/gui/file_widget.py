@@ -87,11 +87,11 @@ class UDaqFileWidget(QWidget):
         where, beside = tight_row(STEP_PX)
         beside.addWidget(self.directory, 1)
         beside.addWidget(self.browse)
-        buttons, below = tight_row(STEP_PX)
-        below.addWidget(self.start)
-        below.addWidget(self.stop)
-        below.addWidget(self.badge)
-        below.addWidget(self.told, 1)
+        self._buttons, self._below = tight_row(STEP_PX)
+        self._below.addWidget(self.start)
+        self._below.addWidget(self.stop)
+        self._below.addWidget(self.badge)
+        self._below.addWidget(self.told, 1)
         self.told.setFont(number_font())
         self._cells = (
             (QLabel("Base name"), self.base),
@@ -99,7 +99,6 @@ class UDaqFileWidget(QWidget):
             (QLabel("Save options"), options),
             (QLabel("Directory"), where),
         )
-        self._buttons = buttons
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX)
         self._grid.setHorizontalSpacing(STEP_PX)
@@ -118,9 +117,11 @@ class UDaqFileWidget(QWidget):
             self._grid.addWidget(widget, row, 2 * column + 1)
         self._grid.setColumnStretch(3, columns - 1)
         rows = len(self._cells) // columns
-        self._grid.addWidget(self._buttons, rows, 0, 1, 2)
-        room = (rows, 2, 1, 2) if columns == 2 else (rows + 1, 0, 1, 2)
-        self._grid.addWidget(self.room, *room)
+        self._grid.addWidget(self._buttons, rows, 0, 1, 2 * columns)
+        if columns == 2:
+            self._below.addWidget(self.room, 1)
+        else:
+            self._grid.addWidget(self.room, rows + 1, 0, 1, 2)
 
     @override
     def resizeEvent(self, event: QResizeEvent) -> None:

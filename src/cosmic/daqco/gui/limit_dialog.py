@@ -11,7 +11,7 @@ from PySide6.QtWidgets import (
 )
 
 from cosmic.daqco.core.settings import LimitSettings
-from cosmic.daqco.gui.dialog import FieldDialog
+from cosmic.daqco.gui.dialog import FieldDialog, button_box
 from cosmic.daqco.gui.ports import DaqPort, LimitState
 from cosmic.daqco.gui.value_field import ValueField
 from cosmic.frame.errors import CosmicError
@@ -39,7 +39,7 @@ class LimitDialog(FieldDialog):
         self.remove = push_button("Remove limit", "Watch this channel no more")
         self.message = QLabel()
         self.message.setWordWrap(True)
-        self.buttons = QDialogButtonBox(Button.Ok | Button.Cancel)
+        self.buttons = button_box(Button.Ok | Button.Cancel)
         self._build()
         self.channel.setCurrentText(channel)
         self._show()

@@ -20,7 +20,6 @@ from cosmic.daqco.gui.ports import DaqPort
 from cosmic.daqco.gui.relay import PortRelay
 from cosmic.daqco.gui.scaling_bar import ScalingBar
 from cosmic.frame.errors import CosmicError
-from cosmic.frame.gui.build import named
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.theme import STEP_PX, number_font
@@ -58,7 +57,7 @@ class UDaqPlotter(QWidget):
         self.cursors = Cursors(self.chart)
         self.limit_lines = LimitLines(self.chart)
         self.state = Chip("LIVE", tip="Whether the picture follows the newest samples")
-        self.lost = named(Chip("lost 0", tip="Samples a channel that were lost"), "lost")
+        self.lost = Chip("lost 0", tip="Samples a channel that were lost")
         self.window_text, self.problem = QLabel(), ElidedLabel()
         self._timer = QTimer(self, timerType=Qt.TimerType.PreciseTimer)
         self._readout = QTimer(self, interval=READOUT_MS)
@@ -74,6 +73,7 @@ class UDaqPlotter(QWidget):
         self.window_text.setFont(number_font())
         self.window_text.setProperty("role", "dim")
         status = QHBoxLayout()
+        status.setSpacing(STEP_PX)
         for widget in (self.state, self.window_text, self.lost):
             status.addWidget(widget)
         status.addWidget(self.problem, 1)

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from cosmic.daqco.core.scale import LARGEST_DEGREE, VOLTS
 from cosmic.daqco.core.settings import ScaleSettings
-from cosmic.daqco.gui.dialog import FieldDialog
+from cosmic.daqco.gui.dialog import FieldDialog, button_box
 from cosmic.daqco.gui.polynomial import checked, coefficient_problem
 from cosmic.daqco.gui.scale_plot import ScalePlot
 from cosmic.daqco.gui.value_field import ValueField, show_refusal
@@ -37,7 +37,7 @@ class ScaleView(FieldDialog):
         self.setWindowTitle(f"Scale {scale.name}")
         self.plot = ScalePlot()
         self.plot.show_scale(scale)
-        buttons = QDialogButtonBox(Button.Close)
+        buttons = button_box(Button.Close)
         buttons.rejected.connect(self.reject)
         column = QVBoxLayout(self)
         column.addWidget(self.plot, 1)
@@ -86,7 +86,7 @@ class ScaleEditor(FieldDialog):
         self.plot = ScalePlot()
         self.message = QLabel()
         self.message.setWordWrap(True)
-        self.buttons = QDialogButtonBox(Button.Ok | Button.Cancel)
+        self.buttons = button_box(Button.Ok | Button.Cancel)
         self._build()
         self._connect()
         self._fill(self._first_names.index(chosen) if chosen in self._first_names else 0)
