@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 NOT_BUILT: Final = {
     "vico": "vision in a window of its own",
     "serve": "a station without a window",
-    "export": "export of recordings",
 }
 _WINDOW_SIZE: Final = (1600, 1000)
 
@@ -44,6 +43,8 @@ def _carry_out(chosen: argparse.Namespace, parser: argparse.ArgumentParser) -> i
         return _init(chosen.folder)
     if chosen.command == "scene":
         return _scene(chosen)
+    if chosen.command == "export":
+        return _export(chosen)
     return _window(chosen, parser)
 
 
@@ -79,6 +80,25 @@ def _scene(chosen: argparse.Namespace) -> int:
     if mistakes:
         return _fail("\n".join(mistakes))
     sys.stdout.write(f"{chosen.scene}: ok\n")
+    return 0
+
+
+def _export(chosen: argparse.Namespace) -> int:
+    from cosmic.daqco.api.export import export_file
+
+    told = sys.stderr if sys.stderr.isatty() else None
+
+    def report(fraction: float) -> bool:
+        if told is not None:
+            told.write(f"\r{chosen.recording.name}: {fraction:4.0%}")
+        return True
+
+    written = export_file(
+        chosen.recording, chosen.to, chosen.output, report, overwrite=chosen.overwrite
+    )
+    if told is not None:
+        told.write("\n")
+    sys.stdout.write(f"{written}\n")
     return 0
 
 
@@ -167,6 +187,11 @@ def _parser() -> argparse.ArgumentParser:
     split = tasks.add_parser("decompose", help="split a concave mesh into convex pieces")
     split.add_argument("mesh", type=Path, metavar="MESH.stl")
     split.add_argument("folder", type=Path, metavar="FOLDER")
+    export = commands.add_parser("export", help="write a recording as CSV or TDMS")
+    export.add_argument("recording", type=Path, metavar="RECORDING")
+    export.add_argument("--to", choices=("csv", "tdms"), default="csv", help="format; CSV")
+    export.add_argument("--output", type=Path, metavar="FILE", help="beside the recording if none")
+    export.add_argument("--overwrite", action="store_true", help="replace a file that exists")
     for name, what in NOT_BUILT.items():
         commands.add_parser(name, help=f"{what} (not built yet)", add_help=False)
     return parser

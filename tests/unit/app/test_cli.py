@@ -164,7 +164,7 @@ def test_init_into_a_file_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 @pytest.mark.parametrize(
     "arguments",
-    [["daqco"], ["vico"], ["serve", "--applications", "mico"], ["--rate", "2", "daqco"]],
+    [["vico"], ["serve", "--applications", "mico"], ["--rate", "2", "vico"]],
 )
 def test_what_is_not_built_says_so(
     arguments: list[str], capsys: pytest.CaptureFixture[str]
@@ -266,3 +266,13 @@ def test_a_picture_that_cannot_be_saved_is_an_error(tmp_path: Path) -> None:
 def test_importing_the_command_line_loads_no_widgets() -> None:
     code = "import sys, cosmic.app.cli; sys.exit('PySide6.QtWidgets' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0
+
+
+# export
+
+
+def test_a_recording_that_is_not_there_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["export", str(tmp_path / "nothing.h5"), "--to", "tdms"]) == 1
+    assert "nothing.h5" in complaints(capsys)[0]

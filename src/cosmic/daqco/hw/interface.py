@@ -31,8 +31,8 @@ class BoardInfo:
     product : str
         Such as "PCI-6229".
     inputs : tuple of str
-        Single-ended inputs in order, "ai0" and so on; the first half of them can be wired
-        differentially, each with its partner in the second half.
+        Single-ended inputs in order, "ai0" and so on. Within each block of sixteen, the first
+        eight can be wired differentially, ai0 with ai8 and so on.
     max_single_rate_hz, max_multi_rate_hz : float
         Highest rate of one input alone, and the sum of the rates of several.
     ranges_v : tuple of (float, float)
@@ -52,7 +52,7 @@ class BoardInfo:
         """Return the highest sampling rate a channel with `active` channels at once."""
         if active <= 1:
             return self.max_single_rate_hz
-        return self.max_multi_rate_hz / active
+        return min(self.max_single_rate_hz, self.max_multi_rate_hz / active)
 
 
 @dataclass(frozen=True, slots=True)
