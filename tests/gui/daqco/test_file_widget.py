@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QMessageBox, QPushButton
 from cosmic.daqco.gui.file_naming import name_problem
 from cosmic.daqco.gui.file_widget import UDaqFileWidget
 from cosmic.frame.gui.theme import State
-from gui.daqco.fake_port import Recorded
+from gui.daqco.fake_port import Counted, Recorded
 
 WHEN = datetime(2026, 11, 21, 12, 16, 40)
 
@@ -48,7 +48,7 @@ def answer(qtbot, widget, text):
 
 def test_the_full_name_shows_the_format_of_the_time_stamp(qtbot, widget):
     write(qtbot, widget.base, "fibre7")
-    assert widget.full_name.text() == "fibre7_yyyy-mm-dd_hhmmss.h5"
+    assert widget.full_name.text() == "fibre7_yyyy-mm-dd_hh-mm-ss.h5"
     choose(qtbot, widget, "Append with number")
     assert widget.full_name.text() == "fibre7_nnn.h5"
     choose(qtbot, widget, "Don't append")
@@ -62,7 +62,7 @@ def test_pressing_start_disables_it_and_enables_stop(qtbot, widget, port):
     click(qtbot, widget.start)
     assert not widget.start.isEnabled()
     assert widget.stop.isEnabled()
-    path = port.directory / "recording_2026-11-21_121640.h5"
+    path = port.directory / "recording_2026-11-21_12-16-40.h5"
     assert port.calls == [("record", path, False)]
     assert widget.full_name.text() == path.name
     assert not widget.base.isEnabled()
@@ -135,7 +135,7 @@ def test_numbers_go_on_after_the_highest_there_is(qtbot, widget, port):
 
 
 @pytest.mark.parametrize(
-    "name", ["", " ", "a/b", "a\\b", "..", ".hidden", "what?", "con", "x" * 200, "a\x00b"]
+    "name", ["", " ", ".h5", "a/b", "a\\b", "..", ".hidden", "what?", "con", "x" * 250, "a\x00b"]
 )
 def test_a_name_that_is_none_is_refused_at_its_field(qtbot, widget, port, name):
     widget.base.setText(name)
@@ -149,7 +149,7 @@ def test_a_name_that_is_none_is_refused_at_its_field(qtbot, widget, port, name):
 def test_a_directory_that_is_not_there_is_refused_at_its_field(qtbot, widget, port):
     write(qtbot, widget.directory, str(port.directory / "missing"))
     assert not widget.start.isEnabled()
-    assert "no such directory" in widget.start.toolTip()
+    assert "does not exist" in widget.start.toolTip()
     assert widget.directory.property("refused")
     (port.directory / "missing").mkdir()
     qtbot.waitUntil(widget.start.isEnabled, timeout=2000)
@@ -168,6 +168,12 @@ def test_time_left_on_the_disk_is_told_for_the_channels_and_rate_in_force(qtbot,
     port.free = 1000
     widget.refresh()
     assert "little room" in widget.room.text()
+
+
+def test_a_writer_that_falls_behind_is_told(qtbot, widget, port):
+    port.counters = Counted(backlog=2500)
+    port.change(recording=Recorded(active=True, path=port.directory / "x.h5"))
+    qtbot.waitUntil(lambda: "2.5 s behind" in widget.told.text())
 
 
 def test_length_and_size_of_the_recording_are_told(qtbot, widget, port):

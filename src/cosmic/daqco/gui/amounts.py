@@ -5,6 +5,7 @@ from typing import Final
 from cosmic.daqco.gui.ports import Recording
 
 LITTLE_ROOM_S: Final = 600.0
+LATE_S: Final = 1.0
 
 
 def size_text(size_bytes: float) -> str:
@@ -30,11 +31,11 @@ def duration_text(duration_s: float) -> str:
     return f"{duration_s:.1f} s"
 
 
-def recording_text(recording: Recording, backlog: int) -> str:
+def recording_text(recording: Recording, behind_s: float) -> str:
     """Return how long and how large a recording is; empty when there has been none."""
     amount = f"{duration_text(recording.duration_s)}, {size_text(recording.size_bytes)}"
     if recording.active:
-        return f"recording: {amount}" + (f", {backlog} chunks waiting" if backlog > 1 else "")
+        return f"recording: {amount}" + (f", {behind_s:.1f} s behind" if behind_s >= LATE_S else "")
     return f"{recording.path.name}: {amount}" if recording.path is not None else ""
 
 

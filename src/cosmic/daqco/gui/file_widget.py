@@ -17,15 +17,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from cosmic.daqco.core.file_names import NameOption, file_name
 from cosmic.daqco.gui.amounts import recording_text, room_text
 from cosmic.daqco.gui.append_row import append_row
-from cosmic.daqco.gui.file_naming import (
-    Append,
-    directory_problem,
-    file_name,
-    name_pattern,
-    name_problem,
-)
+from cosmic.daqco.gui.file_naming import directory_problem, name_pattern, name_problem
 from cosmic.daqco.gui.overwrite_question import overwrite_question
 from cosmic.daqco.gui.ports import DaqPort
 from cosmic.daqco.gui.relay import PortRelay
@@ -139,10 +134,10 @@ class UDaqFileWidget(QWidget):
     # What is chosen
 
     @property
-    def append(self) -> Append:
+    def append(self) -> NameOption:
         """What is appended to the base name."""
         chosen = self.options.checkedButton()
-        return Append.NOTHING if chosen is None else Append(chosen.property("append"))
+        return NameOption.NONE if chosen is None else NameOption(chosen.property("append"))
 
     @property
     def folder(self) -> Path:
@@ -178,10 +173,10 @@ class UDaqFileWidget(QWidget):
         self.full_name.setToolTip(tip)
 
     def _example(self) -> str:
-        try:
-            return f"Now: {file_name(self.base.text(), self.append, self._now(), self.folder)}"
-        except OSError as exc:
-            return str(exc)
+        return f"Now: {self._name_now()}"
+
+    def _name_now(self) -> str:
+        return file_name(self.base.text(), self.append, when=self._now(), directory=self.folder)
 
     def _enable(self, wrong: str) -> None:
         recording, asking = self._port.recording, self._asking is not None
@@ -205,7 +200,8 @@ class UDaqFileWidget(QWidget):
         state = State.ERROR if error else State.BUSY if recording.active else State.OK
         self.badge.set_state(state, error)
         self.badge.setVisible(bool(error) or recording.active or recording.path is not None)
-        self.told.set_text(error or recording_text(recording, self._port.counters.backlog))
+        behind_s = self._port.counters.backlog / self._port.rate_hz
+        self.told.set_text(error or recording_text(recording, behind_s))
 
     def _show_room(self, wrong: str) -> None:
         if wrong:
@@ -242,10 +238,9 @@ class UDaqFileWidget(QWidget):
         self.start.setEnabled(False)
         self._error = ""
         try:
-            name = file_name(self.base.text(), self.append, self._now(), self.folder)
-            path = self.folder / name
+            path = self.folder / self._name_now()
             there = path.stat() if path.exists() else None
-        except OSError as exc:
+        except (OSError, CosmicError) as exc:
             self._error = str(exc)
             self.refresh()
             return

@@ -33,7 +33,7 @@ class Counters(Protocol):
     @property
     @abstractmethod
     def backlog(self) -> int:
-        """Chunks acquired and not yet written."""
+        """Samples a channel that were acquired and are not yet written."""
 
 
 class Recording(Protocol):
