@@ -81,7 +81,6 @@ class WayBar(QWidget):
         last.addWidget(self._cancel)
         for button in (self._go, self._cancel):
             button.setMinimumWidth(10 * STEP_PX)
-        self._words.setMinimumHeight(2 * self._words.fontMetrics().lineSpacing())
         column = QVBoxLayout(self)
         column.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
         column.setSpacing(STEP_PX // 2)
@@ -140,6 +139,8 @@ class WayBar(QWidget):
         self._badge.set_state(state)
         self._head.set_text(head)
         self._words.setText(words)
+        self._words.ensurePolished()  # room for two lines always: the scene below keeps its place
+        self._words.setMinimumHeight(2 * self._words.fontMetrics().lineSpacing() + 2)
         self._go.setVisible(stage is Stage.FOUND)
         self._progress.setVisible(stage in (Stage.SEARCHING, Stage.GOING))
         self._cancel.setText("Close" if stage is Stage.ENDED else "Cancel")
