@@ -63,7 +63,7 @@ def test_check_names_every_mistake_with_file_key_and_reason(
         ('stop_key = "F12"', 'stop_key = "Esc"', "platform.stop_key: the key 'Esc' is taken"),
         ("device = 3\nchannel = 1", "device = 3\nchannel = 2", "has no stage"),
         ("device = 3\nchannel = 1", "device = 9\nchannel = 1", "has no stage"),
-        ('applications = ["mico"]', 'applications = ["miko"]', "unknown application 'miko'"),
+        ('applications = ["mico", ', 'applications = ["miko", ', "unknown application 'miko'"),
         ('twin = "twin.toml"', 'twin = "none.toml"', "none.toml: there is no such file"),
     ],
 )

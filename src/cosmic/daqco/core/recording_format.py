@@ -232,7 +232,8 @@ def scale_row(scale: Scale, *, version: int, channel: int, column: int, time_s: 
 def scale_of(row: npt.NDArray[np.void]) -> Scale:
     """Return the scale that `scale_row` wrote."""
     coefficients = tuple(float(each) for each in row["coefficients"][: int(row["terms"])])
-    return Scale(decoded(row["name"]), decoded(row["unit"]), coefficients)
+    name, unit = bytes(row["name"]), bytes(row["unit"])
+    return Scale(decoded(name), decoded(unit), coefficients)
 
 
 def channel_row(channel: ChannelSettings, scale: Scale) -> object:
