@@ -136,7 +136,9 @@ class OperatorWindow(CosmicServerGui):
         application = self._platform.daqco
         gui = application.get_gui() if application is not None else None
         if isinstance(gui, UDaqMainWidget):
-            self.add_panel(DAQCO, gui, Qt.DockWidgetArea.RightDockWidgetArea, scroll=False)
+            self.add_panel(DAQCO, gui, Qt.DockWidgetArea.RightDockWidgetArea)
+            if self._mico_gui is not None:
+                gui.show_files.setChecked(False)  # the plot needs the room that it shares
             gui.close_requested.connect(self.dock(DAQCO).close)
 
     def _add_log(self, ring: RingBufferHandler, *, console: bool) -> None:
