@@ -7,7 +7,7 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from cosmic.daqco.api.recording import open_recording
@@ -303,6 +303,15 @@ def test_a_time_that_is_no_number_is_refused(tmp_path):
         found.volts("force", start_s=float("nan"))
 
 
+def test_a_closed_recording_gives_no_samples(tmp_path):
+    path = record(tmp_path / "run.h5", header(), volts_of(2, 10))
+    with open_recording(path) as found:
+        pass
+    found.close()
+    with pytest.raises(RecordingError, match="was closed; open it again"):
+        found.volts("force")
+
+
 def test_a_recording_of_nothing_can_be_read(tmp_path):
     path = record(tmp_path / "run.h5", header(), [])
     with open_recording(path) as found:
@@ -416,3 +425,58 @@ def test_a_file_that_was_cut_off_is_refused_or_read_never_garbled(tmp_path, shar
     path.write_bytes(data[: int(len(data) * share)])
     with pytest.raises(RecordingError, match=r"run\.h5"), open_recording(path) as found:
         found.volts("force")
+
+
+@pytest.fixture
+def killed(tmp_path):
+    """What a killed process leaves: a file that was flushed and never closed, and its volts."""
+    head = header()
+    volts = volts_of(2, 20_000)
+    file = RecordingFile(tmp_path / "running.h5", head)
+    for number, chunk in enumerate(chunks(head, volts, 50)):
+        file.append(chunk)
+        if number % 50 == 0:
+            file.flush()
+    file.flush()
+    path = tmp_path / "killed.h5"
+    path.write_bytes((tmp_path / "running.h5").read_bytes()[: file.size_bytes])
+    file.close(complete=True)
+    return path, volts
+
+
+def test_a_file_that_was_never_closed_is_read(killed):
+    path, volts = killed
+    with open_recording(path) as found:
+        assert not found.complete
+        np.testing.assert_array_equal(found.volts("noise"), volts[1])
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.3, 0.6, 0.9, 0.99])
+def test_an_unclosed_file_that_lost_its_end_fails_at_once(killed, share):
+    path, volts = killed
+    data = path.read_bytes()
+    path.write_bytes(data[: int(len(data) * share)])
+    try:
+        with open_recording(path) as found:
+            np.testing.assert_array_equal(found.volts("force"), volts[0, : found.samples])
+    except RecordingError as exc:
+        assert "killed.h5" in str(exc)
+
+
+@pytest.mark.timeout(20)
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.integers(0, 160), st.sampled_from([b"\0", b"\xff"]))
+def test_an_unclosed_file_with_a_lost_page_is_read_or_fails_at_once(killed, page, byte):
+    path, _ = killed
+    data = bytearray(path.read_bytes())
+    first = min(4096 * page, len(data) - 4096)
+    data[first : first + 4096] = byte * 4096
+    other = path.with_name("other.h5")
+    other.write_bytes(data)
+    try:
+        with open_recording(other) as found:
+            found.values("force")
+            found.curve("noise", "none")
+    except RecordingError as exc:
+        assert "other.h5" in str(exc)

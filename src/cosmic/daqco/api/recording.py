@@ -116,22 +116,22 @@ class Recording:
     @property
     def software(self) -> str:
         """Which program wrote it."""
-        return str(self._source.file.attrs["software"])
+        return str(self._source.attributes["software"])
 
     @property
     def configuration(self) -> str:
         """The platform file in force, as text."""
-        return form.decoded(self._source.file["configuration"][()])
+        return self._source.configuration
 
     @property
     def start_utc(self) -> datetime:
         """When it was begun; the same moment as `start_s`."""
-        return datetime.fromisoformat(str(self._source.file.attrs["start_utc"]))
+        return datetime.fromisoformat(str(self._source.attributes["start_utc"]))
 
     @property
     def start_s(self) -> float:
         """When it was begun, platform time."""
-        return float(self._source.file.attrs["start_s"])
+        return float(self._source.attributes["start_s"])
 
     @property
     def scales(self) -> dict[str, tuple[Scale, ...]]:

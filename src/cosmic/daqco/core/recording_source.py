@@ -1,5 +1,6 @@
 """Reading the HDF5 file of a recording, finished, running or killed."""
 
+import logging
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -14,8 +15,10 @@ from cosmic.daqco.core.recording_format import RecordingError
 from cosmic.daqco.core.unclosed_file import UnclosedFile, is_unclosed
 from cosmic.frame.clock import WALL
 
-READ_ERRORS: Final = (OSError, RuntimeError, ValueError, KeyError)
+READ_ERRORS: Final = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError)
 """What h5py raises over a file that is damaged."""
+
+logger = logging.getLogger(__name__)
 
 ATTEMPTS: Final = 5
 PAUSE_S: Final = 0.002
@@ -30,24 +33,23 @@ def open_file(path: Path) -> h5py.File:
     Raises
     ------
     RecordingError
-        There is none, it is none, or it cannot be read.
+        There is none, or it is none.
+    READ_ERRORS
+        It cannot be read.
     """
     if not path.is_file():
         raise RecordingError(f"{path}: there is no such file")
+    if is_unclosed(path):
+        file = h5py.File(UnclosedFile(path), "r")
+    else:
+        file = h5py.File(path, "r", locking="best-effort")
     try:
-        if is_unclosed(path):
-            file = h5py.File(UnclosedFile(path), "r")
-        else:
-            file = h5py.File(path, "r", locking="best-effort")
-    except READ_ERRORS as exc:
-        raise RecordingError(
-            f"{path}: cannot be read ({form.reason(exc)}); it is no recording, or damaged beyond "
-            "what its writer could prevent. Look for a copy"
-        ) from exc
-    if file.attrs.get("format") == form.FORMAT:
-        return file
-    file.close()
-    raise RecordingError(f"{path}: is an HDF5 file, but no recording by CoSMic")
+        if file.attrs.get("format") != form.FORMAT:
+            raise RecordingError(f"{path}: is an HDF5 file, but no recording by CoSMic")
+    except Exception:
+        file.close()
+        raise
+    return file
 
 
 @dataclass(frozen=True)
@@ -74,26 +76,23 @@ class RecordingSource:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.file = open_file(path)
-        try:
-            self._load()
-        except READ_ERRORS as exc:
-            self.file.close()
-            self._open_again(exc)
-        except RecordingError:
-            self.file.close()
-            raise
+        self.file: h5py.File | None = None
+        self._open()
 
     def refresh(self) -> None:
         """Look again at a file that is still being written."""
-        self._open_again()
+        self.close()
+        self._open()
 
     def read_volts(self, channel: int, columns: Columns) -> Values:
         """Return volts of one channel."""
+        if self.file is None:
+            raise RecordingError(f"{self.path}: was closed; open it again")
         try:
             volts: Values = self._volts[channel, columns.first : columns.last]
         except READ_ERRORS as exc:
-            self._open_again(exc)
+            logger.info("%s: read again (%s)", self.path, form.reason(exc))
+            self.refresh()
             try:
                 volts = self._volts[channel, columns.first : columns.last]
             except READ_ERRORS as again:
@@ -102,8 +101,9 @@ class RecordingSource:
 
     def close(self) -> None:
         """Give the file back; harmless the second time."""
-        if self.file:
+        if self.file is not None:
             self.file.close()
+            self.file = None
 
     def times(self, columns: Columns) -> Values:
         """Return the platform time of samples."""
@@ -156,37 +156,39 @@ class RecordingSource:
         into = np.ceil((time_s - row["time_s"]) * self.rate_hz - 1e-6)
         return int(row["column"]) + min(max(0, int(into)), int(row["samples"]))
 
-    def _open_again(self, error: Exception | None = None) -> None:
-        """Open the file again; what was half written a moment ago is whole then."""
-        for _ in range(ATTEMPTS):
-            self.file.close()
-            self.file = open_file(self.path)
+    def _open(self) -> None:
+        """Open the file, a few times: what is half written now is whole in a moment."""
+        for attempt in range(ATTEMPTS):
             try:
-                self._load()
+                self.file = open_file(self.path)
+                self._load(self.file)
             except READ_ERRORS as exc:
-                error = exc
-                self.file.close()
+                self.close()
+                if attempt + 1 == ATTEMPTS:
+                    raise self._broken(exc) from exc
                 WALL.sleep(PAUSE_S)
+            except RecordingError:
+                self.close()
+                raise
             else:
                 return
-        raise self._broken(error or OSError("unknown")) from error
 
-    def _load(self) -> None:
-        version = int(self.file.attrs["format_version"])
+    def _load(self, file: h5py.File) -> None:
+        version = int(file.attrs["format_version"])
         if version > form.VERSION:
             raise RecordingError(
                 f"{self.path}: has format {version}, this CoSMic reads up to {form.VERSION}; "
                 "use a newer one"
             )
-        self.rate_hz = float(self.file.attrs["rate_hz"])
-        self.channels: Table = self.file["channels"][:]
+        self.rate_hz = float(file.attrs["rate_hz"])
+        self.channels: Table = file["channels"][:]
         self.names = tuple(form.decoded(each) for each in self.channels["name"])
-        self.complete = bool(self.file["complete"][()])
+        self.complete = bool(file["complete"][()])
         # Backwards: what a row of `chunks` speaks of was written before it.
-        self.tables: dict[str, Table] = {
-            name: self.file[name][:] for name in reversed(form.GROWING)
-        }
-        self._volts = self.file["volts"]
+        self.tables: dict[str, Table] = {name: file[name][:] for name in reversed(form.GROWING)}
+        self.attributes = {name: file.attrs[name] for name in ("software", "start_utc", "start_s")}
+        self.configuration = form.decoded(file["configuration"][()])
+        self._volts = file["volts"]
         self._trim()
 
     def _trim(self) -> None:
@@ -197,4 +199,7 @@ class RecordingSource:
         self.samples = int(whole["column"][-1] + whole["samples"][-1]) if len(whole) else 0
 
     def _broken(self, exc: Exception) -> RecordingError:
-        return RecordingError(f"{self.path}: is damaged ({form.reason(exc)}); look for a copy")
+        return RecordingError(
+            f"{self.path}: cannot be read ({form.reason(exc)}); it is no recording, or damaged "
+            "beyond what its writer could prevent. Look for a copy"
+        )

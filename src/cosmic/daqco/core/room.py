@@ -6,6 +6,7 @@ good order, and cut to its length when it is closed.
 """
 
 import errno
+import logging
 import os
 import struct
 from pathlib import Path
@@ -14,6 +15,8 @@ from typing import Final
 import h5py
 
 from cosmic.daqco.core.unclosed_file import END_AT, LENGTH
+
+logger = logging.getLogger(__name__)
 
 STEP_BYTES: Final = 16 * 1024 * 1024
 TABLES_BYTES: Final = 4 * 1024 * 1024
@@ -64,8 +67,11 @@ class Room:
 
 def cut(path: Path) -> None:
     """Cut a closed file to the length that it says it has."""
-    with path.open("r+b") as file:
-        head = file.read(LENGTH)
-        (end,) = struct.unpack_from("<Q", head, END_AT)
-        if end < file.seek(0, os.SEEK_END):
-            file.truncate(end)
+    try:
+        with path.open("r+b") as file:
+            head = file.read(LENGTH)
+            (end,) = struct.unpack_from("<Q", head, END_AT)
+            if end < file.seek(0, os.SEEK_END):
+                file.truncate(end)
+    except OSError as exc:  # zeros at the end of a file that is whole harm nobody
+        logger.info("%s: keeps the room that was taken ahead (%s)", path, exc)

@@ -103,10 +103,10 @@ def _closed_head(head: bytes, size: int) -> bytes:
     """Return the superblock without its marks of a writer, and with the end that is there."""
     if not _is_ours(head):
         return head
-    (end,) = struct.unpack_from("<Q", head, END_AT)
     changed = bytearray(head)
     changed[FLAGS_AT] = 0
-    struct.pack_into("<Q", changed, END_AT, min(end, size))
+    # The end that is written there may lag behind what the tables speak of by now.
+    struct.pack_into("<Q", changed, END_AT, size)
     struct.pack_into("<I", changed, CHECKSUM_AT, checksum(bytes(changed[:CHECKSUM_AT])))
     return bytes(changed)
 
