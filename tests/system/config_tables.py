@@ -101,7 +101,7 @@ def rows(model: type[BaseModel]) -> Iterator[tuple[str, str, str, str]]:
         if any("$ref" in part for part in parts):
             continue
         # The schema does not tell what a factory makes; here they make empty tables only.
-        empty = {} if described.get("type") == "object" else None
+        empty: dict[str, Any] | None = {} if described.get("type") == "object" else None
         default = "required" if key in required else _toml(described.get("default", empty))
         yield f"`{key}`", _kind(described, schema.get("$defs", {})), _unit(key), default
 

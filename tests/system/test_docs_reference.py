@@ -10,6 +10,7 @@ from pydantic import BaseModel
 
 import cosmic
 from cosmic.app.platform import load_platform
+from cosmic.daqco.hw.sim_faults import NAMES as BOARD_FAULTS
 from cosmic.mico.core.positioner import Confidence
 from cosmic.mico.hw.sim_scu3d_faults import NAMES as FAULTS
 from system.api_names import CLASSES, ENUMS, exceptions, names, signature
@@ -141,6 +142,11 @@ def first_cells(rows_of_page: list[list[str]], head: str) -> list[str]:
 def test_every_fault_of_the_simulated_controller_is_explained() -> None:
     listed = table_rows(ROOT / "docs" / "explanation" / "simulated-controller.md")
     assert first_cells(listed, "fault") == list(FAULTS)
+
+
+def test_every_fault_of_the_simulated_boards_is_explained() -> None:
+    listed = table_rows(ROOT / "docs" / "explanation" / "acquisition.md")
+    assert first_cells(listed, "fault") == list(BOARD_FAULTS)
 
 
 def test_every_reason_of_a_refusal_and_every_confidence_is_explained(tmp_path: Path) -> None:
