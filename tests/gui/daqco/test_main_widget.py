@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from PySide6.QtCore import QSettings, Qt
-from PySide6.QtWidgets import QDialogButtonBox, QFileDialog
+from PySide6.QtWidgets import QApplication, QDialogButtonBox, QFileDialog, QPushButton
 
 from cosmic.daqco.core.settings import LimitSettings
 from cosmic.daqco.gui.configure_dialog import UDaqConfigureDialog
@@ -104,13 +104,32 @@ def test_it_works_as_a_panel_of_the_server_window(qtbot, port, tmp_path, theme):
     assert window.isVisible()  # the panel asks; its window decides
 
 
-def test_nothing_is_clipped_in_a_small_window(qtbot, main):
-    assert main.minimumSizeHint().width() <= 760
-    assert main.minimumSizeHint().height() <= 480
-    main.resize(main.minimumSizeHint())
-    for button in (main.files.start, main.files.stop, main.plotter.bar.rescale):
+@pytest.mark.parametrize("size", [(1000, 700), (900, 480), (420, 400), None])
+def test_nothing_is_clipped_in_a_small_window(qtbot, main, size):
+    main.resize(*size) if size else main.resize(main.minimumSizeHint())
+    QApplication.processEvents()
+    main.resize(*size) if size else main.resize(main.minimumSizeHint())
+    QApplication.processEvents()
+    buttons = [each for each in main.findChildren(QPushButton) if each.isVisible()]
+    assert main.files.start in buttons
+    for button in buttons:
         corner = button.mapTo(main, button.rect().bottomRight())
-        assert main.rect().contains(corner)
+        assert main.rect().contains(corner), button.text()
+    assert main.plotter.chart.box.height() >= 40
+
+
+def test_a_low_panel_keeps_its_room_for_the_picture(qtbot, main):
+    assert main.files.base.isVisible()
+    assert main.plotter.bar.rescale.isVisible()
+    main.resize(900, 420)
+    qtbot.waitUntil(lambda: not main.files.base.isVisible())
+    assert not main.plotter.bar.rescale.isVisible()
+    qtbot.mouseClick(main.files.fields, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(main.plotter.bar.scales, Qt.MouseButton.LeftButton)
+    main.resize(900, 430)
+    QApplication.processEvents()
+    assert main.files.base.isVisible()
+    assert main.plotter.bar.rescale.isVisible()
 
 
 # --- export -----------------------------------------------------------------------------------

@@ -209,7 +209,7 @@ class ChannelList(QTableView):
 
     @override
     def minimumSizeHint(self) -> QSize:
-        return QSize(26 * STEP_PX, 8 * STEP_PX)
+        return QSize(24 * STEP_PX, 7 * STEP_PX)
 
     def _on_double_clicked(self, index: QModelIndex) -> None:
         if index.column():

@@ -24,7 +24,7 @@ from cosmic.daqco.gui.file_naming import directory_problem, name_pattern, name_p
 from cosmic.daqco.gui.overwrite_question import overwrite_question
 from cosmic.daqco.gui.ports import DaqPort
 from cosmic.daqco.gui.relay import PortRelay
-from cosmic.daqco.gui.value_field import show_refusal
+from cosmic.daqco.gui.value_field import mark_refusal
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
@@ -56,7 +56,7 @@ class UDaqFileWidget(QWidget):
         super().__init__(parent)
         self._port, self._now = port, now
         self._asking: QMessageBox | None = None
-        self._error, self._columns = "", 0
+        self._error, self._columns, self._chosen = "", 0, False
         self.base = tipped(QLineEdit("recording"), "Base of the file name")
         self.full_name = tipped(QLineEdit(), "")
         self.full_name.setReadOnly(True)
@@ -88,6 +88,10 @@ class UDaqFileWidget(QWidget):
         self._below.addWidget(self.badge)
         self._below.addWidget(self.told, 1)
         self.told.setFont(number_font())
+        self.fields = push_button("File…", "Show the fields for name and directory")
+        self.fields.setCheckable(True)
+        self.fields.setChecked(True)
+        self._below.addWidget(self.fields)
         self._cells = (
             (QLabel("Base name"), self.base),
             (QLabel("Full file name"), self.full_name),
@@ -118,6 +122,19 @@ class UDaqFileWidget(QWidget):
         else:
             self._grid.addWidget(self.room, rows + 1, 0, 1, 2)
 
+    def set_compact(self, compact: bool) -> None:
+        """Show the buttons alone, unless the operator chose otherwise."""
+        if not self._chosen:
+            self.fields.setChecked(not compact)
+
+    def _on_fields_clicked(self) -> None:
+        self._chosen = True
+
+    def _show_fields(self, shown: bool) -> None:
+        for cell in self._cells:
+            for widget in cell:
+                widget.setVisible(shown)
+
     @override
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -128,6 +145,8 @@ class UDaqFileWidget(QWidget):
         self.directory.textEdited.connect(self._on_edited)
         self.options.buttonClicked.connect(self.refresh)
         self.browse.clicked.connect(self._on_browse)
+        self.fields.clicked.connect(self._on_fields_clicked)
+        self.fields.toggled.connect(self._show_fields)
         self.start.clicked.connect(self._on_start)
         self.stop.clicked.connect(self._on_stop)
 
@@ -151,8 +170,8 @@ class UDaqFileWidget(QWidget):
         recording = self._port.recording
         wrong_name = "" if recording.active else name_problem(self.base.text())
         wrong_folder = "" if recording.active else directory_problem(self.directory.text())
-        _mark(self.base, wrong_name)
-        _mark(self.directory, wrong_folder)
+        mark_refusal(self.base, wrong_name)
+        mark_refusal(self.directory, wrong_folder)
         self._show_name(wrong_name)
         for widget in (self.base, self.directory, self.browse, *self.options.buttons()):
             widget.setEnabled(not recording.active)
@@ -277,8 +296,3 @@ class UDaqFileWidget(QWidget):
         except CosmicError as exc:
             self._error = str(exc)
         self.refresh()
-
-
-def _mark(field: QLineEdit, reason: str) -> None:
-    if field.accessibleDescription() != reason:
-        show_refusal(field, reason)

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QAction
+from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
@@ -30,8 +30,11 @@ from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.theme import STEP_PX, number_font
+from cosmic.frame.overrides import override
 
 RECORDINGS: Final = "Recordings (*.h5)"
+LOW_PX: Final = 70 * STEP_PX
+NARROW_PX: Final = 70 * STEP_PX
 EXPORTS: Final = "CSV (*.csv);;TDMS (*.tdms)"
 
 
@@ -119,6 +122,13 @@ class UDaqMainWidget(QWidget):
         if do is not None:
             action.triggered.connect(lambda: do())
         return action
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        low, narrow = self.height() < LOW_PX, self.width() < NARROW_PX
+        self.files.set_compact(low)
+        self.plotter.set_compact(low or narrow, narrow=narrow)
 
     # Following the application
 

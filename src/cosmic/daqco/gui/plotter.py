@@ -14,6 +14,7 @@ from cosmic.daqco.gui.limit_banner import LimitBanner
 from cosmic.daqco.gui.plot.chart import Chart, Trace
 from cosmic.daqco.gui.plot.inbox import ChunkInbox
 from cosmic.daqco.gui.plot.marks import Cursors, LimitLines
+from cosmic.daqco.gui.plot.refresh import shown_rate_hz
 from cosmic.daqco.gui.plot.unit_ranges import UnitRanges
 from cosmic.daqco.gui.plot.units import AxisRange
 from cosmic.daqco.gui.ports import DaqPort
@@ -110,14 +111,20 @@ class UDaqPlotter(QWidget):
         self.channels.limit_requested.connect(self.limit_requested)
         self.banner.reset_requested.connect(self._on_reset_requested)
 
+    def set_compact(self, compact: bool, *, narrow: bool) -> None:
+        """Leave the room to the picture; where it is narrow, the channels stand below it."""
+        self.bar.set_compact(compact)
+        upright = Qt.Orientation.Vertical if narrow else Qt.Orientation.Horizontal
+        if self.split.orientation() is not upright:
+            self.split.setOrientation(upright)
+            self._share_room()
+
     # What the operator does
 
     @property
     def refresh_hz(self) -> float:
         """How often the picture is looked at: the setting, or what the screen can show."""
-        screen = self.screen()
-        most = screen.refreshRate() if screen is not None else 60.0
-        return min(self._port.settings.refresh_hz, most if most > 1.0 else 60.0)
+        return shown_rate_hz(self._port.settings.refresh_hz, self.screen())
 
     @property
     def ranges(self) -> dict[str, AxisRange]:
@@ -263,25 +270,21 @@ class UDaqPlotter(QWidget):
     def _on_cursors_changed(self, shown: bool) -> None:
         self.cursors.show(shown)
         self.channels.set_cursors_shown(shown)
-        width = self.channels.sizeHint().width()
-        self.split.setSizes([max(1, self.split.width() - width), width])
+        self._share_room()
         self._show_cursors()
+
+    def _share_room(self) -> None:
+        """Give the channels what they need and the picture the rest."""
+        beside = self.split.orientation() is Qt.Orientation.Horizontal
+        needed = self.channels.sizeHint().width() if beside else 1
+        self.split.setSizes([max(1, self.split.width() - needed), needed])
 
     def _show_cursors(self) -> None:
         model = self.channels.channels
-        if not self.cursors.shown:
-            for column in (1, 2, 3):
-                model.set_values(column, None)
-            return
-        at_a, at_b = self.cursors.values()
-        model.set_values(1, at_a)
-        model.set_values(2, at_b)
-        between = None if at_a is None or at_b is None else np.subtract(at_b, at_a).tolist()
-        model.set_values(3, between)
-        first_s, second_s = self.cursors.times_s()
-        self.window_text.setText(
-            f"A {first_s:.3f} s   B {second_s:.3f} s   B − A {second_s - first_s:.3f} s"
-        )
+        for column, values in enumerate(self.cursors.readings(), start=1):
+            model.set_values(column, values)
+        if self.cursors.shown:
+            self.window_text.setText(self.cursors.text())
 
     def _on_reset_requested(self, channel: str) -> None:
         try:

@@ -46,18 +46,20 @@ class ScalingBar(QWidget):
         self.auto.setChecked(True)
         self.cursors = _toggle("Cursors", "Show two lines to read values at")
         self.clear = push_button("Clear", "Forget the history of the picture; no file is touched")
+        self.scales = _toggle("y-axis", "Show the fields for the vertical axes")
+        self.scales.setChecked(True)
+        self._fields: list[QWidget] = []
+        self._chosen = False
         self._build()
         self._connect()
 
     def _build(self) -> None:
         flow = FlowLayout(STEP_PX, self)
         labelled = (("y-min", self.low), ("y-max", self.high), ("y-interval", self.step))
-        for widget in (self.pause, self.span, self.cursors, self.clear, self.unit):
+        self._fields = [*(_labelled(text, field) for text, field in labelled), self.rescale]
+        before = (self.pause, self.span, self.cursors, self.clear, self.auto, self.scales)
+        for widget in (*before, self.unit, *self._fields):
             flow.addWidget(widget)
-        for text, field in labelled:
-            flow.addWidget(_labelled(text, field))
-        flow.addWidget(self.rescale)
-        flow.addWidget(self.auto)
 
     def _connect(self) -> None:
         self.pause.clicked.connect(self._on_pause)
@@ -65,6 +67,8 @@ class ScalingBar(QWidget):
         self.unit.activated.connect(self._show_range)
         self.rescale.clicked.connect(self._on_rescale)
         self.auto.toggled.connect(self.auto_changed)
+        self.scales.clicked.connect(self._on_scales_clicked)
+        self.scales.toggled.connect(self._show_fields)
         self.cursors.toggled.connect(self.cursors_changed)
         self.clear.clicked.connect(self.clear_requested)
         for field in (self.low, self.high, self.step):
@@ -78,10 +82,15 @@ class ScalingBar(QWidget):
             for unit in ranges:
                 self.unit.addItem(display_unit(unit), unit)
             self.unit.setCurrentIndex(max(0, self.unit.findData(chosen)))
-            self.unit.setVisible(len(ranges) > 1)
         self._ranges = dict(ranges)
+        self._show_fields()
         if not any(f.isModified() or f.reason for f in (self.low, self.high, self.step)):
             self._show_range()
+
+    def set_compact(self, compact: bool) -> None:
+        """Leave the room to the picture, unless the operator chose otherwise."""
+        if not self._chosen:
+            self.scales.setChecked(not compact)
 
     def show_frozen(self, frozen: bool) -> None:
         """Let the first button say what it does now."""
@@ -89,6 +98,15 @@ class ScalingBar(QWidget):
         text, tip = _FROZEN if frozen else _LIVE
         self.pause.setText(text)
         self.pause.setToolTip(tip)
+
+    def _show_fields(self) -> None:
+        shown = self.scales.isChecked()
+        for widget in self._fields:
+            widget.setVisible(shown)
+        self.unit.setVisible(shown and len(self._ranges) > 1)
+
+    def _on_scales_clicked(self) -> None:
+        self._chosen = True
 
     def _show_range(self) -> None:
         unit = self.unit.currentData()

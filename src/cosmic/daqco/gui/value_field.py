@@ -27,6 +27,12 @@ def show_refusal(field: QLineEdit, reason: str) -> None:
     field.setAccessibleDescription(reason)
 
 
+def mark_refusal(field: QLineEdit, reason: str) -> None:
+    """Show a refusal, or its end, once: a note that was clicked away does not come back."""
+    if field.accessibleDescription() != reason:
+        show_refusal(field, reason)
+
+
 class ValueField(QLineEdit):
     """Takes a finite number; the unit stands dimmed behind it.
 

@@ -61,6 +61,19 @@ class Cursors(QObject):
             found.append(samples[:, 0].tolist() if samples.shape[1] else None)
         return found
 
+    def readings(self) -> list[list[float] | None]:
+        """Return the values at A, at B, and B less A; None each where there are none."""
+        if not self.shown:
+            return [None, None, None]
+        at_a, at_b = self.values()
+        between = None if at_a is None or at_b is None else np.subtract(at_b, at_a).tolist()
+        return [at_a, at_b, between]
+
+    def text(self) -> str:
+        """Return where both cursors are and what lies between them."""
+        first_s, second_s = self.times_s()
+        return f"A {first_s:.3f} s   B {second_s:.3f} s   B − A {second_s - first_s:.3f} s"
+
     def _line(self, name: str, time_s: float) -> pg.InfiniteLine:
         palette = current_palette()
         line = pg.InfiniteLine(
