@@ -1,4 +1,5 @@
 import logging
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -143,12 +144,12 @@ def test_a_refused_move_is_made_after_taking_the_axis_out(panel: MicoWidget, qtb
 @pytest.fixture
 def bare(qtbot: QtBot, tmp_path: Path) -> Iterator[MicoWidget]:
     """The shipped platform with no scene named."""
-    folder = shipped_config_dir()
+    folder = tmp_path / "config"
+    shutil.copytree(shipped_config_dir(), folder)
     text = (folder / "platform.toml").read_text(encoding="utf-8")
     scene = load_platform(None)[0].platform.scene
-    (tmp_path / "platform.toml").write_text(text.replace(scene, ""), encoding="utf-8")
-    (tmp_path / "twin.toml").write_bytes((folder / "twin.toml").read_bytes())
-    platform = build_platform(tmp_path, rate=50.0, mico_gui=make_mico_gui)
+    (folder / "platform.toml").write_text(text.replace(scene, ""), encoding="utf-8")
+    platform = build_platform(folder, applications=("mico",), rate=50.0, mico_gui=make_mico_gui)
     assert platform.mico is not None
     platform.initialize()
     panel = platform.mico.get_gui()
