@@ -71,6 +71,11 @@ class Task:
         return self._cancel_requested
 
     @property
+    def failure(self) -> Exception | None:
+        """What it failed with; None while it runs, and when it ended well."""
+        return self._error
+
+    @property
     def progress(self) -> Progress:
         """How far it is now."""
         elapsed_s = WALL.now_s() - self._started_s

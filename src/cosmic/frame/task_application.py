@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
 
 from cosmic.frame.application import CosmicApplicationBase, GuiFactory
-from cosmic.frame.errors import NotAvailable
+from cosmic.frame.errors import MoveCancelled, MoveRefused, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.task import Task
 
@@ -98,9 +98,11 @@ class TaskApplication(CosmicApplicationBase):
             except Exception as exc:
                 task.fail(exc)  # whoever waits for it must not wait for ever
                 raise
-            error = task.progress.error
-            if error:
-                logger.error("%s ended: %s", task.title, error)
+            failure = task.failure
+            if isinstance(failure, (MoveRefused, MoveCancelled)):
+                logger.warning("%s ended: %s", task.title, failure)
+            elif failure is not None:
+                logger.error("%s ended: %s", task.title, failure)
             else:
                 logger.info("%s finished", task.title)
 
