@@ -1,5 +1,7 @@
 """Recordings: written block by block, read back as physical values."""
 
+import errno
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -301,6 +303,33 @@ def test_a_time_that_is_no_number_is_refused(tmp_path):
     path = record(tmp_path / "run.h5", header(), volts_of(2, 10))
     with open_recording(path) as found, pytest.raises(ValueError, match="finite"):
         found.volts("force", start_s=float("nan"))
+
+
+def test_a_chunk_of_which_a_part_is_missing_is_left_out(tmp_path):
+    volts = volts_of(2, 200)
+    path = record(tmp_path / "run.h5", header(), volts)
+    with h5py.File(path, "r+") as file:
+        file["volts"].resize(130, axis=1)
+    with open_recording(path) as found:
+        np.testing.assert_array_equal(found.volts("force"), volts[0, :100])
+        assert found.time_s.size == 100
+
+
+@pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="room is taken otherwise")
+def test_a_full_disk_is_noticed_between_two_flushes(tmp_path, monkeypatch):
+    head = header(rate_hz=15_000.0)
+    file = RecordingFile(tmp_path / "run.h5", head)
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "full")
+
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    with pytest.raises(RecordingError, match=r"cannot grow .*make room"):
+        for chunk in chunks(head, volts_of(2, 3_000_000), 3000):
+            file.append(chunk)
+    file.close(complete=False)
+    with open_recording(tmp_path / "run.h5") as found:
+        assert found.samples > 500_000
 
 
 def test_a_closed_recording_gives_no_samples(tmp_path):

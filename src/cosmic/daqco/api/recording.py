@@ -92,11 +92,8 @@ class Recording:
     def ranges_v(self) -> dict[str, tuple[float, float]]:
         """Voltages expected at each channel, low and high."""
         rows = self._source.channels
-        pairs = zip(rows["low_v"], rows["high_v"], strict=True)
-        return {
-            name: (float(low), float(high))
-            for name, (low, high) in zip(self.channels, pairs, strict=True)
-        }
+        pairs = zip(rows["low_v"].tolist(), rows["high_v"].tolist(), strict=True)
+        return dict(zip(self.channels, pairs, strict=True))
 
     @property
     def rate_hz(self) -> float:
@@ -184,13 +181,7 @@ class Recording:
     def volts(
         self, channel: str, *, start_s: float | None = None, end_s: float | None = None
     ) -> Values:
-        """Return volts as acquired, shape (n,).
-
-        Raises
-        ------
-        RecordingError
-            There is no such channel, or the file is damaged.
-        """
+        """Return volts as acquired, shape (n,); raises as `values`."""
         row = self._row(channel)
         return self._source.read_volts(row, self._source.columns(start_s, end_s))
 
