@@ -30,6 +30,7 @@ NAMES = (
     "planning",
     "scene_view",
     "twin_force",
+    "recorder",
 )
 ALL = (*NAMES, "collision_oracles", "soak")
 ROOT = Path(__file__).resolve().parents[1]

@@ -90,6 +90,7 @@ class Recorder:
         self._unsubscribe: Callable[[], None] | None = None
         self._stats: RecordingStats | None = None
         self._failure = ""
+        self._left_behind: list[UDaqFileWriter] = []
         self._positions_due_s = 0.0
         self._listeners: tuple[Callable[[], object], ...] = ()
         self.position_source: PositionSource | None = None
@@ -152,7 +153,11 @@ class Recorder:
             if writer is None:
                 return
             writer.request_end()
-            writer.join()
+            if not writer.join():
+                # Kept, for a thread that is forgotten while it runs ends the program.
+                self._left_behind.append(writer)
+                self._failure = f"{writer.path}: the disk does not answer; it is still being closed"
+                logger.error("%s", self._failure)
             duration_s = self._stats.duration_s if self._stats else 0.0
             logger.info("recorded %.1f s to %s", duration_s, writer.path)
         tell(self._listeners)
