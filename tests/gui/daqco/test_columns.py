@@ -117,6 +117,11 @@ def test_lost_samples_leave_a_hole_in_the_picture(qapp):
     picture.put(*live.feed(200, np.ones((1, 100))))
     shown = [bool(np.isfinite(picture.column(number)[0][0])) for number in range(30)]
     assert shown == [True] * 10 + [False] * 10 + [True] * 10
+    drawn = [
+        any(picture.image.pixelColor(x, y).name() == "#e69f00" for y in range(picture.height))
+        for x in range(30)
+    ]
+    assert drawn == shown
     history = History(1, 1000.0)
     history.append(0, np.ones((1, 100)))
     history.append(200, np.ones((1, 100)))

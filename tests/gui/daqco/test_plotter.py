@@ -325,6 +325,7 @@ def test_acquisition_begun_anew_does_not_go_on_from_the_old_samples(plotter, por
     acquire(port, [1.0, 2.0], seconds=0.2)
     plotter.refresh()
     assert plotter.chart.now_view().end == 200
+    assert len(plotter.chart.now_view().segments) == 1
 
 
 @pytest.mark.parametrize("rate_hz", [10.0, 200.0, 15_000.0])
