@@ -31,6 +31,7 @@ NAMES = (
     "scene_view",
     "twin_force",
     "recorder",
+    "plot",
 )
 ALL = (*NAMES, "collision_oracles", "soak")
 ROOT = Path(__file__).resolve().parents[1]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from cosmic.app.rig import Rig, connect
     from cosmic.daqco.api.recording import Recording, open_recording
+    from cosmic.daqco.core.recording_format import RecordingError
     from cosmic.frame.errors import (
         CollisionError,
         ConfigError,
@@ -41,6 +42,7 @@ logging.getLogger(__name__).addHandler(logging.NullHandler())
 _HOMES = {
     "cosmic.app.rig": ("Rig", "connect"),
     "cosmic.daqco.api.recording": ("Recording", "open_recording"),
+    "cosmic.daqco.core.recording_format": ("RecordingError",),
     "cosmic.frame.errors": (
         "CollisionError",
         "ConfigError",
@@ -85,6 +87,7 @@ __all__ = [
     "Progress",
     "Reason",
     "Recording",
+    "RecordingError",
     "Rig",
     "StoppedError",
     "Task",

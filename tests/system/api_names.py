@@ -16,7 +16,6 @@ from cosmic.daqco.core.recording_format import (
     ExportCancelled,
     Overrun,
     RecordedEvent,
-    RecordingError,
     RecordingExistsError,
 )
 from cosmic.daqco.core.scale import Scale
@@ -72,7 +71,7 @@ ENUMS: Final[dict[str, type[Enum]]] = {
     "DeviceFault": DeviceFault,
 }
 # Exceptions that a script may want to name and that `cosmic` does not export.
-FURTHER_EXCEPTIONS: Final = (RecordingError, RecordingExistsError, ExportCancelled)
+FURTHER_EXCEPTIONS: Final = (RecordingExistsError, ExportCancelled)
 # Attributes that an object gets when it is made, which the class does not show.
 MADE_LATER: Final = {
     "Axis": ("commander",),

@@ -149,6 +149,8 @@ def test_a_limit_needs_a_rate_that_is_fast_enough() -> None:
             _ = rig.mico
         rig.daqco.configure(rate_hz=1000.0)
         rig.daqco.arm_limit("force", high=100.0)
+        rig.daqco.configure(rate_hz=2000.0)
+        assert rig.daqco.limits[0].settings.armed, "another rate leaves it watched"
         rig.daqco.stop()
         assert not rig.daqco.running
         rig.daqco.start()

@@ -32,6 +32,7 @@ logger = logging.getLogger(__name__)
 
 MICO: Final = "MiCo"
 DAQCO: Final = "DAQCo"
+LOW_SCREEN_PX: Final = 1000
 CONSOLE: Final = "Console"
 SCENE: Final = "Scene"
 
@@ -133,12 +134,23 @@ class OperatorWindow(CosmicServerGui):
         return mode
 
     def _add_daqco(self) -> None:
+        if self._platform.mico is None:
+            self.top_bar.set_collision_model(present=True)  # nothing moves that could collide
         application = self._platform.daqco
         gui = application.get_gui() if application is not None else None
         if isinstance(gui, UDaqMainWidget):
-            self.add_panel(DAQCO, gui, Qt.DockWidgetArea.RightDockWidgetArea)
-            if self._mico_gui is not None:
-                gui.show_files.setChecked(False)  # the plot needs the room that it shares
+            # Below the scene where the screen is high enough for both, else in a tab beside it.
+            low = self.screen().availableGeometry().height() < LOW_SCREEN_PX
+            self.add_panel(
+                DAQCO,
+                gui,
+                Qt.DockWidgetArea.RightDockWidgetArea,
+                scroll=False,
+                beside=SCENE if low and self._scene is not None else "",
+                tabbed=low,
+            )
+            if low and self._scene is not None:
+                self.dock(SCENE).raise_()
             gui.close_requested.connect(self.dock(DAQCO).close)
 
     def _add_log(self, ring: RingBufferHandler, *, console: bool) -> None:

@@ -1,8 +1,9 @@
 """DAQCo as a CoSMic application (thesis 5.5, 6.2)."""
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from threading import RLock
+from typing import Final
 
 from PySide6.QtCore import QObject, Qt
 from typing_extensions import override
@@ -25,6 +26,8 @@ from cosmic.frame.task_application import TaskApplication
 from cosmic.frame.threads import WorkerThread
 
 logger = logging.getLogger(__name__)
+
+FIRST_DATA_S: Final = 1.0
 
 
 class SilenceWatch(WorkerThread):
@@ -117,10 +120,15 @@ class DaqcoApplication(TaskApplication):
 
     @override
     def initialize(self) -> None:
-        """Open the boards and begin to acquire; stays open with `problem` set where it cannot."""
+        """Open the boards and begin to acquire; stays open with `problem` set where it cannot.
+
+        Returns when there are first values.
+        """
         self.start()
         self._silence.start()
         self._open()
+        if self.running:
+            self.buffer.wait_for_data(FIRST_DATA_S)
 
     def initialize_later(self) -> Task:
         """Do what `initialize` does in the application's thread; returns at once."""
@@ -241,13 +249,23 @@ class DaqcoApplication(TaskApplication):
             if core is not None and not restarts(before, settings):
                 core.set_scales(self.scales())
             elif core is not None:
+                armed = [limit for limit in self.guard.limits.values() if limit.armed]
                 self.stop_acquisition()
                 try:
                     self.start_acquisition()
                 except CosmicError:
                     self._settings = before
                     raise
+                self._arm_again(armed)
         self.status_changed.emit()
+
+    def _arm_again(self, limits: Sequence[Limit]) -> None:
+        """Watch limits again that were armed before acquisition began anew."""
+        for limit in limits:
+            try:
+                self.guard.set_limit(limit)
+            except NotAvailable as exc:
+                logger.warning("%s; its limit is no longer armed", exc)
 
     def before_change(self, check: Callable[[DaqcoSettings], None]) -> None:
         """Call `check(settings)` before they come into force; what it raises forbids them."""

@@ -1,7 +1,7 @@
 """`UDaqBuffer`: keeps the latest values and hands every chunk on (thesis 6.2.1, Fig. 6.12)."""
 
 from collections.abc import Callable
-from threading import Lock
+from threading import Event, Lock
 
 from PySide6.QtCore import QObject, Signal
 
@@ -31,6 +31,7 @@ class UDaqBuffer(QObject):
         self._receivers: tuple[Receiver, ...] = ()
         self._latest: DataChunk | None = None
         self._samples = 0
+        self._filled = Event()
 
     @property
     def latest_chunk(self) -> DataChunk | None:
@@ -67,14 +68,20 @@ class UDaqBuffer(QObject):
 
         return unsubscribe
 
+    def wait_for_data(self, timeout_s: float) -> bool:
+        """Wait until there is a latest value; False after `timeout_s` of wall time."""
+        return self._filled.wait(timeout_s)
+
     def clear(self) -> None:
         """Forget what was there: another acquisition begins."""
+        self._filled.clear()
         self._latest, self._samples = None, 0
 
     def put(self, chunk: DataChunk) -> None:
         """Take a chunk and hand it on; acquisition thread."""
         self._latest = chunk
         self._samples = chunk.first_sample + chunk.samples
+        self._filled.set()
         tell(self._receivers, chunk)
         self.data_ready.emit()
         self.data_chunk_ready.emit(chunk)
