@@ -7,13 +7,13 @@ import cosmic
 
 
 def push(rig: cosmic.Rig, file: Path) -> None:
-    """Drive the probe against the fibre in the left gripper, step by step, and record it."""
+    """Drive the probe slowly against the fibre in the left gripper, and record it."""
     probe = rig.mico["probe.y"]
     rig.mico.move({"left.z": -800.0, "left.x": 3600.0})
     probe.move_to(-4940.0)
+    probe.set_closed_loop_frequency(30)  # about 45 um/s: its position is read 20 times a second
     with rig.daqco.record(file, overwrite=True):
-        for target_um in range(-4950, -5051, -10):
-            probe.move_to(float(target_um))
+        probe.move_to(-5050.0)
     print(f"force at the end: {rig.daqco.latest()['force']:.0f} {rig.daqco.units['force']}")
 
 

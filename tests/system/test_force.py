@@ -47,11 +47,16 @@ def test_a_recording_gives_force_over_position_and_a_stiffness(
     rig: cosmic.Rig, tmp_path: Path
 ) -> None:
     file = tmp_path / "push.h5"
-    with rig.daqco.record(file):
-        for target_um in range(-4940, -5051, -10):
-            rig.mico["probe.y"].move_to(float(target_um))
-        rig.daqco.mark("pushed")
-        settled(rig, -4940.0)
+    settled(rig, -4940.0)
+    rig.mico["probe.y"].set_closed_loop_frequency(20)  # slowly, for positions are read at 20 Hz
+    try:
+        with rig.daqco.record(file):
+            rig.mico["probe.y"].move_to(-5050.0)
+            rig.daqco.mark("pushed")
+            seen = rig.daqco.counters.samples
+            wait_until(lambda: rig.daqco.counters.samples > seen + 500)
+    finally:
+        rig.mico["probe.y"].set_closed_loop_frequency(5000)
     with cosmic.open_recording(file) as recording:
         assert recording.complete
         assert recording.channels == rig.daqco.channels
