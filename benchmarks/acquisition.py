@@ -1,0 +1,168 @@
+"""Acquisition as a whole: 32 channels x 15 kHz with recording and plot, and how a limit stops.
+
+The boards are the simulated ones of the shipped platform; what the rest costs without them is
+measured on the fast source. The plot is the window's own, drawn offscreen at 60 Hz. The reaction
+is counted from the sample that crosses to the return of the stop of every channel.
+"""
+
+import os
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+import numpy as np
+import numpy.typing as npt
+from PySide6.QtCore import QEventLoop, QTimer
+from PySide6.QtWidgets import QApplication
+
+from benchmarks.figures import Figure, main, percentile
+from cosmic.app.platform import build_platform
+from cosmic.autonomy.interlocks import join_force_limits
+from cosmic.daqco.api.application import DaqcoApplication
+from cosmic.daqco.api.daqco import Daqco
+from cosmic.daqco.api.recording import open_recording
+from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, LimitSettings
+from cosmic.daqco.gui.plotter import UDaqPlotter
+from cosmic.daqco.hw.interface import BoardLibrary
+from cosmic.daqco.hw.sim_fast import FastLibrary
+from cosmic.daqco.hw.sim_library import SimulatedLibrary
+from cosmic.frame.clock import WallClock
+from cosmic.frame.failure import FailurePolicy
+
+NAME = "acquisition"
+
+
+def settings(boards: tuple[str, ...], rate_hz: float) -> DaqcoSettings:
+    """Return 32 channels on `boards`, plotted at 60 Hz."""
+    each = 32 // len(boards)
+    channels = tuple(
+        ChannelSettings(name=f"{board.lower()}.c{number}", board=board, input=f"ai{number}")
+        for board in boards
+        for number in range(each)
+    )
+    return DaqcoSettings(channel=channels, rate_hz=rate_hz, refresh_hz=60.0)
+
+
+@contextmanager
+def acquiring(library: BoardLibrary, wanted: DaqcoSettings) -> Iterator[Daqco]:
+    """Give an application that acquires."""
+    application = DaqcoApplication(library, wanted, clock=WallClock(), policy=FailurePolicy())
+    application.initialize()
+    try:
+        yield Daqco(application)
+    finally:
+        application.shut_down()
+
+
+def wait_s(app: QApplication, duration_s: float) -> None:
+    """Run the event loop, as a window does."""
+    del app
+    loop = QEventLoop()
+    QTimer.singleShot(round(1000 * duration_s), loop.quit)
+    loop.exec()
+
+
+def chain(
+    name: str, library: BoardLibrary, wanted: DaqcoSettings, length_s: float, *, plot: bool
+) -> list[Figure]:
+    """Return what is lost, and what it costs, with everything at work."""
+    app = QApplication.instance() or QApplication([])
+    assert isinstance(app, QApplication)
+    with tempfile.TemporaryDirectory() as folder, acquiring(library, wanted) as daqco:
+        plotter = UDaqPlotter(daqco) if plot else None
+        if plotter is not None:
+            plotter.resize(1280, 800)
+            plotter.show()
+        wait_s(app, 1.0)
+        file = Path(folder) / "run.h5"
+        began_cpu_s, began_s = time.process_time(), time.perf_counter()
+        with daqco.record(file):
+            wait_s(app, length_s)
+        cpu = (time.process_time() - began_cpu_s) / (time.perf_counter() - began_s)
+        problem = daqco.problem or daqco.recording.failure
+        with open_recording(file) as recording:
+            lost = sum(each.lost for each in recording.overruns)
+            short_s = length_s - recording.samples / recording.rate_hz
+        if plotter is not None:
+            plotter.close()
+            plotter.deleteLater()
+            wait_s(app, 0.1)
+    failed = 1.0 if problem else 0.0
+    return [
+        Figure(NAME, f"{name}: samples a channel lost", lost + failed, "samples", 0.0),
+        Figure(NAME, f"{name}: missing at the end", max(0.0, 1000.0 * short_s), "ms"),
+        Figure(NAME, f"{name}: processor", 100.0 * cpu, "% of a core", 35.0 if plot else 8.0),
+    ]
+
+
+class Step:
+    """A source that is quiet until it is told to jump."""
+
+    def __init__(self) -> None:
+        self.jump_s = float("inf")
+
+    def volts(self, times_s: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Return 0 V before the jump and 5 V after it."""
+        return np.where(times_s >= self.jump_s, 5.0, 0.0)
+
+
+def reactions(times: int) -> list[Figure]:
+    """Return how long it takes from a crossing sample to the stop of every channel."""
+    platform = build_platform(None, applications=("mico",))
+    assert platform.mico is not None
+    platform.initialize()
+    source, clock = Step(), platform.clock
+    one = ChannelSettings(name="force", board="Dev1", input="ai0")
+    application = DaqcoApplication(
+        SimulatedLibrary(clock, {("Dev1", "ai0"): source}),
+        DaqcoSettings(channel=(one,), rate_hz=1000.0),
+        clock=clock,
+        policy=platform.policy,
+    )
+    join_force_limits(application, platform.mico)
+    application.initialize()
+    daqco = Daqco(application)
+    app = QApplication.instance() or QApplication([])
+    assert isinstance(app, QApplication)
+    plotter = UDaqPlotter(daqco)
+    plotter.resize(1280, 800)
+    plotter.show()
+    found: list[float] = []
+    try:
+        for _ in range(times):
+            source.jump_s = float("inf")
+            wait_s(app, 0.1)
+            platform.mico.manager.reset_stop()
+            daqco.set_limit(LimitSettings(channel="force", high=1.0, armed=True))
+            source.jump_s = clock.now_s() + 0.05
+            wait_s(app, 0.2)
+            newest = application.guard.crossings[-1]
+            found.append(1000.0 * newest.reaction_s)
+    finally:
+        plotter.close()
+        plotter.deleteLater()
+        application.shut_down()
+        platform.shut_down()
+    return [
+        Figure(NAME, "crossing to last stop, p50", percentile(found, 50), "ms"),
+        Figure(NAME, "crossing to last stop, p99", percentile(found, 99), "ms", 20.0),
+    ]
+
+
+def measure(*, quick: bool = False) -> list[Figure]:
+    """Measure all of it."""
+    length_s = 2.0 if quick else 60.0
+    clock = WallClock()
+    full = settings(("Dev1", "Dev2"), 15_000.0)
+    figures = chain("32 x 15 kHz with plot", SimulatedLibrary(clock), full, length_s, plot=True)
+    fast = settings(("Fast1",), 15_000.0)
+    figures += chain("no source, no plot", FastLibrary(clock), fast, length_s / 4, plot=False)
+    return figures + reactions(5 if quick else 100)
+
+
+if __name__ == "__main__":
+    main(__doc__, measure)

@@ -1,0 +1,67 @@
+"""Windows over the shipped platform, without the time that its gate's process takes to start."""
+
+from collections.abc import Iterator, Mapping, Set
+from functools import cache
+from pathlib import Path
+from threading import Lock
+
+import pytest
+from typing_extensions import override
+
+from cosmic.app import platform
+from cosmic.mico.core.collision import collision_manager, scene_loader
+from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
+from cosmic.mico.core.collision.collision_manager import Answering
+from cosmic.mico.core.collision.free_way import free_way
+from cosmic.mico.core.collision.model import BodyPair, SceneModel
+from cosmic.mico.core.collision.sweep import Sweep
+
+_load_scene = cache(scene_loader.load_scene)
+_sweeps: dict[int, Sweep] = {}
+_lock = Lock()
+
+
+class InProcess(Answering):
+    """The pure gate, asked directly; one question at a time."""
+
+    def __init__(self, model: SceneModel, **_limits: float) -> None:
+        self._sweep = _sweeps.setdefault(id(model), Sweep(model))
+
+    @override
+    def start(self) -> None: ...
+
+    @override
+    def close(self) -> None: ...
+
+    @override
+    def check(self, spans: Spans, ignored: Set[BodyPair] = frozenset()) -> SweepAnswer:
+        with _lock:
+            return self._sweep.check(spans, ignored)
+
+    @override
+    def nearest(
+        self, positions: Mapping[str, float], ignored: Set[BodyPair] = frozenset()
+    ) -> Approach | None:
+        with _lock:
+            return self._sweep.nearest(positions, ignored)
+
+    @override
+    def free_way(
+        self, spans: Spans, axis: str, ignored: Set[BodyPair] = frozenset()
+    ) -> float | None:
+        with _lock:
+            return free_way(self._sweep, spans, axis, ignored)
+
+
+def _cached(path: Path) -> SceneModel:
+    """Load the shipped scene once, and any other one each time."""
+    shipped = platform.platform_path(None).parent
+    return _load_scene(path) if shipped in path.parents else _load_scene.__wrapped__(path)
+
+
+@pytest.fixture(autouse=True)
+def quick_platform(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Have windows start quickly; the gate's process has tests of its own."""
+    monkeypatch.setattr(collision_manager, "GateProcess", InProcess)
+    monkeypatch.setattr(scene_loader, "load_scene", _cached)
+    yield
