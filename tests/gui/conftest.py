@@ -17,7 +17,7 @@ from cosmic.mico.core.collision.model import BodyPair, SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
 
 _load_scene = cache(scene_loader.load_scene)
-_sweeps: dict[int, Sweep] = {}
+_sweep_of = cache(Sweep)
 _lock = Lock()
 
 
@@ -25,7 +25,7 @@ class InProcess(Answering):
     """The pure gate, asked directly; one question at a time."""
 
     def __init__(self, model: SceneModel, **_limits: float) -> None:
-        self._sweep = _sweeps.setdefault(id(model), Sweep(model))
+        self._sweep = _sweep_of(model)
 
     @override
     def start(self) -> None: ...
