@@ -3,12 +3,14 @@
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 import pytest
 
 import cosmic
 from cosmic.daqco.core.scale import Scale
+from cosmic.frame.config import shipped_config_dir
 from unit.mico.rigs import wait_until
 
 
@@ -161,3 +163,28 @@ def test_a_limit_needs_a_rate_that_is_fast_enough() -> None:
         rig.daqco.start()
         wait_until(lambda: bool(rig.daqco.application.buffer.get_latest_data()))
         assert "force" in rig.daqco.latest()
+
+
+def test_a_board_that_was_lost_is_told_and_acquires_again_when_it_is_back() -> None:
+    with cosmic.connect(rate=2.0, applications=("daqco",)) as rig:
+        faults = rig.daqco.application.library.faults  # type: ignore[attr-defined]
+        faults.inject("unplugged", board="Dev1")
+        wait_until(lambda: bool(rig.daqco.problem))
+        assert "Dev1" in rig.daqco.problem
+        faults.clear()
+        rig.daqco.start()
+        assert not rig.daqco.problem
+        seen = rig.daqco.counters.samples
+        wait_until(lambda: rig.daqco.counters.samples > seen + 100)
+
+
+def test_real_boards_have_no_rate(tmp_path: Path) -> None:
+    folder = tmp_path / "config"
+    copytree(shipped_config_dir(), folder)
+    file = folder / "platform.toml"
+    text = file.read_text(encoding="utf-8")
+    start = text.index("[daqco]")
+    real = text[start:].replace('backend = "simulated"', 'backend = "nidaqmx"', 1)
+    file.write_text(text[:start] + real, encoding="utf-8")
+    with pytest.raises(cosmic.ConfigError, match=r"daqco\.backend"):
+        cosmic.connect(folder, rate=2.0)

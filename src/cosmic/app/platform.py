@@ -194,6 +194,8 @@ def build_platform(
     simulated = file.mico.backend == "simulated"
     if not simulated and (rate != 1.0 or cold):
         raise ConfigError(f"{path}: mico.backend: only the simulated platform has a rate or --cold")
+    if rate != 1.0 and file.daqco is not None and file.daqco.backend != "simulated":
+        raise ConfigError(f"{path}: daqco.backend: real boards have no rate; leave --rate out")
     try:
         clock = RatedClock(rate)
     except (TypeError, ValueError) as exc:

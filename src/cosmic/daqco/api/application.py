@@ -185,10 +185,14 @@ class DaqcoApplication(TaskApplication):
             A board is not there, or taken.
         """
         with self._lock:
-            if self.running:
+            if self.running and not self._problem:
                 return
             if self.end_requested:
                 raise NotAvailable("DAQCo is closed")
+            if self._core is not None:
+                # One that failed may still be ending; forgotten while it runs, it ends the program.
+                self._core.request_end()
+                self._core.join()
             settings = self._settings
             # Chunks as long on the wall as they were asked for, however fast a simulation runs.
             chunk_s = settings.chunk_s * max(1.0, self.clock.rate or 1.0)
