@@ -153,7 +153,7 @@ def reactions(times: int) -> list[Figure]:
     ]
 
 
-def measure(*, quick: bool = False) -> list[Figure]:
+def measure(quick: bool) -> list[Figure]:
     """Measure all of it."""
     length_s = 2.0 if quick else 60.0
     clock = WallClock()

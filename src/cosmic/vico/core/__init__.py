@@ -1,0 +1,1 @@
+"""What ViCo does with pictures: acquiring, keeping, measuring."""

@@ -1,0 +1,1 @@
+"""Cameras, lenses and lights: one file a vendor library or protocol, the simulated ones beside."""

@@ -1,0 +1,273 @@
+"""What ViCo asks of a camera, whatever bus it sits on (thesis 3.3.2, 5.2)."""
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
+
+
+class PixelFormat(StrEnum):
+    """How a picture is coded; names are GenICam's."""
+
+    MONO8 = "Mono8"
+    MONO10 = "Mono10"
+    MONO12 = "Mono12"
+    MONO16 = "Mono16"
+    RGB8 = "RGB8"
+
+
+class Trigger(StrEnum):
+    """What starts an exposure."""
+
+    FREE_RUN = "free run"
+    SOFTWARE = "software"
+    HARDWARE = "hardware"
+
+
+class FrameStatus(StrEnum):
+    """Whether a picture can be trusted."""
+
+    COMPLETE = "complete"
+    INCOMPLETE = "incomplete"
+
+
+@dataclass(frozen=True, slots=True)
+class Roi:
+    """The part of the sensor that is read; in binned pixels, from the upper left corner."""
+
+    x_px: int
+    y_px: int
+    width_px: int
+    height_px: int
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """What a feature accepts: from `low` to `high`, in steps of `step` (0: any value)."""
+
+    low: float
+    high: float
+    step: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class CameraInfo:
+    """Which camera.
+
+    Attributes
+    ----------
+    key : str
+        What `CameraLibrary.open` takes; the same at every start where the bus has such a thing.
+    sensor_px : (int, int)
+        Width and height, unbinned; (0, 0) where only opening it tells.
+    """
+
+    key: str
+    vendor: str
+    model: str
+    serial: str
+    simulated: bool = False
+    sensor_px: tuple[int, int] = (0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSettings:
+    """How a camera takes its pictures."""
+
+    exposure_s: float
+    gain_db: float
+    rate_hz: float
+    roi: Roi
+    binning: int = 1
+    pixel_format: PixelFormat = PixelFormat.MONO8
+    trigger: Trigger = Trigger.FREE_RUN
+
+
+@dataclass(frozen=True, slots=True)
+class CameraRanges:
+    """What a camera accepts with its present ROI and binning; None where it has no such feature."""
+
+    exposure_s: Range | None
+    gain_db: Range | None
+    rate_hz: Range | None
+    width_px: Range
+    height_px: Range
+    binnings: tuple[int, ...] = (1,)
+    pixel_formats: tuple[PixelFormat, ...] = (PixelFormat.MONO8,)
+    triggers: tuple[Trigger, ...] = (Trigger.FREE_RUN,)
+
+
+@dataclass(frozen=True, slots=True)
+class CameraCounters:
+    """What became of the frames since `start`.
+
+    Attributes
+    ----------
+    completed : int
+        Handed over whole.
+    failed : int
+        Arrived with parts missing; never handed over as good.
+    lost : int
+        Never arrived, by the gaps in the frame numbers.
+    underrun : int
+        The camera was ready, and no buffer was free.
+    """
+
+    completed: int = 0
+    failed: int = 0
+    lost: int = 0
+    underrun: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One picture as the camera gave it.
+
+    Attributes
+    ----------
+    data : ndarray, shape (height, width) or (height, width, 3), uint8 or uint16
+        Read-only, a copy that no driver writes to again. MONO10 and MONO12 count from 0 to 1023
+        and 4095. Three layers are red, green, blue.
+    frame_id : int
+        Counts up by one a frame since `start`, 64 bit: a gap is a loss.
+    time_s : float
+        Platform time at which it was complete in this computer.
+    exposed_s : float
+        Platform time at which its exposure began, as well as it can be told; never later than
+        the truth by design, so that a frame said to be exposed after a movement was.
+    device_ns : int or None
+        The camera's own clock.
+    """
+
+    data: Pixels
+    frame_id: int
+    time_s: float
+    exposed_s: float
+    device_ns: int | None = None
+    status: FrameStatus = FrameStatus.COMPLETE
+    pixel_format: PixelFormat = PixelFormat.MONO8
+
+
+class Camera(Protocol):
+    """One open camera.
+
+    Order of calls: `configure`, `start`, `receive` again and again, `stop`; at last `close`.
+    One thread receives; any thread may call `stop`, `trigger` and the properties.
+    """
+
+    @property
+    @abstractmethod
+    def info(self) -> CameraInfo:
+        """Which camera this is, with its sensor size."""
+
+    @property
+    @abstractmethod
+    def ranges(self) -> CameraRanges:
+        """What it accepts now."""
+
+    @property
+    @abstractmethod
+    def settings(self) -> CameraSettings:
+        """What is in force, read back from the camera."""
+
+    @property
+    @abstractmethod
+    def counters(self) -> CameraCounters:
+        """What became of the frames since `start`."""
+
+    @abstractmethod
+    def configure(self, settings: CameraSettings) -> CameraSettings:
+        """Put settings in force and return what the camera made of them.
+
+        While it runs only exposure, gain and rate may differ from those in force. Nothing is
+        changed when anything is refused.
+
+        Raises
+        ------
+        ConfigError
+            A value that the camera does not accept (not a number, outside its range, a ROI off
+            the sensor, a pixel format it does not have, an exposure longer than the frame
+            period); the text says what it accepts.
+        DeviceError
+            The camera is gone, or `DeviceFault.BUSY` for what cannot change while it runs.
+        """
+
+    @abstractmethod
+    def start(self) -> None:
+        """Begin to take pictures; counters begin anew.
+
+        Raises
+        ------
+        DeviceError
+            The camera is gone or taken by another program.
+        """
+
+    @abstractmethod
+    def receive(self, timeout_s: float) -> Frame | None:
+        """Return the next frame in order, or None after `timeout_s` of wall time.
+
+        A frame with parts missing is counted and comes with `FrameStatus.INCOMPLETE`.
+
+        Raises
+        ------
+        DeviceError
+            The camera is gone or failed. After it nothing more comes; close it.
+        """
+
+    @abstractmethod
+    def trigger(self) -> None:
+        """Take one picture now, with `Trigger.SOFTWARE`.
+
+        Raises
+        ------
+        NotAvailable
+            Another trigger is in force.
+        DeviceError
+            The camera is gone.
+        """
+
+    @abstractmethod
+    def stop(self) -> None:
+        """End taking pictures; harmless when none are. A `receive` that waits returns None."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Give the camera back; harmless the second time."""
+
+
+class CameraLibrary(Protocol):
+    """The driver behind some cameras."""
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """What the operator reads, such as "Aravis 0.8.26"."""
+
+    @abstractmethod
+    def cameras(self) -> tuple[CameraInfo, ...]:
+        """Return the cameras there are now; takes its time on a network.
+
+        Raises
+        ------
+        DeviceError
+            The driver cannot tell.
+        """
+
+    @abstractmethod
+    def open(self, key: str) -> Camera:
+        """Open a camera.
+
+        Raises
+        ------
+        NotConnectedError
+            There is none of that key, or another program has it; the text lists those there are.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Give everything back; harmless the second time."""
