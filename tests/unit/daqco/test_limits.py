@@ -159,3 +159,17 @@ def test_a_scale_is_a_polynomial_from_the_constant_upwards() -> None:
     scale = Scale("square", "uN", (1.0, 2.0, 3.0))
     assert scale.apply([0.0, 1.0, 2.0]).tolist() == [1.0, 6.0, 17.0]
     assert VOLTS.apply(-3.5).tolist() == -3.5
+
+
+def test_a_crossing_is_told_until_it_is_acknowledged_which_needs_the_value_back() -> None:
+    rig = Rig()
+    rig.arm()
+    rig.guard.look(chunk([3.6]))
+    with pytest.raises(NotAvailable, match="still beyond"):
+        rig.guard.acknowledge("force")
+    rig.guard.look(chunk([2.5]))
+    assert rig.guard.limits["force"].tripped
+    rig.guard.acknowledge("force")
+    limit = rig.guard.limits["force"]
+    assert limit.armed
+    assert not limit.tripped

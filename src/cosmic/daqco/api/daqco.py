@@ -353,11 +353,5 @@ class Daqco:
         NotAvailable
             The channel is still beyond it.
         """
-        limit = self._application.guard.limits.get(channel)
-        if limit is None:
-            return
-        value = self._application.buffer.get_latest_data().get(channel, math.nan)
-        if limit.armed and not limit.low < value < limit.high:
-            raise NotAvailable(f"{channel} is still beyond its limit")
-        self._application.guard.set_limit(limit)
+        self._application.guard.acknowledge(channel)
         self._tell()

@@ -33,7 +33,9 @@ class Limit:
     armed : bool
         It is watched.
     tripped : bool
-        It was crossed, and the channel has not come back since.
+        It was crossed, and nobody has acknowledged that yet.
+    beyond : bool
+        The channel has not come back inside since.
     """
 
     channel: str
@@ -42,6 +44,7 @@ class Limit:
     hysteresis: float = 0.0
     armed: bool = False
     tripped: bool = False
+    beyond: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +149,25 @@ class LimitGuard:
                     f"sampled at {self._rate_hz:g} Hz"
                 )
             self._last_wall_s = WALL.now_s()
-            self._limits[limit.channel] = replace(limit, tripped=False)
+            self._limits[limit.channel] = replace(limit, tripped=False, beyond=False)
+
+    def acknowledge(self, channel: str) -> None:
+        """Forget that the limit of a channel was crossed; it stays armed.
+
+        Raises
+        ------
+        NotAvailable
+            The channel has not come back inside.
+        """
+        with self._lock:
+            limit = self._limits.get(channel)
+            if limit is None:
+                return
+            if limit.armed and limit.beyond:
+                raise NotAvailable(
+                    f"{channel} is still beyond its limit; bring it back inside, or disarm it"
+                )
+            self._limits[channel] = replace(limit, tripped=False)
 
     def remove(self, channel: str) -> None:
         """Forget the limit of a channel."""
@@ -168,7 +189,7 @@ class LimitGuard:
         if not self.armed or WALL.now_s() - self._last_wall_s <= STALE_S:
             return
         for limit in list(self._limits.values()):
-            if limit.armed and not limit.tripped:
+            if limit.armed and not limit.beyond:
                 text = f"no data of {limit.channel} for {STALE_S:g} s while its limit is armed"
                 now_s = self._clock.now_s()
                 self._trip(Crossing(limit.channel, -1, now_s, math.nan, math.nan, "", text), limit)
@@ -177,14 +198,14 @@ class LimitGuard:
         scale = chunk.scales[row]
         values = scale.apply(chunk.volts[row])
         inside = self._inside(values, limit)
-        if limit.tripped:
+        if limit.beyond:
             narrow = replace(
                 limit, low=limit.low + limit.hysteresis, high=limit.high - limit.hysteresis
             )
             back = np.flatnonzero(self._inside(values, narrow))
             if back.size == 0:
                 return
-            self._set_tripped(limit, tripped=False)
+            self._note(limit, beyond=False)
             offset = int(back[0])
             inside = inside[offset:]
         else:
@@ -207,17 +228,18 @@ class LimitGuard:
         # A value that is no number is not inside.
         return np.asarray((values > limit.low) & (values < limit.high))
 
-    def _set_tripped(self, limit: Limit, *, tripped: bool) -> None:
+    def _note(self, limit: Limit, *, beyond: bool) -> None:
         with self._lock:
             now = self._limits.get(limit.channel)
             if now is not None:
-                self._limits[limit.channel] = replace(now, tripped=tripped)
+                tripped = beyond or now.tripped
+                self._limits[limit.channel] = replace(now, tripped=tripped, beyond=beyond)
 
     def _trip(self, crossing: Crossing, limit: Limit) -> None:
         if self.trip is not None:
             self.trip(crossing.text)
         crossing = replace(crossing, reaction_s=self._clock.now_s() - crossing.time_s)
-        self._set_tripped(limit, tripped=True)
+        self._note(limit, beyond=True)
         self._crossings = (*self._crossings[-99:], crossing)
         logger.warning("%s; stopped after %.1f ms", crossing.text, 1000.0 * crossing.reaction_s)
         tell(self._listeners, crossing)
