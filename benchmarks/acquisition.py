@@ -10,7 +10,9 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
+from unittest.mock import patch
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
@@ -99,6 +101,24 @@ def chain(
     ]
 
 
+def stress(factors: tuple[int, ...], length_s: float) -> list[Figure]:
+    """Return how many times 32 x 15 kHz the chain with its recorder takes before it loses any."""
+    found: list[Figure] = []
+    most = 0
+    for factor in factors:
+        rate_hz = factor * 15_000.0  # beyond 15 kHz, which is as much as a channel may have
+        wanted = settings(("Fast1",), 15_000.0).model_copy(update={"rate_hz": rate_hz})
+        name = f"{factor} x"
+        with patch("cosmic.daqco.core.plan.HIGHEST_RATE_HZ", float("inf")):
+            lost, *_ = chain(name, FastLibrary(WallClock()), wanted, length_s, plot=factor == 10)
+        if factor == 10:
+            found.append(replace(lost, name="10 times that, with plot: samples a channel lost"))
+        if lost.value:
+            break
+        most = factor
+    return [*found, Figure(NAME, "most without a loss, recorded, times 32 x 15 kHz", most, "")]
+
+
 class Step:
     """A source that is quiet until it is told to jump."""
 
@@ -161,6 +181,7 @@ def measure(quick: bool) -> list[Figure]:
     figures = chain("32 x 15 kHz with plot", SimulatedLibrary(clock), full, length_s, plot=True)
     fast = settings(("Fast1",), 15_000.0)
     figures += chain("no source, no plot", FastLibrary(clock), fast, length_s / 4, plot=False)
+    figures += stress((10,) if quick else (10, 20, 40, 80, 160), 1.0 if quick else 5.0)
     return figures + reactions(5 if quick else 100)
 
 

@@ -32,6 +32,7 @@ NAMES = (
     "twin_force",
     "recorder",
     "plot",
+    "acquisition",
 )
 ALL = (*NAMES, "collision_oracles", "soak")
 ROOT = Path(__file__).resolve().parents[1]
