@@ -1,0 +1,352 @@
+"""`CameraThread`: takes the pictures of one camera in a thread of its own (thesis 5.2, V1)."""
+
+import logging
+from collections.abc import Callable
+from queue import Empty, SimpleQueue
+from threading import Condition, Lock
+from typing import Final
+
+from PySide6.QtCore import QObject, Signal
+from typing_extensions import override
+
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import (
+    CosmicError,
+    DeviceError,
+    DeviceFault,
+    NotAvailable,
+    NotConnectedError,
+)
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.listeners import tell
+from cosmic.frame.task import Task
+from cosmic.frame.threads import WorkerThread, forbid_waiting_here
+from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.hw.interface import (
+    Camera,
+    CameraCounters,
+    CameraInfo,
+    CameraRanges,
+    CameraSettings,
+    Frame,
+    FrameStatus,
+)
+
+logger = logging.getLogger(__name__)
+
+LOOK_S: Final = 0.05
+SEARCH_S: Final = 1.0
+REFUSALS: Final = frozenset({DeviceFault.BUSY, DeviceFault.PARAMETER, DeviceFault.UNSUPPORTED})
+"""What a camera may answer without being lost."""
+
+Receiver = Callable[[Picture], object]
+Unsubscribe = Callable[[], None]
+Command = Callable[[Camera], None]
+
+
+class CameraThread(WorkerThread):
+    """Opens a camera, takes pictures until it is told not to, and looks for it when it is lost.
+
+    Receivers get every frame, incomplete ones too, in the camera's thread and in order; they
+    must return at once. The newest whole picture waits for whoever only wants to look.
+
+    Parameters
+    ----------
+    open_camera : callable
+        Opens it; raises `NotConnectedError` while it is not there.
+    prepare : callable
+        What to put in force in a camera just opened, from what it accepts.
+    circumstances : callable
+        What is known of the moment a frame was exposed; called in the camera's thread.
+
+    Signals
+    -------
+    status_changed()
+        Connected, lost, started, stopped or configured.
+    """
+
+    may_wait = False
+
+    status_changed = Signal()
+
+    def __init__(
+        self,
+        name: str,
+        open_camera: Callable[[], Camera],
+        prepare: Callable[[Camera], CameraSettings],
+        circumstances: Callable[[Frame, CameraSettings], Circumstances],
+        policy: FailurePolicy,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(f"camera {name}", policy, parent)
+        self.camera_name = name
+        self._open_camera = open_camera
+        self._prepare = prepare
+        self._circumstances = circumstances
+        self._commands: SimpleQueue[tuple[Task, Command]] = SimpleQueue()
+        self._camera: Camera | None = None
+        self._wanted_running = True
+        self._running = False
+        self._problem = ""
+        self._settings: CameraSettings | None = None
+        self._ranges: CameraRanges | None = None
+        self._last_id: int | None = None
+        self._newest: Picture | None = None
+        self._arrived = Condition()
+        self._receivers: tuple[Receiver, ...] = ()
+        self._lock = Lock()
+        self._over = False
+
+    # What there is; any thread
+
+    @property
+    def info(self) -> CameraInfo | None:
+        """Which camera it is; None while none is connected."""
+        camera = self._camera
+        return camera.info if camera is not None else None
+
+    @property
+    def ranges(self) -> CameraRanges | None:
+        """What it accepts now; None while it is not connected."""
+        return self._ranges
+
+    @property
+    def settings(self) -> CameraSettings | None:
+        """What is in force; None while it is not connected."""
+        return self._settings
+
+    @property
+    def counters(self) -> CameraCounters:
+        """What became of the frames since the start."""
+        camera = self._camera
+        return camera.counters if camera is not None else CameraCounters()
+
+    @property
+    def running(self) -> bool:
+        """It takes pictures, or waits for its trigger."""
+        return self._running
+
+    @property
+    def problem(self) -> str:
+        """Why no pictures come; empty when all is well."""
+        return self._problem
+
+    @property
+    def newest(self) -> Picture | None:
+        """The newest whole picture; None before the first."""
+        return self._newest
+
+    def subscribe(self, receiver: Receiver) -> Unsubscribe:
+        """Call `receiver(picture)` with every frame, in the camera's thread."""
+        with self._lock:
+            self._receivers = (*self._receivers, receiver)
+
+        def unsubscribe() -> None:
+            with self._lock:
+                self._receivers = tuple(each for each in self._receivers if each != receiver)
+
+        return unsubscribe
+
+    def next_picture(self, since_s: float, timeout_s: float) -> Picture:
+        """Wait for a whole picture whose exposure began at `since_s` of platform time or later.
+
+        Raises
+        ------
+        NotAvailable
+            None came within `timeout_s` of wall time; the text says why, where that is known.
+        WrongThreadError
+            Called in the GUI thread.
+        """
+        forbid_waiting_here("waiting for a picture")
+
+        def fresh() -> bool:
+            newest = self._newest
+            return newest is not None and newest.frame.exposed_s >= since_s
+
+        with self._arrived:
+            self._arrived.wait_for(lambda: fresh() or self._over, timeout_s)
+            newest = self._newest
+        if newest is None or not fresh():
+            reason = self._problem or ("it is stopped" if not self._running else "none arrived")
+            raise NotAvailable(f"no picture of {self.camera_name} in {timeout_s:g} s: {reason}")
+        return newest
+
+    # Commands; any thread
+
+    def configure(self, settings: CameraSettings) -> Task:
+        """Begin to put settings in force; a camera that runs is restarted where it must be."""
+
+        def command(camera: Camera) -> None:
+            before = camera.settings
+            if not self._running or _while_running(before, settings):
+                self._settings = camera.configure(settings)
+            else:
+                self._restart(camera, settings, before)
+            self._ranges = camera.ranges
+            logger.info("%s: %s", self.name, self._settings)
+
+        return self._put(f"Settings of {self.camera_name}", command)
+
+    def start_pictures(self) -> Task:
+        """Begin to take pictures; harmless while it does."""
+
+        def command(camera: Camera) -> None:
+            self._wanted_running = True
+            if not self._running:
+                self._begin(camera)
+
+        return self._put(f"Starting {self.camera_name}", command)
+
+    def stop_pictures(self) -> Task:
+        """End taking pictures; the newest stays."""
+
+        def command(camera: Camera) -> None:
+            self._wanted_running = False
+            self._running = False
+            camera.stop()
+
+        return self._put(f"Stopping {self.camera_name}", command)
+
+    def trigger(self) -> None:
+        """Take one picture, with the software trigger.
+
+        Raises
+        ------
+        NotAvailable
+            Another trigger is in force, or no camera is connected.
+        """
+        camera = self._camera
+        if camera is None:
+            raise NotAvailable(f"{self.camera_name}: {self._problem or 'not connected'}")
+        camera.trigger()
+
+    def _put(self, title: str, command: Command) -> Task:
+        task = Task(title)
+        with self._lock:
+            if self._over:
+                task.fail(NotAvailable(f"{self.camera_name} is closed"))
+            else:
+                self._commands.put((task, command))
+        return task
+
+    # In the camera's thread
+
+    @override
+    def run_body(self) -> None:
+        try:
+            while not self.end_requested:
+                try:
+                    self._work()
+                except CosmicError as exc:
+                    self._lose(exc)
+        finally:
+            self._close()
+            with self._lock:
+                self._over = True
+            self._refuse_commands("closed")
+            with self._arrived:
+                self._arrived.notify_all()
+
+    def _work(self) -> None:
+        """Open the camera and take pictures until the end or a failure."""
+        self._camera = camera = self._open_camera()
+        self._settings = camera.configure(self._prepare(camera))
+        self._ranges = camera.ranges
+        logger.info("%s: %s %s connected", self.name, camera.info.vendor, camera.info.model)
+        if self._wanted_running:
+            self._begin(camera)
+        self._problem = ""
+        self.status_changed.emit()
+        while not self.end_requested:
+            self._obey(camera)
+            if not self._running:
+                self._end_requested.wait(LOOK_S)
+                continue
+            frame = camera.receive(LOOK_S)
+            if frame is not None:
+                self._hand_on(frame, camera.settings)
+
+    def _begin(self, camera: Camera) -> None:
+        self._last_id = None
+        camera.start()
+        self._running = True
+
+    def _restart(self, camera: Camera, settings: CameraSettings, before: CameraSettings) -> None:
+        """Stop the camera for what cannot change while it runs; it goes on in any case."""
+        camera.stop()
+        self._running = False
+        try:
+            self._settings = camera.configure(settings)
+        except CosmicError:
+            self._settings = camera.configure(before)
+            raise
+        finally:
+            self._begin(camera)
+
+    def _obey(self, camera: Camera) -> None:
+        while True:
+            try:
+                task, command = self._commands.get_nowait()
+            except Empty:
+                return
+            try:
+                command(camera)
+            except CosmicError as exc:
+                task.fail(exc)
+                if isinstance(exc, DeviceError) and exc.fault not in REFUSALS:
+                    raise
+            else:
+                task.finish()
+            self.status_changed.emit()
+
+    def _hand_on(self, frame: Frame, settings: CameraSettings) -> None:
+        lost = frame.frame_id - self._last_id - 1 if self._last_id is not None else 0
+        self._last_id = frame.frame_id
+        picture = Picture(
+            camera=self.camera_name,
+            frame=frame,
+            circumstances=self._circumstances(frame, settings),
+            lost_before=max(0, lost),
+        )
+        tell(self._receivers, picture)
+        if frame.status is FrameStatus.COMPLETE:
+            with self._arrived:
+                self._newest = picture
+                self._arrived.notify_all()
+
+    def _lose(self, error: CosmicError) -> None:
+        """Say why there are no pictures, and wait before the camera is looked for again."""
+        text = str(error)
+        if text != self._problem:
+            log = logger.warning if isinstance(error, NotConnectedError) else logger.error
+            log("%s: %s; it is looked for every %g s", self.name, text, SEARCH_S)
+        self._problem = text
+        self._close()
+        self._refuse_commands(text)
+        self.status_changed.emit()
+        until_s = WALL.now_s() + SEARCH_S
+        while not self.end_requested and WALL.now_s() < until_s:
+            self._end_requested.wait(LOOK_S)
+            self._refuse_commands(text)
+
+    def _refuse_commands(self, reason: str) -> None:
+        while not self._commands.empty():
+            task, _ = self._commands.get_nowait()
+            task.fail(NotAvailable(f"{self.camera_name}: {reason}"))
+
+    def _close(self) -> None:
+        camera, self._camera = self._camera, None
+        self._running = False
+        self._settings = self._ranges = None
+        if camera is not None:
+            camera.close()
+
+
+def _while_running(before: CameraSettings, after: CameraSettings) -> bool:
+    """Return whether nothing differs but what a running camera may change."""
+    return (before.roi, before.binning, before.pixel_format, before.trigger) == (
+        after.roi,
+        after.binning,
+        after.pixel_format,
+        after.trigger,
+    )
