@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from cosmic.app.rig import Rig, connect
     from cosmic.daqco.api.recording import Recording, open_recording
-    from cosmic.daqco.core.recording_format import RecordingError
     from cosmic.frame.errors import (
         CollisionError,
         ConfigError,
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
         MoveRefused,
         NotAvailable,
         NotConnectedError,
+        RecordingError,
         StoppedError,
         UnknownAxisError,
     )
@@ -42,7 +42,6 @@ logging.getLogger(__name__).addHandler(logging.NullHandler())
 _HOMES = {
     "cosmic.app.rig": ("Rig", "connect"),
     "cosmic.daqco.api.recording": ("Recording", "open_recording"),
-    "cosmic.daqco.core.recording_format": ("RecordingError",),
     "cosmic.frame.errors": (
         "CollisionError",
         "ConfigError",
@@ -54,6 +53,7 @@ _HOMES = {
         "MoveRefused",
         "NotAvailable",
         "NotConnectedError",
+        "RecordingError",
         "StoppedError",
         "UnknownAxisError",
     ),

@@ -11,16 +11,10 @@ from cosmic.daqco.api.daqco import Daqco, DaqCounters, DaqLimit
 from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.curves import Slope
-from cosmic.daqco.core.recording_format import (
-    AxisPosition,
-    ExportCancelled,
-    Overrun,
-    RecordedEvent,
-    RecordingExistsError,
-)
+from cosmic.daqco.core.recording_format import AxisPosition, Overrun, RecordedEvent
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import LimitSettings
-from cosmic.frame.errors import DeviceFault
+from cosmic.frame.errors import DeviceFault, ExportCancelled, RecordingExistsError
 from cosmic.frame.task import Progress, Task
 from cosmic.mico.api.axis import Axis, Jogging
 from cosmic.mico.api.collision import Collision

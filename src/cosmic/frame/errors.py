@@ -48,6 +48,18 @@ class MoveCancelled(CosmicError):  # noqa: N818 - reads as what happened
     """A movement ended before its target: cancelled, or replaced by a newer command."""
 
 
+class RecordingError(CosmicError):
+    """A recording cannot be written, read or exported; the text names the file and what to do."""
+
+
+class RecordingExistsError(RecordingError, FileExistsError):
+    """There is a file of that name already, and nobody said that it may go."""
+
+
+class ExportCancelled(RecordingError):  # noqa: N818 - reads as what happened
+    """An export was ended by whoever began it; nothing of it is left."""
+
+
 class DeviceFault(StrEnum):
     """What went wrong at a device, in words that every vendor library shares."""
 

@@ -9,13 +9,8 @@ from cosmic.daqco.api import export
 from cosmic.daqco.api.export import export_csv, export_file, export_tdms
 from cosmic.daqco.api.recording import open_recording
 from cosmic.daqco.core.recording_file import RecordingFile
-from cosmic.daqco.core.recording_format import (
-    AxisPosition,
-    ExportCancelled,
-    RecordedEvent,
-    RecordingError,
-    RecordingExistsError,
-)
+from cosmic.daqco.core.recording_format import AxisPosition, RecordedEvent
+from cosmic.frame.errors import ExportCancelled, RecordingError, RecordingExistsError
 from unit.daqco.recording_helpers import FORCE, START_UTC, chunks, header, volts_of
 
 

@@ -14,18 +14,14 @@ import numpy as np
 import pytest
 
 from cosmic.daqco.api.recording import open_recording
-from cosmic.daqco.core.file_names import RESERVE_BYTES
 from cosmic.daqco.core.file_writer import UDaqFileWriter
 from cosmic.daqco.core.recording_file import RecordingFile
-from cosmic.daqco.core.recording_format import (
-    AxisPosition,
-    RecordedEvent,
-    RecordingError,
-    RecordingExistsError,
-)
+from cosmic.daqco.core.recording_format import AxisPosition, RecordedEvent
 from cosmic.daqco.core.scale import VOLTS, Scale
 from cosmic.frame.clock import WALL
+from cosmic.frame.errors import RecordingError, RecordingExistsError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.file_names import RESERVE_BYTES
 from unit.daqco.recording_helpers import FORCE, chunks, header, volts_of
 
 Usage = namedtuple("Usage", "total used free")

@@ -14,14 +14,9 @@ from hypothesis import strategies as st
 
 from cosmic.daqco.api.recording import open_recording
 from cosmic.daqco.core.recording_file import RecordingFile, block_samples
-from cosmic.daqco.core.recording_format import (
-    AxisPosition,
-    Overrun,
-    RecordedEvent,
-    RecordingError,
-    RecordingExistsError,
-)
+from cosmic.daqco.core.recording_format import AxisPosition, Overrun, RecordedEvent
 from cosmic.daqco.core.scale import VOLTS, Scale
+from cosmic.frame.errors import RecordingError, RecordingExistsError
 from unit.daqco.recording_helpers import FORCE, START_UTC, chunks, header, volts_of
 
 

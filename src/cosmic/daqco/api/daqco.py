@@ -9,13 +9,13 @@ from pathlib import Path
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.core.chunk import DataChunk
-from cosmic.daqco.core.file_names import space_left
 from cosmic.daqco.core.limits import LOWEST_RATE_HZ, Crossing, Limit
 from cosmic.daqco.core.plan import highest_rate_hz
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, LimitSettings
 from cosmic.daqco.hw.interface import BoardInfo
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
+from cosmic.frame.file_names import space_left
 from cosmic.frame.listeners import tell
 from cosmic.frame.task import Task
 

@@ -18,11 +18,7 @@ from cosmic.daqco.api.export_targets import (
     position_lines,
 )
 from cosmic.daqco.api.recording import Recording, open_recording
-from cosmic.daqco.core.recording_format import (
-    ExportCancelled,
-    RecordingError,
-    RecordingExistsError,
-)
+from cosmic.frame.errors import ExportCancelled, RecordingError, RecordingExistsError
 
 FORMATS: Final = ("csv", "tdms")
 READ_SAMPLES: Final = 32_768

@@ -11,9 +11,10 @@ import numpy.typing as npt
 
 from cosmic.daqco.core import recording_format as form
 from cosmic.daqco.core.curves import Slope, fit_slope
-from cosmic.daqco.core.recording_format import Overrun, RecordedEvent, RecordingError
+from cosmic.daqco.core.recording_format import Overrun, RecordedEvent
 from cosmic.daqco.core.recording_source import Columns, RecordingSource
 from cosmic.daqco.core.scale import Scale
+from cosmic.frame.errors import RecordingError
 
 Values = npt.NDArray[np.float64]
 _CONFIDENCE: Final = {number: word for word, number in form.CONFIDENCES.items()}

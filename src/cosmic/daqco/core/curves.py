@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.daqco.core.recording_format import RecordingError
+from cosmic.frame.errors import RecordingError
 
 Values = npt.NDArray[np.float64]
 FEWEST_SAMPLES = 3

@@ -11,18 +11,12 @@ from PySide6.QtCore import Signal
 from typing_extensions import override
 
 from cosmic.daqco.core.chunk import DataChunk
-from cosmic.daqco.core.file_names import check_base_name, check_directory, check_space, space_left
 from cosmic.daqco.core.recording_file import WRITE_ERRORS, RecordingFile
-from cosmic.daqco.core.recording_format import (
-    AxisPosition,
-    RecordedEvent,
-    RecordingError,
-    RecordingHeader,
-    reason,
-)
+from cosmic.daqco.core.recording_format import AxisPosition, RecordedEvent, RecordingHeader, reason
 from cosmic.frame.clock import WALL
-from cosmic.frame.errors import CosmicError
+from cosmic.frame.errors import CosmicError, RecordingError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.file_names import check_base_name, check_directory, check_space, space_left
 from cosmic.frame.threads import WorkerThread
 
 FLUSH_S: Final = 0.25

@@ -9,16 +9,10 @@ import numpy as np
 
 from cosmic.daqco.core import recording_format as form
 from cosmic.daqco.core.chunk import DataChunk
-from cosmic.daqco.core.recording_format import (
-    AxisPosition,
-    Overrun,
-    RecordedEvent,
-    RecordingError,
-    RecordingExistsError,
-    RecordingHeader,
-)
+from cosmic.daqco.core.recording_format import AxisPosition, Overrun, RecordedEvent, RecordingHeader
 from cosmic.daqco.core.room import TABLES_BYTES, Room, cut
 from cosmic.daqco.core.scale import Scale
+from cosmic.frame.errors import RecordingError, RecordingExistsError
 
 BLOCK_S: Final = 0.5
 SMALLEST_BLOCK: Final = 256

@@ -11,23 +11,11 @@ import numpy.typing as npt
 
 from cosmic.daqco.core.scale import LARGEST_DEGREE, Scale
 from cosmic.daqco.core.settings import ChannelSettings
-from cosmic.frame.errors import CosmicError
 
+SUFFIX: Final = ".h5"
 FORMAT: Final = "CoSMic recording"
 VERSION: Final = 1
 CONFIDENCES: Final = {"unknown": 0, "estimated": 1, "known": 2}
-
-
-class RecordingError(CosmicError):
-    """A recording cannot be written, read or exported; the text names the file and what to do."""
-
-
-class RecordingExistsError(RecordingError, FileExistsError):
-    """There is a file of that name already, and nobody said that it may go."""
-
-
-class ExportCancelled(RecordingError):  # noqa: N818 - reads as what happened
-    """An export was ended by whoever began it; nothing of it is left."""
 
 
 @dataclass(frozen=True, slots=True)

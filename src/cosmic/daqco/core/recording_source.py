@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.daqco.core import recording_format as form
-from cosmic.daqco.core.recording_format import RecordingError
 from cosmic.daqco.core.unclosed_file import UnclosedFile, is_unclosed
 from cosmic.frame.clock import WALL
+from cosmic.frame.errors import RecordingError
 
 READ_ERRORS: Final = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError)
 """What h5py raises over a file that is damaged."""

@@ -4,7 +4,7 @@ from typing import Final
 
 from PySide6.QtWidgets import QButtonGroup, QRadioButton, QWidget
 
-from cosmic.daqco.core.file_names import NameOption
+from cosmic.frame.file_names import NameOption
 from cosmic.frame.gui.build import tight_row, tipped
 from cosmic.frame.gui.theme import STEP_PX
 

@@ -3,8 +3,9 @@
 from pathlib import Path
 from typing import Final
 
-from cosmic.daqco.core.file_names import SUFFIX, NameOption, check_base_name, check_directory
+from cosmic.daqco.core.recording_format import SUFFIX
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.file_names import NameOption, check_base_name, check_directory
 
 _TAILS: Final = {
     NameOption.TIME: "_yyyy-mm-dd_hh-mm-ss",

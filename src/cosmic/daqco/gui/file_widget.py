@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from cosmic.daqco.core.file_names import NameOption, file_name
+from cosmic.daqco.core.recording_format import SUFFIX
 from cosmic.daqco.gui.amounts import recording_text, room_text
 from cosmic.daqco.gui.append_row import append_row
 from cosmic.daqco.gui.file_naming import directory_problem, name_pattern, name_problem
@@ -26,6 +26,7 @@ from cosmic.daqco.gui.ports import DaqPort
 from cosmic.daqco.gui.relay import PortRelay
 from cosmic.daqco.gui.value_field import mark_refusal
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.file_names import NameOption, file_name
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.state_badge import StateBadge
@@ -195,7 +196,13 @@ class UDaqFileWidget(QWidget):
         return f"Now: {self._name_now()}"
 
     def _name_now(self) -> str:
-        return file_name(self.base.text(), self.append, when=self._now(), directory=self.folder)
+        return file_name(
+            self.base.text(),
+            self.append,
+            suffix=SUFFIX,
+            when=self._now(),
+            directory=self.folder,
+        )
 
     def _enable(self, wrong: str) -> None:
         recording, asking = self._port.recording, self._asking is not None

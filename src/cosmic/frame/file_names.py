@@ -4,15 +4,15 @@ import os
 import re
 import shutil
 import unicodedata
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
 from typing import Final
 
-from cosmic.daqco.core.recording_format import RecordingError
+from cosmic.frame.errors import RecordingError
 
-SUFFIX: Final = ".h5"
 RESERVE_BYTES: Final = 32 * 1024 * 1024
 LONGEST_BASE_BYTES: Final = 200
 FORBIDDEN: Final = '/\\<>:"|?*'
@@ -76,24 +76,30 @@ def file_name(
     base: str,
     option: NameOption = NameOption.NONE,
     *,
+    suffix: str,
     when: datetime | None = None,
     directory: Path | None = None,
+    taken_by: Iterable[str] = (),
 ) -> str:
     """Return the whole name of a recording.
 
     Parameters
     ----------
+    suffix : str
+        What all recordings of this kind end in, such as ".h5".
     when : datetime, optional
         Local time of the stamp; needed with `NameOption.TIME`.
     directory : Path, optional
         Where numbers in use are looked up; needed with `NameOption.NUMBER`.
+    taken_by : iterable of str
+        Further endings of files by which a number is in use.
 
     Raises
     ------
     RecordingError
         `base` is no name of a file.
     """
-    stem = check_base_name(base).removesuffix(SUFFIX)
+    stem = check_base_name(base).removesuffix(suffix)
     check_base_name(stem)
     if option is NameOption.TIME:
         if when is None:
@@ -102,13 +108,14 @@ def file_name(
     elif option is NameOption.NUMBER:
         if directory is None:
             raise ValueError("a number needs a directory to look into")
-        stem = f"{stem}_{next_number(stem, directory):03d}"
-    return stem + SUFFIX
+        stem = f"{stem}_{next_number(stem, directory, (suffix, *taken_by)):03d}"
+    return stem + suffix
 
 
-def next_number(stem: str, directory: Path) -> int:
+def next_number(stem: str, directory: Path, suffixes: Iterable[str]) -> int:
     """Return the number after the highest in use for `stem` in `directory`; 1 without any."""
-    pattern = re.compile(re.escape(stem) + r"_(\d+)" + re.escape(SUFFIX), re.IGNORECASE)
+    endings = "|".join(re.escape(each) for each in suffixes)
+    pattern = re.compile(rf"{re.escape(stem)}_(\d+)(?:{endings})", re.IGNORECASE)
     try:
         names = [each.name for each in directory.iterdir()]
     except OSError:  # `check_directory` says what is wrong with it

@@ -5,21 +5,25 @@ import shutil
 import sys
 from collections import namedtuple
 from datetime import datetime
+from functools import partial
 
 import pytest
 
-from cosmic.daqco.core.file_names import (
+from cosmic.frame.errors import RecordingError
+from cosmic.frame.file_names import (
     RESERVE_BYTES,
     NameOption,
     check_base_name,
     check_directory,
     check_space,
-    file_name,
     space_left,
 )
-from cosmic.daqco.core.recording_format import RecordingError
+from cosmic.frame.file_names import (
+    file_name as named,
+)
 
 Usage = namedtuple("Usage", "total used free")
+file_name = partial(named, suffix=".h5")
 WHEN = datetime(2026, 5, 4, 9, 8, 7)
 
 
@@ -35,6 +39,15 @@ def test_the_number_follows_the_highest_in_use(tmp_path):
         (tmp_path / name).touch()
     assert file_name("fibre", NameOption.NUMBER, directory=tmp_path) == "fibre_011.h5"
     assert file_name("f(1)", NameOption.NUMBER, directory=tmp_path) == "f(1)_001.h5"
+
+
+def test_a_number_is_in_use_by_any_of_the_endings_told(tmp_path):
+    for name in ("fibre_002.csv", "fibre_004.txt", "fibre_007"):
+        (tmp_path / name).touch()
+    wanted = {"suffix": ".mkv", "directory": tmp_path}
+    number = NameOption.NUMBER
+    assert named("fibre", number, **wanted, taken_by=(".csv", ".avi")) == "fibre_003.mkv"
+    assert named("fibre", number, **wanted, taken_by=(".csv", "")) == "fibre_008.mkv"
 
 
 def test_numbering_in_a_missing_directory_begins_at_one(tmp_path):
