@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from pydantic import BaseModel
 
-from cosmic.app.platform import PlatformFile, PlatformSettings
+from cosmic.app.platform_file import PlatformFile, PlatformSettings
 from cosmic.daqco.core.settings import (
     ChannelSettings,
     DaqcoSettings,
@@ -30,6 +30,7 @@ from cosmic.twin.force_settings import (
     GripperGeometry,
     JointDrive,
 )
+from cosmic.twin.lens_settings import LensMotorSettings, LensSettings, LightSettings
 from cosmic.twin.settings import (
     ControllerSettings,
     DeviceWiring,
@@ -62,6 +63,9 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[contact]": ContactSettings,
     "[[fibres]]": FibreSettings,
     "[force_sensors.NAME]": ForceSensorSettings,
+    "[lens]": LensSettings,
+    "[lens.zoom]": LensMotorSettings,
+    "[light]": LightSettings,
 }
 WHOLE_FILES: Final = (PlatformFile, TwinSettings)
 
@@ -72,6 +76,10 @@ _UNITS: Final = (
     ("_v_un", "V/µN"),
     ("_un", "µN"),
     ("_n", "N"),
+    ("_counts_s2", "counts/s²"),
+    ("_counts_s", "counts/s"),
+    ("_counts", "counts"),
+    ("_percent", "%"),
     ("_um_s2", "µm/s²"),
     ("_deg_s2", "°/s²"),
     ("_um_s", "µm/s"),

@@ -13,6 +13,7 @@ from cosmic.twin.force_settings import (
     ForceSensorSettings,
     GeometrySettings,
 )
+from cosmic.twin.lens_settings import LensSettings, LightSettings
 
 
 class StageKind(StrictModel):
@@ -136,6 +137,8 @@ class TwinSettings(StrictModel):
     fibres: tuple[FibreSettings, ...] = Field(default=(), strict=False)
     force_sensors: dict[str, ForceSensorSettings]
     sensor_wiring: dict[str, str] = Field(default_factory=dict)
+    lens: LensSettings
+    light: LightSettings
 
     @model_validator(mode="after")
     def _tools_fit_together(self) -> Self:

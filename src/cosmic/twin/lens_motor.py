@@ -1,0 +1,184 @@
+"""One motor of the twin's lens: what its controller counts, and where the lens truly is."""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Final
+
+from cosmic.twin.lens_settings import LensMotorSettings
+from cosmic.twin.ramp import Ramp, ramp_down, ramp_over
+
+LEGS_KEPT: Final = 64
+"""So many legs back, instruments that report late still see where the lens was."""
+
+
+class LensPhase(StrEnum):
+    """What the controller of a motor is about."""
+
+    IDLE = "idle"
+    TO_HOME = "to home"
+    OFF_HOME = "off home"
+    TO_LIMIT = "to limit"
+    SEEK = "seek"
+    BACKLASH = "backlash"
+    ABORT = "abort"
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A movement in one direction, and the rest after it.
+
+    Attributes
+    ----------
+    counter, motor, lens : float
+        At its beginning: steps as counted, where the motor is, where the lens is.
+    share : float
+        Part of the steps sent that the motor makes; less than 1 when it loses some.
+    """
+
+    phase: LensPhase
+    start_s: float
+    direction: int
+    ramp: Ramp
+    counter: float
+    motor: float
+    lens: float
+    share: float
+    travel: tuple[float, float]
+    play: float
+
+    @property
+    def end_s(self) -> float:
+        """When it stands."""
+        return self.start_s + self.ramp.duration_s
+
+    def counter_at(self, time_s: float) -> float:
+        """Return the steps as the controller counts them: it knows nothing of lost ones."""
+        return self.counter + self.direction * self.ramp.gone(time_s - self.start_s)
+
+    def motor_at(self, time_s: float) -> float:
+        """Return where the motor is: at a stop it clicks and stays."""
+        gone = self.ramp.gone(time_s - self.start_s) * self.share
+        low, high = self.travel
+        half = self.play / 2.0
+        return min(max(self.motor + self.direction * gone, low - half), high + half)
+
+    def lens_at(self, time_s: float) -> float:
+        """Return where the lens is: the motor takes it along once the play is used up."""
+        motor, half = self.motor_at(time_s), self.play / 2.0
+        return min(max(self.lens, motor - half), motor + half)
+
+
+class LensMotor:
+    """A stepper without switches, its controller and the lens it turns.
+
+    Parameters
+    ----------
+    start_counts : float
+        Where the lens stands.
+    counter : float
+        What the controller believes then.
+
+    Notes
+    -----
+    Any thread may read; one at a time may command. Legs are never changed, only replaced.
+    """
+
+    def __init__(self, settings: LensMotorSettings, *, start_counts: float, counter: float) -> None:
+        self.settings = settings
+        self.lost_share = 0.0
+        play = float(settings.backlash_counts)
+        rest = Leg(
+            LensPhase.IDLE,
+            start_s=0.0,
+            direction=1,
+            ramp=Ramp(),
+            counter=counter,
+            motor=start_counts + play / 2.0,
+            lens=start_counts,
+            share=1.0,
+            travel=(0.0, float(settings.limit_counts)),
+            play=play,
+        )
+        self._legs: tuple[Leg, ...] = (rest,)
+
+    def leg(self, time_s: float) -> Leg:
+        """Return the leg that `time_s` falls into; before the first, the first."""
+        for leg in reversed(self._legs):
+            if leg.start_s <= time_s:
+                return leg
+        return self._legs[0]
+
+    def begin(self, time_s: float, ways: tuple[tuple[LensPhase, float], ...]) -> None:
+        """Go signed ways one after the other from `time_s` on; what was planned is dropped."""
+        leg = self._standing(time_s)
+        legs = []
+        for phase, way in ways:
+            leg = self._next(leg, phase, way)
+            legs.append(leg)
+        self._follow(time_s, *legs, self._rest(leg))
+
+    def zero(self) -> None:
+        """Have counting begin anew where the last leg planned ends."""
+        *kept, last = self._legs
+        self._legs = (*kept, replace(last, counter=0.0))
+
+    def abort(self, time_s: float) -> None:
+        """Come to a stand as fast as the ramp allows."""
+        leg = self.leg(time_s)
+        speed, _ = leg.ramp.speed(time_s - leg.start_s)
+        if speed <= 0.0:
+            if leg.end_s > time_s:
+                self._follow(time_s, self._standing(time_s))
+            return
+        down = replace(
+            self._standing(time_s),
+            phase=LensPhase.ABORT,
+            direction=leg.direction,
+            ramp=ramp_down(speed, self.settings),
+            share=leg.share,
+        )
+        self._follow(time_s, down, self._rest(down))
+
+    def turn(self, time_s: float, way: float) -> None:
+        """Turn the lens by hand; the controller does not notice."""
+        leg = self._standing(time_s)
+        low, high = leg.travel
+        lens = min(max(leg.lens + way, low), high)
+        self._follow(time_s, replace(leg, lens=lens, motor=leg.motor + lens - leg.lens))
+
+    def _standing(self, time_s: float) -> Leg:
+        leg = self.leg(time_s)
+        return replace(
+            leg,
+            phase=LensPhase.IDLE,
+            start_s=time_s,
+            ramp=Ramp(),
+            counter=leg.counter_at(time_s),
+            motor=leg.motor_at(time_s),
+            lens=leg.lens_at(time_s),
+        )
+
+    def _next(self, before: Leg, phase: LensPhase, way: float) -> Leg:
+        leg = self._rest(before)
+        direction = 1 if way >= 0.0 else -1
+        ramp = ramp_over(abs(way), self.settings)
+        return replace(
+            leg, phase=phase, direction=direction, ramp=ramp, share=1.0 - self.lost_share
+        )
+
+    def _rest(self, leg: Leg) -> Leg:
+        end_s = leg.end_s
+        return replace(
+            leg,
+            phase=LensPhase.IDLE,
+            start_s=end_s,
+            ramp=Ramp(),
+            # A ramp is a sum of floats, a stepper makes whole steps.
+            counter=float(round(leg.counter_at(end_s))),
+            motor=leg.motor_at(end_s),
+            lens=leg.lens_at(end_s),
+        )
+
+    def _follow(self, time_s: float, *legs: Leg) -> None:
+        past = [leg for leg in self._legs if leg.start_s <= time_s]
+        self._legs = (*past[-LEGS_KEPT:], *legs)

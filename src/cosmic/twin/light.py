@@ -1,0 +1,34 @@
+"""The twin's lamp: how bright it is at any moment."""
+
+from typing import Final
+
+from cosmic.twin.lens_settings import LightSettings
+
+CHANGES_KEPT: Final = 256
+"""So many changes back, instruments that report late still see how bright it was."""
+
+
+class TwinLight:
+    """A dimmed LED; it follows at once.
+
+    Notes
+    -----
+    Any thread may look, also at the past; one at a time changes it.
+    """
+
+    def __init__(self, settings: LightSettings) -> None:
+        self.settings = settings
+        self._changes: tuple[tuple[float, float], ...] = ((0.0, settings.start_percent),)
+
+    def percent(self, now_s: float) -> float:
+        """Return how bright it is at `now_s`, 0 to 100."""
+        for since_s, percent in reversed(self._changes):
+            if since_s <= now_s:
+                return percent
+        return self._changes[0][1]
+
+    def set_percent(self, percent: float, now_s: float) -> None:
+        """Make it so bright from `now_s` on."""
+        if not 0.0 <= percent <= 100.0:
+            raise ValueError(f"a brightness lies between 0 and 100 %, got {percent!r}")
+        self._changes = (*self._changes[1 - CHANGES_KEPT :], (now_s, percent))
