@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from cosmic.app.platform import PlatformFile, load_platform, misfits, platform_path
+from cosmic.app.platform_file import PlatformFile, load_platform, platform_path
+from cosmic.app.scene_fit import misfits
 from cosmic.frame.config import load_model, read_toml
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.units import format_quantity

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
-
-from pydantic import Field
+from typing import TYPE_CHECKING
 
 import cosmic
+from cosmic.app.platform_file import KNOWN_APPLICATIONS, PlatformFile, load_platform, load_twin
+from cosmic.app.scene_fit import load_checker
 from cosmic.autonomy.interlocks import join_force_limits, join_positions
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.core.settings import DaqcoSettings
@@ -14,42 +14,15 @@ from cosmic.daqco.hw.factory import make_library
 from cosmic.daqco.hw.sim_signal import Source
 from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import Clock, RatedClock
-from cosmic.frame.config import StrictModel, load_model, shipped_config_dir
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.api.application import MicoApplication
-from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
-from cosmic.mico.core.collision.collision_manager import CollisionManager
-from cosmic.mico.core.collision.model import SceneModel
-from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.factory import make_controller, make_simulated
 from cosmic.mico.hw.interface import Controller
 from cosmic.twin.scene import Scene
-from cosmic.twin.settings import TwinSettings
 
 if TYPE_CHECKING:
     from cosmic.mico.hw.sim_scu3d_faults import Faults
-
-KNOWN_APPLICATIONS: Final = ("mico", "daqco", "vico")
-BUILT_APPLICATIONS: Final = ("mico", "daqco")
-
-
-class PlatformSettings(StrictModel):
-    """Section ``[platform]`` of platform.toml."""
-
-    name: str = Field(min_length=1)
-    twin: str = "twin.toml"
-    scene: str = ""
-    stop_key: str = "F12"
-    applications: Annotated[tuple[str, ...], Field(strict=False)] = BUILT_APPLICATIONS
-
-
-class PlatformFile(StrictModel):
-    """A whole platform.toml."""
-
-    platform: PlatformSettings
-    mico: MicoSettings
-    daqco: DaqcoSettings | None = None
 
 
 @dataclass(frozen=True)
@@ -82,82 +55,6 @@ class Platform:
             self.mico.shut_down()
         if self.daqco is not None:
             self.daqco.shut_down()
-
-
-def platform_path(config: str | Path | None) -> Path:
-    """Return the platform file that `config` names: a file, a folder with one, or None."""
-    if config is None:
-        return shipped_config_dir() / "platform.toml"
-    path = Path(config)
-    return path / "platform.toml" if path.is_dir() else path
-
-
-def load_platform(config: str | Path | None) -> tuple[PlatformFile, Path]:
-    """Read and check a platform file.
-
-    Raises
-    ------
-    ConfigError
-        A line for every mistake, each with file, key and reason.
-    """
-    path = platform_path(config)
-    file = load_model(path, PlatformFile)
-    unknown = [name for name in file.platform.applications if name not in KNOWN_APPLICATIONS]
-    if unknown:
-        raise ConfigError(
-            f"{path}: platform.applications: unknown application {unknown[0]!r}; "
-            f"known are {', '.join(KNOWN_APPLICATIONS)}"
-        )
-    return file, path
-
-
-def load_twin(file: PlatformFile, path: Path) -> TwinSettings:
-    """Read the twin that a platform file names, from the folder of that file."""
-    return load_model(path.parent / file.platform.twin, TwinSettings)
-
-
-def load_checker(file: PlatformFile, path: Path) -> CollisionChecker:
-    """Return the collision model that a platform file names, or the stand-in where none is named.
-
-    Raises
-    ------
-    ConfigError
-        The scene is wrong, or does not fit the platform; a line for every mistake.
-    """
-    if not file.platform.scene:
-        return NoCollisionModel()
-    # Imported here: what reads meshes takes its time to load.
-    from cosmic.mico.core.collision.scene_loader import load_scene
-
-    scene = load_scene(path.parent / file.platform.scene)
-    mistakes = misfits(file, path, scene)
-    if mistakes:
-        raise ConfigError("\n".join(mistakes))
-    return CollisionManager(scene, axes=(each.name for each in file.mico.positioner))
-
-
-def misfits(file: PlatformFile, path: Path, scene: SceneModel) -> list[str]:
-    """Return where a scene and the positioners do not fit together, a line each."""
-    positioners = {each.name: each for each in file.mico.positioner}
-    lines = [
-        f"{path}: platform.scene: {file.platform.scene} drives {axis}, which is no positioner"
-        for axis in scene.axes
-        if axis not in positioners
-    ]
-    for index, each in enumerate(file.mico.positioner):
-        where = f"{path}: mico.positioner[{index}]"
-        if each.name not in scene.axes:
-            lines.append(
-                f"{where}.name: {each.name} moves nothing in {file.platform.scene}; add a drive"
-            )
-        elif each.limits is not None:
-            low, high = scene.travel(each.name)
-            if not low <= each.limits[0] <= each.limits[1] <= high:
-                lines.append(
-                    f"{where}.limits_{each.unit}: {each.limits[0]:g} to {each.limits[1]:g} reaches "
-                    f"beyond the hard stops of {file.platform.scene}, {low:g} to {high:g}"
-                )
-    return lines
 
 
 def build_platform(
@@ -200,42 +97,17 @@ def build_platform(
         clock = RatedClock(rate)
     except (TypeError, ValueError) as exc:
         raise ConfigError(f"rate: {exc}") from None
-    policy = FailurePolicy()
-    mico, faults, scene = None, None, None
+    scene = None
     if simulated:
         twin = load_twin(file, path)
         scene = Scene.from_settings(twin, clock, seed=seed, cold=cold, folder=path.parent)
-    if "mico" in applications and "mico" in file.platform.applications:
-        controller: Controller
-        if scene is not None:
-            controller, faults = make_simulated(scene)
-        else:
-            controller = make_controller(file.mico.backend, library_path=file.mico.library)
-        mico = MicoApplication(
-            controller,
-            file.mico,
-            clock=clock,
-            policy=policy,
-            checker=load_checker(file, path),
-            gui_factory=mico_gui,
-        )
-    daqco = None
-    if "daqco" in applications and "daqco" in file.platform.applications and file.daqco:
-        daqco = DaqcoApplication(
-            make_library(
-                file.daqco.backend,
-                clock=clock,
-                scene_sources=_sources(scene),
-                clock_sources=file.daqco.clock_sources,
-                seed=seed,
-            ),
-            file.daqco,
-            clock=clock,
-            policy=policy,
-            software=f"CoSMic {cosmic.__version__}",
-            configuration=path.read_text(encoding="utf-8"),
-            gui_factory=daqco_gui,
-        )
+    site = _Site(file, path, clock, FailurePolicy(), scene, seed)
+    hosted = [name for name in applications if name in file.platform.applications]
+    mico, faults, daqco = None, None, None
+    if "mico" in hosted:
+        mico, faults = _build_mico(site, mico_gui)
+    if "daqco" in hosted and file.daqco is not None:
+        daqco = _build_daqco(site, file.daqco, daqco_gui)
     if daqco is not None and mico is not None:
         join_force_limits(daqco, mico)
         join_positions(daqco.recorder, mico, clock)
@@ -243,10 +115,64 @@ def build_platform(
         file=file,
         path=path,
         clock=clock,
-        policy=policy,
+        policy=site.policy,
         mico=mico,
         faults=faults,
         daqco=daqco,
+    )
+
+
+@dataclass(frozen=True)
+class _Site:
+    """What the applications of one process share while they are built."""
+
+    file: PlatformFile
+    path: Path
+    clock: Clock
+    policy: FailurePolicy
+    scene: Scene | None
+    seed: int
+
+
+def _build_mico(
+    site: _Site, gui_factory: GuiFactory | None
+) -> "tuple[MicoApplication, Faults | None]":
+    settings = site.file.mico
+    controller: Controller
+    faults: Faults | None = None
+    if site.scene is not None:
+        controller, faults = make_simulated(site.scene)
+    else:
+        controller = make_controller(settings.backend, library_path=settings.library)
+    application = MicoApplication(
+        controller,
+        settings,
+        clock=site.clock,
+        policy=site.policy,
+        checker=load_checker(site.file, site.path),
+        gui_factory=gui_factory,
+    )
+    return application, faults
+
+
+def _build_daqco(
+    site: _Site, settings: DaqcoSettings, gui_factory: GuiFactory | None
+) -> DaqcoApplication:
+    library = make_library(
+        settings.backend,
+        clock=site.clock,
+        scene_sources=_sources(site.scene),
+        clock_sources=settings.clock_sources,
+        seed=site.seed,
+    )
+    return DaqcoApplication(
+        library,
+        settings,
+        clock=site.clock,
+        policy=site.policy,
+        software=f"CoSMic {cosmic.__version__}",
+        configuration=site.path.read_text(encoding="utf-8"),
+        gui_factory=gui_factory,
     )
 
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, NoReturn, Self
 
 from typing_extensions import override
 
-from cosmic.app.platform import KNOWN_APPLICATIONS, Platform, build_platform
+from cosmic.app.platform import Platform, build_platform
+from cosmic.app.platform_file import KNOWN_APPLICATIONS
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.errors import ConfigError, NotAvailable, NotConnectedError
 from cosmic.mico.api.mico import Mico

@@ -16,7 +16,8 @@ from PySide6.QtWidgets import QApplication
 
 from cosmic.app.check import key_mistakes
 from cosmic.app.operator_window import OperatorWindow
-from cosmic.app.platform import KNOWN_APPLICATIONS, Platform, build_platform
+from cosmic.app.platform import Platform, build_platform
+from cosmic.app.platform_file import KNOWN_APPLICATIONS
 from cosmic.daqco.gui.main_widget import make_daqco_gui
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.gui.palette import ThemeName

@@ -11,7 +11,8 @@ from PySide6.QtWidgets import QCheckBox, QPushButton, QToolButton
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.operator_window import OperatorWindow
-from cosmic.app.platform import build_platform, load_platform
+from cosmic.app.platform import build_platform
+from cosmic.app.platform_file import load_platform
 from cosmic.app.way_bar import Stage, WayBar, way_text
 from cosmic.app.way_guide import poses_along
 from cosmic.frame.config import shipped_config_dir

@@ -8,7 +8,8 @@ from pytestqt.qtbot import QtBot
 
 from cosmic.app.hint_bar import HintBar
 from cosmic.app.operator_window import OperatorWindow
-from cosmic.app.platform import Platform, build_platform, load_platform
+from cosmic.app.platform import Platform, build_platform
+from cosmic.app.platform_file import load_platform
 from cosmic.frame.clock import WALL, RatedClock
 from cosmic.frame.errors import DeviceError, DeviceFault, MoveCancelled, StoppedError
 from cosmic.frame.failure import FailurePolicy

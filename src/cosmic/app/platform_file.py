@@ -1,0 +1,65 @@
+"""What a platform.toml says, read and checked."""
+
+from pathlib import Path
+from typing import Annotated, Final
+
+from pydantic import Field
+
+from cosmic.daqco.core.settings import DaqcoSettings
+from cosmic.frame.config import StrictModel, load_model, shipped_config_dir
+from cosmic.frame.errors import ConfigError
+from cosmic.mico.core.settings import MicoSettings
+from cosmic.twin.settings import TwinSettings
+
+KNOWN_APPLICATIONS: Final = ("mico", "daqco", "vico")
+BUILT_APPLICATIONS: Final = ("mico", "daqco")
+
+
+class PlatformSettings(StrictModel):
+    """Section ``[platform]`` of platform.toml."""
+
+    name: str = Field(min_length=1)
+    twin: str = "twin.toml"
+    scene: str = ""
+    stop_key: str = "F12"
+    applications: Annotated[tuple[str, ...], Field(strict=False)] = BUILT_APPLICATIONS
+
+
+class PlatformFile(StrictModel):
+    """A whole platform.toml."""
+
+    platform: PlatformSettings
+    mico: MicoSettings
+    daqco: DaqcoSettings | None = None
+
+
+def platform_path(config: str | Path | None) -> Path:
+    """Return the platform file that `config` names: a file, a folder with one, or None."""
+    if config is None:
+        return shipped_config_dir() / "platform.toml"
+    path = Path(config)
+    return path / "platform.toml" if path.is_dir() else path
+
+
+def load_platform(config: str | Path | None) -> tuple[PlatformFile, Path]:
+    """Read and check a platform file.
+
+    Raises
+    ------
+    ConfigError
+        A line for every mistake, each with file, key and reason.
+    """
+    path = platform_path(config)
+    file = load_model(path, PlatformFile)
+    unknown = [name for name in file.platform.applications if name not in KNOWN_APPLICATIONS]
+    if unknown:
+        raise ConfigError(
+            f"{path}: platform.applications: unknown application {unknown[0]!r}; "
+            f"known are {', '.join(KNOWN_APPLICATIONS)}"
+        )
+    return file, path
+
+
+def load_twin(file: PlatformFile, path: Path) -> TwinSettings:
+    """Read the twin that a platform file names, from the folder of that file."""
+    return load_model(path.parent / file.platform.twin, TwinSettings)
