@@ -1,0 +1,294 @@
+"""Measure the map from stage to picture, and the table's rotation centre, from places tracked."""
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.frame.errors import CosmicError
+from cosmic.vico.core.pixel_map import Floats, Pair, PixelMap, as_matrix, as_pair
+
+FEWEST_POINTS: Final = 4
+LARGEST_RMS_PX: Final = 0.5
+OUTLIER_PX: Final = 1.5
+OUTLIER_SHARE: Final = 0.25
+SMALLEST_SPREAD_PX: Final = 15.0
+NARROWEST: Final = 0.1
+LARGEST_ANISOTROPY: Final = 0.05
+MOST_TRIPLES: Final = 400
+
+FEWEST_ANGLES: Final = 5
+SMALLEST_TURN_DEG: Final = 30.0
+LARGEST_RMS_UM: Final = 3.0
+LARGEST_CENTRE_STD_UM: Final = 2.0
+SMALLEST_RADIUS_UM: Final = 100.0
+
+
+class CalibrationRefused(CosmicError):  # noqa: N818 - reads as what happened
+    """What was measured does not make a calibration; the text says why and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """Where the thing that is tracked was seen while the stages stood somewhere.
+
+    Attributes
+    ----------
+    platform_um : (float, float)
+        By the stages' encoders.
+    picture_px : (float, float)
+        On the whole sensor, unbinned; see `PixelMap`.
+    label : str
+        How an outlier is named; empty: by its number, from 1.
+    """
+
+    platform_um: Pair
+    picture_px: Pair
+    label: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class MapFit:
+    """A map with what is left over.
+
+    Attributes
+    ----------
+    rms_px, max_px : float
+        Distance between where the places used were seen and where the map says.
+    outliers : tuple of str
+        Sightings left out, each with how far off it is.
+    """
+
+    map: PixelMap
+    rms_px: float
+    max_px: float
+    outliers: tuple[str, ...] = ()
+
+
+def fit_map(sightings: Sequence[Sighting], *, limit_px: float = LARGEST_RMS_PX) -> MapFit:
+    """Fit the map from stage to picture.
+
+    Raises
+    ------
+    CalibrationRefused
+        Too few places, too close together or on a line; too many outliers; residual above
+        `limit_px` RMS; the two axes are seen at different scales.
+    """
+    places = np.array([each.platform_um for each in sightings], dtype=np.float64).reshape(-1, 2)
+    seen = np.array([each.picture_px for each in sightings], dtype=np.float64).reshape(-1, 2)
+    if not (np.isfinite(places).all() and np.isfinite(seen).all()):
+        raise CalibrationRefused("calibration: a place or a pixel is not a number; track again")
+    _check_places(places, seen)
+    kept = _inliers(places, seen)
+    left_out = np.flatnonzero(~kept).tolist()
+    fitted, residuals_px = _least_squares(places[kept], seen[kept])
+    off_px = np.linalg.norm(fitted.to_px(places) - seen, axis=1)
+    outliers = tuple(
+        f"{sightings[i].label or f'point {i + 1}'}: {off_px[i]:.1f} px off" for i in left_out
+    )
+    if len(left_out) > OUTLIER_SHARE * len(sightings) or kept.sum() < FEWEST_POINTS:
+        raise CalibrationRefused(
+            f"calibration: {len(left_out)} of {len(sightings)} places do not fit the others "
+            f"({'; '.join(outliers)}); look whether the right thing was tracked and stands sharp"
+        )
+    _check_places(places[kept], seen[kept])
+    rms_px = float(np.sqrt(np.mean(residuals_px**2)))
+    _check_map(fitted, rms_px, limit_px)
+    return MapFit(fitted, rms_px, float(residuals_px.max()), outliers)
+
+
+def _check_places(places: Floats, seen: Floats) -> None:
+    if len(places) < FEWEST_POINTS:
+        raise CalibrationRefused(
+            f"calibration: {len(places)} places, at least {FEWEST_POINTS} are needed"
+        )
+    asked = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
+    if not asked[1] > NARROWEST * asked[0]:
+        raise CalibrationRefused(
+            "calibration: the stage moved along a line only; move in both directions"
+        )
+    # Of the picture itself, so that a thing that did not move with the stage is caught as well.
+    spread_px = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)[1] / math.sqrt(len(seen))
+    if not spread_px >= SMALLEST_SPREAD_PX:
+        raise CalibrationRefused(
+            f"calibration: the places seen spread by {spread_px:.1f} px across, "
+            f"{SMALLEST_SPREAD_PX:g} px are needed; move further, and see that what is tracked "
+            "moves with the stage"
+        )
+
+
+def _check_map(fitted: PixelMap, rms_px: float, limit_px: float) -> None:
+    if not rms_px <= limit_px:
+        raise CalibrationRefused(
+            f"calibration: residual of {rms_px:.2f} px RMS, at most {limit_px:g} px are accepted; "
+            "focus, wait until the stage rests before each picture, and measure again"
+        )
+    if not fitted.anisotropy <= LARGEST_ANISOTROPY:
+        raise CalibrationRefused(
+            f"calibration: one direction is seen {100.0 * fitted.anisotropy:.0f} % larger than "
+            "the other; look whether both axes really moved as told"
+        )
+
+
+def _least_squares(places: Floats, seen: Floats) -> tuple[PixelMap, Floats]:
+    """Return the map and how far each place is from it, px."""
+    centre_um, centre_px = places.mean(axis=0), seen.mean(axis=0)
+    away = places - centre_um
+    solution = np.linalg.lstsq(away, seen - centre_px, rcond=None)[0]
+    error = away @ solution - (seen - centre_px)
+    # Two coordinates a place; six numbers of the map are taken from them.
+    freedom = max(1, 2 * len(places) - 6)
+    fitted = PixelMap(
+        as_matrix(solution.T),
+        as_pair(centre_um),
+        as_pair(centre_px),
+        math.sqrt(float(np.sum(error**2)) / freedom),
+        as_matrix(np.linalg.inv(away.T @ away)),
+        len(places),
+    )
+    return fitted, np.asarray(np.linalg.norm(error, axis=1))
+
+
+def _inliers(places: Floats, seen: Floats) -> npt.NDArray[np.bool_]:
+    """Return which sightings agree with most of the others (least median of squares)."""
+    best_px, kept = math.inf, np.ones(len(places), dtype=np.bool_)
+    for triple in _triples(len(places)):
+        corners = np.column_stack([places[triple], np.ones(3)])
+        if abs(np.linalg.det(corners)) < 1e-6 * max(1.0, float(np.ptp(places)) ** 2):
+            continue
+        affine = np.linalg.solve(corners, seen[triple])
+        off_px = np.linalg.norm(
+            np.column_stack([places, np.ones(len(places))]) @ affine - seen, axis=1
+        )
+        middle_px = float(np.median(off_px))
+        if middle_px < best_px:
+            best_px, kept = middle_px, off_px <= max(2.0 * OUTLIER_PX, 4.0 * middle_px)
+    for _ in range(3):
+        if kept.sum() < FEWEST_POINTS:
+            return kept
+        fitted, near_px = _least_squares(places[kept], seen[kept])
+        off_px = np.linalg.norm(fitted.to_px(places) - seen, axis=1)
+        limit_px = max(OUTLIER_PX, 4.0 * float(np.median(near_px)))
+        kept = off_px <= limit_px
+    return kept
+
+
+def _triples(count: int) -> Iterator[list[int]]:
+    total = math.comb(count, 3)
+    if total <= MOST_TRIPLES:
+        yield from (list(each) for each in itertools.combinations(range(count), 3))
+        return
+    rng = np.random.default_rng(0)
+    for _ in range(MOST_TRIPLES):
+        yield rng.choice(count, size=3, replace=False).tolist()
+
+
+@dataclass(frozen=True, slots=True)
+class RotationFit:
+    """About which place the table turns.
+
+    Attributes
+    ----------
+    rms_um, max_um : float
+        How far the places seen are from the circle, at the angle each was seen at.
+    std_um : float
+        Standard deviation of the centre, in the direction that is known least.
+    sense : int
+        1 where a growing angle turns from the platform's x towards its y; -1 the other way.
+    """
+
+    centre_um: Pair
+    radius_um: float
+    rms_um: float
+    max_um: float
+    std_um: float
+    sense: int
+    angles: int
+
+
+def fit_rotation(
+    angles_deg: Sequence[float],
+    places_um: Sequence[Pair],
+    *,
+    limit_um: float = LARGEST_RMS_UM,
+    limit_std_um: float = LARGEST_CENTRE_STD_UM,
+) -> RotationFit:
+    """Fit the circle on which a thing on the table goes round; angles by the table's encoder.
+
+    Raises
+    ------
+    CalibrationRefused
+        Fewer than five angles, too small a turn, a thing that hardly moves, a residual above
+        `limit_um` RMS, or a centre less sure than `limit_std_um`.
+    """
+    angles = np.radians(np.asarray(angles_deg, dtype=np.float64))
+    places = np.asarray(places_um, dtype=np.float64).reshape(-1, 2)
+    _check_angles(angles, places)
+    found = min((_circle(angles, places, sense) for sense in (1, -1)), key=lambda each: each.rms_um)
+    if not found.radius_um >= SMALLEST_RADIUS_UM:
+        raise CalibrationRefused(
+            f"rotation centre: what is tracked goes round at {found.radius_um:.0f} um, at least "
+            f"{SMALLEST_RADIUS_UM:g} um are needed; take another thing, and see that it turns along"
+        )
+    if not found.rms_um <= limit_um:
+        raise CalibrationRefused(
+            f"rotation centre: residual of {found.rms_um:.1f} um RMS, at most {limit_um:g} um are "
+            "accepted; see that the thing tracked lies fast on the table and the scale is right"
+        )
+    if not found.std_um <= limit_std_um:
+        raise CalibrationRefused(
+            f"rotation centre: known to {found.std_um:.1f} um only, {limit_std_um:g} um are "
+            "needed; turn further, or take more angles"
+        )
+    return found
+
+
+def _check_angles(angles: Floats, places: Floats) -> None:
+    if len(angles) != len(places):
+        raise CalibrationRefused(
+            f"rotation centre: {len(angles)} angles and {len(places)} places; one place an angle"
+        )
+    if not (np.isfinite(angles).all() and np.isfinite(places).all()):
+        raise CalibrationRefused("rotation centre: an angle or a place is not a number")
+    different = len(np.unique(np.round(np.degrees(angles))))
+    if different < FEWEST_ANGLES:
+        raise CalibrationRefused(
+            f"rotation centre: {different} angles, at least {FEWEST_ANGLES} are needed, "
+            "a degree or more apart"
+        )
+    turn_deg = float(np.degrees(np.ptp(angles)))
+    if not turn_deg >= SMALLEST_TURN_DEG:
+        raise CalibrationRefused(
+            f"rotation centre: a turn of {turn_deg:.0f} degrees, at least "
+            f"{SMALLEST_TURN_DEG:g} are needed"
+        )
+
+
+def _circle(angles: Floats, places: Floats, sense: int) -> RotationFit:
+    """Fit centre and spoke; that the angles are known makes it linear, and surer than a circle."""
+    cosine, sine = np.cos(angles), sense * np.sin(angles)
+    ones, zeros = np.ones_like(angles), np.zeros_like(angles)
+    design = np.concatenate(
+        [
+            np.column_stack([ones, zeros, cosine, -sine]),
+            np.column_stack([zeros, ones, sine, cosine]),
+        ]
+    )
+    solution = np.linalg.lstsq(design, places.T.reshape(-1), rcond=None)[0]
+    error = (design @ solution - places.T.reshape(-1)).reshape(2, -1)
+    off_um = np.linalg.norm(error, axis=0)
+    freedom = max(1, 2 * len(angles) - 4)
+    covariance = np.linalg.inv(design.T @ design) * float(np.sum(error**2)) / freedom
+    return RotationFit(
+        as_pair(solution[:2]),
+        float(np.hypot(*solution[2:])),
+        float(np.sqrt(np.mean(off_um**2))),
+        float(off_um.max()),
+        float(np.sqrt(np.linalg.eigvalsh(covariance[:2, :2]).max())),
+        sense,
+        len(angles),
+    )

@@ -1,0 +1,144 @@
+"""From the platform to the picture and back: an affine map that knows how sure it is."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Pair = tuple[float, float]
+Matrix = tuple[Pair, Pair]
+
+
+@dataclass(frozen=True, slots=True)
+class PixelMap:
+    """Where a place on the platform is seen in the picture, for one zoom and one height.
+
+    Pixels are those of the whole sensor, unbinned; (0, 0) is the middle of the upper left one.
+    `for_window` gives the map for pictures of a part of the sensor, or binned.
+
+    Attributes
+    ----------
+    matrix_px_um : two rows of two
+        What a move of the platform does in the picture.
+    centre_um, centre_px : (float, float)
+        Mean of the places it was measured with, and where that is seen.
+    noise_px : float
+        Standard deviation of one coordinate of one place that was tracked.
+    leverage_um2 : two rows of two
+        Inverse of the sum of squares of the measured places about their mean; 1/um^2.
+    points : int
+        How many places it rests on.
+    """
+
+    matrix_px_um: Matrix
+    centre_um: Pair
+    centre_px: Pair
+    noise_px: float
+    leverage_um2: Matrix
+    points: int
+
+    @property
+    def scale_um_px(self) -> float:
+        """Size of a pixel; the mean of both directions."""
+        return 1.0 / math.sqrt(abs(_determinant(self.matrix_px_um)))
+
+    @property
+    def rotation_rad(self) -> float:
+        """Angle of the platform's x axis in the picture, from right towards down."""
+        (a, _), (c, _) = self.matrix_px_um
+        return math.atan2(c, a)
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether the platform is seen as in a mirror.
+
+        Seen from above, x to the right and y away from the operator is x to the right and y up,
+        which is against the picture's rows: a negative determinant is the straight view.
+        """
+        return _determinant(self.matrix_px_um) > 0.0
+
+    @property
+    def anisotropy(self) -> float:
+        """How much longer a move is seen in one direction than in the other; 0 is alike."""
+        large, small = np.linalg.svd(np.array(self.matrix_px_um), compute_uv=False)
+        return float(large / small - 1.0)
+
+    def to_px(self, platform_um: npt.ArrayLike) -> Floats:
+        """Return where places are seen; shape (..., 2), as x, y."""
+        away = np.asarray(platform_um, dtype=np.float64) - self.centre_um
+        return np.asarray(away @ np.array(self.matrix_px_um).T + self.centre_px)
+
+    def to_um(self, picture_px: npt.ArrayLike) -> Floats:
+        """Return which places are seen at points of the picture; shape (..., 2), as x, y."""
+        away = np.asarray(picture_px, dtype=np.float64) - self.centre_px
+        return np.asarray(away @ np.linalg.inv(np.array(self.matrix_px_um)).T + self.centre_um)
+
+    def std_um(self, picture_px: npt.ArrayLike) -> Floats:
+        """Return the standard deviation of a coordinate of `to_um` due to this map; shape (...).
+
+        It grows away from where the map was measured. What the point in the picture is unsure by
+        comes on top: multiply that by `scale_um_px`.
+        """
+        away = self.to_um(picture_px) - self.centre_um
+        leverage = np.einsum("...i,ij,...j", away, np.array(self.leverage_um2), away)
+        spread = np.sqrt(1.0 / self.points + np.maximum(leverage, 0.0))
+        return np.asarray(self.noise_px * self.scale_um_px * spread)
+
+    def for_window(self, *, x_px: int = 0, y_px: int = 0, binning: int = 1) -> "PixelMap":
+        """Return the map for pictures read from `x_px`, `y_px` on, in binned pixels."""
+        middle = 0.5 * (binning - 1)
+        u_px, v_px = self.centre_px
+        matrix = np.array(self.matrix_px_um) / binning
+        return replace(
+            self,
+            matrix_px_um=as_matrix(matrix),
+            centre_px=((u_px - middle) / binning - x_px, (v_px - middle) / binning - y_px),
+            noise_px=self.noise_px / binning,
+        )
+
+
+def _determinant(matrix: Matrix) -> float:
+    (a, b), (c, d) = matrix
+    return a * d - b * c
+
+
+def as_matrix(values: Floats) -> Matrix:
+    """Return a 2 x 2 array as rows."""
+    (a, b), (c, d) = values.tolist()
+    return (a, b), (c, d)
+
+
+def as_pair(values: Floats) -> Pair:
+    """Return an array of two as a pair."""
+    x, y = values.tolist()
+    return x, y
+
+
+def between(first: PixelMap, second: PixelMap, share: float) -> PixelMap:
+    """Return the map `share` of the way from `first` to `second`, 0 to 1.
+
+    The scale goes evenly in its logarithm, as zoom lenses are built. The place on the optical
+    axis stays the same while the scale changes, so that every other goes with the size of a pixel.
+    """
+    one, other = np.array(first.matrix_px_um), np.array(second.matrix_px_um)
+    log_one = 0.5 * math.log(abs(np.linalg.det(one)))
+    log_other = 0.5 * math.log(abs(np.linalg.det(other)))
+    log_scale = (1.0 - share) * log_one + share * log_other
+    shape = (1.0 - share) * one / math.exp(log_one) + share * other / math.exp(log_other)
+    matrix = shape * (math.exp(log_scale) / math.sqrt(abs(np.linalg.det(shape))))
+    seen_px = 0.5 * (np.array(first.centre_px) + np.array(second.centre_px))
+    size = [math.exp(-each) for each in (log_one, log_scale, log_other)]
+    alike = math.isclose(size[0], size[2], rel_tol=1e-3)
+    weight = share if alike else (size[1] - size[0]) / (size[2] - size[0])
+    place_um = (1.0 - weight) * first.to_um(seen_px) + weight * second.to_um(seen_px)
+    unsure = max(first, second, key=lambda each: float(np.trace(each.leverage_um2)))
+    return PixelMap(
+        as_matrix(matrix),
+        as_pair(place_um),
+        as_pair(seen_px),
+        max(first.noise_px, second.noise_px),
+        unsure.leverage_um2,
+        min(first.points, second.points),
+    )
