@@ -1,8 +1,8 @@
 """Run all benchmarks and print one table in Markdown.
 
 `python -m benchmarks.run --repeat 3` starts each benchmark three times, in turn, each time in a
-process of its own, and prints the medians with the range. The long ones, `soak` and
-`collision_oracles`, are commands of their own.
+process of its own, and prints the medians with the range. The long ones, `soak`,
+`acquisition_soak` and `collision_oracles`, are commands of their own.
 """
 
 import argparse
@@ -34,7 +34,7 @@ NAMES = (
     "plot",
     "acquisition",
 )
-ALL = (*NAMES, "collision_oracles", "soak")
+ALL = (*NAMES, "collision_oracles", "soak", "acquisition_soak")
 ROOT = Path(__file__).resolve().parents[1]
 
 
