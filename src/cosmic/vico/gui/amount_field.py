@@ -1,0 +1,223 @@
+"""A field for a number in any unit, with a range; refuses, never clamps, and says why."""
+
+import math
+from typing import Final
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFocusEvent, QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QLineEdit, QSizePolicy, QWidget
+
+from cosmic.frame.gui.reason_bubble import ReasonBubble
+from cosmic.frame.gui.theme import STEP_PX, State, current_palette, number_font, state_look
+from cosmic.frame.overrides import override
+from cosmic.vico.gui.texts import number_text, plain_steps
+
+_ENTER: Final = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+_STEPS: Final = {Qt.Key.Key_Up: 1, Qt.Key.Key_Down: -1}
+
+
+def mark_refused(field: QLineEdit, reason: str) -> None:
+    """Turn the border of a field and say below it why; an empty reason takes both away."""
+    if field.accessibleDescription() == reason:
+        return
+    if reason:
+        ReasonBubble.of(field).show_for(field, f"{state_look(State.REFUSED).glyph} {reason}")
+    else:
+        ReasonBubble.of(field).dismiss(field)
+    field.setAccessibleDescription(reason)
+    field.setProperty("refused", bool(reason))
+    field.style().unpolish(field)
+    field.style().polish(field)
+
+
+class AmountField(QLineEdit):
+    """Takes a number within a range; its unit stands dimmed behind it.
+
+    Enter accepts, Escape goes back, the arrow keys go up and down a step.
+
+    Signals
+    -------
+    committed(float)
+        A good value other than the last was entered.
+    """
+
+    committed = Signal(float)
+
+    def __init__(
+        self,
+        name: str,
+        unit: str = "",
+        *,
+        low: float = -math.inf,
+        high: float = math.inf,
+        value: float | None = None,
+        integers: bool = False,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._name, self._unit, self._integers = name, unit, integers
+        self._low, self._high, self._step = low, high, 1.0
+        self._good: float | None = None
+        self._before: float | None = None
+        self._shown = ""
+        self.setFont(number_font())
+        self.setAlignment(Qt.AlignmentFlag.AlignRight)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName(name)
+        room = self.fontMetrics().horizontalAdvance(unit) + STEP_PX // 2 if unit else 0
+        self.setTextMargins(0, 0, room, 0)
+        self.set_range(low, high)
+        self.set_value(value)
+        self.textEdited.connect(self._on_edited)
+
+    @property
+    def reason(self) -> str:
+        """Why the entry is refused; empty when it is not."""
+        return self.accessibleDescription()
+
+    @property
+    def is_editing(self) -> bool:
+        """True while the text is not the last good value."""
+        return bool(self.reason) or self.text() != self._shown
+
+    def value(self) -> float | None:
+        """Return the last good value; None where there never was one."""
+        return self._good
+
+    def set_value(self, value: float | None) -> None:
+        """Take over a value from the model; an entry under way stays."""
+        editing = self.is_editing
+        self._good, self._before = value, None
+        self._shown = "" if value is None else number_text(value)
+        if not editing and self.text() != self._shown:
+            self.setText(self._shown)
+
+    def set_range(self, low: float, high: float, step: float = 0.0) -> None:
+        """Accept `low` to `high` from now on; the arrow keys go by `step` (0: as fits)."""
+        self._low, self._high = low, high
+        finite = math.isfinite(high - low)
+        self._step = step or (plain_steps(low, high) if finite else 1.0)
+        self._tell()
+
+    def refuse(self, reason: str) -> None:
+        """Say why the entry is not taken; a value committed just before was never good."""
+        if self._before is not None:
+            self._good, self._before = self._before, None
+            self._shown = number_text(self._good)
+        mark_refused(self, reason)
+        self._tell()
+
+    def revert(self) -> None:
+        """Go back to the last good value."""
+        self.setText(self._shown)
+        self.refuse("")
+        self.selectAll()
+
+    def commit(self) -> bool:
+        """Judge the text as Enter does; False when it was refused."""
+        value = self._judge()
+        if value is None:
+            return False
+        self.refuse("")
+        changed, before = value != self._good, self._good
+        self._good, self._shown = value, number_text(value)
+        self.setText(self._shown)
+        if changed:
+            self._before = before
+            self.committed.emit(value)
+        return not self.reason
+
+    def _judge(self) -> float | None:
+        text = self.text().strip().removesuffix(self._unit).strip().replace("−", "-")
+        try:
+            value = float(text)
+        except ValueError:
+            hint = "; write the decimal sign as a point" if "," in text else ""
+            self.refuse(f"{text!r} is not a number{hint}" if text else "type a number")
+            return None
+        problem = self._problem(value)
+        if problem:
+            self.refuse(problem)
+            return None
+        return value
+
+    def _problem(self, value: float) -> str:
+        if not math.isfinite(value):
+            return "give a finite number"
+        if self._integers and not value.is_integer():
+            return f"{value:g} is not a whole number"
+        if not self._low <= value <= self._high:
+            side, limit = (
+                ("below the lowest", self._low)
+                if value < self._low
+                else ("above the highest", self._high)
+            )
+            return f"{self._with_unit(value)} is {side} value, {self._with_unit(limit)}"
+        return ""
+
+    def _with_unit(self, value: float) -> str:
+        return f"{number_text(value)} {self._unit}".strip()
+
+    def _on_edited(self) -> None:
+        self._before = None
+        if self.reason:
+            self.refuse("")
+
+    def _tell(self) -> None:
+        if self.reason:
+            self.setToolTip(f"REFUSED: {self.reason}\nEsc goes back to the last good value")
+            return
+        span = ""
+        if math.isfinite(self._low) and math.isfinite(self._high):
+            span = f", {number_text(self._low)} to {self._with_unit(self._high)}"
+        self.setToolTip(f"{self._name}{span}; Enter accepts, Esc goes back")
+
+    def _go(self, steps: int) -> None:
+        if self._good is None:
+            return
+        target = min(max(self._good + steps * self._step, self._low), self._high)
+        self.setText(number_text(target))
+        self.commit()
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape and self.is_editing:
+            self.revert()
+            event.accept()
+        elif event.key() in _STEPS:
+            self._go(_STEPS[Qt.Key(event.key())])
+            event.accept()
+        else:
+            super().keyPressEvent(event)
+            if event.key() in _ENTER and self.commit():
+                self.selectAll()
+
+    @override
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        leaving = event.reason() not in (
+            Qt.FocusReason.PopupFocusReason,
+            Qt.FocusReason.ActiveWindowFocusReason,
+        )
+        if leaving and self.text() != self._shown and not self.reason:
+            self.commit()
+
+    @override
+    def sizeHint(self) -> QSize:
+        digits = self.fontMetrics().horizontalAdvance("00000.000")
+        return QSize(digits + self.textMargins().right() + 2 * STEP_PX, super().sizeHint().height())
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        return self.sizeHint()
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        if not self._unit:
+            return
+        colours = current_palette()
+        painter = QPainter(self)
+        painter.setPen(QColor(colours.dim if self.isEnabled() else colours.disabled))
+        align = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        painter.drawText(self.rect().adjusted(0, 0, -STEP_PX, 0), int(align), self._unit)

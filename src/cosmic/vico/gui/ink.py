@@ -1,0 +1,65 @@
+"""Pens and labels that can be seen over any picture, bright or dark."""
+
+from typing import Final
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPainterPath, QPen
+
+from cosmic.frame.gui.palette import OKABE_ITO
+from cosmic.frame.gui.theme import STEP_PX, number_font
+
+HALO: Final = QColor(0, 0, 0, 150)
+WHITE: Final = QColor("#FFFFFF")
+SKY: Final = QColor(OKABE_ITO["sky blue"])
+GREEN: Final = QColor("#35D0A0")
+"""Okabe-Ito's bluish green, lighter: the original is lost on a grey picture."""
+ORANGE: Final = QColor(OKABE_ITO["orange"])
+YELLOW: Final = QColor(OKABE_ITO["yellow"])
+PINK: Final = QColor(OKABE_ITO["reddish purple"])
+
+
+def pen(colour: QColor, width: float = 1.5, *, dashed: bool = False) -> QPen:
+    """Return a pen whose width does not follow the zoom."""
+    made = QPen(colour, width)
+    made.setCosmetic(True)
+    made.setCapStyle(Qt.PenCapStyle.RoundCap)
+    if dashed:
+        made.setDashPattern([4.0, 4.0])
+    return made
+
+
+def stroke(painter: QPainter, path: QPainterPath, made: QPen) -> None:
+    """Draw a path over a dark rim."""
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.setPen(pen(HALO, made.widthF() + 2.0))
+    painter.drawPath(path)
+    painter.setPen(made)
+    painter.drawPath(path)
+
+
+def line(painter: QPainter, begin: QPointF, end: QPointF, made: QPen) -> None:
+    """Draw a line over a dark rim."""
+    painter.setPen(pen(HALO, made.widthF() + 2.0))
+    painter.drawLine(begin, end)
+    painter.setPen(made)
+    painter.drawLine(begin, end)
+
+
+def label(
+    painter: QPainter, place: QPointF, text: str, colour: QColor, room: QRectF, *, gap: float = 8.0
+) -> QRectF:
+    """Write `text` beside a place on a dark ground, inside `room`; returns where it stands."""
+    font = number_font(12, bold=True)
+    metrics = QFontMetricsF(font)
+    width = max(metrics.horizontalAdvance(part) for part in text.splitlines())
+    height = metrics.height() * len(text.splitlines())
+    box = QRectF(place.x() + gap, place.y() - height - gap, width + STEP_PX, height + 4.0)
+    box.moveLeft(min(max(box.left(), room.left() + 2), room.right() - box.width() - 2))
+    box.moveTop(min(max(box.top(), room.top() + 2), room.bottom() - box.height() - 2))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(0, 0, 0, 165))
+    painter.drawRoundedRect(box, 3.0, 3.0)
+    painter.setFont(font)
+    painter.setPen(colour)
+    painter.drawText(box, int(Qt.AlignmentFlag.AlignCenter), text)
+    return box

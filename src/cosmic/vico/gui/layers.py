@@ -1,0 +1,117 @@
+"""Layers over the picture that only show: crosshair, scale bar, note."""
+
+import math
+from typing import Final
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPen
+
+from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font, ui_font
+from cosmic.frame.overrides import override
+from cosmic.vico.gui.ink import HALO, SKY, WHITE, line, pen
+from cosmic.vico.gui.picture_view import Layer, PictureView
+
+BAR_SHARE: Final = 0.25
+EDGE_PX: Final = 2 * STEP_PX
+
+
+def round_length(most: float) -> float:
+    """Return the largest of 1, 2, 5, 10, ... that is at most `most`."""
+    if most <= 0.0:
+        return 0.0
+    power = 10.0 ** math.floor(math.log10(most))
+    return max(factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= most * 1.0001)
+
+
+class Crosshair(Layer):
+    """Marks the middle of the picture."""
+
+    def __init__(self) -> None:
+        self.shown = False
+
+    @override
+    def paint(self, painter: QPainter, view: PictureView) -> None:
+        width, height = view.size_px
+        if not self.shown or not width:
+            return
+        to = view.to_screen
+        middle = to.map(QPointF((width - 1) / 2.0, (height - 1) / 2.0))
+        box = to.mapRect(QRectF(-0.5, -0.5, width, height))
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, on=False)
+        thin = pen(SKY, 1.0)
+        line(painter, QPointF(box.left(), middle.y()), QPointF(box.right(), middle.y()), thin)
+        line(painter, QPointF(middle.x(), box.top()), QPointF(middle.x(), box.bottom()), thin)
+
+
+class ScaleBar(Layer):
+    """Says how long something is, by the scale that was in force when the picture was taken."""
+
+    def __init__(self) -> None:
+        self.shown = True
+        self.text = ""
+        self.length_px = 0.0
+        """Of the bar, on the screen."""
+
+    @override
+    def paint(self, painter: QPainter, view: PictureView) -> None:
+        if not self.shown or view.picture is None:
+            self.text = ""
+            return
+        self._measure(view)
+        ratio = float(view.devicePixelRatioF())
+        font = number_font(12, bold=True)
+        metrics = QFontMetricsF(font)
+        width = max(self.length_px, metrics.horizontalAdvance(self.text)) + 2 * STEP_PX
+        height = metrics.height() + 2 * STEP_PX
+        bottom = view.height() - EDGE_PX
+        box = QRectF(view.width() - EDGE_PX - width, bottom - height, width, height)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(HALO)
+        painter.drawRoundedRect(box, 3.0, 3.0)
+        painter.setFont(font)
+        painter.setPen(WHITE)
+        text_box = box.adjusted(0, 2, 0, -STEP_PX - 2)
+        painter.drawText(text_box, int(Qt.AlignmentFlag.AlignCenter), self.text)
+        left = box.center().x() - self.length_px / 2.0
+        y = box.bottom() - STEP_PX
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, on=False)
+        painter.setPen(QPen(WHITE, 3.0 / ratio if ratio > 1 else 3.0))
+        painter.drawLine(QPointF(left, y), QPointF(left + self.length_px, y))
+
+    def _measure(self, view: PictureView) -> None:
+        picture = view.picture
+        scale = picture.circumstances.scale_um_px if picture is not None else None
+        screen_px = abs(view.to_screen.m11())  # for one pixel of the picture
+        room = BAR_SHARE * view.width()
+        if scale is None:
+            length = round_length(room / screen_px)
+            self.text, self.length_px = f"{length:g} px", length * screen_px
+            return
+        length = round_length(room / screen_px * scale)
+        self.text = f"{length / 1e3:g} mm" if length >= 1e3 else f"{length:g} µm"
+        self.length_px = length / scale * screen_px
+
+
+class Note(Layer):
+    """One line across the picture, for why it is not live."""
+
+    def __init__(self) -> None:
+        self.text = ""
+
+    @override
+    def paint(self, painter: QPainter, view: PictureView) -> None:
+        if not self.text:
+            return
+        font = ui_font(15, bold=True)
+        metrics = QFontMetricsF(font)
+        room = QRectF(view.rect()).adjusted(STEP_PX, STEP_PX, -STEP_PX, -STEP_PX)
+        flags = int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap)
+        needed = metrics.boundingRect(room.adjusted(24, 16, -24, -16), flags, self.text)
+        box = needed.adjusted(-16, -10, 16, 10)
+        box.moveCenter(room.center())
+        painter.setPen(pen(QColor(current_palette().refused), 2.0))
+        painter.setBrush(QColor(16, 18, 20, 225))
+        painter.drawRoundedRect(box, 4.0, 4.0)
+        painter.setFont(font)
+        painter.setPen(WHITE)
+        painter.drawText(box.adjusted(8, 4, -8, -4), flags, self.text)

@@ -1,0 +1,327 @@
+"""`PictureView`: a picture that can be panned and zoomed, with layers drawn over it."""
+
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import Final, Protocol
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
+from PySide6.QtGui import (
+    QColor,
+    QContextMenuEvent,
+    QHelpEvent,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QResizeEvent,
+    QTransform,
+)
+from PySide6.QtWidgets import QToolTip, QWidget
+
+from cosmic.frame.gui.theme import current_palette
+from cosmic.frame.overrides import override
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.gui.levels import Levels, colour_picture, full_scale, index_table, palette
+from cosmic.vico.gui.seen import Pixel
+from cosmic.vico.hw.interface import Pixels
+
+MARGIN: Final = 0.0
+LEAST_ZOOM, MOST_ZOOM = 0.02, 64.0
+
+
+class Layer(Protocol):
+    """Something drawn over the picture; it never takes a click."""
+
+    @abstractmethod
+    def paint(self, painter: QPainter, view: "PictureView") -> None:
+        """Draw, in coordinates of the screen; `view.to_screen` brings pixels there."""
+
+    def tip(self, place: QPointF, view: "PictureView") -> str:  # noqa: ARG002 - for those who say
+        """Return what to say when the operator points there; empty for nothing."""
+        return ""
+
+
+class Tool(Protocol):
+    """Takes the left mouse button while it is chosen."""
+
+    cursor: Qt.CursorShape
+
+    @abstractmethod
+    def press(self, place_px: Pixel) -> None:
+        """Take the button going down there."""
+
+    @abstractmethod
+    def move(self, place_px: Pixel) -> None:
+        """Take the mouse coming there, with the button down or not."""
+
+    @abstractmethod
+    def release(self, place_px: Pixel) -> None:
+        """Take the button being let go there."""
+
+    @abstractmethod
+    def cancel(self) -> None:
+        """Forget what is half done."""
+
+
+class PictureView(pg.GraphicsView):  # type: ignore[misc]
+    """Shows the picture it was given last; the view stays when the next one comes.
+
+    Signals
+    -------
+    pointed(object)
+        The mouse is at that pixel (x, y), or None: outside.
+    zoom_changed()
+        Another part is shown, or at another size.
+    delete_requested(), cancel_requested()
+        Delete and Escape were pressed.
+    menu_requested(QPointF)
+        The right button was clicked there, on the screen.
+    """
+
+    pointed = Signal(object)
+    zoom_changed = Signal()
+    delete_requested = Signal()
+    cancel_requested = Signal()
+    menu_requested = Signal(QPointF)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent, useOpenGL=False, background=None)
+        self.layers: list[Layer] = []
+        self.paints = 0
+        self.tool: Tool | None = None
+        self.picture: Picture | None = None
+        self._levels = Levels(0.0, 255.0)
+        self._marks = self._greyed = False
+        self._fitted = True
+        self._full = 255
+        self._index = index_table(255)
+        self.box = pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False, defaultPadding=0)
+        self.box.disableAutoRange()
+        self.setCentralItem(self.box)
+        self.image = pg.ImageItem(axisOrder="row-major", autoLevels=False)
+        self.image.setPos(-0.5, -0.5)  # the middle of a pixel is where its number says
+        self.box.addItem(self.image)
+        self.box.sigRangeChangedManually.connect(self._on_moved_by_hand)
+        self.box.sigTransformChanged.connect(self.zoom_changed)
+        self.setMouseTracking(True)
+        self.setAccessibleName("Live picture")
+
+    # What is shown
+
+    @property
+    def levels(self) -> Levels:
+        """What is shown black and white."""
+        return self._levels
+
+    @property
+    def full(self) -> int:
+        """Brightness of an over-exposed pixel of the picture shown."""
+        return self._full
+
+    def set_levels(self, levels: Levels) -> None:
+        """Change the contrast."""
+        if levels != self._levels:
+            self._levels = levels
+            self._look_changed()
+
+    def set_marks(self, marks: bool) -> None:
+        """Colour pixels that are over-exposed or quite black, or not."""
+        self._marks = marks
+        self._look_changed()
+
+    def set_greyed(self, greyed: bool) -> None:
+        """Show that the picture is old."""
+        if greyed != self._greyed:
+            self._greyed = greyed
+            self._look_changed()
+
+    def show_picture(self, picture: Picture) -> None:
+        """Show `picture` instead of the one before."""
+        before, self.picture = self.picture, picture
+        full = full_scale(picture.frame.pixel_format)
+        if full != self._full:
+            share = full / self._full
+            self._full, self._index = full, index_table(full)
+            self._levels = Levels(self._levels.low * share, self._levels.high * share)
+        resized = before is None or before.data.shape != picture.data.shape
+        if resized or full != 255:
+            self._look_changed()
+        else:
+            self._put(picture.data)
+        if resized and self._fitted:
+            self.fit()
+
+    def _look_changed(self) -> None:
+        if self.picture is None:
+            return
+        if self.picture.data.ndim == 2:
+            table = palette(self._levels, self._full, marks=self._marks, greyed=self._greyed)
+            self.image.setLookupTable(table, update=False)
+        self._put(self.picture.data)
+
+    def _put(self, data: Pixels) -> None:
+        if data.ndim == 3:
+            plain = self._levels == Levels(0.0, 255.0) and not self._marks and not self._greyed
+            shown = (
+                np.asarray(data)
+                if plain
+                else colour_picture(data, self._levels, marks=self._marks, greyed=self._greyed)
+            )
+        else:
+            shown = data if self._index is None else np.take(self._index, data)
+        self.image.setImage(shown, autoLevels=False)
+        if not self.layers:
+            return
+        self.viewport().update()  # the layers lie over margins as well
+
+    # Which part is shown
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of the picture shown; (0, 0) before the first."""
+        return (0, 0) if self.picture is None else self.picture.data.shape[1::-1]
+
+    @property
+    def to_screen(self) -> QTransform:
+        """From pixels of the picture to those of the widget."""
+        inner: QTransform = self.box.childGroup.sceneTransform()
+        outer: QTransform = self.viewportTransform()
+        return inner * outer
+
+    @property
+    def zoom(self) -> float:
+        """Pixels of the screen for one of the picture."""
+        return abs(self.to_screen.m11()) * float(self.devicePixelRatioF())
+
+    def pixel_at(self, place: QPointF) -> Pixel:
+        """Return the pixel below a place of the widget; it may lie outside the picture."""
+        inverse, _ = self.to_screen.inverted()
+        there = inverse.map(place)
+        return there.x(), there.y()
+
+    def is_inside(self, place_px: Pixel) -> bool:
+        """Tell whether the picture has such a pixel."""
+        width, height = self.size_px
+        x, y = place_px
+        return -0.5 <= x < width - 0.5 and -0.5 <= y < height - 0.5
+
+    def fit(self) -> None:
+        """Show all of the picture, and keep to it when the window changes."""
+        self._fitted = True
+        width, height = self.size_px
+        if width:
+            self.box.setRange(QRectF(-0.5, -0.5, width, height), padding=MARGIN)
+
+    def one_to_one(self) -> None:
+        """Show a pixel of the picture by one of the screen, around the middle of the view."""
+        self._fitted = False
+        middle = self.pixel_at(QPointF(self.width() / 2, self.height() / 2))
+        if not self.is_inside(middle):
+            middle = (self.size_px[0] / 2, self.size_px[1] / 2)
+        ratio = self.devicePixelRatioF()
+        width, height = self.width() * ratio, self.height() * ratio
+        around = QRectF(middle[0] - width / 2, middle[1] - height / 2, width, height)
+        self.box.setRange(around, padding=0.0)
+
+    def _on_moved_by_hand(self) -> None:
+        self._fitted = False
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if getattr(self, "_fitted", False) and self.picture is not None:
+            self.fit()
+
+    @override
+    def close(self) -> bool:
+        return QWidget.close(self)  # pyqtgraph's own takes the viewport apart under Qt's feet
+
+    # Layers
+
+    @override
+    def drawForeground(self, painter: QPainter, rect: QRectF) -> None:
+        self.paints += 1
+        painter.save()
+        painter.resetTransform()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        for layer in self.layers:
+            painter.save()
+            layer.paint(painter, self)
+            painter.restore()
+        painter.restore()
+
+    @override
+    def drawBackground(self, painter: QPainter, rect: QRectF) -> None:
+        painter.fillRect(rect, QColor(current_palette().field))
+
+    def redraw(self) -> None:
+        """Draw the layers anew."""
+        self.viewport().update()
+
+    @override
+    def viewportEvent(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
+            place = QPointF(event.pos())
+            told = (layer.tip(place, self) for layer in reversed(self.layers))
+            QToolTip.showText(event.globalPos(), next((text for text in told if text), ""), self)
+            return True
+        return bool(super().viewportEvent(event))
+
+    # Mouse and keys
+
+    def set_tool(self, tool: Tool | None) -> None:
+        """Give the left button to `tool`; None gives it back to panning."""
+        if self.tool is not None:
+            self.tool.cancel()
+        self.tool = tool
+        self.viewport().setCursor(Qt.CursorShape.ArrowCursor if tool is None else tool.cursor)
+        self.redraw()
+
+    def _with_tool(self, act: Callable[[Pixel], None], event: QMouseEvent) -> None:
+        act(self.pixel_at(event.position()))
+        event.accept()
+        self.redraw()
+
+    @override
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if self.tool is not None and event.button() == Qt.MouseButton.LeftButton:
+            self.setFocus(Qt.FocusReason.MouseFocusReason)
+            self._with_tool(self.tool.press, event)
+        else:
+            super().mousePressEvent(event)
+
+    @override
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        here = self.pixel_at(event.position())
+        self.pointed.emit(here if self.is_inside(here) else None)
+        if self.tool is not None:
+            self._with_tool(self.tool.move, event)
+        else:
+            super().mouseMoveEvent(event)
+
+    @override
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        if self.tool is not None and event.button() == Qt.MouseButton.LeftButton:
+            self._with_tool(self.tool.release, event)
+        else:
+            super().mouseReleaseEvent(event)
+
+    @override
+    def leaveEvent(self, event: QEvent) -> None:
+        super().leaveEvent(event)
+        self.pointed.emit(None)
+
+    @override
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        self.menu_requested.emit(QPointF(event.pos()))
+        event.accept()
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
+            self.delete_requested.emit()
+        elif event.key() == Qt.Key.Key_Escape and self.tool is not None:
+            self.cancel_requested.emit()
+        else:
+            event.ignore()

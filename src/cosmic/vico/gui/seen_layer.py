@@ -1,0 +1,96 @@
+"""What machine vision found, drawn over the picture: fibres, their ends, tips."""
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF
+from PySide6.QtGui import QPainter, QPainterPath, QPolygonF
+
+from cosmic.frame.overrides import override
+from cosmic.vico.gui.ink import GREEN, HALO, ORANGE, SKY, WHITE, label, pen, stroke
+from cosmic.vico.gui.picture_view import Layer, PictureView
+from cosmic.vico.gui.seen import Analysis, FibreSeen, TipSeen
+from cosmic.vico.gui.texts import length_text
+
+NOT_SURE = "not sure"
+MOST_POINTS = 400
+
+
+def fibre_text(fibre: FibreSeen, scale_um_px: float | None) -> str:
+    """Return the label of a fibre: length, width, curl, and whether that is certain."""
+    length = length_text(fibre.length_px, scale_um_px)
+    width = length_text(fibre.width_px, scale_um_px)
+    words = f"{length}, width {width}\ncurl {fibre.curl:.3f}"
+    return words if fibre.certain else f"{words}, {NOT_SURE}"
+
+
+class SeenLayer(Layer):
+    """Draws the newest analysis; what is not certain is dashed and says so."""
+
+    def __init__(self) -> None:
+        self.shown = True
+        self.analysis: Analysis | None = None
+        self.labels: list[tuple[QRectF, str]] = []
+        """Where labels stand on the screen, and what to say there."""
+
+    @override
+    def paint(self, painter: QPainter, view: PictureView) -> None:
+        self.labels = []
+        found = self.analysis
+        if not self.shown or found is None or not self._fits(view, found):
+            return
+        scale = found.picture.circumstances.scale_um_px
+        for fibre in found.fibres:
+            self._paint_fibre(painter, view, fibre, scale)
+        for tip in found.tips:
+            self._paint_tip(painter, view, tip)
+
+    @override
+    def tip(self, place: QPointF, view: PictureView) -> str:
+        return next((text for box, text in self.labels if box.contains(place)), "")
+
+    @staticmethod
+    def _fits(view: PictureView, found: Analysis) -> bool:
+        """Tell whether it was found in a picture of the size shown."""
+        return found.picture.data.shape[:2] == view.size_px[::-1]
+
+    def _paint_fibre(
+        self, painter: QPainter, view: PictureView, fibre: FibreSeen, scale: float | None
+    ) -> None:
+        colour = GREEN if fibre.certain else ORANGE
+        path = _path(fibre.centre_line_px, view)
+        stroke(painter, path, pen(colour, 2.0, dashed=not fibre.certain))
+        to = view.to_screen
+        painter.setPen(pen(HALO, 1.0))
+        painter.setBrush(colour)
+        for x, y in np.asarray(fibre.ends_px, float):
+            painter.drawEllipse(to.map(QPointF(x, y)), 4.5, 4.5)
+        line_px = np.asarray(fibre.centre_line_px, float)
+        if not len(line_px):
+            return
+        middle = line_px[len(line_px) // 2]
+        text = fibre_text(fibre, scale)
+        place = to.map(QPointF(*middle))
+        box = label(painter, place, text, colour, QRectF(view.rect()))
+        said = "certain" if fibre.certain else f"{NOT_SURE}: " + "; ".join(fibre.doubts)
+        self.labels.append((box, f"Fibre, {said}"))
+
+    def _paint_tip(self, painter: QPainter, view: PictureView, tip: TipSeen) -> None:
+        place = view.to_screen.map(QPointF(*tip.place_px))
+        colour = SKY if tip.certain else ORANGE
+        path = QPainterPath()
+        for dx, dy in ((9.0, 0.0), (0.0, 9.0)):
+            path.moveTo(place - QPointF(dx, dy))
+            path.lineTo(place + QPointF(dx, dy))
+        stroke(painter, path, pen(colour, 2.0))
+        text = tip.name if tip.certain else f"{tip.name}, {NOT_SURE}"
+        box = label(painter, place, text, WHITE, QRectF(view.rect()), gap=4.0)
+        self.labels.append((box, f"Tip of {text}"))
+
+
+def _path(points_px: np.ndarray, view: PictureView) -> QPainterPath:
+    """Return a line on the screen, with no more points than the eye can tell."""
+    points = np.asarray(points_px, float)
+    step = max(1, len(points) // MOST_POINTS)
+    chosen = np.concatenate([points[:-1:step], points[-1:]])
+    path = QPainterPath()
+    path.addPolygon(view.to_screen.map(QPolygonF([QPointF(x, y) for x, y in chosen])))
+    return path

@@ -1,0 +1,77 @@
+"""One line for something that takes a while: what, how far, how long, and a way to end it."""
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QWidget
+
+from cosmic.frame.gui.build import push_button
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.theme import STEP_PX, State, state_look
+from cosmic.frame.task import Progress, Task
+from cosmic.vico.gui.relay import TaskWatch
+from cosmic.vico.gui.texts import duration_text
+
+
+class TaskBar(QWidget):
+    """Is there while a task runs; keeps how it ended until the next one.
+
+    Signals
+    -------
+    ended(Progress)
+        The task is over.
+    """
+
+    ended = Signal(object)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.text = ElidedLabel()
+        self.bar = QProgressBar()
+        self.bar.setRange(0, 1000)
+        self.bar.setTextVisible(False)
+        self.bar.setFixedWidth(10 * STEP_PX)
+        self.cancel = push_button("Cancel", "End it now")
+        self.cancel.clicked.connect(self._on_cancel)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(STEP_PX)
+        row.addWidget(self.text, 1)
+        row.addWidget(self.bar)
+        row.addWidget(self.cancel)
+        kept = self.sizePolicy()
+        kept.setRetainSizeWhenHidden(True)  # what stands around it stays where it is
+        for widget in (self.bar, self.cancel):
+            widget.setSizePolicy(kept)
+        self.watch = TaskWatch(self)
+        self.watch.progressed.connect(self._on_progressed)
+        self._show_running(running=False)
+
+    def follow(self, task: Task) -> None:
+        """Show how far `task` is."""
+        self._show_running(running=True)
+        self.watch.follow(task)
+
+    def say(self, text: str, *, refused: bool = False) -> None:
+        """Show one line without a task."""
+        glyph = f"{state_look(State.REFUSED).glyph} " if refused else ""
+        self.text.set_text(glyph + text)
+
+    def _show_running(self, *, running: bool) -> None:
+        self.bar.setVisible(running)
+        self.cancel.setVisible(running)
+
+    def _on_progressed(self, progress: Progress) -> None:
+        self._show_running(running=not progress.done)
+        if progress.done:
+            if progress.error:
+                self.say(f"{progress.title}: {progress.error}", refused=True)
+            else:
+                self.say(f"{progress.title}: {progress.text or 'done'}")
+            self.ended.emit(progress)
+            return
+        left = "" if progress.left_s is None else f", {duration_text(progress.left_s)} left"
+        self.say(f"{progress.title}: {progress.text}{left}")
+        self.bar.setValue(round(1000 * progress.fraction))
+
+    def _on_cancel(self) -> None:
+        if self.watch.task is not None:
+            self.watch.task.cancel()

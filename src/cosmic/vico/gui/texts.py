@@ -1,0 +1,52 @@
+"""Numbers as the operator reads them."""
+
+import math
+
+
+def duration_text(seconds: float) -> str:
+    """Return a duration, such as "12 s", "3 min 20 s" or "48 h"."""
+    if not math.isfinite(seconds):
+        return "?"
+    whole = max(0, round(seconds))
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    hours = whole / 3600.0
+    return f"{hours:.1f} h" if hours < 10.0 else f"{hours:.0f} h"
+
+
+def size_text(size_bytes: int) -> str:
+    """Return a file's size, such as "12.3 MB"."""
+    for unit, factor in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if size_bytes >= factor:
+            return f"{size_bytes / factor:.1f} {unit}"
+    return f"{size_bytes} B"
+
+
+def length_text(length_px: float, scale_um_px: float | None) -> str:
+    """Return a length in um, or in pixels where the scale is not known."""
+    if scale_um_px is None:
+        return f"{length_px:.1f} px"
+    length_um = length_px * scale_um_px
+    return f"{length_um / 1e3:.4g} mm" if length_um >= 1e4 else f"{_four(length_um)} µm"
+
+
+def _four(value: float) -> str:
+    """Return four figures without an exponent."""
+    decimals = 0 if value >= 1000 else 1 if value >= 100 else 2
+    return f"{value:.{decimals}f}"
+
+
+def number_text(value: float, figures: int = 6) -> str:
+    """Return a number as short as it can be typed."""
+    return f"{value:.{figures}g}"
+
+
+def plain_steps(low: float, high: float) -> float:
+    """Return a step of 1, 2 or 5 times a power of ten, about a hundredth of the range."""
+    span = high - low
+    if span <= 0.0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(span / 100.0))
+    return next(f * power for f in (1.0, 2.0, 5.0, 10.0) if f * power >= span / 100.0)
