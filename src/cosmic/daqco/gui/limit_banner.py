@@ -26,7 +26,8 @@ def limit_text(limit: LimitState, unit: str) -> str:
         text += f": {limit.value:.4g} {shown}"
     if limit.reaction_ms is not None:
         text += f", stopped after {limit.reaction_ms:.1f} ms"
-    return f"{text}; {limit.reason}" if limit.reason else text
+    # The reason repeats the value where there is one; without, it is all that is known.
+    return f"{text}; {limit.reason}" if limit.reason and limit.value is None else text
 
 
 class LimitBanner(QWidget):

@@ -5,7 +5,10 @@ from typing import Protocol, TypeVar
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, MoveCancelled
+from cosmic.frame.task import Task
+from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.movement import Movement
+from cosmic.mico.core.orders import Motion
 
 T = TypeVar("T", covariant=True)
 
@@ -59,6 +62,27 @@ class GroupMovement:
         if failures:
             raise min(failures, key=_importance)
         return {name: movement.wait() for name, movement in self.movements.items()}
+
+
+def move_together(
+    manager: DeviceManager,
+    motions: Mapping[str, Motion],
+    task: Task,
+    *,
+    source: str,
+    consent: bool = False,
+) -> None:
+    """Start `motions` at once and wait for all; whoever cancels `task` stops them.
+
+    Raises
+    ------
+    CosmicError
+        What ended one of them early, or the refusal: then nothing has moved.
+    """
+    orders = manager.order_together(motions, source=source, consent=consent)
+    together = GroupMovement({name: order.movement for name, order in orders.items()})
+    task.on_cancel(together.cancel)
+    together.wait()
 
 
 class _Waitable(Protocol[T]):

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from cosmic.frame.errors import CosmicError, MoveCancelled
 from cosmic.frame.task import Task
-from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.group import move_together
 from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.orders import Motion, MoveTo, Reference
 from cosmic.mico.core.positioner import PositionerState
@@ -69,7 +69,4 @@ def _run_group(
         raise MoveCancelled("initialisation was cancelled")
     what = "referencing" if any(isinstance(m, Reference) for m in group.values()) else "moving"
     task.report(fraction, f"{what} {', '.join(group)}")
-    orders = manager.order_together(group, source=SOURCE, consent=True)
-    together = GroupMovement({name: order.movement for name, order in orders.items()})
-    task.on_cancel(together.cancel)
-    together.wait()
+    move_together(manager, group, task, source=SOURCE, consent=True)

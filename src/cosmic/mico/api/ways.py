@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from cosmic.frame.errors import CosmicError, MoveCancelled
 from cosmic.frame.task import Task
-from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.group import move_together
 from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.orders import Motion, MoveTo
 from cosmic.mico.core.planning.problem import Plan
@@ -65,10 +65,7 @@ def follow(manager: DeviceManager, way: Way, task: Task, source: str) -> None:
             motions: dict[str, Motion] = {
                 name: MoveTo(target, manager.state(name).unit) for name, target in waypoint.items()
             }
-            orders = manager.order_together(motions, source=source)
-            together = GroupMovement({name: order.movement for name, order in orders.items()})
-            task.on_cancel(together.cancel)
-            together.wait()
+            move_together(manager, motions, task, source=source)
         task.finish()
     except CosmicError as exc:
         task.fail(exc)

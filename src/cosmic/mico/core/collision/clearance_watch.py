@@ -79,7 +79,7 @@ class ClearanceWatch(WorkerThread):
                 nearest = self._measures.nearest(positions)
             except CosmicError:
                 answered = False  # the gate says it too, and louder
-        if nearest != self._latest or not answered:
+        if nearest != self._latest:
             self._latest = nearest
             self.changed.emit(nearest)
         return answered
