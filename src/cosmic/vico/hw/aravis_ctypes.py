@@ -1,0 +1,223 @@
+"""Aravis' C interface, one to one: prototypes, constants, and binding by name.
+
+Names and numbers are those of the headers of Aravis 0.8.26 and of GLib's GObject. Nothing is
+converted and nothing raises on an error here; that is one floor up in `aravis_calls`.
+"""
+
+import ctypes
+from ctypes import (
+    CFUNCTYPE,
+    POINTER,
+    c_char_p,
+    c_double,
+    c_int,
+    c_int64,
+    c_size_t,
+    c_uint,
+    c_uint32,
+    c_uint64,
+    c_ulong,
+    c_void_p,
+)
+from typing import Any, Final
+
+from cosmic.frame.errors import DeviceFault, NotConnectedError
+
+LIBRARY_NAME: Final = "libaravis-0.8.so.0"
+
+# ArvBufferStatus
+ARV_BUFFER_STATUS_SUCCESS: Final = 0
+ARV_BUFFER_STATUS_ABORTED: Final = 7
+# ArvAcquisitionMode, ArvAuto
+ARV_ACQUISITION_MODE_CONTINUOUS: Final = 0
+ARV_AUTO_OFF: Final = 0
+# ArvGvStreamSocketBuffer
+ARV_GV_STREAM_SOCKET_BUFFER_FIXED: Final = 0
+# ArvDeviceError, of the error domain below
+ARV_DEVICE_ERROR: Final = "arv-device-error-quark"
+ARV_DEVICE_ERROR_WRONG_FEATURE: Final = 0
+ARV_DEVICE_ERROR_FEATURE_NOT_FOUND: Final = 1
+ARV_DEVICE_ERROR_NOT_CONNECTED: Final = 2
+ARV_DEVICE_ERROR_PROTOCOL_ERROR: Final = 3
+ARV_DEVICE_ERROR_TRANSFER_ERROR: Final = 4
+ARV_DEVICE_ERROR_TIMEOUT: Final = 5
+ARV_DEVICE_ERROR_NOT_FOUND: Final = 6
+ARV_DEVICE_ERROR_INVALID_PARAMETER: Final = 7
+ARV_DEVICE_ERROR_GENICAM_NOT_FOUND: Final = 8
+ARV_DEVICE_ERROR_NO_STREAM_CHANNEL: Final = 9
+ARV_DEVICE_ERROR_NOT_CONTROLLER: Final = 10
+ARV_DEVICE_ERROR_UNKNOWN: Final = 11
+ARV_DEVICE_ERROR_PROTOCOL_ERROR_NOT_IMPLEMENTED: Final = 12
+ARV_DEVICE_ERROR_PROTOCOL_ERROR_INVALID_PARAMETER: Final = 13
+ARV_DEVICE_ERROR_PROTOCOL_ERROR_INVALID_ADDRESS: Final = 14
+ARV_DEVICE_ERROR_PROTOCOL_ERROR_WRITE_PROTECT: Final = 15
+ARV_DEVICE_ERROR_PROTOCOL_ERROR_BAD_ALIGNMENT: Final = 16
+ARV_DEVICE_ERROR_PROTOCOL_ERROR_ACCESS_DENIED: Final = 17
+ARV_DEVICE_ERROR_PROTOCOL_ERROR_BUSY: Final = 18
+# fundamental types of GObject: the number shifted by G_TYPE_FUNDAMENTAL_SHIFT
+G_TYPE_INT: Final = 6 << 2
+
+
+class GError(ctypes.Structure):
+    """What a call that failed leaves behind; freed by `g_error_free`."""
+
+    _fields_ = (("domain", c_uint32), ("code", c_int), ("message", c_char_p))
+
+
+class GValue(ctypes.Structure):
+    """A value with its type; all zero before `g_value_init`."""
+
+    _fields_ = (("g_type", c_size_t), ("data", c_uint64 * 2))
+
+
+ControlLostHandler = CFUNCTYPE(None, c_void_p, c_void_p)
+"""Handler of ArvDevice's signal "control-lost": the device and the user data."""
+
+_P = c_void_p
+_ERROR = POINTER(POINTER(GError))
+_INT_OUT, _DOUBLE_OUT, _UINT_OUT = POINTER(c_int), POINTER(c_double), POINTER(c_uint)
+_U64_OUT, _SIZE_OUT = POINTER(c_uint64), POINTER(c_size_t)
+_STRINGS = POINTER(c_char_p)
+
+Prototype = tuple[type | None, tuple[Any, ...]]
+
+PLAIN: Final[dict[str, Prototype]] = {
+    "arv_get_major_version": (c_uint, ()),
+    "arv_get_minor_version": (c_uint, ()),
+    "arv_get_micro_version": (c_uint, ()),
+    "arv_enable_interface": (None, (c_char_p,)),
+    "arv_disable_interface": (None, (c_char_p,)),
+    "arv_update_device_list": (None, ()),
+    "arv_get_n_devices": (c_uint, ()),
+    "arv_get_device_id": (c_char_p, (c_uint,)),
+    "arv_get_device_address": (c_char_p, (c_uint,)),
+    "arv_get_device_vendor": (c_char_p, (c_uint,)),
+    "arv_get_device_model": (c_char_p, (c_uint,)),
+    "arv_get_device_serial_nbr": (c_char_p, (c_uint,)),
+    "arv_get_device_protocol": (c_char_p, (c_uint,)),
+    "arv_camera_get_device": (_P, (_P,)),
+    "arv_camera_is_gv_device": (c_int, (_P,)),
+    "arv_gv_device_is_controller": (c_int, (_P,)),
+    "arv_stream_push_buffer": (None, (_P, _P)),
+    "arv_stream_timeout_pop_buffer": (_P, (_P, c_uint64)),
+    "arv_stream_get_statistics": (None, (_P, _U64_OUT, _U64_OUT, _U64_OUT)),
+    "arv_gv_stream_get_statistics": (None, (_P, _U64_OUT, _U64_OUT)),
+    "arv_buffer_new_allocate": (_P, (c_size_t,)),
+    "arv_buffer_get_status": (c_int, (_P,)),
+    "arv_buffer_get_timestamp": (c_uint64, (_P,)),
+    "arv_buffer_get_system_timestamp": (c_uint64, (_P,)),
+    "arv_buffer_get_frame_id": (c_uint64, (_P,)),
+    "arv_buffer_get_data": (_P, (_P, _SIZE_OUT)),
+    "arv_buffer_get_image_width": (c_int, (_P,)),
+    "arv_buffer_get_image_height": (c_int, (_P,)),
+    "arv_buffer_get_image_pixel_format": (c_uint32, (_P,)),
+    "arv_buffer_get_image_padding": (None, (_P, _INT_OUT, _INT_OUT)),
+    "g_object_unref": (None, (_P,)),
+    "g_object_set_property": (None, (_P, c_char_p, POINTER(GValue))),
+    "g_signal_connect_data": (c_ulong, (_P, c_char_p, ControlLostHandler, _P, _P, c_int)),
+    "g_signal_handler_disconnect": (None, (_P, c_ulong)),
+    "g_value_init": (_P, (POINTER(GValue), c_size_t)),
+    "g_value_set_int": (None, (POINTER(GValue), c_int)),
+    "g_quark_to_string": (c_char_p, (c_uint32,)),
+    "g_error_free": (None, (POINTER(GError),)),
+    "g_free": (None, (_P,)),
+    "g_get_real_time": (c_int64, ()),
+}
+"""What cannot fail, or says so by its answer."""
+
+_IN_CAMERA_INTS = ("x_offset", "y_offset", "width", "height", "x_binning", "y_binning")
+_IN_CAMERA_FLOATS = ("exposure_time", "gain", "frame_rate")
+
+FALLIBLE: Final[dict[str, Prototype]] = {
+    "arv_camera_new": (_P, (c_char_p,)),
+    "arv_camera_create_stream": (_P, (_P, _P, _P)),
+    "arv_camera_get_sensor_size": (None, (_P, _INT_OUT, _INT_OUT)),
+    "arv_camera_get_region": (None, (_P, _INT_OUT, _INT_OUT, _INT_OUT, _INT_OUT)),
+    "arv_camera_set_region": (None, (_P, c_int, c_int, c_int, c_int)),
+    "arv_camera_get_binning": (None, (_P, _INT_OUT, _INT_OUT)),
+    "arv_camera_set_binning": (None, (_P, c_int, c_int)),
+    "arv_camera_is_binning_available": (c_int, (_P,)),
+    "arv_camera_is_region_offset_available": (c_int, (_P,)),
+    "arv_camera_get_pixel_format_as_string": (c_char_p, (_P,)),
+    "arv_camera_set_pixel_format_from_string": (None, (_P, c_char_p)),
+    "arv_camera_dup_available_pixel_formats_as_strings": (_STRINGS, (_P, _UINT_OUT)),
+    "arv_camera_start_acquisition": (None, (_P,)),
+    "arv_camera_stop_acquisition": (None, (_P,)),
+    "arv_camera_set_acquisition_mode": (None, (_P, c_int)),
+    "arv_camera_set_trigger": (None, (_P, c_char_p)),
+    "arv_camera_clear_triggers": (None, (_P,)),
+    "arv_camera_software_trigger": (None, (_P,)),
+    "arv_camera_is_software_trigger_supported": (c_int, (_P,)),
+    "arv_camera_dup_available_trigger_sources": (_STRINGS, (_P, _UINT_OUT)),
+    "arv_camera_is_exposure_auto_available": (c_int, (_P,)),
+    "arv_camera_set_exposure_time_auto": (None, (_P, c_int)),
+    "arv_camera_is_gain_auto_available": (c_int, (_P,)),
+    "arv_camera_set_gain_auto": (None, (_P, c_int)),
+    "arv_camera_get_payload": (c_uint, (_P,)),
+    "arv_camera_is_feature_available": (c_int, (_P, c_char_p)),
+    "arv_camera_get_integer": (c_int64, (_P, c_char_p)),
+    "arv_camera_gv_set_packet_size": (None, (_P, c_int)),
+    "arv_camera_gv_get_packet_size": (c_uint, (_P,)),
+    "arv_device_read_memory": (c_int, (_P, c_uint64, c_uint32, _P)),
+    **{
+        f"arv_camera_get_{name}_bounds": (None, (_P, _INT_OUT, _INT_OUT))
+        for name in _IN_CAMERA_INTS
+    },
+    **{f"arv_camera_get_{name}_increment": (c_int, (_P,)) for name in _IN_CAMERA_INTS},
+    **{
+        f"arv_camera_get_{name}_bounds": (None, (_P, _DOUBLE_OUT, _DOUBLE_OUT))
+        for name in _IN_CAMERA_FLOATS
+    },
+    **{f"arv_camera_get_{name}": (c_double, (_P,)) for name in _IN_CAMERA_FLOATS},
+    **{f"arv_camera_set_{name}": (None, (_P, c_double)) for name in _IN_CAMERA_FLOATS},
+    **{f"arv_camera_is_{name}_available": (c_int, (_P,)) for name in _IN_CAMERA_FLOATS},
+}
+"""What takes a `GError **` as well, as its last argument."""
+
+
+def bind(library: object) -> dict[str, Any]:
+    """Return every function above by name, with its types set.
+
+    Parameters
+    ----------
+    library : ctypes.CDLL or object
+        What has the functions as attributes; types are set only on those of a `CDLL`.
+
+    Raises
+    ------
+    NotConnectedError
+        A function is missing: the library is older than 0.8.20 or not Aravis.
+    """
+    functions = {}
+    wanted = PLAIN | {name: (back, (*a, _ERROR)) for name, (back, a) in FALLIBLE.items()}
+    for name, (answer, arguments) in wanted.items():
+        function = getattr(library, name, None)
+        if function is None:
+            raise NotConnectedError(
+                f"the library {LIBRARY_NAME} has no function {name}: Aravis 0.8.26 or a later "
+                f"0.8 is needed (Debian 12: package libaravis-0.8-0)",
+                fault=DeviceFault.UNSUPPORTED,
+            )
+        if isinstance(library, ctypes.CDLL):
+            function.restype, function.argtypes = answer, arguments
+        functions[name] = function
+    return functions
+
+
+def load_library(path: str = "") -> ctypes.CDLL:
+    """Load Aravis from `path`, or from where the system looks when it is empty.
+
+    Raises
+    ------
+    NotConnectedError
+        It is not installed.
+    """
+    wanted = path or LIBRARY_NAME
+    try:
+        return ctypes.CDLL(wanted)
+    except OSError as exc:
+        raise NotConnectedError(
+            f"cannot load {wanted}: {exc}. Install Aravis: on Debian and Ubuntu the package "
+            f"libaravis-0.8-0 (apt install libaravis-0.8-0)",
+            fault=DeviceFault.COMMUNICATION,
+        ) from exc

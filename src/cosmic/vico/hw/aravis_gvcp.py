@@ -1,0 +1,102 @@
+"""Asks a GigE Vision camera whether it is there and still ours, without waiting for it.
+
+Aravis itself notices a camera that is gone only after some six seconds. Any program may read
+registers of a camera; this reads the one that says who controls it (GigE Vision, GVCP).
+"""
+
+import socket
+import struct
+from typing import Final
+
+_PORT: Final = 3956
+_COMMAND: Final = struct.Struct(">BBHHHI")
+_ACKNOWLEDGE: Final = struct.Struct(">HHHHI")
+_KEY, _ACKNOWLEDGE_REQUIRED = 0x42, 0x01
+_READ_REGISTER, _READ_REGISTER_ACKNOWLEDGE = 0x0080, 0x0081
+_CONTROL_CHANNEL_PRIVILEGE: Final = 0x0A00
+_EXCLUSIVE_OR_CONTROL: Final = 0x3
+
+QUIET_S: Final = 0.5
+_ANSWER_S: Final = 0.3
+_TRIES: Final = 3
+
+
+class GvcpWatch:
+    """Finds out within 1.5 s of silence that a camera is gone; one thread.
+
+    Parameters
+    ----------
+    address : str
+        IP address of the camera.
+    now_s : float
+        Wall time of the last sign of life.
+    """
+
+    def __init__(self, address: str, now_s: float, *, port: int = _PORT) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._peer = (address, port)
+        self._alive_s = now_s
+        self._asked_s: float | None = None
+        self._tries = 0
+        self._request = 0
+
+    def alive(self, now_s: float) -> None:
+        """Note a sign of life."""
+        self._alive_s, self._asked_s, self._tries = now_s, None, 0
+
+    def poll(self, now_s: float) -> str:
+        """Return why the camera is lost, or "" if it is not or not yet known; never waits."""
+        if self._asked_s is not None:
+            reason = self._read(now_s)
+            if reason:
+                return reason
+        if self._asked_s is None:
+            if now_s - self._alive_s >= QUIET_S:
+                self._ask(now_s)
+            return ""
+        if now_s - self._asked_s < _ANSWER_S:
+            return ""
+        if self._tries >= _TRIES:
+            return f"it answers nothing at {self._peer[0]} any more"
+        self._ask(now_s)
+        return ""
+
+    def close(self) -> None:
+        """Give the socket back."""
+        self._socket.close()
+
+    def _ask(self, now_s: float) -> None:
+        self._request = self._request % 0xFFFF + 1
+        self._tries += 1
+        self._asked_s = now_s
+        message = _COMMAND.pack(
+            _KEY,
+            _ACKNOWLEDGE_REQUIRED,
+            _READ_REGISTER,
+            4,
+            self._request,
+            _CONTROL_CHANNEL_PRIVILEGE,
+        )
+        try:
+            self._socket.sendto(message, self._peer)
+        except OSError:
+            return  # the network itself is down: no answer will come, and that counts
+
+    def _read(self, now_s: float) -> str:
+        while True:
+            try:
+                answer, _ = self._socket.recvfrom(1024)
+            except OSError:  # nothing there yet
+                return ""
+            if len(answer) < 8:
+                continue
+            status, kind, _, request = struct.unpack_from(">HHHH", answer)
+            if request != self._request or kind != _READ_REGISTER_ACKNOWLEDGE:
+                continue
+            self.alive(now_s)
+            if status == 0 and len(answer) >= _ACKNOWLEDGE.size:
+                privilege = _ACKNOWLEDGE.unpack_from(answer)[4]
+                if not privilege & _EXCLUSIVE_OR_CONTROL:
+                    return "it was started anew and no longer knows this program"
+            return ""
