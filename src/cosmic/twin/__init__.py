@@ -1,1 +1,1 @@
-"""The simulated platform as plain physics; numpy only, no Qt."""
+"""The simulated platform as plain physics; numpy and OpenCV, no Qt."""

@@ -96,6 +96,9 @@ class FibreSettings(StrictModel):
         How much of a held fibre stands out of the jaws.
     x_um, y_um, angle_deg : float
         Middle and direction on the plate.
+    curl_deg, kink_deg : float
+        By how much it turns, evenly from end to end and at once in its middle, where it lies. It
+        is seen so; what takes and pushes it takes it for straight.
     """
 
     length_um: float = Field(gt=0.0)
@@ -108,6 +111,8 @@ class FibreSettings(StrictModel):
     x_um: float = 0.0
     y_um: float = 0.0
     angle_deg: float = 0.0
+    curl_deg: float = Field(default=0.0, gt=-180.0, lt=180.0)
+    kink_deg: float = Field(default=0.0, gt=-120.0, lt=120.0)
 
     @model_validator(mode="after")
     def _partly_inside(self) -> Self:

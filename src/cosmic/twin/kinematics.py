@@ -132,10 +132,13 @@ class Skeleton:
             ways.append((joint.drive.stage, _point(way)))
         return Slide(_point(pose @ np.array([*point_um, 1.0])), tuple(ways))
 
+    def turn(self, link: str) -> Floats:
+        """Return how a sliding link is turned in the world, shape (3, 3)."""
+        return np.asarray(self.pose(link, _Zeros())[:3, :3])
+
     def direction(self, link: str, axis: Point) -> Point:
         """Return a direction of a sliding link in the world."""
-        turned = self.pose(link, _Zeros())[:3, :3] @ np.array(axis)
-        return _point(turned)
+        return _point(self.turn(link) @ np.array(axis))
 
     def _chain(self, link: str) -> list[Joint]:
         """Return the joints from the root to `link`."""
@@ -178,7 +181,7 @@ def _joint(path: Path, element: ET.Element, drives: Mapping[str, Drive]) -> tupl
     origin, axis = element.find("origin"), element.find("axis")
     place = np.eye(4)
     if origin is not None:
-        place[:3, :3] = _from_rpy(*_numbers(origin.get("rpy", "0 0 0")))
+        place[:3, :3] = from_rpy(*_numbers(origin.get("rpy", "0 0 0")))
         place[:3, 3] = np.array(_numbers(origin.get("xyz", "0 0 0"))) * UM_PER_M
     vector = np.array(_numbers("1 0 0" if axis is None else axis.attrib["xyz"]))
     length = float(np.linalg.norm(vector))
@@ -207,7 +210,7 @@ def _point(vector: Floats) -> Point:
     return float(vector[0]), float(vector[1]), float(vector[2])
 
 
-def _from_rpy(roll: float, pitch: float, yaw: float) -> Floats:
+def from_rpy(roll: float, pitch: float, yaw: float) -> Floats:
     """Return the rotation of URDF's fixed-axis angles: about x, then y, then z."""
     x, y, z = np.eye(3)
     return np.asarray(_turn(z, yaw) @ _turn(y, pitch) @ _turn(x, roll))

@@ -11,6 +11,9 @@ from cosmic.frame.clock import Clock
 from cosmic.frame.config import shipped_config_dir
 from cosmic.twin.force_side import ForceSide
 from cosmic.twin.kinematics import Point
+from cosmic.twin.lens import TwinLens
+from cosmic.twin.light import TwinLight
+from cosmic.twin.optics.optics import Optics
 from cosmic.twin.settings import StageKind, TwinSettings
 from cosmic.twin.stage import Stage
 
@@ -62,6 +65,12 @@ class Scene:
         What the controllers know of each stage.
     force_side : ForceSide or None
         Fibres, tools and force sensors; None in a scene of bare stages.
+    lens : TwinLens or None
+        The motorised lens; None in a scene of bare stages.
+    light : TwinLight or None
+        The lamp; None in a scene of bare stages.
+    optics : Optics or None
+        What cameras see; None in a scene of bare stages.
     """
 
     def __init__(
@@ -74,6 +83,9 @@ class Scene:
         wiring: Wiring,
         at_power_up: Mapping[str, AtPowerUp],
         force_side: ForceSide | None = None,
+        lens: TwinLens | None = None,
+        light: TwinLight | None = None,
+        optics: Optics | None = None,
     ) -> None:
         self.settings = settings
         self.clock = clock
@@ -82,6 +94,9 @@ class Scene:
         self.wiring = wiring
         self.at_power_up = dict(at_power_up)
         self.force_side = force_side
+        self.lens = lens
+        self.light = light
+        self.optics = optics
 
     @classmethod
     def from_settings(
@@ -124,6 +139,9 @@ class Scene:
                 safe_forward=forward,
             )
         wiring = tuple(tuple(name or None for name in d.channels) for d in settings.devices)
+        files = folder or shipped_config_dir()
+        force_side = ForceSide(settings, files, stages, seed)
+        lens, light = TwinLens(settings.lens, seed, cold=cold), TwinLight(settings.light)
         return cls(
             settings,
             clock,
@@ -131,7 +149,10 @@ class Scene:
             stages=stages,
             wiring=wiring,
             at_power_up=at_power_up,
-            force_side=ForceSide(settings, folder or shipped_config_dir(), stages, seed),
+            force_side=force_side,
+            lens=lens,
+            light=light,
+            optics=Optics(settings, files, stages, force_side, lens, light, seed),
         )
 
     @classmethod

@@ -14,6 +14,7 @@ from cosmic.twin.force_settings import (
     GeometrySettings,
 )
 from cosmic.twin.lens_settings import LensSettings, LightSettings
+from cosmic.twin.optics.settings import OpticsSettings
 
 
 class StageKind(StrictModel):
@@ -137,6 +138,7 @@ class TwinSettings(StrictModel):
     fibres: tuple[FibreSettings, ...] = Field(default=(), strict=False)
     force_sensors: dict[str, ForceSensorSettings]
     sensor_wiring: dict[str, str] = Field(default_factory=dict)
+    optics: OpticsSettings
     lens: LensSettings
     light: LightSettings
 

@@ -1,0 +1,1 @@
+"""What cameras above the twin's plate see."""

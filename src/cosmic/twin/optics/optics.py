@@ -1,0 +1,240 @@
+"""The cameras' side of the scene: what each view shows at a moment, and the truth about it."""
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from threading import Lock
+from typing import TYPE_CHECKING, Final, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.twin.force_side import ForceSide
+from cosmic.twin.kinematics import Floats, Point
+from cosmic.twin.lens import LensAxisName, TwinLens
+from cosmic.twin.light import TwinLight
+from cosmic.twin.optics.projection import Area, Projection, project
+from cosmic.twin.settings import TwinSettings
+from cosmic.twin.stage import Stage
+
+if TYPE_CHECKING:
+    from cosmic.twin.optics.subjects import Subjects
+    from cosmic.twin.optics.view import View
+
+Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
+
+MICROSCOPE: Final = "microscope"
+OVERVIEW: Final = "overview"
+
+
+class RoiLike(Protocol):
+    """A part of the sensor, in binned pixels; ViCo's `Roi` is one."""
+
+    @property
+    @abstractmethod
+    def x_px(self) -> int:
+        """Left edge."""
+
+    @property
+    @abstractmethod
+    def y_px(self) -> int:
+        """Upper edge."""
+
+    @property
+    @abstractmethod
+    def width_px(self) -> int:
+        """Columns."""
+
+    @property
+    @abstractmethod
+    def height_px(self) -> int:
+        """Rows."""
+
+
+class Optics:
+    """What the twin's cameras see; any thread. Nothing is computed before somebody looks.
+
+    Parameters
+    ----------
+    settings : TwinSettings
+        Constants.
+    folder : Path
+        Of twin.toml.
+    stages : mapping of str to Stage
+        All stages by name.
+    force_side : ForceSide
+        Fibres and tools.
+    seed : int
+        Of dirt and noise.
+    """
+
+    def __init__(
+        self,
+        settings: TwinSettings,
+        folder: Path,
+        stages: Mapping[str, Stage],
+        force_side: ForceSide,
+        lens: TwinLens,
+        light: TwinLight,
+        seed: int,
+    ) -> None:
+        self.settings = settings.optics
+        self._twin = settings
+        self._folder = folder
+        self._stages = stages
+        self._force_side = force_side
+        self._lens = lens
+        self._light = light
+        self._seed = seed
+        self._lock = Lock()
+        self._drawn: tuple[Subjects, dict[str, View]] | None = None
+
+    @property
+    def views(self) -> tuple[str, ...]:
+        """Names of the views; the microscope's is the first."""
+        return tuple(self.settings.views)
+
+    @property
+    def sensor_px(self) -> tuple[int, int]:
+        """Width and height of each camera's sensor."""
+        return self.settings.camera.width_px, self.settings.camera.height_px
+
+    def render(
+        self,
+        at_s: float,
+        exposure_s: float = 0.02,
+        gain_db: float = 0.0,
+        roi: RoiLike | None = None,
+        binning: int = 1,
+        bits: int = 8,
+        view: str = MICROSCOPE,
+    ) -> Pixels:
+        """Return what a camera sees at `at_s`: a fresh array, shape (height, width).
+
+        Parameters
+        ----------
+        at_s : float
+            Platform time, not later than now and some seconds ago at most.
+        roi : RoiLike or None
+            In binned pixels; None: the whole sensor.
+        binning : int
+            So many pixels across and down are averaged into one.
+        bits : int
+            8: uint8; 16: uint16.
+        """
+        subjects, views = self._ready()
+        return views[view].draw(
+            subjects.at(at_s),
+            at_s,
+            exposure_s=exposure_s,
+            gain_db=gain_db,
+            area=self._area(roi, binning),
+            binning=binning,
+            bits=bits,
+        )
+
+    # ------------------------------------------------------------------ truth, for tests only
+
+    def world_to_picture_px(
+        self,
+        point_um: Point | Floats,
+        at_s: float,
+        roi: RoiLike | None = None,
+        binning: int = 1,
+        view: str = MICROSCOPE,
+    ) -> Floats:
+        """Return where points of the world truly lie in the picture: shape (2,) or (n, 2), x and y.
+
+        For tests that need to know; code that controls the platform must find out for itself.
+
+        Parameters
+        ----------
+        point_um : (float, float, float) or ndarray, shape (n, 3)
+            A pixel's centre has whole numbers.
+        """
+        points = np.asarray(point_um, dtype=np.float64)
+        projection = self.projection(at_s, roi, binning, view)
+        found = projection.picture_px(points.reshape(-1, 3))
+        return found[0] if points.ndim == 1 else found
+
+    def projection(
+        self, at_s: float, roi: RoiLike | None = None, binning: int = 1, view: str = MICROSCOPE
+    ) -> Projection:
+        """Return how the world is truly seen: scale, sharpness, focus; for tests only."""
+        return project(
+            self.settings.views[view],
+            self.settings.camera,
+            zoom=self._zoom(view)(at_s),
+            focus=self._focus(view)(at_s),
+            area=self._area(roi, binning),
+            binning=binning,
+            wavelength_um=self.settings.picture.wavelength_um,
+        )
+
+    def centre_lines_um(self, at_s: float) -> tuple[Floats, ...]:
+        """Return the true middle of each fibre as it is drawn, shape (n, 3); for tests only.
+
+        Those that lie come first.
+        """
+        subject = self._ready()[0].at(at_s)
+        return tuple(strand.line_um for strand in (*subject.lying, *subject.held))
+
+    # ------------------------------------------------------------------ inside
+
+    def _area(self, roi: RoiLike | None, binning: int) -> Area:
+        if roi is None:
+            width, height = self.sensor_px
+            return Area(0, 0, width // binning, height // binning)
+        return Area(roi.x_px, roi.y_px, roi.width_px, roi.height_px)
+
+    def _zoom(self, view: str) -> Callable[[float], float]:
+        return self._part("zoom", self._lens.zoom_range_counts, view)
+
+    def _focus(self, view: str) -> Callable[[float], float]:
+        return self._part("focus", self._lens.focus_range_counts, view)
+
+    def _part(
+        self, axis: LensAxisName, ends: tuple[float, float], view: str
+    ) -> Callable[[float], float]:
+        if not self.settings.views[view].lens:
+            return _at_low_end
+        low, high = ends
+
+        def part(at_s: float) -> float:
+            return (self._lens.position_counts(axis, at_s) - low) / (high - low)
+
+        return part
+
+    def _ready(self) -> tuple["Subjects", dict[str, "View"]]:
+        """Make what draws, at the first picture: it takes OpenCV, which takes time to import."""
+        with self._lock:
+            if self._drawn is None:
+                self._drawn = self._made()
+            return self._drawn
+
+    def _made(self) -> tuple["Subjects", dict[str, "View"]]:
+        from cosmic.twin.optics.ground import make_dirt
+        from cosmic.twin.optics.noise import Noise
+        from cosmic.twin.optics.subjects import Subjects
+        from cosmic.twin.optics.view import View
+
+        width, height = self.sensor_px
+        noise = Noise(width_px=width, height_px=height, seed=self._seed)
+        dirt = make_dirt(self.settings.picture, self._seed)
+        views = {
+            name: View(
+                self.settings,
+                view,
+                dirt,
+                noise,
+                zoom=self._zoom(name),
+                focus=self._focus(name),
+                percent=self._light.percent,
+            )
+            for name, view in self.settings.views.items()
+        }
+        return Subjects(self._twin, self._folder, self._stages, self._force_side), views
+
+
+def _at_low_end(at_s: float) -> float:  # noqa: ARG001
+    return 0.0

@@ -1,0 +1,144 @@
+"""Fibres, scratches and dust: what lets light through in part."""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from cosmic.twin.optics.canvas import REACH, Floats, Layer, Patch, Single, darken, patch
+
+STEPS: Final = 16
+"""Steps a pixel in tables over a distance."""
+
+FAR: Final = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class Shade:
+    """How much light passes the walls of a fibre and its hollow middle.
+
+    Attributes
+    ----------
+    wall_part : float
+        How much of the width the two walls take.
+    """
+
+    wall: float
+    lumen: float
+    wall_part: float
+
+
+def stroke(layer: Layer, line_px: Floats, half_px: float, sigma_px: float, shade: Shade) -> None:
+    """Darken a layer along a line with square ends.
+
+    Parameters
+    ----------
+    line_px : ndarray, shape (n, 2), float64
+        The middle of the stroke.
+    half_px : float
+        Half its width.
+    sigma_px : float
+        Standard deviation of its blur.
+    """
+    where = patch(layer, line_px, half_px, sigma_px)
+    if where is None:
+        return
+    sigma = round(sigma_px / where.cell, 2)
+    table = _profile(round(half_px / where.cell, 2), sigma, shade)
+    distance, ends = _distances(where, where.cells(line_px), len(table) / STEPS, sigma)
+    index = np.minimum(distance * STEPS, len(table) - 1).astype(np.int32)
+    darken(layer, where, 1.0 - table[index] * ends)
+
+
+def speck(layer: Layer, place_px: Floats, radius_px: float, sigma_px: float, passes: float) -> None:
+    """Darken a layer in a soft round spot; blur makes it wider and fainter."""
+    square = radius_px * radius_px
+    spread = math.sqrt(0.5 * square + sigma_px * sigma_px)
+    where = patch(layer, place_px[None, :], 0.0, spread)
+    if where is None:
+        return
+    ((x, y),) = where.cells(place_px[None, :])
+    peak = (1.0 - passes) * square / (2.0 * spread * spread)
+    per_cell = -0.5 * (where.cell / spread) ** 2
+    across = np.exp(per_cell * (np.arange(where.width, dtype=np.float32) - x) ** 2)
+    down = np.exp(per_cell * (np.arange(where.height, dtype=np.float32) - y) ** 2)
+    darken(layer, where, (1.0 - peak * np.outer(down, across)).astype(np.float32))
+
+
+@lru_cache(maxsize=256)
+def _profile(half: float, sigma: float, shade: Shade) -> Single:
+    """Return the light taken away at distances from the middle of a blurred stroke."""
+    count = int((half + REACH * sigma + 1.0) * STEPS) + 2
+    distances = (np.arange(count) + 0.5) / STEPS
+    inner = half * (1.0 - shade.wall_part)
+    taken = (1.0 - shade.wall) * _band(distances, half, sigma)
+    taken += (shade.wall - shade.lumen) * _band(distances, inner, sigma)
+    taken[-1] = 0.0
+    return taken.astype(np.float32)
+
+
+def _band(distances: Floats, half: float, sigma: float) -> Floats:
+    """Return what is left of a band of one after blurring."""
+    return _risen((half - distances) / sigma) - _risen((-half - distances) / sigma)
+
+
+def _risen(values: Floats) -> Floats:
+    """Return the integral of the Gaussian bell up to values."""
+    return np.array([0.5 * math.erfc(-each / math.sqrt(2.0)) for each in values.ravel()]).reshape(
+        values.shape
+    )
+
+
+_EDGE_AT: Final = np.linspace(-4.0, 4.0, 129)
+_EDGE: Final = _risen(_EDGE_AT)
+
+
+def _distances(where: Patch, line: Floats, reach: float, sigma: float) -> tuple[Single, Single]:
+    """Return the distance of each cell from a line, and how much of its square ends is there."""
+    nearest = np.full((where.height, where.width), FAR, np.float32)
+    ends = np.ones_like(nearest)
+    last = len(line) - 2
+    for number in range(last + 1):
+        first, second = line[number], line[number + 1]
+        length = math.hypot(*(second - first))
+        if length < 1e-9:
+            continue
+        box = _box(where, first, second, reach)
+        if box is None:
+            continue
+        rows, columns = box
+        x = np.arange(columns.start, columns.stop, dtype=np.float32) - np.float32(first[0])
+        y = np.arange(rows.start, rows.stop, dtype=np.float32)[:, None] - np.float32(first[1])
+        ux, uy = ((second - first) / length).astype(np.float32)
+        along, across = x * ux + y * uy, y * ux - x * uy
+        low = -FAR if number == 0 else 0.0
+        high = FAR if number == last else length
+        beyond = along - np.clip(along, low, high)
+        distance = np.sqrt(across * across + beyond * beyond)
+        closer = distance < nearest[box]
+        nearest[box] = np.where(closer, distance, nearest[box])
+        if number in (0, last):
+            inside = _edges(along, length, sigma, first=number == 0, last=number == last)
+            ends[box] = np.where(closer, inside, ends[box])
+    return nearest, ends
+
+
+def _edges(along: Single, length: float, sigma: float, *, first: bool, last: bool) -> Single:
+    """Return how far places along a segment lie inside a fibre's square ends, 0 to 1."""
+    inside = np.ones_like(along)
+    if first:
+        inside *= np.interp(along / sigma, _EDGE_AT, _EDGE).astype(np.float32)
+    if last:
+        inside *= np.interp((length - along) / sigma, _EDGE_AT, _EDGE).astype(np.float32)
+    return inside
+
+
+def _box(where: Patch, first: Floats, second: Floats, reach: float) -> tuple[slice, slice] | None:
+    low, high = np.minimum(first, second) - reach, np.maximum(first, second) + reach
+    left, top = max(int(low[0]), 0), max(int(low[1]), 0)
+    right, bottom = min(int(high[0]) + 2, where.width), min(int(high[1]) + 2, where.height)
+    if not (left < right and top < bottom):
+        return None
+    return slice(top, bottom), slice(left, right)

@@ -1,0 +1,173 @@
+"""Draws what one camera sees."""
+
+import math
+from collections.abc import Callable
+from threading import Lock
+from typing import Final
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.twin.optics.canvas import Layer
+from cosmic.twin.optics.ground import FULL, Dirt, even_light, soil
+from cosmic.twin.optics.noise import Noise
+from cosmic.twin.optics.outlines import hull, outline, shrunk
+from cosmic.twin.optics.projection import Area, Projection, project
+from cosmic.twin.optics.settings import OpticsSettings, ViewSettings
+from cosmic.twin.optics.strokes import Shade, stroke
+from cosmic.twin.optics.subjects import Solid, Strand, Subject
+
+Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
+Part = Callable[[float], float]
+
+PER_GREY: Final = 64
+"""Steps of a layer in one grey level of 255: four times full white fit in."""
+
+RIM_UM: Final = 6.0
+"""Width of the dark rim of a tool."""
+
+RIM_SHADE: Final = 0.55
+
+
+class View:
+    """One camera's view, with what does not move kept from picture to picture; any thread.
+
+    Parameters
+    ----------
+    zoom, focus : callable
+        Where the lens is at a time, 0 to 1.
+    percent : callable
+        How bright the lamp is at a time, 0 to 100.
+    """
+
+    def __init__(
+        self,
+        settings: OpticsSettings,
+        view: ViewSettings,
+        dirt: Dirt,
+        noise: Noise,
+        *,
+        zoom: Part,
+        focus: Part,
+        percent: Part,
+    ) -> None:
+        self._settings = settings
+        self._view = view
+        self._dirt = dirt
+        self._noise = noise
+        self._zoom, self._focus, self._percent = zoom, focus, percent
+        picture = settings.picture
+        self._shade = Shade(picture.wall, picture.lumen, picture.wall_part)
+        self._lock = Lock()
+        self._even_key: object = None
+        self._even: Layer = np.empty((0, 0), np.uint16)
+        self._still_key: object = None
+        self._still: Layer = self._even
+        self._lit_key: object = None
+        self._lit: Layer = self._even
+
+    def projection(self, at_s: float, area: Area, binning: int) -> Projection:
+        """Return where things lie in a picture of that time."""
+        return project(
+            self._view,
+            self._settings.camera,
+            zoom=self._zoom(at_s),
+            focus=self._focus(at_s),
+            area=area,
+            binning=binning,
+            wavelength_um=self._settings.picture.wavelength_um,
+        )
+
+    def draw(
+        self,
+        subject: Subject,
+        at_s: float,
+        *,
+        exposure_s: float,
+        gain_db: float,
+        area: Area,
+        binning: int,
+        bits: int,
+    ) -> Pixels:
+        """Return a picture, shape (height, width), uint8 or uint16."""
+        projection = self.projection(at_s, area, binning)
+        gain = 10.0 ** (gain_db / 20.0)
+        grey = self._grey(at_s, projection) * exposure_s * gain
+        with self._lock:
+            layer = self._lit_up(subject, projection, area, grey).copy()
+        for strand in subject.held:
+            self._strand(layer, projection, strand)
+        for solid in sorted(subject.solids, key=lambda each: each.height_um):
+            self._solid(layer, projection, solid, grey)
+        return self._exposed(layer, at_s, grey=grey, gain=gain, binning=binning, bits=bits)
+
+    # ------------------------------------------------------------------ brightness
+
+    def _grey(self, at_s: float, projection: Projection) -> float:
+        """Return the grey level of the bare plate for an exposure of one second at 0 dB."""
+        picture = self._settings.picture
+        lamp = self._percent(at_s) / picture.full_percent + picture.stray
+        dimming = projection.magnification**-self._view.dimming
+        return float(picture.ground_grey * lamp * dimming / picture.full_exposure_s)
+
+    def _exposed(
+        self, layer: Layer, at_s: float, *, grey: float, gain: float, binning: int, bits: int
+    ) -> Pixels:
+        camera = self._settings.camera
+        light = camera.shot_grey * gain * min(grey, 255.0)
+        # Binned pixels are averaged: their noise is less, their brightness the same.
+        sigma = math.sqrt((camera.noise_grey * gain) ** 2 + light) / binning
+        black = camera.black_grey * PER_GREY
+        return self._noise.expose(layer, sigma * PER_GREY, black, at_s, bits)
+
+    # ------------------------------------------------------------------ what stays
+
+    def _lit_up(self, subject: Subject, projection: Projection, area: Area, grey: float) -> Layer:
+        """Return the plate with what lies on it, as bright as it is now."""
+        still_key = (projection, area, subject.plate.round(6).tobytes(), subject.lying_key)
+        if still_key != self._still_key:
+            self._still = self._plate(subject, projection, area)
+            self._still_key, self._lit_key = still_key, None
+        if grey != self._lit_key:
+            scale = grey * PER_GREY / FULL
+            self._lit = np.empty_like(self._still)
+            cv2.addWeighted(self._still, scale, self._still, 0.0, 0.0, self._lit)
+            self._lit_key = grey
+        return self._lit
+
+    def _plate(self, subject: Subject, projection: Projection, area: Area) -> Layer:
+        sensor, picture = self._settings.camera, self._settings.picture
+        even_key = area, projection.px_um / projection.magnification, projection.axis_px
+        if even_key != self._even_key:
+            shape = area.height_px, area.width_px
+            self._even = even_light(shape, projection, sensor, picture)
+            self._even_key = even_key
+        layer = self._even.copy()
+        soil(layer, self._dirt, projection, sensor, subject.plate)
+        for strand in subject.lying:
+            self._strand(layer, projection, strand)
+        return layer
+
+    # ------------------------------------------------------------------ what is drawn
+
+    def _strand(self, layer: Layer, projection: Projection, strand: Strand) -> None:
+        height = strand.height_um
+        stroke(
+            layer,
+            projection.picture_px(strand.line_um),
+            0.5 * strand.width_um * projection.px_um_at(height),
+            projection.sigma_px(height),
+            self._shade,
+        )
+
+    def _solid(self, layer: Layer, projection: Projection, solid: Solid, grey: float) -> None:
+        picture = self._settings.picture
+        corners = hull(projection.picture_px(solid.corners_um))
+        sigma = projection.sigma_px(solid.height_um)
+        silicon = solid.link.startswith("probe")
+        value = (picture.silicon if silicon else picture.steel) * grey * PER_GREY
+        outline(layer, corners, sigma, RIM_SHADE * value)
+        inner = shrunk(corners, RIM_UM * projection.px_um)
+        if inner is not None:
+            outline(layer, inner, sigma, value)
