@@ -1,0 +1,115 @@
+"""Makes the lens and the lamp that the configuration names."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Literal
+
+from cosmic.frame.errors import ConfigError, DeviceFault, NotConnectedError
+from cosmic.vico.hw.brightlight import BrightLight
+from cosmic.vico.hw.navitar_lens import NavitarLens
+from cosmic.vico.hw.navitar_probe import Found, probe
+from cosmic.vico.hw.navitar_protocol import Product
+from cosmic.vico.hw.peripherals import Lens, LensAxis, Light
+from cosmic.vico.hw.serial_port import SerialPort, open_serial_port
+
+if TYPE_CHECKING:
+    from cosmic.vico.hw.sim_line import SimLine
+    from cosmic.vico.hw.sim_peripherals import SimPeripherals
+
+LensBackend = Literal["simulated", "navitar", "none"]
+LightBackend = Literal["simulated", "brightlight", "none"]
+
+
+def make_lens(
+    backend: LensBackend,
+    *,
+    port: str = "",
+    homed: bool = False,
+    limits_counts: Mapping[LensAxis, int] | None = None,
+    simulation: "SimPeripherals | None" = None,
+) -> Lens | None:
+    """Open the lens of `backend`; nothing moves. None for "none".
+
+    Parameters
+    ----------
+    backend : str
+        "simulated", or "navitar" for a controller of either generation. Neither stands in for
+        the other.
+    port : str
+        For "navitar": the serial port, such as "/dev/ttyUSB0" or "COM3".
+    homed : bool
+        It has been homed and kept under power since. A simulated lens that was found warm has.
+    simulation : SimPeripherals or None
+        For "simulated": the platform's.
+
+    Raises
+    ------
+    NotConnectedError
+        The port is not there, or something else answers on it.
+    ConfigError
+        No port, or no simulation, is given.
+    """
+    if backend == "none":
+        return None
+    if backend == "simulated":
+        line = _given(simulation).lens_line
+        # The simulated controller remembers nothing either; the morning after does.
+        homed = homed or not _given(simulation).lens.cold
+        found = probe(_simulated(line, "simulated lens"))
+    else:
+        found = probe(open_serial_port(_named(port, backend)))
+    _expect(found, "a lens controller", Product.MOTORS, Product.MOTORS_2)
+    kind = "simulated lens" if backend == "simulated" else "Navitar"
+    name = f"{kind}, generation {found.generation}"
+    return NavitarLens(found.registers, name=name, homed=homed, limits_counts=limits_counts)
+
+
+def make_light(
+    backend: LightBackend, *, port: str = "", simulation: "SimPeripherals | None" = None
+) -> Light | None:
+    """Open the lamp of `backend`; it goes on shining as it does. None for "none".
+
+    Raises
+    ------
+    NotConnectedError
+        The port is not there, or something else answers on it.
+    ConfigError
+        No port, or no simulation, is given.
+    """
+    if backend == "none":
+        return None
+    if backend == "simulated":
+        found = probe(_simulated(_given(simulation).light_line, "simulated light"))
+    else:
+        found = probe(open_serial_port(_named(port, backend)))
+    _expect(found, "a BrightLight", Product.BRIGHTLIGHT)
+    name = "simulated BrightLight" if backend == "simulated" else "BrightLight"
+    return BrightLight(found.registers, name=name)
+
+
+def _simulated(line: "SimLine", name: str) -> SerialPort:
+    # Imported here, so that a real rig does not load the simulation.
+    from cosmic.vico.hw.sim_line import SimSerial
+
+    return SerialPort(SimSerial(line), name)
+
+
+def _given(simulation: "SimPeripherals | None") -> "SimPeripherals":
+    if simulation is None:
+        raise ConfigError("a simulated lens or light needs the twin of the platform")
+    return simulation
+
+
+def _named(port: str, backend: str) -> str:
+    if not port:
+        raise ConfigError(f"backend {backend!r} needs a port, such as /dev/ttyUSB0 or COM3")
+    return port
+
+
+def _expect(found: Found, what: str, *products: Product) -> None:
+    if found.product not in products:
+        found.registers.close()
+        raise NotConnectedError(
+            f"{found.registers.name}: {what} was expected, a {found.product.name} answers "
+            f"({found.product:#x}); are the ports of lens and light exchanged?",
+            fault=DeviceFault.COMMUNICATION,
+        )
