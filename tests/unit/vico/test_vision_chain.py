@@ -1,0 +1,197 @@
+"""The chain runs what is on, in order, and one bad link does not stop the rest."""
+
+import logging
+
+import cv2
+import numpy as np
+import pytest
+
+from cosmic.frame.errors import ConfigError
+from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.core.vision.algorithms import make_chain
+from cosmic.vico.core.vision.chain import Analysis, Chain, Registry, Results, Unavailable
+from cosmic.vico.hw.interface import Frame, Pixels, Roi
+
+
+def picture(data: Pixels | None = None, number: int = 1) -> Picture:
+    data = np.full((60, 80), 100, np.uint8) if data is None else data
+    return Picture("cam", Frame(data, number, 0.1 * number, 0.1 * number), Circumstances())
+
+
+class Mean:
+    name = "mean"
+
+    def run(self, picture: Picture, results: Results) -> object:
+        return float(picture.data.mean())
+
+
+class Double:
+    name = "double"
+
+    def run(self, picture: Picture, results: Results) -> object:
+        mean = results.get("mean")
+        return 2.0 * mean if isinstance(mean, float) else Unavailable("there is no mean")
+
+
+class Moody:
+    """Raises while it is told to."""
+
+    name = "moody"
+
+    def __init__(self) -> None:
+        self.raises = True
+        self.runs = 0
+
+    def run(self, picture: Picture, results: Results) -> object:
+        self.runs += 1
+        if self.raises:
+            raise ZeroDivisionError("divided the picture by nothing")
+        return "well"
+
+
+class Meddler:
+    name = "meddler"
+
+    def run(self, picture: Picture, results: Results) -> object:
+        results["mean"] = 0.0  # type: ignore[index]
+        return None
+
+
+def test_each_sees_what_those_before_it_found() -> None:
+    shown = picture()
+    analysis = Chain([Mean(), Double()]).run(shown)
+    assert dict(analysis.results) == {"mean": 100.0, "double": 200.0}
+    assert analysis.picture is shown
+    assert analysis.failures == {}
+    assert list(analysis.durations_s) == ["mean", "double"]
+    assert 0.0 <= sum(analysis.durations_s.values()) <= analysis.duration_s
+
+
+def test_a_result_is_asked_for_by_name_and_kind() -> None:
+    analysis = Chain([Double()]).run(picture())
+    assert analysis.get("double", float) is None
+    assert analysis.get("double", Unavailable) == Unavailable("there is no mean")
+    assert analysis.get("nobody", float) is None
+
+
+def test_one_that_is_switched_off_does_not_run_until_it_is_switched_on() -> None:
+    chain = Chain([Mean(), Double()], off=["mean"])
+    assert [state.on for state in chain.states] == [False, True]
+    assert list(chain.run(picture()).results) == ["double"]
+    chain.switch("mean", on=True)
+    assert list(chain.run(picture()).results) == ["mean", "double"]
+    assert all(state.last_s is not None for state in chain.states)
+
+
+@pytest.mark.usefixtures("caplog")
+def test_one_that_raises_is_named_and_the_rest_runs(caplog: pytest.LogCaptureFixture) -> None:
+    chain = Chain([Moody(), Mean()])
+    with caplog.at_level(logging.ERROR):
+        analysis = chain.run(picture(number=17))
+    assert dict(analysis.results) == {"mean": 100.0}
+    assert analysis.failures["moody"].text == "moody: divided the picture by nothing"
+    assert not analysis.failures["moody"].switched_off
+    assert "moody failed on frame 17" in caplog.text
+
+
+def test_after_three_failures_in_a_row_it_is_switched_off_and_says_why() -> None:
+    moody = Moody()
+    chain = Chain([moody, Mean()])
+    seen = [chain.run(picture()).failures for _ in range(5)]
+    assert moody.runs == 3
+    assert [each["moody"].switched_off for each in seen if each] == [False, False, True]
+    state = chain.states[0]
+    assert not state.on
+    assert "3 times in a row: moody: divided" in state.reason
+    chain.switch("moody", on=True)
+    moody.raises = False
+    assert chain.run(picture()).results["moody"] == "well"
+    assert chain.states[0].reason == ""
+
+
+def test_failures_now_and_then_switch_nothing_off() -> None:
+    moody = Moody()
+    chain = Chain([moody])
+    for number in range(12):
+        moody.raises = number % 3 != 0
+        chain.run(picture())
+    assert moody.runs == 12
+
+
+def test_nobody_changes_what_another_found() -> None:
+    analysis = Chain([Mean(), Meddler()]).run(picture())
+    assert dict(analysis.results) == {"mean": 100.0}
+    assert "meddler" in analysis.failures
+
+
+def test_names_that_do_not_fit_are_refused() -> None:
+    with pytest.raises(ConfigError, match="two algorithms are called 'mean'"):
+        Chain([Mean(), Mean()])
+    with pytest.raises(ConfigError, match="no algorithm 'blur'; there are: mean"):
+        Chain([Mean()], off=["blur"])
+    with pytest.raises(ConfigError, match="no algorithm 'blur'"):
+        Chain([Mean()]).switch("blur", on=True)
+
+
+def test_one_line_above_a_class_adds_it_to_every_chain() -> None:
+    registry = Registry()
+
+    @registry.add
+    class Brightness:
+        name = "brightness"
+
+        def run(self, picture: Picture, results: Results) -> object:
+            return int(picture.data.max())
+
+    chain = registry.chain()
+    assert chain.names == ("brightness",)
+    assert chain.run(picture()).results["brightness"] == 100
+    assert chain.algorithm("brightness") is not registry.chain().algorithm("brightness")
+    assert isinstance(chain.algorithm("brightness"), Brightness)
+
+
+# --- what is built in -------------------------------------------------------------------------
+
+
+def run_only(name: str, shown: Picture) -> Analysis:
+    chain = make_chain()
+    for other in set(chain.names) - {name}:
+        chain.switch(other, on=False)
+    return chain.run(shown)
+
+
+def test_the_focus_measure_says_when_its_region_is_not_on_the_picture() -> None:
+    chain = make_chain()
+    for other in set(chain.names) - {"focus"}:
+        chain.switch(other, on=False)
+    textured = np.random.default_rng(0).integers(0, 255, (60, 80), np.uint8)
+    assert chain.run(picture(textured)).get("focus", float)
+    chain.algorithm("focus").region = Roi(50, 0, 60, 60)  # type: ignore[attr-defined]
+    found = chain.run(picture(textured)).get("focus", Unavailable)
+    assert found is not None
+    assert "must lie within the picture" in found.reason
+
+
+def strand(bend_px: float = 30.0, shift: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
+    x = np.linspace(60.0, 540.0, 200)
+    y = 200.0 + bend_px * np.sin(x / 90.0)
+    return np.column_stack([x, y]) + shift
+
+
+def drawn(*lines: np.ndarray, width_px: int = 10, seed: int = 0) -> np.ndarray:
+    image = np.full((400, 600), 150, np.uint8)
+    for line in lines:
+        points = np.rint(line * 16.0).astype(np.int32)
+        cv2.polylines(image, [points], False, 80, width_px, cv2.LINE_AA, shift=4)
+    blurred = cv2.GaussianBlur(image, (0, 0), 1.2).astype(np.float64)
+    return np.clip(blurred + np.random.default_rng(seed).normal(0, 2, image.shape), 0, 255).astype(
+        np.uint8
+    )
+
+
+def test_fibres_are_found_on_grey_and_on_coloured_pictures() -> None:
+    grey = drawn(strand())
+    for data in (grey, np.ascontiguousarray(np.stack([grey] * 3, axis=2))):
+        analysis = run_only("fibres", picture(data))
+        (fibre,) = analysis.results["fibres"]  # type: ignore[misc]
+        assert fibre.width_px == pytest.approx(11.0, abs=1.5)
