@@ -1,0 +1,1 @@
+"""Machine vision: what is measured on a picture."""

@@ -1,0 +1,126 @@
+"""Reasons not to rely on what was found."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from cosmic.vico.core.vision.ends import EndKind
+from cosmic.vico.core.vision.grey import Floats
+from cosmic.vico.core.vision.refine import STEP_PX, Course
+
+OUT_OF_FOCUS = "out of focus: its edges are blurred over a large part of its width"
+FAINT = "hardly stands out from the noise"
+FADES = "it fades towards an end, so that its end is not where it seems to be"
+UNEVEN = "its width varies so much that it may be more than one fibre, or none"
+UNSEEN = "its edges are seen on too small a part of its length"
+HIDDEN_STRETCH = "a long stretch of it lies on or beside another fibre"
+CONTINUES = "another piece begins where it ends: it may be one broken fibre"
+STUBBY = "too short for its width to be a fibre"
+LEFT_OVER = "beside it something stands out that belongs to no fibre"
+CROWDED = "the picture is full of fibres: no single one can be told apart"
+IMPRECISE = "its length is known to less than one per cent"
+SHARP = "it bends more sharply than its own width"
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """When something is doubtful."""
+
+    blur_of_width: float = 0.33
+    blur_px: float = 2.5
+    contrast_to_noise: float = 1.5
+    fade: float = 0.55
+    width_spread: float = 0.3
+    seen: float = 0.6
+    gap_widths: float = 8.0
+
+
+LIMITS = Limits()
+
+
+def doubts_of(course: Course) -> list[str]:
+    """Return what is doubtful about one fibre by itself."""
+    found = [end.kind.value for end in course.ends if end.kind is not EndKind.FREE]
+    found = [each for each in found if each != EndKind.HIDDEN.value]
+    seen = course.good
+    if course.blur_px > max(LIMITS.blur_px, LIMITS.blur_of_width * course.width):
+        found.append(OUT_OF_FOCUS)
+    typical = float(np.median(course.contrast[seen])) if seen.any() else 0.0
+    if typical < LIMITS.contrast_to_noise * course.noise:
+        found.append(FAINT)
+    if fades(course, typical):
+        found.append(FADES)
+    if width_spread(course) > LIMITS.width_spread:
+        found.append(UNEVEN)
+    if float(seen.mean()) < LIMITS.seen:
+        found.append(UNSEEN)
+    if longest_gap(seen) * STEP_PX > max(30.0, LIMITS.gap_widths * course.width):
+        found.append(HIDDEN_STRETCH)
+    if sharpest_turn(course) > 1.6:
+        found.append(SHARP)
+    return found
+
+
+def fades(course: Course, typical: float) -> bool:
+    """Return whether a fibre is much fainter at an end than on the whole."""
+    skip = int(np.ceil((1.0 + 2.0 * course.blur_px) / STEP_PX))
+    count = max(3, int(1.5 * course.width / STEP_PX))
+    parts = (course.contrast[skip : skip + count], course.contrast[-skip - count : -skip])
+    return any(len(part) > 0 and float(np.median(part)) < LIMITS.fade * typical for part in parts)
+
+
+def width_spread(course: Course) -> float:
+    """Return the robust relative spread of a fibre's width."""
+    widths = course.widths[np.isfinite(course.widths)]
+    if len(widths) < 4:
+        return 1.0
+    low, high = np.percentile(widths, (16, 84))
+    return float(0.5 * (high - low) / max(float(np.median(widths)), 1e-6))
+
+
+def longest_gap(seen: np.ndarray) -> int:
+    """Return the longest run of points that were not seen."""
+    edges = np.nonzero(np.concatenate([[True], seen, [True]]))[0]
+    return int(np.diff(edges).max()) - 1
+
+
+def sharpest_turn(course: Course) -> float:
+    """Return the largest angle that a fibre turns within twice its width, radians."""
+    count = max(2, int(2.0 * course.width / STEP_PX))
+    line = course.line
+    if len(line) < 2 * count + 2:
+        return 0.0
+    way = line[count:] - line[:-count]
+    angle = np.arctan2(way[:, 1], way[:, 0])
+    turn = np.angle(np.exp(1j * (angle[count:] - angle[:-count])))
+    return float(np.abs(turn).max()) if len(turn) else 0.0
+
+
+def continued(lines: list[Floats], widths: list[float]) -> set[int]:
+    """Return the fibres at an end of which another one begins."""
+    found: set[int] = set()
+    ends = [(index, line[at], outward(line, at)) for index, line in enumerate(lines)
+            for at in (0, -1)]
+    if len(ends) < 4:
+        return found
+    places = np.array([place for _, place, _ in ends])
+    reach = 6.0 * max(widths) + 20.0
+    for first, last in cKDTree(places).query_pairs(reach):
+        i, place, out = ends[first]
+        j, other, other_out = ends[last]
+        way = other - place
+        gap = float(np.linalg.norm(way))
+        if i == j or gap > 4.0 * (widths[i] + widths[j]) / 2 + 10.0:
+            continue
+        way /= max(gap, 1e-9)
+        if float(out @ way) > 0.8 and float(other_out @ -way) > 0.8:
+            found |= {i, j}
+    return found
+
+
+def outward(line: Floats, at: int) -> Floats:
+    """Return the direction in which a line leaves its first (0) or last (-1) point."""
+    inner = min(8, len(line) - 1)
+    way = line[0] - line[inner] if at == 0 else line[-1] - line[-1 - inner]
+    return np.asarray(way / max(float(np.linalg.norm(way)), 1e-9))

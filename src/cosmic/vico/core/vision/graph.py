@@ -1,0 +1,162 @@
+"""The skeleton of a mask as branches between nodes."""
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from skimage.morphology import skeletonize
+
+from cosmic.vico.core.vision.grey import Floats, Floats32, Mask
+from cosmic.vico.core.vision.smoothing import arc_lengths
+
+FREE = -1
+NEIGHBOURS = ((-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1))
+
+
+@dataclass(slots=True, eq=False)
+class Branch:
+    """A piece of skeleton without forks.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2), x and y
+    nodes : list of int
+        The node at its first and at its last point; FREE at a free end.
+    """
+
+    points: Floats
+    nodes: list[int]
+
+    @property
+    def length(self) -> float:
+        """Length along its points."""
+        return float(arc_lengths(self.points)[-1])
+
+    @property
+    def closed(self) -> bool:
+        """Whether it is a ring without any node."""
+        return self.nodes == [FREE, FREE] and len(self.points) > 8 and bool(
+            np.abs(self.points[0] - self.points[-1]).max() <= 1.5
+        )
+
+
+@dataclass(slots=True, eq=False)
+class Graph:
+    """Branches and nodes of one picture.
+
+    Attributes
+    ----------
+    half_widths : ndarray, float32
+        Distance of each pixel of the mask to the ground.
+    """
+
+    branches: list[Branch]
+    nodes: list[Floats]
+    half_widths: Floats32
+    pruned: list[Branch] = field(default_factory=list)
+
+    def half_width(self, points: Floats) -> float:
+        """Return the typical half width along points."""
+        columns, rows = np.round(points).astype(int).T
+        return float(np.median(self.half_widths[rows, columns]))
+
+
+def skeleton_of(mask: Mask) -> Mask:
+    """Return the skeleton of a mask."""
+    return np.asarray(skeletonize(mask > 0), dtype=np.uint8)
+
+
+def build_graph(mask: Mask, most: int) -> Graph | None:
+    """Return the graph of a mask, or None where it has more than `most` forks."""
+    framed = cv2.copyMakeBorder(mask, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
+    half_widths = cv2.distanceTransform(framed, cv2.DIST_L2, 5)[1:-1, 1:-1]
+    skeleton = skeleton_of(mask)
+    around = cv2.filter2D(skeleton, -1, np.ones((3, 3)), borderType=cv2.BORDER_CONSTANT)
+    forks = ((skeleton > 0) & (around > 3)).astype(np.uint8)
+    count, labels, _, centres = cv2.connectedComponentsWithStats(forks, connectivity=8)
+    if count - 1 > most:
+        return None
+    pieces = ((skeleton > 0) & (forks == 0)).astype(np.uint8)
+    branches = [branch(pixels, labels) for pixels in paths(pieces)]
+    nodes = [np.asarray(centre, dtype=float) for centre in centres[1:]]
+    for each in branches:
+        with_nodes(each, nodes)
+    return Graph(branches, nodes, np.asarray(half_widths, dtype=np.float32))
+
+
+def paths(pieces: Mask) -> list[list[tuple[int, int]]]:
+    """Return the pixels (row, column) of each piece in order."""
+    left = {(int(row), int(column)) for row, column in zip(*np.nonzero(pieces), strict=True)}
+    found = []
+    while left:
+        start = next(iter(left))
+        left.discard(start)
+        ahead = walked(start, left)
+        back = walked(start, left)
+        found.append([*reversed(back), start, *ahead])
+    return found
+
+
+def walked(start: tuple[int, int], left: set[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Return the pixels after `start` as far as they go, and take them from `left`."""
+    way = []
+    row, column = start
+    while True:
+        for down, right in NEIGHBOURS:
+            ahead = (row + down, column + right)
+            if ahead in left:
+                left.discard(ahead)
+                way.append(ahead)
+                row, column = ahead
+                break
+        else:
+            return way
+
+
+def branch(pixels: list[tuple[int, int]], labels: npt.NDArray[np.int32]) -> Branch:
+    """Return a piece with the nodes it touches."""
+    points = np.array(pixels, dtype=float)[:, ::-1]
+    first = touched(pixels[0], labels)
+    last = touched(pixels[-1], labels)
+    if len(pixels) == 1:
+        both = [*first, FREE, FREE]
+        return Branch(points, both[:2])
+    # The ends of a short piece may touch the same two nodes: each takes its own.
+    start = first[0] if first else FREE
+    end = next((node for node in last if node != start or len(pixels) > 3), FREE)
+    return Branch(points, [start, end])
+
+
+def touched(pixel: tuple[int, int], labels: npt.NDArray[np.int32]) -> list[int]:
+    """Return the nodes next to a pixel, from zero."""
+    row, column = pixel
+    window = labels[max(0, row - 1) : row + 2, max(0, column - 1) : column + 2]
+    return [int(label) - 1 for label in np.unique(window) if label > 0]
+
+
+def with_nodes(each: Branch, nodes: list[Floats]) -> None:
+    """Add the places of its nodes to a branch."""
+    parts = [each.points]
+    if each.nodes[0] != FREE:
+        parts.insert(0, nodes[each.nodes[0]][None])
+    if each.nodes[1] != FREE:
+        parts.append(nodes[each.nodes[1]][None])
+    each.points = np.concatenate(parts)
+
+
+def prune(graph: Graph) -> None:
+    """Take away the short side branches that a rough edge gives a skeleton."""
+    for each in list(graph.branches):
+        free = each.nodes.count(FREE)
+        if free == 0:
+            continue
+        if free == 2:
+            if len(each.points) < 3:
+                graph.branches.remove(each)
+            continue
+        node = max(each.nodes)
+        column, row = np.round(graph.nodes[node]).astype(int)
+        if each.length <= 1.3 * float(graph.half_widths[row, column]) + 1.5:
+            graph.branches.remove(each)
+            graph.pruned.append(each)

@@ -1,0 +1,276 @@
+"""Branches joined to strands: through crossings by the way that bends least."""
+
+from collections import defaultdict
+from dataclasses import dataclass, field
+from functools import cache
+
+import numpy as np
+
+from cosmic.vico.core.vision.graph import FREE, Branch, Graph
+from cosmic.vico.core.vision.grey import Floats
+from cosmic.vico.core.vision.smoothing import arc_lengths
+
+# Bending, in squared radians, that is worse than two loose ends in a crossing.
+LOOSE = 0.7
+MOST_STUBS = 8
+AMBIGUOUS = "a crossing can be read in two ways"
+ON_ANOTHER = "an end lies on a fibre, so that it cannot be seen"
+CLUSTER = "too many fibres meet in one place"
+RING = "a closed ring has no ends"
+FOLDED = "it folds back sharply at a crossing"
+
+Stub = tuple[int, int]
+Pairing = tuple[tuple[int, int], ...]
+
+
+@dataclass(slots=True, eq=False)
+class Strand:
+    """One way through the skeleton, from end to end.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 2)
+        In pixels of the reduced picture.
+    half_width : float
+        Likewise.
+    joints : list of ndarray
+        Places of the crossings it goes through.
+    """
+
+    points: Floats
+    half_width: float
+    joints: list[Floats] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
+    closed: bool = False
+
+
+@dataclass(slots=True, eq=False)
+class Joint:
+    """Nodes so near to each other that they are one crossing."""
+
+    stubs: list[Stub]
+    place: Floats
+    partner: dict[Stub, Stub] = field(default_factory=dict)
+    doubts: dict[Stub, list[str]] = field(default_factory=lambda: defaultdict(list))
+
+
+def strands(graph: Graph) -> list[Strand]:
+    """Return the strands of a graph."""
+    half_width = component_half_widths(graph)
+    bridges, group = merged(graph, half_width)
+    joints = make_joints(graph, bridges, group)
+    for joint in joints.values():
+        pair(graph, joint, half_width)
+    at = {stub: joint for joint in joints.values() for stub in joint.stubs}
+    used: set[int] = set(bridges)
+    found = []
+    starts = [
+        (index, end)
+        for index in range(len(graph.branches))
+        for end in (0, 1)
+        if index not in bridges
+        and ((index, end) not in at or (index, end) not in at[index, end].partner)
+    ]
+    rest = [(index, 0) for index in range(len(graph.branches))]
+    for number, start in enumerate([*starts, *rest]):
+        if start[0] not in used:
+            found.append(follow(graph, at, start, used, half_width))
+            found[-1].closed = found[-1].closed or number >= len(starts)
+    for each in found:
+        if each.closed:
+            each.doubts.append(RING)
+    return found
+
+
+def component_half_widths(graph: Graph) -> list[float]:
+    """Return the typical half width for each branch, from all that hangs together with it."""
+    parent = list(range(len(graph.nodes)))
+
+    def root(node: int) -> int:
+        while parent[node] != node:
+            node = parent[node]
+        return node
+
+    for each in graph.branches:
+        if FREE not in each.nodes:
+            parent[root(each.nodes[0])] = root(each.nodes[1])
+    groups: dict[int, list[int]] = defaultdict(list)
+    for index, each in enumerate(graph.branches):
+        node = max(each.nodes)
+        groups[root(node) if node != FREE else -1 - index].append(index)
+    widths = [1.0] * len(graph.branches)
+    for members in groups.values():
+        points = np.concatenate([graph.branches[index].points for index in members])
+        typical = max(1.0, graph.half_width(points))
+        for index in members:
+            widths[index] = typical
+    return widths
+
+
+def merged(graph: Graph, half_width: list[float]) -> tuple[set[int], list[int]]:
+    """Return the branches inside a crossing, and the group of each node."""
+    group = list(range(len(graph.nodes)))
+    bridges = set()
+    for index, each in enumerate(graph.branches):
+        if FREE in each.nodes:
+            continue
+        width = 2.0 * half_width[index]
+        short = each.length < 1.3 * width + 1.0
+        inner = each.points[1:-1] if len(each.points) > 2 else each.points
+        wide = each.length < 8.0 * width and graph.half_width(inner) > 0.62 * width
+        if (short or wide) and each.nodes[0] != each.nodes[1]:
+            bridges.add(index)
+            old, new = group[each.nodes[0]], group[each.nodes[1]]
+            group = [new if label == old else label for label in group]
+    return bridges, group
+
+
+def make_joints(graph: Graph, bridges: set[int], group: list[int]) -> dict[int, Joint]:
+    """Return the crossings with the branches that meet there."""
+    stubs: dict[int, list[Stub]] = defaultdict(list)
+    for index, each in enumerate(graph.branches):
+        if index in bridges:
+            continue
+        for end, node in enumerate(each.nodes):
+            if node != FREE:
+                stubs[group[node]].append((index, end))
+    places: dict[int, list[Floats]] = defaultdict(list)
+    for node, label in enumerate(group):
+        places[label].append(graph.nodes[node])
+    return {
+        label: Joint(found, np.mean(places[label], axis=0)) for label, found in stubs.items()
+    }
+
+
+def outward(branch: Branch, end: int, half_width: float) -> tuple[Floats, Floats]:
+    """Return where a branch leaves its crossing, and in which direction."""
+    points = branch.points if end == 0 else branch.points[::-1]
+    s = arc_lengths(points)
+    total = float(s[-1])
+    near = min(1.2 * half_width + 1.0, 0.3 * total)
+    far = min(near + max(6.0, 4.0 * half_width), 0.9 * total if total > 12 else total)
+    part = points[(s >= near) & (s <= far)]
+    if len(part) < 2:
+        part = points[[0, -1]]
+    middle = part.mean(axis=0)
+    _, _, axes = np.linalg.svd(part - middle, full_matrices=False)
+    direction = axes[0] if (part[-1] - part[0]) @ axes[0] >= 0 else -axes[0]
+    return middle, direction
+
+
+def turn(first: Floats, last: Floats) -> float:
+    """Return the angle from one direction to another, -pi to pi."""
+    return float(np.arctan2(first[0] * last[1] - first[1] * last[0], first @ last))
+
+
+def bending(first: tuple[Floats, Floats], last: tuple[Floats, Floats]) -> float:
+    """Return how much a curve must bend to enter by one stub and leave by another."""
+    way = last[0] - first[0]
+    if float(np.linalg.norm(way)) < 1e-6:
+        return np.pi**2
+    enter = turn(way, -first[1])
+    leave = turn(way, last[1])
+    return enter**2 + enter * leave + leave**2
+
+
+@cache
+def pairings(count: int, loose: int) -> tuple[Pairing, ...]:
+    """Return every way to pair `count` stubs with at most `loose` left over."""
+
+    def rest(left: tuple[int, ...], spare: int) -> list[Pairing]:
+        if not left:
+            return [()]
+        first, others = left[0], left[1:]
+        found = []
+        if spare > 0:
+            found += rest(others, spare - 1)
+        for index, other in enumerate(others):
+            remaining = others[:index] + others[index + 1 :]
+            found += [((first, other), *more) for more in rest(remaining, spare)]
+        return found
+
+    return tuple(rest(tuple(range(count)), loose))
+
+
+def pair(graph: Graph, joint: Joint, half_width: list[float]) -> None:
+    """Pair the stubs of a crossing, and say where that is doubtful."""
+    count = len(joint.stubs)
+    if count < 2:
+        return
+    if count == 2:
+        first, last = joint.stubs
+        joint.partner = {first: last, last: first}
+        return
+    if count > MOST_STUBS:
+        for stub in joint.stubs:
+            joint.doubts[stub].append(CLUSTER)
+        return
+    leaving = [
+        outward(graph.branches[index], end, half_width[index]) for index, end in joint.stubs
+    ]
+    costs = np.array([[bending(a, b) for b in leaving] for a in leaving])
+    ways = pairings(count, count % 2 + (2 if count > 3 else 0))
+    prices = np.array(
+        [sum(costs[i, j] for i, j in way) + LOOSE * (count - 2 * len(way)) for way in ways]
+    )
+    order = np.argsort(prices)
+    best = ways[int(order[0])]
+    for i, j in best:
+        joint.partner[joint.stubs[i]] = joint.stubs[j]
+        joint.partner[joint.stubs[j]] = joint.stubs[i]
+    base = LOOSE * (count % 2)
+    worth, next_worth = (float(np.sqrt(max(0.0, prices[k] - base))) for k in order[:2])
+    unclear = next_worth < 1.6 * worth + 0.15
+    judge(joint, costs, best, unclear)
+
+
+def judge(joint: Joint, costs: Floats, best: Pairing, unclear: bool) -> None:
+    """Write down what is doubtful about a crossing."""
+    paired = {index for both in best for index in both}
+    for index, stub in enumerate(joint.stubs):
+        if unclear:
+            joint.doubts[stub].append(AMBIGUOUS)
+        if index not in paired:
+            joint.doubts[stub].append(ON_ANOTHER)
+    for i, j in best:
+        if costs[i, j] > 0.6:
+            joint.doubts[joint.stubs[i]].append(FOLDED)
+
+
+def follow(
+    graph: Graph, at: dict[Stub, Joint], start: Stub, used: set[int], half_width: list[float]
+) -> Strand:
+    """Return the strand that begins at the end `start` of a branch."""
+    parts: list[Floats] = []
+    strand = Strand(np.zeros((0, 2)), half_width[start[0]])
+    stub: Stub | None = start
+    while stub is not None and stub[0] not in used:
+        index, end = stub
+        used.add(index)
+        each = graph.branches[index]
+        strand.closed = strand.closed or each.closed
+        points = each.points if end == 0 else each.points[::-1]
+        exit_stub = (index, 1 - end)
+        for side in (stub, exit_stub):
+            if side in at:
+                strand.doubts += at[side].doubts[side]
+        ahead = at[exit_stub].partner.get(exit_stub) if exit_stub in at else None
+        if stub in at and stub in at[stub].partner and parts:
+            points = trimmed(points, half_width[index], at[stub])
+        if ahead is not None:
+            points = trimmed(points[::-1], half_width[index], at[exit_stub])[::-1]
+            if len(at[exit_stub].stubs) > 2:
+                strand.joints.append(at[exit_stub].place)
+        parts.append(points)
+        stub = ahead
+    strand.points = np.concatenate(parts)
+    return strand
+
+
+def trimmed(points: Floats, half_width: float, joint: Joint) -> Floats:
+    """Return a branch without its start inside a crossing, where the skeleton is bent."""
+    if len(joint.stubs) == 2:
+        return points
+    s = arc_lengths(points)
+    keep = s >= min(1.2 * half_width + 1.0, 0.3 * float(s[-1]))
+    return points[keep]

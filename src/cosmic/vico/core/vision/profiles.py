@@ -1,0 +1,216 @@
+"""Grey levels across a fibre, and the edges in them."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import gaussian_filter1d
+
+from cosmic.vico.core.vision.grey import Floats, Floats32
+from cosmic.vico.core.vision.smoothing import directions
+
+Flags = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Profiles:
+    """Cross sections of a fibre.
+
+    Attributes
+    ----------
+    across : ndarray, shape (m,)
+        Places along the normal, pixels.
+    height : ndarray, shape (n, m)
+        What stands out from the ground at each point of the line; fibre positive.
+    clear : ndarray of bool, shape (n, m)
+        Whether the place is ground or this fibre, as far as is known.
+    noise : float
+        Standard deviation of a single pixel of the ground.
+    """
+
+    across: Floats
+    height: Floats
+    clear: Flags
+    noise: float
+    normals: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Edges:
+    """Where each cross section has half of its height.
+
+    Attributes
+    ----------
+    left, right : ndarray, shape (n,)
+        Places along the normal; NaN where there is no edge where one is expected.
+    contrast : ndarray, shape (n,)
+        Height of each cross section.
+    mean : ndarray, shape (m,)
+        The typical cross section, 1 at its highest.
+    """
+
+    left: Floats
+    right: Floats
+    contrast: Floats
+    mean: Floats
+    steepness_px: float
+
+
+def sample(image: Floats32, places: Floats) -> Floats:
+    """Return grey levels at places (..., 2), the border repeated outside."""
+    x = places[..., 0].astype(np.float32)
+    y = places[..., 1].astype(np.float32)
+    found = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(found, dtype=np.float64).reshape(places.shape[:-1])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """A picture at full size with what was found on it at reduced size.
+
+    Attributes
+    ----------
+    image : ndarray, float32
+    taken : ndarray, float32
+        1 where something stands out, reduced by `factor`.
+    sign : float
+        1 for fibres lighter than the ground, -1 for darker ones.
+    """
+
+    image: Floats32
+    taken: Floats32
+    factor: int
+    sign: float
+
+    @property
+    def corner(self) -> Floats:
+        """The largest x and y."""
+        rows, columns = self.image.shape
+        return np.array([columns - 1.0, rows - 1.0])
+
+    def full(self, points: Floats) -> Floats:
+        """Return places of the reduced picture in full-size pixels."""
+        return points * self.factor + 0.5 * (self.factor - 1)
+
+    def reduced(self, places: Floats) -> Floats:
+        """Return full-size places in pixels of the reduced picture."""
+        return (places - 0.5 * (self.factor - 1)) / self.factor
+
+
+def cross_sections(scene: Scene, line: Floats, width: float, reach: float) -> Profiles:
+    """Return the cross sections at the points of a line."""
+    tangent = directions(line)
+    normals = np.column_stack([-tangent[:, 1], tangent[:, 0]])
+    spacing = 0.5 if width < 12 else 1.0
+    count = int(np.ceil(reach / spacing))
+    across = np.arange(-count, count + 1) * spacing
+    places = line[:, None, :] + across[None, :, None] * normals[:, None, :]
+    values = sample(scene.image, places)
+    inside = np.abs(across) < 0.5 * width + 2.0
+    other = sample(scene.taken, scene.reduced(places)) > 0.25
+    outside = (places < -0.5).any(axis=2) | (places > scene.corner + 0.5).any(axis=2)
+    clear = ~outside & (inside[None, :] | ~other)
+    ground, noise = ground_of(values, clear & ~inside[None, :], across)
+    height = scene.sign * (values - ground)
+    return Profiles(across, height, clear, noise, normals)
+
+
+def ground_of(values: Floats, free: Flags, across: Floats) -> tuple[Floats, float]:
+    """Return the ground under each cross section, sloping from side to side, and its noise."""
+    sides = []
+    seen = []
+    for side in (across < 0, across > 0):
+        part = free & side[None, :]
+        number = part.sum(axis=1)
+        total = np.where(part, values, 0.0).sum(axis=1)
+        sides.append(gaussian_filter1d(total, 6.0, mode="nearest"))
+        seen.append(gaussian_filter1d(number.astype(float), 6.0, mode="nearest"))
+    levels = [total / np.maximum(count, 1e-9) for total, count in zip(sides, seen, strict=True)]
+    both = (sides[0] + sides[1]) / np.maximum(seen[0] + seen[1], 1e-9)
+    levels = [np.where(count > 0.5, level, both) for level, count in zip(levels, seen, strict=True)]
+    reach = float(np.abs(across).max())
+    share = np.clip((across / (1.4 * reach) + 0.5), 0.0, 1.0)[None, :]
+    ground = levels[0][:, None] * (1 - share) + levels[1][:, None] * share
+    rest = np.where(free, values - ground, np.nan)
+    if not free.any():
+        return ground, 0.0
+    spread = np.abs(rest[free])
+    return ground, 1.4826 * float(np.median(spread))
+
+
+def along(height: Floats, sigma: float) -> Floats:
+    """Return cross sections averaged along the fibre."""
+    return np.asarray(gaussian_filter1d(height, sigma, axis=0, mode="nearest"))
+
+
+def box_centres(profiles: Profiles, height: Floats, width: float, reach: float) -> Floats:
+    """Return where a box of the fibre's width fits best into each cross section."""
+    across = profiles.across
+    spacing = across[1] - across[0]
+    total = np.cumsum(np.pad(height, ((0, 0), (1, 0))), axis=1)
+    size = max(1, round(width / spacing))
+    sums = total[:, size:] - total[:, :-size]
+    middles = (across[: sums.shape[1]] + across[size - 1 :][: sums.shape[1]]) / 2
+    sums = np.where(np.abs(middles)[None, :] <= reach, sums, -np.inf)
+    best = np.argmax(sums, axis=1)
+    return np.asarray(middles[best])
+
+
+def typical_section(height: Floats, good: Flags) -> Floats:
+    """Return the median cross section, 1 at its highest."""
+    rows = height[good] if good.any() else height
+    if len(rows) > 160:
+        rows = rows[:: len(rows) // 160 + 1]
+    middle = np.median(rows, axis=0)
+    return np.asarray(middle / max(float(middle.max()), 1e-9))
+
+
+def level_crossing(mean: Floats, across: Floats, level: float, side: int) -> float:
+    """Return the outermost place on one side at which the typical section has a level."""
+    order = np.argsort(side * across)
+    x, y = across[order], mean[order]
+    above = np.nonzero(y[:-1] >= level)[0]
+    above = above[side * x[above] > -0.5 * side * x[-1]]
+    for index in above[::-1]:
+        if y[index + 1] < level:
+            share = (y[index] - level) / (y[index] - y[index + 1])
+            return float(x[index] + share * (x[index + 1] - x[index]))
+    return float("nan")
+
+
+def find_edges(profiles: Profiles, height: Floats, good: Flags, width: float) -> Edges:
+    """Return the outer edges of each cross section at half of its height."""
+    across = profiles.across
+    near = np.abs(across) < 0.5 * width + 3.0
+    mean = np.where(near, typical_section(height, good), 0.0)
+    weight = mean / max(float((mean**2).sum()), 1e-9)
+    contrast = height @ weight
+    contrast = gaussian_filter1d(contrast, 3.0, mode="nearest")
+    scaled = height / np.maximum(contrast, 1e-6)[:, None]
+    expected = [level_crossing(mean, across, 0.5, side) for side in (-1, 1)]
+    found = [
+        edge_near(scaled, across, place, side, 0.35 * width + 1.0)
+        for place, side in zip(expected, (-1, 1), strict=True)
+    ]
+    inner = [level_crossing(mean, across, 0.75, side) for side in (-1, 1)]
+    outer = [level_crossing(mean, across, 0.25, side) for side in (-1, 1)]
+    steep = float(np.nanmean(np.abs(np.subtract(outer, inner)))) if np.isfinite(inner).any() else 0
+    return Edges(found[0], found[1], contrast, mean, steep / 1.349)
+
+
+def edge_near(scaled: Floats, across: Floats, place: float, side: int, most: float) -> Floats:
+    """Return where each section falls below half, outwards, nearest to `place`; NaN if nowhere."""
+    if not np.isfinite(place):
+        return np.full(len(scaled), np.nan)
+    inner, outer = (scaled[:, :-1], scaled[:, 1:]) if side > 0 else (scaled[:, 1:], scaled[:, :-1])
+    falls = (inner >= 0.5) & (outer < 0.5)
+    step = np.maximum(inner - outer, 1e-9)
+    share = (inner - 0.5) / step * (across[1] - across[0])
+    start = across[:-1] if side > 0 else across[1:]
+    where = start[None, :] + side * share
+    away = np.where(falls, np.abs(where - place), np.inf)
+    best = np.argmin(away, axis=1)
+    rows = np.arange(len(scaled))
+    found = where[rows, best]
+    return np.where(away[rows, best] <= most, found, np.nan)

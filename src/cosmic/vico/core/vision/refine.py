@@ -1,0 +1,241 @@
+"""A strand of the skeleton made exact on the full-size picture."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from cosmic.vico.core.vision.ends import End, EndKind, Level, find_end
+from cosmic.vico.core.vision.grey import Floats
+from cosmic.vico.core.vision.joining import Strand
+from cosmic.vico.core.vision.profiles import (
+    Edges,
+    Flags,
+    Profiles,
+    Scene,
+    along,
+    box_centres,
+    cross_sections,
+    find_edges,
+)
+from cosmic.vico.core.vision.smoothing import arc_lengths, resampled, smooth
+
+STEP_PX = 2.0
+ROUNDS = 3
+
+
+@dataclass(slots=True, eq=False)
+class Course:
+    """The exact course of a fibre while it is being found.
+
+    Attributes
+    ----------
+    line : ndarray, shape (n, 2)
+        Full-size pixels, evenly spaced.
+    good : ndarray of bool, shape (n,)
+        Where both edges were seen.
+    widths : ndarray, shape (n,)
+        NaN where they were not.
+    """
+
+    line: Floats
+    width: float
+    good: Flags
+    widths: Floats
+    contrast: Floats
+    ends: list[End]
+    noise: float = 0.0
+    blur_px: float = 0.0
+    scatter_px: float = 0.0
+    mean: Floats = field(default_factory=lambda: np.zeros(0))
+    spans: list[float] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Neighbours:
+    """The other strands of the picture, to keep out of the way of."""
+
+    tree: cKDTree | None
+    margins: Floats
+
+    def near(self, line: Floats, width: float) -> Flags:
+        """Return which points lie where another strand covers part of the cross section."""
+        if self.tree is None:
+            return np.zeros(len(line), bool)
+        distance, index = self.tree.query(line)
+        return np.asarray(distance < 0.5 * width + self.margins[index] + 1.5)
+
+
+def refine(scene: Scene, strand: Strand, neighbours: Neighbours) -> Course | None:
+    """Return the exact course of a strand, or None where there is no fibre after all."""
+    width = max(2.0, (2.0 * strand.half_width - 0.5) * scene.factor)
+    line = resampled(scene.full(strand.points), STEP_PX)
+    if len(line) < 6:
+        return None
+    wave = max(3.0 * width, 6.0 * scene.factor) / STEP_PX
+    line = resampled(smooth(line, np.ones(len(line)), wave), STEP_PX)
+    course = Course(
+        line, width, np.ones(len(line), bool), np.full(len(line), width), np.ones(len(line)), []
+    )
+    centre_roughly(scene, course, neighbours)
+    for number in range(ROUNDS):
+        if not measure(scene, course, neighbours, last=number == ROUNDS - 1):
+            return None
+        course.ends = both_ends(scene, course, strand, 2.0 * scene.factor if number == 0 else 2.0)
+        stretch(course)
+        if len(course.line) < 6:
+            return None
+    measure(scene, course, neighbours, last=True)
+    return course
+
+
+def excluded(course: Course, neighbours: Neighbours) -> Flags:
+    """Return the points whose cross section another strand, or another part, covers."""
+    near = neighbours.near(course.line, course.width)
+    apart = int(2.5 * course.width / STEP_PX) + 3
+    reach = 1.15 * course.width + 1.0
+    tree = cKDTree(course.line)
+    pairs = tree.query_pairs(reach, output_type="ndarray")
+    if len(pairs):
+        far = np.abs(pairs[:, 0] - pairs[:, 1]) > apart
+        near[pairs[far].ravel()] = True
+    return near
+
+
+def centre_roughly(scene: Scene, course: Course, neighbours: Neighbours) -> None:
+    """Move a line onto its fibre, from where the skeleton of the reduced picture lies."""
+    for reach in (scene.factor + 0.35 * course.width, 1.0 + 0.25 * course.width):
+        profiles = cross_sections(
+            scene, course.line, course.width, 1.1 * course.width + 2 * scene.factor + 4
+        )
+        height = along(np.where(profiles.clear, profiles.height, 0.0), 2.0)
+        offset = box_centres(profiles, height, course.width, reach)
+        weights = np.where(excluded(course, neighbours), 0.0, 1.0)
+        move(course, profiles, offset, weights, max(24.0, 3.0 * course.width))
+
+
+def move(
+    course: Course, profiles: Profiles, offset: Floats, weights: Floats, wave_px: float
+) -> None:
+    """Shift a line along its normals, robustly, and space it evenly again."""
+    target = course.line + offset[:, None] * profiles.normals
+    wave = wave_px / STEP_PX
+    line = smooth(target, weights, wave)
+    rest = np.linalg.norm(target - line, axis=1)
+    used = weights > 0
+    if used.sum() > 8:
+        limit = 4.0 * 1.4826 * float(np.median(rest[used])) + 0.1
+        line = smooth(target, np.where(rest > limit, 0.0, weights), wave)
+        course.scatter_px = float(np.median(rest[used])) * 1.2
+    course.line = line
+
+
+def measure(scene: Scene, course: Course, neighbours: Neighbours, *, last: bool) -> bool:
+    """Find edges, width and contrast along a line and move it to the middle; False: no fibre."""
+    course.line = resampled(course.line, STEP_PX)
+    profiles = cross_sections(scene, course.line, course.width, 1.2 * course.width + 8.0)
+    free = ~excluded(course, neighbours)
+    typical = float(np.median(profiles.height[:, np.abs(profiles.across) < 0.4 * course.width]))
+    ratio = profiles.noise / max(typical, 1e-6)
+    height = along(np.where(profiles.clear, profiles.height, 0.0), float(np.clip(6 * ratio, 0.8, 4)))
+    if not free.any():
+        return False
+    edges = find_edges(profiles, height, free, course.width)
+    widths = edges.right - edges.left
+    good = free & np.isfinite(widths)
+    if good.sum() < 4:
+        return False
+    take(course, edges, widths, good, profiles)
+    inner = good & ~near_ends(course)
+    weights = np.where(inner if inner.sum() >= 4 else good, 1.0, 0.0)
+    offset = np.where(good, 0.5 * (edges.left + edges.right), 0.0)
+    wave = max(20.0, 2.0 * course.width) * (1.0 + 4.0 * min(ratio, 1.0))
+    if not last or True:
+        move(course, profiles, offset, weights, wave)
+    return True
+
+
+def near_ends(course: Course) -> Flags:
+    """Return the points so near to an end that the end's blur reaches them."""
+    near = np.zeros(len(course.line), bool)
+    if not course.ends:
+        return near
+    count = int(np.ceil((1.0 + 1.5 * course.blur_px) / STEP_PX))
+    near[:count] = near[-count:] = True
+    return near
+
+
+def take(
+    course: Course, edges: Edges, widths: Floats, good: Flags, profiles: Profiles
+) -> None:
+    """Keep what the cross sections say."""
+    typical = float(np.median(widths[good]))
+    course.width = typical
+    course.good = good & (np.abs(widths - typical) < 0.6 * typical + 1.0)
+    course.widths = np.where(course.good, widths, np.nan)
+    course.contrast = edges.contrast
+    course.noise = profiles.noise
+    course.blur_px = edges.steepness_px
+    course.mean = edges.mean
+
+
+def both_ends(scene: Scene, course: Course, strand: Strand, extra: float) -> list[End]:
+    """Return what the two ends are, the line's first one first."""
+    if strand.closed:
+        return [End(EndKind.HIDDEN, 0.0, course.width)] * 2
+    found = []
+    for line, contrast in (
+        (course.line[::-1], course.contrast[::-1]),
+        (course.line, course.contrast),
+    ):
+        count = max(4, int(3 * course.width / STEP_PX))
+        height = float(np.median(contrast[-count:]))
+        level = Level(
+            width=course.width,
+            contrast=height,
+            ground=ground_at(scene, line, course.width),
+            noise=course.noise,
+            search_px=1.5 * course.width + 4.0 + extra,
+        )
+        found.append(find_end(scene, line, level))
+    return found
+
+
+def ground_at(scene: Scene, line: Floats, width: float) -> float:
+    """Return the grey level of the ground beside the end of a line."""
+    count = max(4, int(2 * width / STEP_PX))
+    profiles = cross_sections(scene, line[-count - 8 :], width, 1.2 * width + 8.0)
+    beside = profiles.clear & (np.abs(profiles.across) > 0.5 * width + 3.0)[None, :]
+    from cosmic.vico.core.vision.profiles import sample
+
+    places = line[-count - 8 :][:, None, :] + (
+        profiles.across[None, :, None] * profiles.normals[:, None, :]
+    )
+    values = sample(scene.image, places)
+    return float(np.median(values[beside])) if beside.any() else float(np.median(values))
+
+
+def stretch(course: Course) -> None:
+    """Cut or lengthen a line to its ends."""
+    line = course.line
+    for turn in (0, 1):
+        end = course.ends[turn]
+        line = line[::-1] if turn == 0 else line
+        if end.kind in (EndKind.FREE, EndKind.BORDER):
+            line = ended(line, end.along_px, course.width)
+        line = line[::-1] if turn == 0 else line
+    course.line = resampled(line, STEP_PX)
+
+
+def ended(line: Floats, beyond: float, width: float) -> Floats:
+    """Return a line that ends `beyond` its last point."""
+    s = arc_lengths(line)
+    if beyond <= 0:
+        total = float(s[-1]) + beyond
+        keep = s < total - 1e-6
+        last = np.array([np.interp(total, s, line[:, axis]) for axis in (0, 1)])
+        return np.concatenate([line[keep], last[None]])
+    count = int(np.clip(round(0.6 * width), 3, max(3, len(line) // 3)))
+    out = line[-1] - line[-1 - min(count, len(line) - 1)]
+    out /= max(float(np.linalg.norm(out)), 1e-9)
+    return np.concatenate([line, (line[-1] + beyond * out)[None]])

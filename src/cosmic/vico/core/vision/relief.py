@@ -1,0 +1,156 @@
+"""Where a picture is darker or lighter than its ground, found at a quarter of its size."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from cosmic.vico.core.vision.grey import Floats32, Mask
+from cosmic.vico.hw.interface import Pixels
+
+# Wider bodies are tools, not fibres: the ground is what remains of them. Full-size pixels.
+WIDEST_PX = 64
+QUARTER = 4
+SMALL_PX = 420
+# Of 8-bit levels: less cannot be told from the steps of the converter.
+LEAST_LEVELS = 1.5
+NOISE_TIMES = 6.0
+OF_STRONGEST = 0.05
+# A network fills the picture, a fibre does not.
+CROWDED = 0.25
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Relief:
+    """What stands out from the ground, at reduced size.
+
+    Attributes
+    ----------
+    factor : int
+        Full-size pixels for one of these.
+    height : ndarray, shape (rows, columns), float32
+        Grey levels above (`lighter`) or below the ground.
+    mask : ndarray of uint8
+        1 where something stands out.
+    hollow : ndarray of uint8
+        1 where the inside of a hollow fibre was filled in.
+    crowded : bool
+        So much stands out that no single fibre can be told.
+    """
+
+    factor: int
+    lighter: bool
+    height: Floats32
+    mask: Mask
+    hollow: Mask
+    crowded: bool
+
+
+def reduction(shape: tuple[int, ...]) -> int:
+    """Return by how much a picture is reduced to look for fibres."""
+    return int(np.clip(round(max(shape) / SMALL_PX), 1, QUARTER))
+
+
+def reduced(image: Pixels, factor: int) -> Floats32:
+    """Return a picture at reduced size, smoothed where the reduction does not do it."""
+    rows, columns = (side // factor for side in image.shape)
+    part = image[: rows * factor, : columns * factor]
+    small = cv2.resize(part, (columns, rows), interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.GaussianBlur(small.astype(np.float32), (3, 3), 0.7), dtype=np.float32)
+
+
+def kernel(side: int) -> Mask:
+    """Return a round kernel of odd size."""
+    size = max(3, int(side) | 1)
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), dtype=np.uint8)
+
+
+def find_relief(image: Pixels) -> Relief:
+    """Return what stands out, choosing between darker and lighter by what looks like fibres."""
+    factor = reduction(image.shape)
+    small = reduced(image, factor)
+    side = int(min(WIDEST_PX, 0.3 * min(image.shape)) / factor) | 1
+    square = np.ones((max(3, side), max(3, side)), np.uint8)
+    hats = [
+        (lighter, stands_out(cv2.morphologyEx(small, kind, square)))
+        for lighter, kind in ((False, cv2.MORPH_BLACKHAT), (True, cv2.MORPH_TOPHAT))
+    ]
+    floor = LEAST_LEVELS if image.dtype == np.uint8 else LEAST_LEVELS * level_step(image)
+    strongest = max(float(np.percentile(height, 99.8)) for _, height in hats)
+    floor = max(floor, OF_STRONGEST * strongest)
+    found = [(lighter, height, threshold(height, floor)) for lighter, height in hats]
+    lighter, height, level = max(found, key=lambda each: fibre_like(each[1], each[2]))
+    mask = thresholded(height, level)
+    crowded = float(mask.mean()) > CROWDED
+    hollow = np.zeros_like(mask) if crowded else insides(mask, 24 / factor)
+    return Relief(factor, lighter, height, mask | hollow, hollow, crowded)
+
+
+def level_step(image: Pixels) -> float:
+    """Return how many levels of a 16-bit picture make one of 256 over the range it uses."""
+    low, high = (float(value) for value in np.percentile(image[::8, ::8], (0.5, 99.5)))
+    return max(1.0, (high - low) / 256.0)
+
+
+def stands_out(hat: Floats32) -> Floats32:
+    """Return a hat without the offset that noise gives it."""
+    return np.asarray(hat - np.median(hat), dtype=np.float32)
+
+
+def threshold(height: Floats32, floor: float) -> float:
+    """Return above what something stands out from noise."""
+    noise = 1.4826 * float(np.median(np.abs(height)))
+    return max(NOISE_TIMES * noise, floor)
+
+
+def fibre_like(height: Floats32, level: float) -> float:
+    """Return how much of what stands out is long and narrow."""
+    mask = (height > level).astype(np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+    if count < 2:
+        return 0.0
+    areas = stats[1:, cv2.CC_STAT_AREA].astype(float)
+    reach = np.hypot(stats[1:, cv2.CC_STAT_WIDTH], stats[1:, cv2.CC_STAT_HEIGHT]) + 0.0
+    sums = np.bincount(labels.ravel(), height.ravel(), count)[1:]
+    long = (reach**2 > 5.0 * areas) | (areas > 0.3 * areas.max())
+    return float((reach * (sums / areas) * long * (reach > 12)).sum())
+
+
+def thresholded(height: Floats32, level: float) -> Mask:
+    """Return what stands out by half of its own strength, so that blur does not widen it."""
+    mask = (height > level).astype(np.uint8)
+    count, labels = cv2.connectedComponents(mask, connectivity=8)
+    if count < 2:
+        return mask
+    order = np.argsort(labels.ravel(), kind="stable")
+    sizes = np.bincount(labels.ravel(), minlength=count)
+    firsts = np.concatenate([[0], np.cumsum(sizes)])
+    values = height.ravel()[order]
+    typical = np.full(count, np.inf)
+    for number in range(1, count):
+        if sizes[number] > 8:
+            typical[number] = np.percentile(values[firsts[number] : firsts[number + 1]], 75)
+    strongest = cv2.dilate(height, np.ones((11, 11), np.uint8))
+    asked = np.clip(0.4 * strongest, level, 0.55 * typical[labels])
+    return (mask.astype(bool) & (height > np.minimum(asked, 1e9))).astype(np.uint8)
+
+
+def insides(mask: Mask, widest: float) -> Mask:
+    """Return the long narrow gaps between two walls: the inside of a hollow fibre."""
+    closed = cv2.morphologyEx(
+        cv2.copyMakeBorder(mask, 16, 16, 16, 16, cv2.BORDER_CONSTANT, value=0),
+        cv2.MORPH_CLOSE,
+        kernel(int(widest)),
+    )[16:-16, 16:-16]
+    gaps = ((closed > 0) & (mask == 0)).astype(np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(gaps, connectivity=8)
+    if count < 2:
+        return gaps
+    depth = cv2.distanceTransform(gaps, cv2.DIST_L2, 3)
+    deepest = np.zeros(count)
+    np.maximum.at(deepest, labels.ravel(), depth.ravel())
+    thickness = np.maximum(2.0 * deepest - 1.0, 1.0)
+    areas = stats[:, cv2.CC_STAT_AREA]
+    long = (areas > 10.0 * thickness**2) & (areas > 20)
+    long[0] = False
+    return long[labels].astype(np.uint8)
