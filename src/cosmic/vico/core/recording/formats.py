@@ -1,0 +1,243 @@
+"""The formats that pictures are recorded in, and the names that recordings get."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from cosmic.frame.errors import RecordingError
+from cosmic.frame.file_names import NameOption, check_base_name, check_directory, file_name
+from cosmic.vico.hw.interface import CameraSettings, PixelFormat, Pixels
+
+SIDE_SUFFIX: Final = ".csv"
+
+
+class PictureFormat(StrEnum):
+    """How pictures are recorded."""
+
+    FFV1 = "ffv1"
+    FAST = "fast"
+    SMALL = "small"
+    TIFF = "tiff"
+    PNG = "png"
+
+
+@dataclass(frozen=True, slots=True)
+class Traits:
+    """What a format is like.
+
+    Attributes
+    ----------
+    text : str
+        What the operator reads.
+    suffix : str
+        Of the file, or of each picture of a sequence.
+    sequence : bool
+        A directory with a file a picture, not one file.
+    lossless : bool
+        Every pixel comes back as it was.
+    ratio : float
+        Bytes in the file to bytes of the pixels, about, to tell how long a disk lasts.
+    codec, container : str
+        As FFmpeg names them; empty for sequences.
+    coded : mapping of PixelFormat to str
+        FFmpeg's pixel format by the camera's; what is missing cannot be recorded.
+    options : mapping of str to str
+        Of the codec.
+    threads : str
+        What its threads share out, "SLICE" or "FRAME"; PyAV's default is slower by half.
+    """
+
+    text: str
+    suffix: str
+    lossless: bool
+    ratio: float
+    sequence: bool = False
+    codec: str = ""
+    container: str = ""
+    coded: Mapping[PixelFormat, str] | None = None
+    options: Mapping[str, str] | None = None
+    threads: str = "SLICE"
+
+    def holds(self, pixel_format: PixelFormat) -> bool:
+        """Return whether pictures of `pixel_format` can be recorded."""
+        return self.coded is None or pixel_format in self.coded
+
+
+def _coded(mono8: str, mono16: str, rgb8: str) -> dict[PixelFormat, str]:
+    # 10 and 12 bits go as 16: FFmpeg would stretch them where it converts, and values must stay.
+    deep = (PixelFormat.MONO10, PixelFormat.MONO12, PixelFormat.MONO16)
+    found = {PixelFormat.MONO8: mono8, PixelFormat.RGB8: rgb8}
+    return found | dict.fromkeys(deep, mono16) if mono16 else found
+
+
+FORMATS: Final[Mapping[PictureFormat, Traits]] = {
+    PictureFormat.FFV1: Traits(
+        text="FFV1 in Matroska, lossless",
+        suffix=".mkv",
+        lossless=True,
+        ratio=0.55,
+        codec="ffv1",
+        container="matroska",
+        coded=_coded("gray", "gray16le", "bgr0"),
+        options={"level": "3", "slices": "16", "slicecrc": "1", "g": "1"},
+    ),
+    PictureFormat.FAST: Traits(
+        text="Huffman in NUT, lossless, for high frame rates",
+        suffix=".nut",
+        lossless=True,
+        ratio=0.7,
+        codec="ffvhuff",
+        container="nut",
+        coded=_coded("gray", "gray16le", "gbrp"),
+        threads="FRAME",
+    ),
+    PictureFormat.SMALL: Traits(
+        text="Motion JPEG in Matroska, small, 8 bits, not lossless",
+        suffix=".mkv",
+        lossless=False,
+        ratio=0.15,
+        codec="mjpeg",
+        container="matroska",
+        coded=_coded("yuvj420p", "", "yuvj444p"),
+    ),
+    PictureFormat.TIFF: Traits(
+        text="a TIFF a picture, uncompressed",
+        suffix=".tif",
+        lossless=True,
+        ratio=1.0,
+        sequence=True,
+    ),
+    PictureFormat.PNG: Traits(
+        text="a PNG a picture, lossless, slow",
+        suffix=".png",
+        lossless=True,
+        ratio=0.65,
+        sequence=True,
+    ),
+}
+
+# Endings that would say something else than what is in the file.
+_MEANT: Final = {".mkv", ".nut", ".avi", ".mp4", ".mov", ".tif", ".tiff", ".png", SIDE_SUFFIX}
+
+
+def traits(picture_format: PictureFormat | str) -> Traits:
+    """Return what a format is like.
+
+    Raises
+    ------
+    RecordingError
+        There is no such format; the text lists those there are.
+    """
+    try:
+        return FORMATS[PictureFormat(picture_format)]
+    except ValueError as exc:
+        known = ", ".join(PictureFormat)
+        raise RecordingError(
+            f"there is no picture format {str(picture_format)!r}; choose one of {known}"
+        ) from exc
+
+
+def check_pixels(picture_format: PictureFormat, pixel_format: PixelFormat) -> None:
+    """Refuse pixels that a format cannot keep.
+
+    Raises
+    ------
+    RecordingError
+        It cannot; the text says which can.
+    """
+    if not traits(picture_format).holds(pixel_format):
+        able = ", ".join(name for name, each in FORMATS.items() if each.holds(pixel_format))
+        raise RecordingError(
+            f"format {picture_format} cannot keep {pixel_format} pictures; choose one of {able}"
+        )
+
+
+def picture_bytes_per_s(picture_format: PictureFormat, settings: CameraSettings) -> float:
+    """Return how fast a recording grows, about."""
+    sample_bytes = {PixelFormat.MONO8: 1, PixelFormat.RGB8: 3}.get(settings.pixel_format, 2)
+    raw = settings.roi.width_px * settings.roi.height_px * sample_bytes * settings.rate_hz
+    return raw * traits(picture_format).ratio
+
+
+def picture_file_name(
+    base: str,
+    picture_format: PictureFormat,
+    option: NameOption = NameOption.NONE,
+    *,
+    when: datetime | None = None,
+    directory: Path | None = None,
+) -> str:
+    """Return the whole name of a recording, or of the directory of a sequence.
+
+    Parameters, Raises
+    ------------------
+    As `cosmic.frame.file_names.file_name`. A number is in use when a recording of any format
+    has it, since they share the name of the side file.
+    """
+    endings = {"", SIDE_SUFFIX, *(each.suffix for each in FORMATS.values())}
+    suffix = recording_suffix(picture_format)
+    return file_name(
+        base, option, suffix=suffix, when=when, directory=directory, taken_by=sorted(endings)
+    )
+
+
+def recording_suffix(picture_format: PictureFormat) -> str:
+    """Return the ending of a recording's path; none for the directory of a sequence."""
+    found = traits(picture_format)
+    return "" if found.sequence else found.suffix
+
+
+def checked_path(path: Path, picture_format: PictureFormat) -> Path:
+    """Return the absolute path of a recording, with the ending of its format.
+
+    Raises
+    ------
+    RecordingError
+        Its name or its directory forbid it, or its ending is another format's.
+    """
+    suffix = recording_suffix(picture_format)
+    name = check_base_name(path.name)
+    if name.lower().endswith(suffix or "/"):
+        name = name[: len(name) - len(suffix)]
+    other = Path(name).suffix.lower()
+    if other in _MEANT:
+        raise RecordingError(
+            f"name {path.name!r}: {other} is not the ending of format {picture_format}; leave it "
+            f"out, or end it in {suffix or 'nothing, for it names a directory'}"
+        )
+    return check_directory(path.parent) / (check_base_name(name) + suffix)
+
+
+def side_path_of(path: Path) -> Path:
+    """Return where the side file of a recording lies."""
+    known = {recording_suffix(each) for each in PictureFormat} - {""}
+    stem = path.stem if path.suffix.lower() in known else path.name
+    return path.with_name(stem + SIDE_SUFFIX)
+
+
+def kind_of(data: Pixels, pixel_format: PixelFormat) -> tuple[tuple[int, ...], str, PixelFormat]:
+    """Return what all pictures of a recording have in common.
+
+    Raises
+    ------
+    RecordingError
+        The pixels are not of the kind that `pixel_format` says.
+    """
+    deep = pixel_format not in {PixelFormat.MONO8, PixelFormat.RGB8}
+    layers = data.shape[2:] == (3,) if pixel_format is PixelFormat.RGB8 else data.ndim == 2
+    if not layers or data.dtype != (np.uint16 if deep else np.uint8) or 0 in data.shape:
+        raise RecordingError(
+            f"a picture said to be {pixel_format} has shape {data.shape} and type {data.dtype}; "
+            "it cannot be recorded"
+        )
+    return data.shape, str(data.dtype), pixel_format
+
+
+def words(items: Iterable[object]) -> str:
+    """Return a list for a message."""
+    return ", ".join(str(each) for each in items) or "none"

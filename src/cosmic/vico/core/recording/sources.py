@@ -1,0 +1,211 @@
+"""Where the pictures of a recording are read from: a video file, or a directory."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+import numpy as np
+
+from cosmic.frame.errors import RecordingError
+from cosmic.vico.core.recording.planes import from_video_frame
+from cosmic.vico.core.recording.sequence_writer import picture_files
+from cosmic.vico.hw.interface import Pixels
+
+if TYPE_CHECKING:
+    import av
+
+# A picture with an error in it is told, not mended.
+_STRICT: Final = {"err_detect": "crccheck+explode"}
+
+
+class PictureSource(Protocol):
+    """Gives the pictures in their order."""
+
+    def count(self) -> int:
+        """Return how many whole pictures there are; looks through the file."""
+
+    def pictures(self) -> Iterator[Pixels]:
+        """Yield all pictures, from the first."""
+
+    def picture(self, index: int, stamp: int | None) -> Pixels:
+        """Return one picture; `stamp` says at which millisecond it lies, where that is known."""
+
+    def close(self) -> None:
+        """Give the files back; harmless the second time."""
+
+
+class SequenceSource:
+    """A directory with a file a picture."""
+
+    def __init__(self, directory: Path) -> None:
+        self._files = list(picture_files(directory).values())
+
+    def count(self) -> int:
+        """Return how many pictures there are."""
+        return len(self._files)
+
+    def pictures(self) -> Iterator[Pixels]:
+        """Yield all pictures."""
+        for index in range(len(self._files)):
+            yield self.picture(index)
+
+    def picture(self, index: int, stamp: int | None = None) -> Pixels:
+        """Return one picture; `stamp` is not needed."""
+        del stamp
+        return read_picture(self._files[index])
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+def read_picture(path: Path) -> Pixels:
+    """Return the pixels of a TIFF or PNG.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be read.
+    """
+    import cv2
+    import tifffile
+
+    try:
+        if path.suffix == ".png":
+            coded = np.frombuffer(path.read_bytes(), np.uint8)
+            data: Any = cv2.imdecode(coded, cv2.IMREAD_UNCHANGED)
+            if data is not None and data.ndim == 3:
+                data = np.ascontiguousarray(data[:, :, ::-1])
+        else:
+            data = tifffile.imread(path)
+    except (OSError, ValueError, cv2.error, tifffile.TiffFileError) as exc:
+        raise RecordingError(f"{path}: cannot be read ({exc})") from exc
+    if data is None:
+        raise RecordingError(f"{path}: is no picture, or damaged")
+    found: Pixels = data
+    return found
+
+
+class VideoSource:
+    """A video file, finished, running or cut off.
+
+    Parameters
+    ----------
+    colour : bool
+        The pictures have three layers.
+    whole : bool
+        The file was closed in order, so that damage in it is told; else the pictures end there.
+    """
+
+    def __init__(self, path: Path, *, colour: bool, whole: bool) -> None:
+        self._path = path
+        self._colour = colour
+        self._whole = whole
+        self._container: Any = None
+        self._next: tuple[int, Iterator[av.VideoFrame]] | None = None
+        self._open()
+
+    def _open(self) -> None:
+        import av
+
+        self.close()
+        self._failure = av.FFmpegError
+        try:
+            self._container = av.open(str(self._path))
+            self._stream = self._container.streams.video[0]
+            self._stream.codec_context.options = _STRICT
+            self._stream.thread_type = "SLICE"
+        except (av.FFmpegError, IndexError) as exc:
+            raise RecordingError(
+                f"{self._path}: no picture in it can be read ({exc}); is it damaged, or was the "
+                "program ended before the first picture was written?"
+            ) from exc
+
+    def count(self) -> int:
+        """Return how many whole pictures there are; looks through the file."""
+        self._open()
+        try:
+            return sum(1 for _ in self._packets())
+        finally:
+            self._open()
+
+    def pictures(self) -> Iterator[Pixels]:
+        """Yield all pictures."""
+        self._open()
+        for frame in self._frames():
+            yield self._pixels(frame)
+
+    def picture(self, index: int, stamp: int | None) -> Pixels:
+        """Return one picture."""
+        if self._next is None or self._next[0] != index:
+            found = self._sought(stamp) if stamp is not None else None
+            if found is None:
+                found = self._counted(index)
+            self._next = (index, found)
+        frames = self._next[1]
+        frame = next(frames, None)
+        if frame is None:
+            raise RecordingError(f"{self._path}: picture {index} cannot be read")
+        self._next = (index + 1, frames)
+        return self._pixels(frame)
+
+    def _counted(self, index: int) -> "Iterator[av.VideoFrame]":
+        """Return the pictures from `index` on, found by counting."""
+        self._open()
+        frames = self._frames()
+        for _ in range(index):
+            next(frames, None)
+        return frames
+
+    def _sought(self, stamp: int) -> "Iterator[av.VideoFrame] | None":
+        """Return the pictures from the one at `stamp` on; None when it is not found there."""
+        base = self._stream.time_base
+        try:
+            self._container.seek(round(stamp / 1000 / base), stream=self._stream)
+        except self._failure:
+            return None
+        frames = self._frames()
+        for frame in frames:
+            at = round(frame.pts * base * 1000)
+            if at == stamp:
+                return _with(frame, frames)
+            if at > stamp:
+                return None
+        return None
+
+    def close(self) -> None:
+        """Give the file back; harmless the second time."""
+        self._next = None
+        if self._container is not None:
+            self._container.close()
+            self._container = None
+
+    def _pixels(self, frame: "av.VideoFrame") -> Pixels:
+        return from_video_frame(frame, colour=self._colour)
+
+    def _packets(self) -> "Iterator[av.Packet[av.VideoStream]]":
+        """Yield whole packets, up to the first that is not."""
+        try:
+            for packet in self._container.demux(self._stream):
+                if packet.is_corrupt:
+                    self._tell("a picture is cut off")
+                    return
+                if packet.size:
+                    yield packet
+        except self._failure as exc:
+            self._tell(exc)
+
+    def _frames(self) -> "Iterator[av.VideoFrame]":
+        try:
+            for packet in self._packets():
+                yield from packet.decode()
+        except self._failure as exc:
+            self._tell(exc)
+
+    def _tell(self, why: object) -> None:
+        if self._whole:
+            raise RecordingError(f"{self._path}: is damaged; a picture cannot be read ({why})")
+
+
+def _with(first: "av.VideoFrame", rest: "Iterator[av.VideoFrame]") -> "Iterator[av.VideoFrame]":
+    yield first
+    yield from rest
