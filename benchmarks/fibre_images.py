@@ -231,7 +231,7 @@ ROWS = {
     "noise 12": Recipe(noise=12.0),
     "blur 4": Recipe(blur_px=4.0),
     "uneven 60 %, 80 specks": Recipe(uneven=0.6, specks=80),
-    "crossing itself": Recipe(crossing=True, turns=1.0, length_px=(900.0, 2000.0)),
+    "crossing itself": Recipe(crossing=True, turns=3.0, length_px=(900.0, 2000.0)),
 }
 
 

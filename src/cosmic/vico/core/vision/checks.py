@@ -33,7 +33,7 @@ class Limits:
     fade: float = 0.55
     width_spread: float = 0.3
     seen: float = 0.6
-    gap_widths: float = 8.0
+    gap_widths: float = 14.0
 
 
 LIMITS = Limits()

@@ -104,7 +104,7 @@ def fibre(scene: Scene, strand: Strand, course: Course) -> Fibre:
     line = resampled(course.line, 2.0)
     fine = resampled(course.line, 0.5)
     length = float(arc_lengths(fine)[-1])
-    projected, orientation = longest_extent(fine)
+    projected, orientation = longest_extent(line)
     widths = filled(course.widths, len(line))
     width = float(widths.mean())
     kinks = kink_angles_deg(line, width)

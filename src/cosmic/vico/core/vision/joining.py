@@ -12,6 +12,9 @@ from cosmic.vico.core.vision.smoothing import arc_lengths
 
 # Bending, in squared radians, that is worse than two loose ends in a crossing.
 LOOSE = 0.7
+# Two fibres that cross at a small angle lie on each other over so many widths.
+LONGEST_BRIDGE = 14.0
+EASY = 0.5
 MOST_STUBS = 8
 AMBIGUOUS = "a crossing can be read in two ways"
 ON_ANOTHER = "an end lies on a fibre, so that it cannot be seen"
@@ -118,11 +121,34 @@ def merged(graph: Graph, half_width: list[float]) -> tuple[set[int], list[int]]:
         short = each.length < 1.3 * width + 1.0
         inner = each.points[1:-1] if len(each.points) > 2 else each.points
         wide = each.length < 8.0 * width and graph.half_width(inner) > 0.62 * width
-        if (short or wide) and each.nodes[0] != each.nodes[1]:
+        through = each.length < LONGEST_BRIDGE * width and crosses(graph, index, half_width)
+        if (short or wide or through) and each.nodes[0] != each.nodes[1]:
             bridges.add(index)
             old, new = group[each.nodes[0]], group[each.nodes[1]]
             group = [new if label == old else label for label in group]
     return bridges, group
+
+
+def crosses(graph: Graph, bridge: int, half_width: list[float]) -> bool:
+    """Return whether two smooth curves could share a branch: a crossing at a small angle."""
+    sides = []
+    for node in graph.branches[bridge].nodes:
+        stubs = [
+            (index, end)
+            for index, each in enumerate(graph.branches)
+            if index != bridge
+            for end in (0, 1)
+            if each.nodes[end] == node
+        ]
+        if len(stubs) != 2:
+            return False
+        sides.append(
+            [leaving(graph.branches[i], i, end, half_width[i]) for i, end in stubs]
+        )
+    (a, b), (c, d) = sides
+    return min(
+        max(bending(a, c), bending(b, d)), max(bending(a, d), bending(b, c))
+    ) < EASY
 
 
 def make_joints(graph: Graph, bridges: set[int], group: list[int]) -> dict[int, Joint]:
@@ -142,20 +168,37 @@ def make_joints(graph: Graph, bridges: set[int], group: list[int]) -> dict[int, 
     }
 
 
-def outward(branch: Branch, end: int, half_width: float) -> tuple[Floats, Floats]:
-    """Return where a branch leaves its crossing, and in which direction."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Exit:
+    """How a branch leaves its crossing: place, direction and curvature."""
+
+    branch: int
+    place: Floats
+    direction: Floats
+    curvature: float
+
+
+def leaving(branch: Branch, number: int, end: int, half_width: float) -> Exit:
+    """Return how a branch leaves its crossing, where its skeleton is no longer bent by it."""
     points = branch.points if end == 0 else branch.points[::-1]
     s = arc_lengths(points)
     total = float(s[-1])
-    near = min(1.2 * half_width + 1.0, 0.3 * total)
-    far = min(near + max(6.0, 4.0 * half_width), 0.9 * total if total > 12 else total)
-    part = points[(s >= near) & (s <= far)]
-    if len(part) < 2:
-        part = points[[0, -1]]
-    middle = part.mean(axis=0)
-    _, _, axes = np.linalg.svd(part - middle, full_matrices=False)
-    direction = axes[0] if (part[-1] - part[0]) @ axes[0] >= 0 else -axes[0]
-    return middle, direction
+    near = min(2.0 * half_width + 1.0, 0.3 * total)
+    far = min(near + max(12.0, 10.0 * half_width), 0.9 * total if total > 12 else total)
+    chosen = (s >= near) & (s <= far)
+    if chosen.sum() < 3:
+        chosen[:] = True
+    t = s[chosen] - near
+    part = points[chosen]
+    order = 2 if len(part) >= 10 else 1
+    x, y = (np.polyfit(t, part[:, axis], order) for axis in (0, 1))
+    slope = np.array([x[-2], y[-2]])
+    speed = max(float(np.linalg.norm(slope)), 1e-6)
+    bow = 2.0 * np.array([x[0], y[0]]) if order == 2 else np.zeros(2)
+    curvature = float(slope[0] * bow[1] - slope[1] * bow[0]) / speed**3
+    most = 0.3 / half_width
+    place = np.array([x[-1], y[-1]])
+    return Exit(number, place, slope / speed, float(np.clip(curvature, -most, most)))
 
 
 def turn(first: Floats, last: Floats) -> float:
@@ -163,14 +206,18 @@ def turn(first: Floats, last: Floats) -> float:
     return float(np.arctan2(first[0] * last[1] - first[1] * last[0], first @ last))
 
 
-def bending(first: tuple[Floats, Floats], last: tuple[Floats, Floats]) -> float:
-    """Return how much a curve must bend to enter by one stub and leave by another."""
-    way = last[0] - first[0]
-    if float(np.linalg.norm(way)) < 1e-6:
-        return np.pi**2
-    enter = turn(way, -first[1])
-    leave = turn(way, last[1])
-    return enter**2 + enter * leave + leave**2
+def bending(first: Exit, last: Exit) -> float:
+    """Return how much a curve must leave its bow to enter by one branch and leave by another."""
+    way = last.place - first.place
+    gap = float(np.linalg.norm(way))
+    if gap < 1e-6 or first.branch == last.branch:
+        # A fibre has ends: a branch is not joined to itself.
+        return float(np.pi**2)
+    bow = 0.5 * (last.curvature - first.curvature) * gap
+    change = (last.curvature + first.curvature) * gap
+    enter = turn(way, -first.direction) + 0.5 * bow
+    leave = turn(way, last.direction) - 0.5 * bow
+    return enter**2 + enter * leave + leave**2 + change**2 / 12.0
 
 
 @cache
@@ -205,10 +252,11 @@ def pair(graph: Graph, joint: Joint, half_width: list[float]) -> None:
         for stub in joint.stubs:
             joint.doubts[stub].append(CLUSTER)
         return
-    leaving = [
-        outward(graph.branches[index], end, half_width[index]) for index, end in joint.stubs
+    exits = [
+        leaving(graph.branches[index], index, end, half_width[index])
+        for index, end in joint.stubs
     ]
-    costs = np.array([[bending(a, b) for b in leaving] for a in leaving])
+    costs = np.array([[bending(a, b) for b in exits] for a in exits])
     ways = pairings(count, count % 2 + (2 if count > 3 else 0))
     prices = np.array(
         [sum(costs[i, j] for i, j in way) + LOOSE * (count - 2 * len(way)) for way in ways]

@@ -1,8 +1,7 @@
 """Length, curl, kinks and pose of a centre line (ISO 16065-1, TAPPI T 271)."""
 
+import cv2
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
-from scipy.spatial.distance import pdist, squareform
 
 from cosmic.vico.core.vision.grey import Floats
 from cosmic.vico.core.vision.smoothing import arc_lengths, directions
@@ -14,16 +13,18 @@ KINK_WEIGHTS = ((91.0, 4), (46.0, 3), (21.0, 2))
 
 def longest_extent(line: Floats) -> tuple[float, float]:
     """Return the largest distance between two points, and its direction in degrees."""
-    points = line
-    try:
-        points = line[np.unique(ConvexHull(line).vertices)]
-    except QhullError:
-        pass
-    distance = squareform(pdist(points))
+    points = hull_of(line)
+    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     first, last = np.unravel_index(int(np.argmax(distance)), distance.shape)
     way = points[last] - points[first]
     angle = float(np.degrees(np.arctan2(way[1], way[0]))) % 180.0
     return float(distance[first, last]), angle
+
+
+def hull_of(line: Floats) -> Floats:
+    """Return the corners of the convex hull of a line: the only points that can be far apart."""
+    corners = cv2.convexHull(line.astype(np.float32)).reshape(-1, 2)
+    return np.asarray(corners, dtype=np.float64)
 
 
 def kink_angles_deg(line: Floats, width: float) -> list[float]:

@@ -34,6 +34,7 @@ class Profiles:
     clear: Flags
     noise: float
     normals: Floats
+    ground: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,12 +109,12 @@ def cross_sections(scene: Scene, line: Floats, width: float, reach: float) -> Pr
     places = line[:, None, :] + across[None, :, None] * normals[:, None, :]
     values = sample(scene.image, places)
     inside = np.abs(across) < 0.5 * width + 2.0
-    other = sample(scene.taken, scene.reduced(places)) > 0.25
-    outside = (places < -0.5).any(axis=2) | (places > scene.corner + 0.5).any(axis=2)
-    clear = ~outside & (inside[None, :] | ~other)
+    clear = inside[None, :] | (sample(scene.taken, scene.reduced(places)) < 0.25)
+    if (line < reach + 1.0).any() or (line > scene.corner - reach - 1.0).any():
+        clear &= ((places >= -0.5) & (places <= scene.corner + 0.5)).all(axis=2)
     ground, noise = ground_of(values, clear & ~inside[None, :], across)
     height = scene.sign * (values - ground)
-    return Profiles(across, height, clear, noise, normals)
+    return Profiles(across, height, clear, noise, normals, ground[:, count])
 
 
 def ground_of(values: Floats, free: Flags, across: Floats) -> tuple[Floats, float]:
@@ -132,11 +133,9 @@ def ground_of(values: Floats, free: Flags, across: Floats) -> tuple[Floats, floa
     reach = float(np.abs(across).max())
     share = np.clip((across / (1.4 * reach) + 0.5), 0.0, 1.0)[None, :]
     ground = levels[0][:, None] * (1 - share) + levels[1][:, None] * share
-    rest = np.where(free, values - ground, np.nan)
-    if not free.any():
-        return ground, 0.0
-    spread = np.abs(rest[free])
-    return ground, 1.4826 * float(np.median(spread))
+    thin = max(1, len(values) // 60)
+    spread = np.abs(values[::thin] - ground[::thin])[free[::thin]]
+    return ground, 1.4826 * float(np.median(spread)) if len(spread) else 0.0
 
 
 def along(height: Floats, sigma: float) -> Floats:

@@ -21,7 +21,7 @@ from cosmic.vico.core.vision.profiles import (
 from cosmic.vico.core.vision.smoothing import arc_lengths, resampled, smooth
 
 STEP_PX = 2.0
-ROUNDS = 3
+ROUNDS = 2
 
 
 @dataclass(slots=True, eq=False)
@@ -48,7 +48,7 @@ class Course:
     blur_px: float = 0.0
     scatter_px: float = 0.0
     mean: Floats = field(default_factory=lambda: np.zeros(0))
-    spans: list[float] = field(default_factory=list)
+    ground: Floats = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,24 +69,36 @@ class Neighbours:
 def refine(scene: Scene, strand: Strand, neighbours: Neighbours) -> Course | None:
     """Return the exact course of a strand, or None where there is no fibre after all."""
     width = max(2.0, (2.0 * strand.half_width - 0.5) * scene.factor)
-    line = resampled(scene.full(strand.points), STEP_PX)
+    line = first_line(scene, strand, max(3.0 * width, 6.0 * scene.factor))
     if len(line) < 6:
         return None
-    wave = max(3.0 * width, 6.0 * scene.factor) / STEP_PX
-    line = resampled(smooth(line, np.ones(len(line)), wave), STEP_PX)
     course = Course(
         line, width, np.ones(len(line), bool), np.full(len(line), width), np.ones(len(line)), []
     )
     centre_roughly(scene, course, neighbours)
     for number in range(ROUNDS):
-        if not measure(scene, course, neighbours, last=number == ROUNDS - 1):
+        if not measure(scene, course, neighbours):
             return None
         course.ends = both_ends(scene, course, strand, 2.0 * scene.factor if number == 0 else 2.0)
         stretch(course)
         if len(course.line) < 6:
             return None
-    measure(scene, course, neighbours, last=True)
+    measure(scene, course, neighbours)
     return course
+
+
+def first_line(scene: Scene, strand: Strand, wave_px: float) -> Floats:
+    """Return the way of a strand, smooth, and through its crossings as its sides lead."""
+    points = scene.full(strand.points)
+    s = arc_lengths(points)
+    at = np.arange(0.0, float(s[-1]), STEP_PX)
+    line = np.column_stack([np.interp(at, s, points[:, axis]) for axis in (0, 1)])
+    after = np.clip(np.searchsorted(s, at), 1, len(s) - 1)
+    gap = s[after] - s[after - 1]
+    weights = np.where(gap > 3.0 * scene.factor, 0.0, 1.0)
+    if (weights > 0).sum() < 6:
+        return line[:0]
+    return resampled(smooth(line, weights, wave_px / STEP_PX), STEP_PX)
 
 
 def excluded(course: Course, neighbours: Neighbours) -> Flags:
@@ -130,7 +142,7 @@ def move(
     course.line = line
 
 
-def measure(scene: Scene, course: Course, neighbours: Neighbours, *, last: bool) -> bool:
+def measure(scene: Scene, course: Course, neighbours: Neighbours) -> bool:
     """Find edges, width and contrast along a line and move it to the middle; False: no fibre."""
     course.line = resampled(course.line, STEP_PX)
     profiles = cross_sections(scene, course.line, course.width, 1.2 * course.width + 8.0)
@@ -150,8 +162,7 @@ def measure(scene: Scene, course: Course, neighbours: Neighbours, *, last: bool)
     weights = np.where(inner if inner.sum() >= 4 else good, 1.0, 0.0)
     offset = np.where(good, 0.5 * (edges.left + edges.right), 0.0)
     wave = max(20.0, 2.0 * course.width) * (1.0 + 4.0 * min(ratio, 1.0))
-    if not last or True:
-        move(course, profiles, offset, weights, wave)
+    move(course, profiles, offset, weights, wave)
     return True
 
 
@@ -175,6 +186,7 @@ def take(
     course.widths = np.where(course.good, widths, np.nan)
     course.contrast = edges.contrast
     course.noise = profiles.noise
+    course.ground = profiles.ground
     course.blur_px = edges.steepness_px
     course.mean = edges.mean
 
@@ -184,35 +196,21 @@ def both_ends(scene: Scene, course: Course, strand: Strand, extra: float) -> lis
     if strand.closed:
         return [End(EndKind.HIDDEN, 0.0, course.width)] * 2
     found = []
-    for line, contrast in (
-        (course.line[::-1], course.contrast[::-1]),
-        (course.line, course.contrast),
+    for line, contrast, ground in (
+        (course.line[::-1], course.contrast[::-1], course.ground[::-1]),
+        (course.line, course.contrast, course.ground),
     ):
         count = max(4, int(3 * course.width / STEP_PX))
         height = float(np.median(contrast[-count:]))
         level = Level(
             width=course.width,
             contrast=height,
-            ground=ground_at(scene, line, course.width),
+            ground=float(np.median(ground[-count:])),
             noise=course.noise,
             search_px=1.5 * course.width + 4.0 + extra,
         )
         found.append(find_end(scene, line, level))
     return found
-
-
-def ground_at(scene: Scene, line: Floats, width: float) -> float:
-    """Return the grey level of the ground beside the end of a line."""
-    count = max(4, int(2 * width / STEP_PX))
-    profiles = cross_sections(scene, line[-count - 8 :], width, 1.2 * width + 8.0)
-    beside = profiles.clear & (np.abs(profiles.across) > 0.5 * width + 3.0)[None, :]
-    from cosmic.vico.core.vision.profiles import sample
-
-    places = line[-count - 8 :][:, None, :] + (
-        profiles.across[None, :, None] * profiles.normals[:, None, :]
-    )
-    values = sample(scene.image, places)
-    return float(np.median(values[beside])) if beside.any() else float(np.median(values))
 
 
 def stretch(course: Course) -> None:

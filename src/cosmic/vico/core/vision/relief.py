@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from cosmic.vico.core.vision.grey import Floats32, Mask
 from cosmic.vico.hw.interface import Pixels
@@ -44,6 +45,40 @@ class Relief:
     mask: Mask
     hollow: Mask
     crowded: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pieces:
+    """The connected pieces of a mask.
+
+    Attributes
+    ----------
+    order : ndarray of int
+        Flat places of their pixels, piece after piece.
+    firsts, areas : ndarray of int
+        Where each piece begins in `order`, and its number of pixels.
+    """
+
+    order: npt.NDArray[np.intp]
+    firsts: npt.NDArray[np.intp]
+    areas: npt.NDArray[np.intp]
+
+    @classmethod
+    def of(cls, mask: Mask) -> "Pieces":
+        """Return the pieces of a mask."""
+        _, labels = cv2.connectedComponents(mask, connectivity=8)
+        places = np.flatnonzero(mask)
+        found = labels.ravel()[places]
+        order = places[np.argsort(found, kind="stable")]
+        areas = np.bincount(found)[1:] if len(found) else np.zeros(0, np.intp)
+        firsts = np.concatenate([[0], np.cumsum(areas)[:-1]]) if len(areas) else areas
+        return cls(order, firsts.astype(np.intp), areas)
+
+    def deepest(self, mask: Mask) -> Floats32:
+        """Return the largest distance to the outside in each piece."""
+        framed = cv2.copyMakeBorder(mask, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
+        depth = cv2.distanceTransform(framed, cv2.DIST_L2, 3)[1:-1, 1:-1]
+        return np.asarray(np.maximum.reduceat(depth.ravel()[self.order], self.firsts))
 
 
 def reduction(shape: tuple[int, ...]) -> int:
@@ -104,53 +139,47 @@ def threshold(height: Floats32, floor: float) -> float:
 
 
 def fibre_like(height: Floats32, level: float) -> float:
-    """Return how much of what stands out is long and narrow."""
+    """Return how much of what stands out is long and narrow, by length times contrast."""
     mask = (height > level).astype(np.uint8)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    if count < 2:
+    pieces = Pieces.of(mask)
+    if not len(pieces.areas):
         return 0.0
-    areas = stats[1:, cv2.CC_STAT_AREA].astype(float)
-    reach = np.hypot(stats[1:, cv2.CC_STAT_WIDTH], stats[1:, cv2.CC_STAT_HEIGHT]) + 0.0
-    sums = np.bincount(labels.ravel(), height.ravel(), count)[1:]
-    long = (reach**2 > 5.0 * areas) | (areas > 0.3 * areas.max())
-    return float((reach * (sums / areas) * long * (reach > 12)).sum())
+    thickness = np.maximum(2.0 * pieces.deepest(mask) - 1.0, 1.0)
+    slender = np.maximum(pieces.areas / thickness - 4.0 * thickness - 4.0, 0.0)
+    contrast = np.add.reduceat(height.ravel()[pieces.order], pieces.firsts) / pieces.areas
+    return float((slender * contrast).sum())
 
 
 def thresholded(height: Floats32, level: float) -> Mask:
     """Return what stands out by half of its own strength, so that blur does not widen it."""
     mask = (height > level).astype(np.uint8)
-    count, labels = cv2.connectedComponents(mask, connectivity=8)
-    if count < 2:
+    pieces = Pieces.of(mask)
+    if not len(pieces.areas):
         return mask
-    order = np.argsort(labels.ravel(), kind="stable")
-    sizes = np.bincount(labels.ravel(), minlength=count)
-    firsts = np.concatenate([[0], np.cumsum(sizes)])
-    values = height.ravel()[order]
-    typical = np.full(count, np.inf)
-    for number in range(1, count):
-        if sizes[number] > 8:
-            typical[number] = np.percentile(values[firsts[number] : firsts[number + 1]], 75)
-    strongest = cv2.dilate(height, np.ones((11, 11), np.uint8))
-    asked = np.clip(0.4 * strongest, level, 0.55 * typical[labels])
-    return (mask.astype(bool) & (height > np.minimum(asked, 1e9))).astype(np.uint8)
+    values = height.ravel()[pieces.order]
+    number = np.repeat(np.arange(len(pieces.areas)), pieces.areas)
+    ranked = values[np.lexsort((values, number))]
+    typical = ranked[pieces.firsts + (3 * pieces.areas) // 4]
+    strongest = cv2.dilate(height, np.ones((11, 11), np.uint8)).ravel()[pieces.order]
+    asked = np.clip(0.4 * strongest, level, 0.55 * np.repeat(typical, pieces.areas))
+    found = np.zeros(mask.size, np.uint8)
+    found[pieces.order[values > asked]] = 1
+    return found.reshape(mask.shape)
 
 
 def insides(mask: Mask, widest: float) -> Mask:
     """Return the long narrow gaps between two walls: the inside of a hollow fibre."""
+    edge = 16
     closed = cv2.morphologyEx(
-        cv2.copyMakeBorder(mask, 16, 16, 16, 16, cv2.BORDER_CONSTANT, value=0),
+        cv2.copyMakeBorder(mask, edge, edge, edge, edge, cv2.BORDER_CONSTANT, value=0),
         cv2.MORPH_CLOSE,
         kernel(int(widest)),
-    )[16:-16, 16:-16]
+    )[edge:-edge, edge:-edge]
     gaps = ((closed > 0) & (mask == 0)).astype(np.uint8)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(gaps, connectivity=8)
-    if count < 2:
-        return gaps
-    depth = cv2.distanceTransform(gaps, cv2.DIST_L2, 3)
-    deepest = np.zeros(count)
-    np.maximum.at(deepest, labels.ravel(), depth.ravel())
-    thickness = np.maximum(2.0 * deepest - 1.0, 1.0)
-    areas = stats[:, cv2.CC_STAT_AREA]
-    long = (areas > 10.0 * thickness**2) & (areas > 20)
-    long[0] = False
-    return long[labels].astype(np.uint8)
+    found = np.zeros(mask.size, np.uint8)
+    pieces = Pieces.of(gaps)
+    if len(pieces.areas):
+        thickness = np.maximum(2.0 * pieces.deepest(gaps) - 1.0, 1.0)
+        long = (pieces.areas > 10.0 * thickness**2) & (pieces.areas > 20)
+        found[pieces.order[np.repeat(long, pieces.areas)]] = 1
+    return found.reshape(mask.shape)
