@@ -38,8 +38,8 @@ def stroke(painter: QPainter, path: QPainterPath, made: QPen) -> None:
 
 
 def line(painter: QPainter, begin: QPointF, end: QPointF, made: QPen) -> None:
-    """Draw a line over a dark rim."""
-    painter.setPen(pen(HALO, made.widthF() + 2.0))
+    """Draw a line over a faint dark rim."""
+    painter.setPen(pen(QColor(0, 0, 0, 80), made.widthF() + 2.0))
     painter.drawLine(begin, end)
     painter.setPen(made)
     painter.drawLine(begin, end)

@@ -38,7 +38,7 @@ class Crosshair(Layer):
         middle = to.map(QPointF((width - 1) / 2.0, (height - 1) / 2.0))
         box = to.mapRect(QRectF(-0.5, -0.5, width, height))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, on=False)
-        thin = pen(SKY, 1.0)
+        thin = pen(SKY, 1.0 if float(view.devicePixelRatioF()) == 1.0 else 1.5)
         line(painter, QPointF(box.left(), middle.y()), QPointF(box.right(), middle.y()), thin)
         line(painter, QPointF(middle.x(), box.top()), QPointF(middle.x(), box.bottom()), thin)
 
@@ -92,6 +92,40 @@ class ScaleBar(Layer):
         self.length_px = length / scale * screen_px
 
 
+class CornerText(Layer):
+    """One line in a corner of the view, on a dark ground.
+
+    Parameters
+    ----------
+    top : bool
+        In the upper left corner; else in the lower left one.
+    """
+
+    def __init__(self, *, top: bool) -> None:
+        self.text = ""
+        self._top = top
+
+    @override
+    def paint(self, painter: QPainter, view: PictureView) -> None:
+        if not self.text:
+            return
+        font = number_font(12)
+        metrics = QFontMetricsF(font)
+        room = QRectF(view.rect()).adjusted(STEP_PX, STEP_PX, -STEP_PX, -STEP_PX)
+        most = room.width() - 2 * STEP_PX
+        flags = int(Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap)
+        needed = metrics.boundingRect(QRectF(0.0, 0.0, most, room.height()), flags, self.text)
+        box = QRectF(room.left(), room.top(), needed.width() + 2 * STEP_PX, needed.height() + 6)
+        if not self._top:
+            box.moveBottom(room.bottom())
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(0, 0, 0, 185))
+        painter.drawRoundedRect(box, 3.0, 3.0)
+        painter.setFont(font)
+        painter.setPen(WHITE)
+        painter.drawText(box.adjusted(STEP_PX, 3, -STEP_PX + 2, -3), flags, self.text)
+
+
 class Note(Layer):
     """One line across the picture, for why it is not live."""
 
@@ -110,7 +144,7 @@ class Note(Layer):
         box = needed.adjusted(-16, -10, 16, 10)
         box.moveCenter(room.center())
         painter.setPen(pen(QColor(current_palette().refused), 2.0))
-        painter.setBrush(QColor(16, 18, 20, 225))
+        painter.setBrush(QColor(16, 18, 20, 242))
         painter.drawRoundedRect(box, 4.0, 4.0)
         painter.setFont(font)
         painter.setPen(WHITE)

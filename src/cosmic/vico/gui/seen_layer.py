@@ -69,7 +69,7 @@ class SeenLayer(Layer):
         middle = line_px[len(line_px) // 2]
         text = fibre_text(fibre, scale)
         place = to.map(QPointF(*middle))
-        box = label(painter, place, text, colour, QRectF(view.rect()))
+        box = label(painter, place, text, colour, QRectF(view.rect()), gap=14.0)
         said = "certain" if fibre.certain else f"{NOT_SURE}: " + "; ".join(fibre.doubts)
         self.labels.append((box, f"Fibre, {said}"))
 

@@ -47,11 +47,13 @@ class TaskBar(QWidget):
 
     def follow(self, task: Task) -> None:
         """Show how far `task` is."""
+        self.show()
         self._show_running(running=True)
         self.watch.follow(task)
 
     def say(self, text: str, *, refused: bool = False) -> None:
         """Show one line without a task."""
+        self.show()
         glyph = f"{state_look(State.REFUSED).glyph} " if refused else ""
         self.text.set_text(glyph + text)
 

@@ -1,0 +1,277 @@
+"""`CameraView`: the live picture of one camera, with all that belongs beside it."""
+
+from collections.abc import Callable
+from datetime import datetime
+from typing import Final
+
+from PySide6.QtCore import QSize, Qt, QTimer
+from PySide6.QtGui import QHideEvent, QShowEvent
+from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.build import named
+from cosmic.frame.gui.theme import STEP_PX, State, state_look
+from cosmic.frame.overrides import override
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.gui.camera_chooser import CameraChooser
+from cosmic.vico.gui.chain_panel import ChainPanel
+from cosmic.vico.gui.contrast_panel import ContrastPanel
+from cosmic.vico.gui.layers import CornerText, Crosshair, Note, ScaleBar
+from cosmic.vico.gui.levels import Histogram, histogram
+from cosmic.vico.gui.picture_tools import PictureTools
+from cosmic.vico.gui.picture_view import PictureView
+from cosmic.vico.gui.pointer_text import pointer_text
+from cosmic.vico.gui.ports import VicoPort
+from cosmic.vico.gui.record_bar import RecordBar
+from cosmic.vico.gui.relay import PortRelay
+from cosmic.vico.gui.seen import Pixel
+from cosmic.vico.gui.seen_layer import SeenLayer
+from cosmic.vico.gui.settings_form import SettingsForm
+from cosmic.vico.gui.status_row import StatusRow
+from cosmic.vico.gui.tool_row import ToolRow
+from cosmic.vico.hw.interface import FrameStatus, Trigger
+
+LOOK_MS: Final = 8
+LEAST_S: Final = 0.030
+"""Between two pictures: a little less than 1/30 s, so that no picture of 30 Hz waits for a turn."""
+READOUT_MS: Final = 200
+STALE_S: Final = 2.0
+DRAWER_PX: Final = 38 * STEP_PX
+
+
+class CameraView(QWidget):
+    """Shows the newest picture of a camera; content of a dock, or a window of its own.
+
+    Parameters
+    ----------
+    port : VicoPort
+        The application.
+    name : str
+        Which camera.
+    now : callable
+        Returns the local time.
+    """
+
+    def __init__(
+        self,
+        port: VicoPort,
+        name: str,
+        parent: QWidget | None = None,
+        *,
+        now: Callable[[], datetime] = datetime.now,
+    ) -> None:
+        super().__init__(parent)
+        self.setWindowTitle(f"Camera {name}")
+        self._camera, self._now = port.camera(name), now
+        self._newest: Picture | None = None
+        self._came, self._came_s, self._drawn_s = "", WALL.now_s(), 0.0
+        self._histogram: Histogram | None = None
+        self._pointed: Pixel | None = None
+        self.view = PictureView()
+        self.cross, self.scale_bar = Crosshair(), ScaleBar()
+        self.seen, self.note = SeenLayer(), Note()
+        self.row, self.status = ToolRow(), StatusRow(self._camera)
+        self.contrast, self.chain = ContrastPanel(), ChainPanel(self._camera)
+        self.form = SettingsForm(self._camera, self)
+        self.chooser = CameraChooser(port, name)
+        self.recorder = RecordBar(self._camera, now=now)
+        self.pointer, self.message = CornerText(top=False), CornerText(top=True)
+        self.tools = PictureTools(self.view, self.row, self._camera, self)
+        corners = (self.scale_bar, self.pointer, self.message)
+        self.view.layers = [self.seen, self.cross, *self.tools.layers, *corners, self.note]
+        self._look = QTimer(self, timerType=Qt.TimerType.PreciseTimer, interval=LOOK_MS)
+        self._readout = QTimer(self, interval=READOUT_MS)
+        self._build()
+        self._connect()
+        self._relay = PortRelay(port, self)
+        self._relay.changed.connect(self.refresh)
+        self.refresh()
+
+    # Putting it together
+
+    def _build(self) -> None:
+        self.view.setMinimumSize(24 * STEP_PX, 14 * STEP_PX)
+        self.drawer = self._make_drawer()
+        middle = QHBoxLayout()
+        middle.setSpacing(STEP_PX)
+        middle.addWidget(self.view, 1)
+        middle.addWidget(self.drawer)
+        light = QHBoxLayout()
+        light.setSpacing(2 * STEP_PX)
+        light.addWidget(self.form.exposure, 1)
+        light.addWidget(self.form.gain, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX // 2)
+        column.setSpacing(STEP_PX // 2)
+        column.addWidget(self.row)
+        column.addLayout(middle, 1)
+        column.addLayout(light)
+        column.addWidget(self.status)
+        column.addWidget(self.recorder)
+
+    def _make_drawer(self) -> QScrollArea:
+        content = QWidget()
+        column = QVBoxLayout(content)
+        column.setContentsMargins(0, 0, STEP_PX // 2, 0)
+        column.setSpacing(STEP_PX // 2)
+        for title, widgets in (
+            ("Contrast", (self.contrast,)),
+            ("Camera", (self.chooser, self.form.panel)),
+            ("Machine vision", (self.chain,)),
+        ):
+            group = QGroupBox(title)
+            inner = QVBoxLayout(group)
+            inner.setContentsMargins(0, 0, 0, 0)
+            inner.setSpacing(STEP_PX // 2)
+            for widget in widgets:
+                inner.addWidget(widget)
+            column.addWidget(group)
+        column.addStretch(1)
+        drawer = named(QScrollArea(), "dockScroll")
+        drawer.setWidgetResizable(True)
+        drawer.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        drawer.setFixedWidth(DRAWER_PX)
+        drawer.setWidget(content)
+        drawer.hide()
+        return drawer
+
+    def _connect(self) -> None:
+        self._look.timeout.connect(self.look)
+        self._readout.timeout.connect(self.read_out)
+        row, view = self.row, self.view
+        row.live.clicked.connect(self._on_live)
+        row.fit.clicked.connect(view.fit)
+        row.one_to_one.clicked.connect(view.one_to_one)
+        row.more.toggled.connect(self.drawer.setVisible)
+        for button, layer in (
+            (row.cross, self.cross),
+            (row.scale, self.scale_bar),
+            (row.found, self.seen),
+        ):
+            button.toggled.connect(_shower(layer, view))
+        self.contrast.levels_changed.connect(view.set_levels)
+        self.contrast.marks_changed.connect(view.set_marks)
+        view.pointed.connect(self._on_pointed)
+        self.tools.told.connect(self.say)
+        self.tools.region_chosen.connect(self.form.read_part)
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self._look.start()
+        self._readout.start()
+        self.look()
+        self.read_out()
+
+    @override
+    def hideEvent(self, event: QHideEvent) -> None:
+        super().hideEvent(event)
+        self._look.stop()  # nobody looks: the camera and its recording go on
+        self._readout.stop()
+
+    # Pictures
+
+    def look(self) -> None:
+        """Show the newest picture, unless the last one was shown just now."""
+        newest = self._camera.latest()
+        if newest is self._newest or newest is None:
+            return
+        now_s = WALL.now_s()
+        if now_s - self._drawn_s < LEAST_S or newest.frame.status is not FrameStatus.COMPLETE:
+            return
+        self._newest, self._drawn_s = newest, now_s
+        self._came, self._came_s = f"{self._now():%H:%M:%S}", now_s
+        self.seen.analysis = self._camera.analysis
+        self._show_old("")
+        self.view.show_picture(newest)
+
+    def read_out(self) -> None:
+        """Show numbers, histogram and state."""
+        picture = self.view.picture
+        if picture is not None and picture is self._newest:
+            self._histogram = histogram(picture.data, self.view.full)
+            self.contrast.show_histogram(self._histogram)
+        self.status.refresh(self._histogram)
+        self.recorder.refresh()
+        self._show_state()
+        self._show_pointer()
+
+    def _show_state(self) -> None:
+        camera, settings = self._camera, self._camera.settings
+        since = f"no picture since {self._came}" if self._came else "no picture yet"
+        if camera.problem:
+            self._show_old(f"{camera.problem}\n{since}")
+            self.status.show_state(State.ERROR, camera.problem)
+        elif not camera.running:
+            self._show_old("" if self._came else "not started")
+            self.status.show_state(State.UNKNOWN, f"stopped; {since}")
+        elif settings is not None and settings.trigger is not Trigger.FREE_RUN:
+            self.status.show_state(State.OK, f"waits for its trigger; {since}")
+        elif WALL.now_s() - self._came_s > self._patience_s:
+            self._show_old(since)
+            self.status.show_state(State.ERROR, since)
+        else:
+            self.status.show_state(State.OK, "live")
+
+    @property
+    def _patience_s(self) -> float:
+        settings = self._camera.settings
+        return STALE_S if settings is None else max(STALE_S, 3.0 / max(settings.rate_hz, 1e-3))
+
+    def _show_old(self, text: str) -> None:
+        if text == self.note.text:
+            return
+        self.note.text = text
+        self.view.set_greyed(bool(text))
+        self.view.redraw()
+
+    # Following the application
+
+    def refresh(self) -> None:
+        """Show what is in force."""
+        camera = self._camera
+        self.form.refresh()
+        self.chain.refresh()
+        self.row.show_running(camera.running, camera.problem)
+        self.row.show_targets(tuple(camera.targets), camera.calibration_problem)
+        self.tools.refresh()
+        self.recorder.refresh()
+        self._show_state()
+
+    def _on_live(self) -> None:
+        try:
+            (self._camera.stop if self._camera.running else self._camera.start)()
+        except CosmicError as exc:
+            self.say(f"{state_look(State.REFUSED).glyph} {exc}")
+        else:
+            self.say("")
+            self._came_s = WALL.now_s()
+        self.row.show_running(self._camera.running, self._camera.problem)
+
+    def _on_pointed(self, place_px: Pixel | None) -> None:
+        self._pointed = place_px
+        self._show_pointer()
+
+    def _show_pointer(self) -> None:
+        text = pointer_text(self._camera, self.view.picture, self._pointed)
+        if text != self.pointer.text:
+            self.pointer.text = text
+            self.view.redraw()
+
+    def say(self, text: str) -> None:
+        """Write one line over the picture, such as a refusal; empty takes it away."""
+        self.message.text = text
+        self.view.redraw()
+
+    @override
+    def sizeHint(self) -> QSize:
+        return QSize(90 * STEP_PX, 70 * STEP_PX)
+
+
+def _shower(layer: Crosshair | ScaleBar | SeenLayer, view: PictureView) -> Callable[[bool], None]:
+    def show(shown: bool) -> None:
+        layer.shown = shown
+        view.redraw()
+
+    return show

@@ -1,0 +1,125 @@
+"""Which tool the left button has, and what comes of it."""
+
+from PySide6.QtCore import QObject, QPointF, Signal
+from PySide6.QtWidgets import QMenu
+
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.theme import State, state_look
+from cosmic.vico.gui.camera_port import CameraPort
+from cosmic.vico.gui.measures import MeasureLayer
+from cosmic.vico.gui.picture_view import Layer, PictureView, Tool
+from cosmic.vico.gui.seen import Pixel
+from cosmic.vico.gui.tool_row import ToolRow
+from cosmic.vico.gui.tools import AngleTool, ClickTool, DistanceTool, RoiLayer, RoiTool
+
+
+class PictureTools(QObject):
+    """Joins the buttons to the picture.
+
+    Signals
+    -------
+    told(str)
+        One line for the operator: what was begun, or why not.
+    region_chosen(int, int, int, int)
+        x, y, width and height of the part to be read, in pixels of the picture shown.
+    """
+
+    told = Signal(str)
+    region_chosen = Signal(int, int, int, int)
+
+    def __init__(
+        self, view: PictureView, row: ToolRow, camera: CameraPort, parent: QObject
+    ) -> None:
+        super().__init__(parent)
+        self._view, self._row, self._camera = view, row, camera
+        self._target = ""
+        self.measures = MeasureLayer()
+        self._roi, self._click = RoiTool(view, self), ClickTool(self)
+        self.layers: tuple[Layer, ...] = (self.measures, RoiLayer(self._roi))
+        self._tools: dict[str, Tool] = {
+            "distance": DistanceTool(self.measures, self._scale),
+            "angle": AngleTool(self.measures, self._scale),
+            "region": self._roi,
+        }
+        row.tool_chosen.connect(self._on_tool)
+        row.target_chosen.connect(self._on_target)
+        view.delete_requested.connect(self._on_delete)
+        view.cancel_requested.connect(self.put_away)
+        view.menu_requested.connect(self._on_menu)
+        self._click.clicked.connect(self._on_clicked)
+        self._roi.chosen.connect(self._on_region)
+
+    def _scale(self) -> float | None:
+        """Return the scale that was in force when the picture shown was taken."""
+        picture = self._view.picture
+        return None if picture is None else picture.circumstances.scale_um_px
+
+    def refresh(self) -> None:
+        """Put the tool away that can no longer be used."""
+        if self._target and self._camera.calibration_problem:
+            self.put_away()
+            self._refuse(self._camera.calibration_problem)
+
+    def put_away(self) -> None:
+        """Let the mouse pan again."""
+        self._row.choose("")
+        self._on_tool("")
+
+    def _on_tool(self, name: str) -> None:
+        self._target = ""
+        self._view.set_tool(self._tools.get(name))
+        self.told.emit("")
+
+    def _on_target(self, target: str) -> None:
+        self._view.set_tool(self._click)
+        self._target = target
+        self.told.emit(f"click where {target} is to go; Esc ends it")
+
+    def _on_clicked(self, place_px: Pixel) -> None:
+        if not self._view.is_inside(place_px):
+            self._refuse("that is outside the picture")
+            return
+        try:
+            self.told.emit(self._camera.click_to_move(place_px, self._target))
+        except CosmicError as exc:
+            self._refuse(str(exc))
+
+    def _refuse(self, reason: str) -> None:
+        self.told.emit(f"{state_look(State.REFUSED).glyph} {reason}")
+
+    def _on_region(self, x_px: int, y_px: int, width_px: int, height_px: int) -> None:
+        self.put_away()
+        self.region_chosen.emit(x_px, y_px, width_px, height_px)
+
+    # Measurements
+
+    def _on_delete(self) -> None:
+        self.measures.remove(self.measures.chosen)
+        self._view.redraw()
+
+    def _on_clear(self) -> None:
+        self.measures.clear()
+        self._view.redraw()
+
+    def _on_menu(self, place: QPointF) -> None:
+        near = self.measures.at(place, self._view)
+        if near is not None:
+            self.measures.chosen = near
+            self._view.redraw()
+        menu = self.make_menu()
+        menu.aboutToHide.connect(menu.deleteLater)
+        menu.popup(self._view.mapToGlobal(place.toPoint()))
+
+    def make_menu(self) -> QMenu:
+        """Return the menu of the right button."""
+        menu = QMenu(self._view)
+        for text, act, usable in (
+            ("Delete this measurement", self._on_delete, self.measures.chosen is not None),
+            ("Delete all measurements", self._on_clear, bool(self.measures.measures)),
+            ("Fit", self._view.fit, True),
+            ("1:1", self._view.one_to_one, True),
+        ):
+            action = menu.addAction(text)
+            action.setEnabled(usable)
+            action.triggered.connect(act)
+        return menu

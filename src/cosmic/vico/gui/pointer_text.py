@@ -1,0 +1,20 @@
+"""What is said of the pixel below the mouse."""
+
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.gui.camera_port import CameraPort
+from cosmic.vico.gui.seen import Pixel
+
+
+def pointer_text(camera: CameraPort, picture: Picture | None, place_px: Pixel | None) -> str:
+    """Return place and brightness of a pixel, and where that is on the platform."""
+    if picture is None or place_px is None:
+        return ""
+    height, width = picture.data.shape[:2]
+    x, y = round(place_px[0]), round(place_px[1])
+    if not (0 <= x < width and 0 <= y < height):
+        return ""
+    value = picture.data[y, x]
+    shown = f"{int(value)}" if value.ndim == 0 else ", ".join(f"{int(each)}" for each in value)
+    there_um = camera.platform_um(place_px)
+    where = "" if there_um is None else f"  at {', '.join(f'{v:.1f}' for v in there_um)} µm"
+    return f"{x}, {y} px = {shown}{where}"

@@ -1,0 +1,242 @@
+"""Snap, record and time-lapse of one camera."""
+
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import Final
+
+from PySide6.QtWidgets import (
+    QComboBox,
+    QHBoxLayout,
+    QLabel,
+    QSizePolicy,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.build import named, push_button, tipped
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look
+from cosmic.frame.task import Task
+from cosmic.vico.gui.camera_port import CameraPort, VideoFormat
+from cosmic.vico.gui.file_fields import FileFields, overwrite_question
+from cosmic.vico.gui.task_bar import TaskBar
+from cosmic.vico.gui.texts import duration_text, size_text
+from cosmic.vico.gui.time_lapse_dialog import TimeLapseDialog
+
+STILL: Final = ".png"
+
+
+class RecordBar(QWidget):
+    """Buttons, fields for file and format (folded away), and what has been written.
+
+    Parameters
+    ----------
+    now : callable
+        Returns the local time that names are stamped with.
+    """
+
+    def __init__(
+        self,
+        port: CameraPort,
+        parent: QWidget | None = None,
+        *,
+        now: Callable[[], datetime] = datetime.now,
+    ) -> None:
+        super().__init__(parent)
+        self._port = port
+        self._error = ""
+        self.snap = named(push_button("Snap", "Write the picture shown to a file"), "snap")
+        self.record = named(push_button("Record", ""), "record")
+        self.record.setCheckable(True)
+        self.lapse = push_button("Time-lapse…", "Record one picture every so often")
+        self.more = push_button("File…", "Show the fields for name, directory and format")
+        self.more.setCheckable(True)
+        self.format = tipped(QComboBox(), "How recordings are written")
+        self.files = FileFields(port.directory, port.name, now=now)
+        self.told, self.tasks = ElidedLabel(), TaskBar()
+        self.told.setFont(number_font())
+        self._fields = QWidget()
+        self._build()
+        self.snap.clicked.connect(self._on_snap)
+        self.record.clicked.connect(self._on_record)
+        self.lapse.clicked.connect(self._on_lapse)
+        self.more.toggled.connect(self._fields.setVisible)
+        self.format.activated.connect(self.refresh)
+        self.files.edited.connect(self.refresh)
+        self.refresh()
+
+    def _build(self) -> None:
+        self.record.setFixedWidth(
+            max(self.record.fontMetrics().horizontalAdvance("■ Stop"), 7 * STEP_PX) + 3 * STEP_PX
+        )
+        folded = QVBoxLayout(self._fields)
+        folded.setContentsMargins(0, 0, 0, 0)
+        folded.setSpacing(STEP_PX // 2)
+        line = QHBoxLayout()
+        caption = QLabel("Format")
+        caption.setProperty("role", "dim")
+        line.addWidget(caption)
+        line.addWidget(self.format, 1)
+        folded.addWidget(self.files)
+        folded.addLayout(line)
+        self._fields.hide()
+        self._lines = QStackedWidget()
+        self._lines.addWidget(self.told)
+        self._lines.addWidget(self.tasks)
+        self._lines.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        top = QHBoxLayout()
+        top.setSpacing(STEP_PX // 2)
+        for button in (self.snap, self.record, self.lapse, self.more):
+            top.addWidget(button)
+        top.addSpacing(STEP_PX // 2)
+        top.addWidget(self._lines, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(STEP_PX // 2)
+        column.addLayout(top)
+        column.addWidget(self._fields)
+
+    # Looking
+
+    @property
+    def chosen(self) -> VideoFormat | None:
+        """The format that is chosen."""
+        row = self.format.currentIndex()
+        formats = self._port.formats
+        return formats[row] if 0 <= row < len(formats) else None
+
+    def refresh(self) -> None:
+        """Show what is being recorded and what may be done now."""
+        self._show_formats()
+        recording, wrong = self._port.recording, self.files.problem
+        self.files.setEnabled(not recording.active)
+        self.format.setEnabled(not recording.active)
+        still_wrong = wrong or ("" if self._port.latest() else "There is no picture yet")
+        chosen = self.chosen
+        wrong = wrong or (chosen.problem if chosen is not None else "There is no format")
+        wrong = wrong or ("" if self._port.running else "No pictures are taken: start the camera")
+        _allow(self.snap, still_wrong, "Write the picture shown to a file")
+        _allow(self.lapse, wrong or _busy(recording.active), "Record one picture every so often")
+        self.record.setChecked(recording.active)
+        self.record.setText("■ Stop" if recording.active else "● Record")
+        _allow(
+            self.record,
+            "" if recording.active else wrong,
+            "Stop recording and close the file" if recording.active else "Record every picture",
+        )
+        self._tell()
+
+    def _show_formats(self) -> None:
+        formats = self._port.formats
+        texts = [f"{each.name} – {each.problem or each.description}" for each in formats]
+        if [self.format.itemText(row) for row in range(self.format.count())] != texts:
+            row = max(0, self.format.currentIndex())
+            self.format.clear()
+            self.format.addItems(texts)
+            self.format.setCurrentIndex(min(row, len(texts) - 1))
+            self.format.setMinimumContentsLength(12)
+
+    def _tell(self) -> None:
+        recording = self._port.recording
+        failure = self._error or ("" if recording.active else recording.failure)
+        if failure:
+            self.told.set_text(f"{state_look(State.ERROR).glyph} {failure}")
+        elif recording.active or recording.path is not None:
+            self.told.set_text(self._recording_text())
+        else:
+            self.told.set_text(self._room_text())
+
+    def _recording_text(self) -> str:
+        now = self._port.recording
+        name = now.path.name if now.path is not None else ""
+        left = "" if now.left_s is None else f", disk lasts {duration_text(now.left_s)}"
+        waiting = f", {now.waiting} waiting" if now.active else ""
+        return (
+            f"{now.written} written, {now.dropped} dropped{waiting}, "
+            f"{size_text(now.size_bytes)}{left if now.active else ''}  {name}"
+        )
+
+    def _room_text(self) -> str:
+        if self.files.problem:
+            return self.files.problem
+        chosen = self.chosen
+        try:
+            room_s = self._port.room_s(self.files.folder, chosen.name if chosen else "")
+        except CosmicError as exc:
+            return str(exc)
+        return "" if room_s is None else f"disk lasts {duration_text(room_s)}"
+
+    # Reactions
+
+    def _try(self, action: Callable[[], object]) -> None:
+        self._error = ""
+        if not self.tasks.watch.busy:
+            self._lines.setCurrentWidget(self.told)
+        try:
+            action()
+        except (CosmicError, OSError) as exc:
+            self._error = str(exc)
+        self.refresh()
+
+    def _unless_there(self, path: Path, act: Callable[[bool], object]) -> None:
+        """Do it, after a question where it would overwrite something."""
+        if path.exists():
+            overwrite_question(self, path, lambda: self._try(lambda: act(True))).open()
+            self.refresh()
+        else:
+            self._try(lambda: act(False))
+
+    def _on_snap(self) -> None:
+        path = self.files.path(STILL, exact=True)
+        self._unless_there(path, lambda over: self._follow_snap(path, overwrite=over))
+
+    def _follow_snap(self, path: Path, *, overwrite: bool) -> None:
+        self._follow(self._port.snap(path, overwrite=overwrite))
+
+    def _follow(self, task: Task) -> None:
+        self._lines.setCurrentWidget(self.tasks)
+        self.tasks.follow(task)
+
+    def _on_record(self) -> None:
+        self.record.setChecked(self._port.recording.active)
+        if self._port.recording.active:
+            self._try(self._port.stop_recording)
+            return
+        chosen = self.chosen
+        if chosen is None:
+            return
+        path = self.files.path(chosen.suffix)
+        self._unless_there(path, lambda over: self._port.record(path, chosen.name, overwrite=over))
+
+    def _on_lapse(self) -> None:
+        dialog = TimeLapseDialog(self)
+        dialog.agreed.connect(self.begin_lapse)
+        dialog.open()
+
+    def begin_lapse(self, interval_s: float, count: int) -> None:
+        """Record `count` pictures, one each `interval_s`."""
+        chosen = self.chosen
+        if chosen is None:
+            return
+        path = self.files.path(chosen.suffix)
+
+        def begin(over: bool) -> None:
+            task = self._port.time_lapse(
+                path, chosen.name, interval_s=interval_s, count=count, overwrite=over
+            )
+            self._follow(task)
+
+        self._unless_there(path, begin)
+
+
+def _busy(active: bool) -> str:
+    return "A recording is running" if active else ""
+
+
+def _allow(button: QWidget, reason: str, tip: str) -> None:
+    button.setEnabled(not reason)
+    if button.toolTip() != (reason or tip):
+        button.setToolTip(reason or tip)

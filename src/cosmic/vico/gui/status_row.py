@@ -1,0 +1,78 @@
+"""How a camera is doing: state, rate, what became of the frames, light and sharpness."""
+
+from typing import Final
+
+from PySide6.QtWidgets import QWidget
+
+from cosmic.frame.clock import WALL
+from cosmic.frame.gui.state_badge import StateBadge
+from cosmic.frame.gui.theme import STEP_PX, State
+from cosmic.vico.gui.camera_port import CameraPort
+from cosmic.vico.gui.flow_layout import FlowLayout
+from cosmic.vico.gui.levels import Histogram
+from cosmic.vico.gui.readings import FocusBars, Reading
+
+RATE_OVER_S: Final = 1.0
+
+
+class StatusRow(QWidget):
+    """Readings side by side; they go on in a new line where it is narrow."""
+
+    def __init__(self, port: CameraPort, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._port = port
+        self._since_s, self._since_count = WALL.now_s(), port.counters.completed
+        self._rate_hz: float | None = None
+        self.badge = StateBadge(State.UNKNOWN)
+        self.rate = Reading("000.0 Hz", "Pictures a second that came from the camera")
+        self.completed = Reading("00000000 whole", "Pictures that came whole since the start")
+        self.failed = Reading("failed 00000", "Pictures that came with parts missing; not shown")
+        self.lost = Reading("lost 00000", "Pictures that never came, by the gaps in their numbers")
+        self.dropped = Reading(
+            "dropped 00000", "Pictures the camera had and this computer had no room for"
+        )
+        self.over = Reading("over-exposed 00.00 %", "Share of the pixels that are over-exposed")
+        self.focus = Reading("focus 0000.0", "Sharpness of the newest picture; larger is sharper")
+        self.bars = FocusBars()
+        flow = FlowLayout(STEP_PX // 2, self)
+        for widget in self.readings:
+            flow.addWidget(widget)
+
+    @property
+    def readings(self) -> tuple[QWidget, ...]:
+        """All that is shown, in order."""
+        counted = (self.completed, self.failed, self.lost, self.dropped)
+        return (self.badge, self.rate, *counted, self.over, self.focus, self.bars)
+
+    def show_state(self, state: State, detail: str) -> None:
+        """Say how the camera is."""
+        self.badge.set_state(state, detail)
+
+    def refresh(self, histogram: Histogram | None) -> None:
+        """Show the numbers as they are now."""
+        counters = self._port.counters
+        self._measure_rate(counters.completed)
+        rate = "–" if self._rate_hz is None else f"{self._rate_hz:.1f}"
+        self.rate.setText(f"{rate} Hz")
+        self.completed.setText(f"{counters.completed} whole")
+        for reading, name, count in (
+            (self.failed, "failed", counters.failed),
+            (self.lost, "lost", counters.lost),
+            (self.dropped, "dropped", counters.underrun),
+        ):
+            reading.setText(f"{name} {count}")
+            reading.show_alarm(count > 0)
+        over = 0.0 if histogram is None else 100.0 * histogram.over
+        self.over.setText(f"over-exposed {over:.2f} %")
+        focus = self._port.focus
+        self.focus.setText("focus –" if focus is None else f"focus {focus:.1f}")
+        if focus is not None:
+            self.bars.add(focus)
+
+    def _measure_rate(self, count: int) -> None:
+        now_s = WALL.now_s()
+        if count < self._since_count or not self._port.running:
+            self._since_s, self._since_count, self._rate_hz = now_s, count, None
+        elif now_s - self._since_s >= RATE_OVER_S:
+            self._rate_hz = (count - self._since_count) / (now_s - self._since_s)
+            self._since_s, self._since_count = now_s, count

@@ -1,0 +1,123 @@
+"""The buttons above the picture: what part is shown, what lies over it, what a click does."""
+
+from typing import Final
+
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QMenu, QToolButton, QWidget
+
+from cosmic.frame.gui.build import named, tipped
+from cosmic.frame.gui.theme import STEP_PX
+from cosmic.vico.gui.flow_layout import FlowLayout
+
+TOOLS: Final = {
+    "distance": ("Distance", "Measure a distance: press, drag, let go; Del takes the chosen away"),
+    "angle": ("Angle", "Measure an angle: click one arm, the vertex, the other arm"),
+    "region": ("Region", "Read only a part of the sensor: press, drag, let go"),
+}
+MOVE_TIP: Final = "Move something to the place you click in the picture"
+
+
+class ToolRow(QWidget):
+    """Buttons in one line, or in two where it is narrow.
+
+    Signals
+    -------
+    tool_chosen(str)
+        "distance", "angle", "region", or empty: the mouse pans.
+    target_chosen(str)
+        What goes where the operator clicks next.
+    """
+
+    tool_chosen = Signal(str)
+    target_chosen = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.live = named(_button("Live", "", checkable=True), "live")
+        self.fit = _button("Fit", "Show all of the picture")
+        self.one_to_one = _button("1:1", "Show each pixel of the camera by one of the screen")
+        self.tools = {
+            name: named(_button(text, tip, checkable=True), name)
+            for name, (text, tip) in TOOLS.items()
+        }
+        self.go = named(_button("Move", MOVE_TIP, checkable=True), "move")
+        self.menu = QMenu(self)
+        self.cross = _button("Cross", "Show a crosshair in the middle", checkable=True)
+        self.scale = _button("Scale", "Show the scale bar", checkable=True)
+        self.found = _button("Found", "Show what machine vision found", checkable=True)
+        self.more = named(
+            _button("Settings", "Contrast, camera and machine vision", checkable=True), "settings"
+        )
+        self.scale.setChecked(True)
+        self.found.setChecked(True)
+        flow = FlowLayout(STEP_PX // 2, self)
+        for widget in self.buttons:
+            flow.addWidget(widget)
+        for name, button in self.tools.items():
+            button.clicked.connect(
+                lambda checked, name=name: self._on_tool(name if checked else "")
+            )
+        self.go.clicked.connect(self._on_move)
+        self.menu.triggered.connect(self._on_target)
+
+    @property
+    def buttons(self) -> tuple[QToolButton, ...]:
+        """All of them, in order."""
+        shown = (self.cross, self.scale, self.found)
+        return (
+            self.live,
+            self.fit,
+            self.one_to_one,
+            *self.tools.values(),
+            self.go,
+            *shown,
+            self.more,
+        )
+
+    def choose(self, name: str) -> None:
+        """Show which tool is chosen: one of `TOOLS`, "move", or empty."""
+        for each, button in self.tools.items():
+            button.setChecked(each == name)
+        self.go.setChecked(name == "move")
+
+    def show_running(self, running: bool, problem: str) -> None:
+        """Show whether pictures are taken."""
+        self.live.setChecked(running)
+        self.live.setToolTip(
+            "End taking pictures" if running else problem or "Begin to take pictures"
+        )
+
+    def show_targets(self, targets: tuple[str, ...], problem: str) -> None:
+        """Offer what can be moved; a problem disables the button and stands in its tooltip."""
+        problem = problem or ("" if targets else "Nothing can be moved from here")
+        self.go.setEnabled(not problem)
+        self.go.setToolTip(f"Not now: {problem}" if problem else MOVE_TIP)
+        if tuple(action.text() for action in self.menu.actions()) != targets:
+            self.menu.clear()
+            for target in targets:
+                self.menu.addAction(target)
+
+    def _on_tool(self, name: str) -> None:
+        self.choose(name)
+        self.tool_chosen.emit(name)
+
+    def _on_move(self, checked: bool) -> None:
+        if not checked:
+            self._on_tool("")
+            return
+        self.go.setChecked(False)  # until it is said what
+        self.menu.popup(self.go.mapToGlobal(self.go.rect().bottomLeft()))
+
+    def _on_target(self, action: QAction) -> None:
+        self.choose("move")
+        self.target_chosen.emit(action.text())
+
+
+def _button(text: str, tip: str, *, checkable: bool = False) -> QToolButton:
+    button = tipped(QToolButton(), tip)
+    button.setText(text)
+    button.setAccessibleName(tip if text == "1:1" else text)
+    button.setCheckable(checkable)
+    button.setStyleSheet(f"QToolButton {{ padding: 1px {STEP_PX - 3}px; }}")
+    return button
