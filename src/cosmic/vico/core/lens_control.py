@@ -1,0 +1,243 @@
+"""`PeripheralThread`: lens and light, each at the end of its line, in a thread of their own."""
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from threading import Condition
+from typing import Final
+
+from PySide6.QtCore import QObject, Signal
+from typing_extensions import override
+
+from cosmic.frame.clock import WALL, Clock
+from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.task import Task
+from cosmic.frame.threads import WorkerThread
+from cosmic.vico.core.lens_history import LensHistory
+from cosmic.vico.core.lens_move import Move
+from cosmic.vico.core.lens_side import IDLE_S, LensSide, LightSide
+from cosmic.vico.core.peripheral_state import PeripheralState
+from cosmic.vico.hw.peripherals import Lens, LensAxis, Light
+
+MOVING_S: Final = 0.05
+"""Wall time between two looks while something moves; a line carries more, but not much."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Order:
+    """What is to be done; `lasts`: its task ends later than it is carried out."""
+
+    task: Task
+    carry_out: Callable[[Task], None]
+    of_light: bool = False
+    lasts: bool = False
+
+
+class PeripheralThread(WorkerThread):
+    """Opens lens and light, carries out commands, and publishes what it hears.
+
+    A lost line is told and left alone until `reopen`; lens and light fail each for itself.
+    Closing stops what moves.
+
+    Parameters
+    ----------
+    open_lens, open_light : callable
+        Open the device; return None where the platform has none.
+    timeout_s : float
+        Platform time after which a movement has failed.
+
+    Signals
+    -------
+    state_changed(PeripheralState)
+        Something is different from before; at most 20 times a second.
+
+    Attributes
+    ----------
+    history : LensHistory
+        Where the motors were, and how bright it was, at moments past.
+    """
+
+    may_wait = False
+
+    state_changed = Signal(object)
+
+    def __init__(
+        self,
+        open_lens: Callable[[], Lens | None],
+        open_light: Callable[[], Light | None],
+        clock: Clock,
+        policy: FailurePolicy,
+        *,
+        timeout_s: float = 60.0,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__("lens and light", policy, parent)
+        self.history = LensHistory()
+        self._clock = clock
+        self._timeout_s = timeout_s
+        self._lens = LensSide(open_lens, clock, self.history)
+        self._light = LightSide(open_light, clock, self.history)
+        self._orders: deque[_Order] = deque()
+        self._wake = Condition()
+        self._abort_wanted = False
+        self._over = False
+        self._state = PeripheralState(clock.now_s(), WALL.now_s())
+
+    # What there is; any thread
+
+    @property
+    def state(self) -> PeripheralState:
+        """What was last heard."""
+        return self._state
+
+    @property
+    def lens_name(self) -> str:
+        """What the operator reads; empty while there is none."""
+        return self._lens.name
+
+    @property
+    def light_name(self) -> str:
+        """What the operator reads; empty while there is none."""
+        return self._light.name
+
+    # Commands; any thread, all return at once
+
+    def home(self, *axes: LensAxis) -> Task:
+        """Begin to run motors, or both, to where counting begins."""
+        return self._move("Homing the lens", dict.fromkeys(axes or tuple(LensAxis)))
+
+    def seek(self, axis: LensAxis, target_counts: int) -> Task:
+        """Begin to move a motor; its task fails with `NotAvailable` when it was not homed."""
+        return self._move(f"Moving the {axis}", {axis: target_counts})
+
+    def set_light(self, percent: float) -> Task:
+        """Begin to make the light so bright; of several that wait the last counts."""
+        with self._wake:
+            replaced = [each for each in self._orders if each.of_light]
+            self._orders = deque(each for each in self._orders if not each.of_light)
+        for each in replaced:
+            each.task.fail(MoveCancelled("replaced by a newer brightness"))
+        task = Task("Setting the light")
+        return self._put(_Order(task, lambda _: self._light.set_percent(percent), of_light=True))
+
+    def reopen(self) -> Task:
+        """Begin to open again what was lost."""
+
+        def carry_out(_: Task) -> None:
+            self._open()
+            problems = [each for each in (self._lens.problem, self._light.problem) if each]
+            if problems:
+                raise NotAvailable("; ".join(problems))
+
+        return self._put(_Order(Task("Connecting lens and light"), carry_out))
+
+    def abort(self) -> None:
+        """Stop both motors, ahead of everything that waits; movements that wait are cancelled."""
+        with self._wake:
+            self._abort_wanted = True
+            dropped = [each for each in self._orders if not each.of_light]
+            self._orders = deque(each for each in self._orders if each.of_light)
+            self._wake.notify_all()
+        for order in dropped:
+            order.task.fail(MoveCancelled("aborted before it began"))
+
+    def _move(self, title: str, targets: Mapping[LensAxis, int | None]) -> Task:
+        def carry_out(task: Task) -> None:
+            self._lens.begin(Move(task, targets, self._clock, self._timeout_s))
+
+        task = self._put(_Order(Task(title), carry_out, lasts=True))
+        task.on_cancel(self.abort)
+        return task
+
+    def _put(self, order: _Order) -> Task:
+        with self._wake:
+            over = self._over
+            if not over:
+                self._orders.append(order)
+                self._wake.notify_all()
+        if over:
+            order.task.fail(NotAvailable("lens and light are closed"))
+        return order.task
+
+    @override
+    def request_end(self) -> None:
+        super().request_end()
+        with self._wake:
+            self._wake.notify_all()
+
+    # In its own thread
+
+    @override
+    def run_body(self) -> None:
+        try:
+            self._open()
+            while not self.end_requested:
+                self._publish()
+                self._rest()
+                self._obey()
+                self._lens.look()
+                self._light.look()
+        finally:
+            self._close()
+
+    def _open(self) -> None:
+        self._lens.open()
+        self._light.open()
+        self._lens.look()
+        self._light.look()
+
+    def _rest(self) -> None:
+        with self._wake:
+            if not (self._orders or self._abort_wanted or self.end_requested):
+                self._wake.wait(MOVING_S if self._lens.busy else IDLE_S)
+
+    def _obey(self) -> None:
+        while not self.end_requested:
+            with self._wake:
+                abort, self._abort_wanted = self._abort_wanted, False
+                order = self._orders.popleft() if self._orders and not abort else None
+            if abort:
+                self._lens.abort()
+            elif order is None:
+                return
+            elif not order.task.done:
+                self._carry_out(order)
+
+    def _carry_out(self, order: _Order) -> None:
+        try:
+            order.carry_out(order.task)
+        except CosmicError as exc:
+            self._publish()  # whoever hears of the end sees how things are
+            order.task.fail(exc)
+        else:
+            if not order.lasts:
+                self._publish()
+                order.task.finish()
+
+    def _publish(self) -> None:
+        before = self._state
+        lens, light = self._lens, self._light
+        now = PeripheralState(
+            time_s=self._clock.now_s(),
+            wall_s=WALL.now_s(),
+            zoom=lens.states.get(LensAxis.ZOOM),
+            focus=lens.states.get(LensAxis.FOCUS),
+            light_percent=light.percent,
+            lens_problem=lens.problem,
+            light_problem=light.problem,
+        )
+        self._state = now
+        if replace(now, time_s=before.time_s, wall_s=before.wall_s) != before:
+            self.state_changed.emit(now)
+        lens.tell_ends()
+
+    def _close(self) -> None:
+        with self._wake:
+            self._over = True
+            left, self._orders = list(self._orders), deque()
+        for order in left:
+            order.task.fail(NotAvailable("lens and light are closed"))
+        self._lens.close()
+        self._light.close()
+        self._lens.tell_ends()
