@@ -7,7 +7,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from cosmic.vico.core.vision.grey import Floats
-from cosmic.vico.core.vision.profiles import Scene, sample
+from cosmic.vico.core.vision.profiles import Scene, sample, within
 from cosmic.vico.core.vision.smoothing import directions
 
 
@@ -57,10 +57,12 @@ def find_end(scene: Scene, line: Floats, level: Level) -> End:
     half = max(1.0, 0.45 * level.width)
     lateral = np.linspace(-half, half, max(3, 2 * round(half) + 1))
     axis = bent(line, outward, along)
-    places = axis[:, None, :] + lateral[None, :, None] * normal[None, None, :]
-    inside = ((places >= -0.5) & (places <= scene.corner + 0.5)).all(axis=(1, 2))
-    values = scene.sign * (sample(scene.image, places) - level.ground)
-    mean = values.mean(axis=1)
+    x, y = (
+        (axis[:, n, None] + lateral[None, :] * normal[n]).astype(np.float32) for n in (0, 1)
+    )
+    inside = within(scene, x, y).all(axis=1)
+    values = scene.sign * (sample(scene.image, x, y) - level.ground)
+    mean = values.mean(axis=1, dtype=np.float64)
     blur = max(1.0, min(4.0, 12.0 * level.noise / max(level.contrast, 1e-6) / np.sqrt(half)))
     mean = gaussian_filter1d(mean, blur / spacing * 0.8, mode="nearest")
     return crossing(along, mean, inside, plateau(along, mean, level), level)

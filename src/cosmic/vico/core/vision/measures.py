@@ -14,11 +14,12 @@ KINK_WEIGHTS = ((91.0, 4), (46.0, 3), (21.0, 2))
 def longest_extent(line: Floats) -> tuple[float, float]:
     """Return the largest distance between two points, and its direction in degrees."""
     points = hull_of(line)
-    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
-    first, last = np.unravel_index(int(np.argmax(distance)), distance.shape)
+    x, y = (np.subtract.outer(points[:, axis], points[:, axis]) for axis in (0, 1))
+    squared = x * x + y * y
+    first, last = np.unravel_index(int(np.argmax(squared)), squared.shape)
     way = points[last] - points[first]
     angle = float(np.degrees(np.arctan2(way[1], way[0]))) % 180.0
-    return float(distance[first, last]), angle
+    return float(np.linalg.norm(way)), angle
 
 
 def hull_of(line: Floats) -> Floats:

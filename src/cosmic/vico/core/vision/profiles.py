@@ -29,8 +29,8 @@ class Profiles:
         Standard deviation of a single pixel of the ground.
     """
 
-    across: Floats
-    height: Floats
+    across: Floats32
+    height: Floats32
     clear: Flags
     noise: float
     normals: Floats
@@ -58,12 +58,16 @@ class Edges:
     steepness_px: float
 
 
-def sample(image: Floats32, places: Floats) -> Floats:
-    """Return grey levels at places (..., 2), the border repeated outside."""
-    x = places[..., 0].astype(np.float32)
-    y = places[..., 1].astype(np.float32)
+def sample(image: Floats32, x: Floats32, y: Floats32) -> Floats32:
+    """Return grey levels at places, the border repeated outside."""
     found = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(found, dtype=np.float64).reshape(places.shape[:-1])
+    return np.asarray(found, dtype=np.float32)
+
+
+def within(scene: "Scene", x: Floats32, y: Floats32) -> Flags:
+    """Return which places lie on the picture."""
+    right, bottom = scene.corner + 0.5
+    return np.asarray((x >= -0.5) & (x <= right) & (y >= -0.5) & (y <= bottom))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,45 +109,59 @@ def cross_sections(scene: Scene, line: Floats, width: float, reach: float) -> Pr
     normals = np.column_stack([-tangent[:, 1], tangent[:, 0]])
     spacing = 0.5 if width < 12 else 1.0
     count = int(np.ceil(reach / spacing))
-    across = np.arange(-count, count + 1) * spacing
-    places = line[:, None, :] + across[None, :, None] * normals[:, None, :]
-    values = sample(scene.image, places)
+    across = (np.arange(-count, count + 1) * spacing).astype(np.float32)
+    x, y = (
+        (line[:, axis, None] + across[None, :] * normals[:, axis, None]).astype(np.float32)
+        for axis in (0, 1)
+    )
+    values = sample(scene.image, x, y)
     inside = np.abs(across) < 0.5 * width + 2.0
-    clear = inside[None, :] | (sample(scene.taken, scene.reduced(places)) < 0.25)
+    other = sample(scene.taken, *(np.asarray(scene.reduced(places)) for places in (x, y)))
+    clear = inside[None, :] | (other < 0.25)
     if (line < reach + 1.0).any() or (line > scene.corner - reach - 1.0).any():
-        clear &= ((places >= -0.5) & (places <= scene.corner + 0.5)).all(axis=2)
+        clear &= within(scene, x, y)
     ground, noise = ground_of(values, clear & ~inside[None, :], across)
-    height = scene.sign * (values - ground)
-    return Profiles(across, height, clear, noise, normals, ground[:, count])
+    height = np.float32(scene.sign) * (values - ground)
+    return Profiles(across, height, clear, noise, normals, ground[:, count].astype(np.float64))
 
 
-def ground_of(values: Floats, free: Flags, across: Floats) -> tuple[Floats, float]:
+def ground_of(values: Floats32, free: Flags, across: Floats32) -> tuple[Floats32, float]:
     """Return the ground under each cross section, sloping from side to side, and its noise."""
     sides = []
     seen = []
     for side in (across < 0, across > 0):
         part = free & side[None, :]
         number = part.sum(axis=1)
-        total = np.where(part, values, 0.0).sum(axis=1)
+        total = np.where(part, values, np.float32(0.0)).sum(axis=1, dtype=np.float64)
         sides.append(gaussian_filter1d(total, 6.0, mode="nearest"))
         seen.append(gaussian_filter1d(number.astype(float), 6.0, mode="nearest"))
     levels = [total / np.maximum(count, 1e-9) for total, count in zip(sides, seen, strict=True)]
     both = (sides[0] + sides[1]) / np.maximum(seen[0] + seen[1], 1e-9)
+    # Where no ground is seen at all, what is seen elsewhere along the fibre serves.
+    if not (seen[0] + seen[1] > 0.5).all() and (seen[0] + seen[1] > 0.5).any():
+        known = np.flatnonzero(seen[0] + seen[1] > 0.5)
+        both = np.interp(np.arange(len(both)), known, both[known])
     levels = [np.where(count > 0.5, level, both) for level, count in zip(levels, seen, strict=True)]
     reach = float(np.abs(across).max())
-    share = np.clip((across / (1.4 * reach) + 0.5), 0.0, 1.0)[None, :]
-    ground = levels[0][:, None] * (1 - share) + levels[1][:, None] * share
+    share = np.clip(across / (1.4 * reach) + 0.5, 0.0, 1.0)[None, :].astype(np.float32)
+    low, high = (level[:, None].astype(np.float32) for level in levels)
+    ground = low + (high - low) * share
     thin = max(1, len(values) // 60)
     spread = np.abs(values[::thin] - ground[::thin])[free[::thin]]
     return ground, 1.4826 * float(np.median(spread)) if len(spread) else 0.0
 
 
-def along(height: Floats, sigma: float) -> Floats:
-    """Return cross sections averaged along the fibre."""
-    return np.asarray(gaussian_filter1d(height, sigma, axis=0, mode="nearest"))
+def along(profiles: Profiles, sigma: float) -> Floats32:
+    """Return the height of cross sections averaged along the fibre, where it is clear."""
+    height = np.where(profiles.clear, profiles.height, np.float32(0.0))
+    size = 2 * int(np.ceil(3.0 * sigma)) + 1
+    weights = cv2.getGaussianKernel(size, sigma, cv2.CV_32F)
+    one = np.ones((1, 1), np.float32)
+    found = cv2.sepFilter2D(height, -1, one, weights, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(found, dtype=np.float32)
 
 
-def box_centres(profiles: Profiles, height: Floats, width: float, reach: float) -> Floats:
+def box_centres(profiles: Profiles, height: Floats32, width: float, reach: float) -> Floats:
     """Return where a box of the fibre's width fits best into each cross section."""
     across = profiles.across
     spacing = across[1] - across[0]
@@ -156,16 +174,15 @@ def box_centres(profiles: Profiles, height: Floats, width: float, reach: float) 
     return np.asarray(middles[best])
 
 
-def typical_section(height: Floats, good: Flags) -> Floats:
+def typical_section(height: Floats32, good: Flags) -> Floats:
     """Return the median cross section, 1 at its highest."""
     rows = height[good] if good.any() else height
-    if len(rows) > 160:
-        rows = rows[:: len(rows) // 160 + 1]
+    rows = rows[:: len(rows) // 100 + 1]
     middle = np.median(rows, axis=0)
     return np.asarray(middle / max(float(middle.max()), 1e-9))
 
 
-def level_crossing(mean: Floats, across: Floats, level: float, side: int) -> float:
+def level_crossing(mean: Floats, across: Floats32, level: float, side: int) -> float:
     """Return the outermost place on one side at which the typical section has a level."""
     order = np.argsort(side * across)
     x, y = across[order], mean[order]
@@ -178,15 +195,15 @@ def level_crossing(mean: Floats, across: Floats, level: float, side: int) -> flo
     return float("nan")
 
 
-def find_edges(profiles: Profiles, height: Floats, good: Flags, width: float) -> Edges:
+def find_edges(profiles: Profiles, height: Floats32, good: Flags, width: float) -> Edges:
     """Return the outer edges of each cross section at half of its height."""
     across = profiles.across
     near = np.abs(across) < 0.5 * width + 3.0
     mean = np.where(near, typical_section(height, good), 0.0)
     weight = mean / max(float((mean**2).sum()), 1e-9)
-    contrast = height @ weight
+    contrast = (height @ weight.astype(np.float32)).astype(np.float64)
     contrast = gaussian_filter1d(contrast, 3.0, mode="nearest")
-    scaled = height / np.maximum(contrast, 1e-6)[:, None]
+    scaled = height / np.maximum(contrast, 1e-6)[:, None].astype(np.float32)
     expected = [level_crossing(mean, across, 0.5, side) for side in (-1, 1)]
     found = [
         edge_near(scaled, across, place, side, 0.35 * width + 1.0)
@@ -198,18 +215,17 @@ def find_edges(profiles: Profiles, height: Floats, good: Flags, width: float) ->
     return Edges(found[0], found[1], contrast, mean, steep / 1.349)
 
 
-def edge_near(scaled: Floats, across: Floats, place: float, side: int, most: float) -> Floats:
+def edge_near(scaled: Floats32, across: Floats32, place: float, side: int, most: float) -> Floats:
     """Return where each section falls below half, outwards, nearest to `place`; NaN if nowhere."""
     if not np.isfinite(place):
         return np.full(len(scaled), np.nan)
     inner, outer = (scaled[:, :-1], scaled[:, 1:]) if side > 0 else (scaled[:, 1:], scaled[:, :-1])
     falls = (inner >= 0.5) & (outer < 0.5)
-    step = np.maximum(inner - outer, 1e-9)
-    share = (inner - 0.5) / step * (across[1] - across[0])
     start = across[:-1] if side > 0 else across[1:]
-    where = start[None, :] + side * share
-    away = np.where(falls, np.abs(where - place), np.inf)
+    away = np.where(falls, np.abs(start - np.float32(place))[None, :], np.float32(np.inf))
     best = np.argmin(away, axis=1)
     rows = np.arange(len(scaled))
-    found = where[rows, best]
-    return np.where(away[rows, best] <= most, found, np.nan)
+    drop = np.maximum(inner[rows, best] - outer[rows, best], 1e-9)
+    share = (inner[rows, best] - 0.5) / drop * (across[1] - across[0])
+    found = (start[best] + side * share).astype(np.float64)
+    return np.where(away[rows, best] <= most + 1.0, found, np.nan)

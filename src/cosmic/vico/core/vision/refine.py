@@ -120,7 +120,7 @@ def centre_roughly(scene: Scene, course: Course, neighbours: Neighbours) -> None
         profiles = cross_sections(
             scene, course.line, course.width, 1.1 * course.width + 2 * scene.factor + 4
         )
-        height = along(np.where(profiles.clear, profiles.height, 0.0), 2.0)
+        height = along(profiles, 2.0)
         offset = box_centres(profiles, height, course.width, reach)
         weights = np.where(excluded(course, neighbours), 0.0, 1.0)
         move(course, profiles, offset, weights, max(24.0, 3.0 * course.width))
@@ -147,9 +147,9 @@ def measure(scene: Scene, course: Course, neighbours: Neighbours) -> bool:
     course.line = resampled(course.line, STEP_PX)
     profiles = cross_sections(scene, course.line, course.width, 1.2 * course.width + 8.0)
     free = ~excluded(course, neighbours)
-    typical = float(np.median(profiles.height[:, np.abs(profiles.across) < 0.4 * course.width]))
+    typical = float(np.median(profiles.height[::4, np.abs(profiles.across) < 0.4 * course.width]))
     ratio = profiles.noise / max(typical, 1e-6)
-    height = along(np.where(profiles.clear, profiles.height, 0.0), float(np.clip(6 * ratio, 0.8, 4)))
+    height = along(profiles, float(np.clip(6 * ratio, 0.8, 4.0)))
     if not free.any():
         return False
     edges = find_edges(profiles, height, free, course.width)
