@@ -148,7 +148,6 @@ class PictureRecorder(WorkerThread):
         self._taken = self._taken_bytes = 0
         self._told_dropped = 0
         self._in_hand: _Came | None = None
-        self._abandoned = 0
         self._times_s: tuple[float, float] | None = None
         self._error: CosmicError | None = None
         self._paused = False
@@ -160,6 +159,11 @@ class PictureRecorder(WorkerThread):
         return self._file.path
 
     @property
+    def side_path(self) -> Path:
+        """Where its side file lies."""
+        return self._file.side_path
+
+    @property
     def error(self) -> CosmicError | None:
         """Why the recording ended early; None when it did not."""
         return self._error
@@ -168,15 +172,17 @@ class PictureRecorder(WorkerThread):
     def stats(self) -> PictureRecordingStats:
         """How it stands now; any thread."""
         first_s, last_s = self._times_s or (0.0, 0.0)
+        left, left_bytes = self._given - self._taken, self._given_bytes - self._taken_bytes
+        ended = self._ended
         return PictureRecordingStats(
             path=self._file.path,
             side_path=self._file.side_path,
             written=self._file.count,
-            dropped=self._dropped + self._abandoned,
+            dropped=self._dropped + (left if ended else 0),
             incomplete=self._incomplete,
             lost=self._lost,
-            waiting=self._given - self._taken,
-            waiting_bytes=self._given_bytes - self._taken_bytes,
+            waiting=0 if ended else left,
+            waiting_bytes=0 if ended else left_bytes,
             duration_s=last_s - first_s,
             file_bytes=self._size_bytes(),
             left_s=self._left_s,
@@ -303,11 +309,12 @@ class PictureRecorder(WorkerThread):
     def _abandon(self) -> None:
         """Say of the pictures that wait that they are not in the file."""
         left = [self._in_hand, *(self._queue.get() for _ in range(self._queue.qsize()))]
+        abandoned = 0
         for came in left:
             if came is not None:
-                self._abandoned += came.data is not None
+                abandoned += came.data is not None
                 status = came.row.status if came.data is None else DROPPED
-                dropped = came.row.dropped + self._abandoned
+                dropped = came.row.dropped + abandoned
                 self._file.note(replace(came.row, status=status, dropped=dropped))
 
     def _close(self) -> None:

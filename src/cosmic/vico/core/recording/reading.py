@@ -194,6 +194,8 @@ class PictureRecording:
             return SequenceSource(self._path)
         if not self._path.exists():  # nothing came: a video without a picture is not kept
             return None
+        if self._side.rows and not self._written and not self._path.stat().st_size:
+            return None  # the first picture failed already
         colour = self.pixel_format is PixelFormat.RGB8
         return VideoSource(self._path, colour=colour, whole=self._side.complete)
 

@@ -2,20 +2,18 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from cosmic.frame.errors import RecordingError
+from cosmic.vico.core.recording.ffv1_check import is_intact
 from cosmic.vico.core.recording.planes import from_video_frame
 from cosmic.vico.core.recording.sequence_writer import picture_files
 from cosmic.vico.hw.interface import Pixels
 
 if TYPE_CHECKING:
     import av
-
-# A picture with an error in it is told, not mended.
-_STRICT: Final = {"err_detect": "crccheck+explode"}
 
 
 class PictureSource(Protocol):
@@ -112,7 +110,6 @@ class VideoSource:
         try:
             self._container = av.open(str(self._path))
             self._stream = self._container.streams.video[0]
-            self._stream.codec_context.options = _STRICT
             self._stream.thread_type = "SLICE"
         except (av.FFmpegError, IndexError) as exc:
             raise RecordingError(
@@ -184,15 +181,31 @@ class VideoSource:
 
     def _packets(self) -> "Iterator[av.Packet[av.VideoStream]]":
         """Yield whole packets, up to the first that is not."""
+        checked = self._stream.codec_context.name == "ffv1"
         try:
-            for packet in self._container.demux(self._stream):
+            for packet in self._demuxed():
                 if packet.is_corrupt:
                     self._tell("a picture is cut off")
+                    return
+                if checked and packet.size and not is_intact(bytes(packet)):
+                    self._tell("its checksum is wrong")
                     return
                 if packet.size:
                     yield packet
         except self._failure as exc:
             self._tell(exc)
+
+    def _demuxed(self) -> "Iterator[av.Packet[av.VideoStream]]":
+        packets = self._container.demux(self._stream)
+        if self._whole or self._container.format.name != "nut":
+            yield from packets
+            return
+        # FFmpeg does not say of the last packet in NUT whether it is cut off.
+        held = None
+        for packet in packets:
+            if held is not None and packet.size:
+                yield held
+            held = packet
 
     def _frames(self) -> "Iterator[av.VideoFrame]":
         try:

@@ -1,0 +1,38 @@
+"""Records pictures of noise until it is killed; says how many are in the file, a line each."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from cosmic.frame.clock import WALL
+from cosmic.frame.failure import FailurePolicy
+from cosmic.vico.core.recording.formats import PictureFormat
+from cosmic.vico.core.recording.picture_recorder import PictureRecorder
+from unit.vico.recording.picture_helpers import AXES, noise, picture, settings
+
+RATE_HZ = 40.0
+
+
+def main(path: str, picture_format: str) -> None:
+    size = {"width": 160, "height": 120}
+    recorder = PictureRecorder(
+        Path(path),
+        PictureFormat(picture_format),
+        settings(**size, rate_hz=RATE_HZ),
+        FailurePolicy(),
+        axes=AXES,
+    )
+    recorder.start()
+    shots = [noise(**size, seed=seed) for seed in range(8)]
+    began_s = WALL.now_s()
+    for number in range(10_000):
+        time_s = WALL.now_s()
+        recorder.put(picture(number, np.asarray(shots[number % 8]), time_s=time_s))
+        sys.stdout.write(f"{number} {time_s - began_s:.3f}\n")
+        sys.stdout.flush()
+        WALL.sleep(max(0.0, began_s + (number + 1) / RATE_HZ - WALL.now_s()))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
