@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.twin.optics.canvas import Layer
+from cosmic.twin.optics.canvas import Layer, patch
 from cosmic.twin.optics.ground import FULL, Dirt, even_light, soil
 from cosmic.twin.optics.noise import Noise
 from cosmic.twin.optics.outlines import hull, outline, shrunk
@@ -27,7 +27,7 @@ PER_GREY: Final = 64
 RIM_UM: Final = 6.0
 """Width of the dark rim of a tool."""
 
-RIM_SHADE: Final = 0.55
+RIM_SHADE: Final = 0.75
 
 
 class View:
@@ -163,8 +163,11 @@ class View:
 
     def _solid(self, layer: Layer, projection: Projection, solid: Solid, grey: float) -> None:
         picture = self._settings.picture
-        corners = hull(projection.picture_px(solid.corners_um))
+        points = projection.picture_px(solid.corners_um)
         sigma = projection.sigma_px(solid.height_um)
+        if patch(layer, points, 1.0, sigma) is None:
+            return
+        corners = hull(points)
         silicon = solid.link.startswith("probe")
         value = (picture.silicon if silicon else picture.steel) * grey * PER_GREY
         outline(layer, corners, sigma, RIM_SHADE * value)
