@@ -91,6 +91,7 @@ class CameraThread(WorkerThread):
         self._settings: CameraSettings | None = None
         self._ranges: CameraRanges | None = None
         self._last_id: int | None = None
+        self._reopen = False
         self._newest: Picture | None = None
         self._arrived = Condition()
         self._receivers: tuple[Receiver, ...] = ()
@@ -207,6 +208,10 @@ class CameraThread(WorkerThread):
 
         return self._put(f"Stopping {self.camera_name}", command)
 
+    def reopen(self) -> None:
+        """Give the camera back and open it anew: another one, where that was chosen meanwhile."""
+        self._reopen = True
+
     def trigger(self) -> None:
         """Take one picture, with the software trigger.
 
@@ -248,7 +253,9 @@ class CameraThread(WorkerThread):
                 self._arrived.notify_all()
 
     def _work(self) -> None:
-        """Open the camera and take pictures until the end or a failure."""
+        """Open the camera and take pictures until the end, another camera or a failure."""
+        self._reopen = False
+        self._close()
         self._camera = camera = self._open_camera()
         self._settings = camera.configure(self._prepare(camera))
         self._ranges = camera.ranges
@@ -257,7 +264,7 @@ class CameraThread(WorkerThread):
             self._begin(camera)
         self._problem = ""
         self.status_changed.emit()
-        while not self.end_requested:
+        while not (self.end_requested or self._reopen):
             self._obey(camera)
             if not self._running:
                 self._end_requested.wait(LOOK_S)
@@ -325,7 +332,7 @@ class CameraThread(WorkerThread):
         self._refuse_commands(text)
         self.status_changed.emit()
         until_s = WALL.now_s() + SEARCH_S
-        while not self.end_requested and WALL.now_s() < until_s:
+        while not (self.end_requested or self._reopen) and WALL.now_s() < until_s:
             self._end_requested.wait(LOOK_S)
             self._refuse_commands(text)
 

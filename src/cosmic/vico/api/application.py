@@ -1,0 +1,182 @@
+"""ViCo as a CoSMic application (thesis 5.2): cameras, lens and light of one platform."""
+
+import logging
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Qt
+from typing_extensions import override
+
+from cosmic.frame.application import GuiFactory
+from cosmic.frame.clock import Clock
+from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.task import Task
+from cosmic.frame.task_application import TaskApplication
+from cosmic.vico.api.places import Places
+from cosmic.vico.core.camera_libraries import CameraLibraries
+from cosmic.vico.core.camera_unit import CameraUnit
+from cosmic.vico.core.lens_control import PeripheralThread
+from cosmic.vico.core.picture import Circumstances
+from cosmic.vico.core.settings import Backend, CameraPlace, VicoSettings
+from cosmic.vico.core.zoom_scale import ZoomScale
+from cosmic.vico.hw.interface import CameraInfo, CameraLibrary, CameraSettings, Frame
+from cosmic.vico.hw.peripherals import Lens, LensAxis, Light
+
+logger = logging.getLogger(__name__)
+
+
+class VicoApplication(TaskApplication):
+    """Owns cameras, lens and light; its methods may be called from any thread.
+
+    Parameters
+    ----------
+    make_library : callable
+        Returns the driver of a backend.
+    open_lens, open_light : callable
+        Open what the platform has; return None where it has none.
+
+    Attributes
+    ----------
+    units : mapping of str to CameraUnit
+        By the camera's name, in the order of the platform file.
+    position_source : callable or None
+        Returns where every axis was at a platform time; called in the cameras' threads.
+    places : Places or None
+        What joins pixels and platform, where micromanipulation is hosted as well.
+    """
+
+    def __init__(
+        self,
+        make_library: Callable[[Backend], CameraLibrary],
+        open_lens: Callable[[], Lens | None],
+        open_light: Callable[[], Light | None],
+        settings: VicoSettings,
+        *,
+        clock: Clock,
+        policy: FailurePolicy,
+        gui_factory: GuiFactory | None = None,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__("ViCo", policy, gui_factory, parent)
+        self.settings = settings
+        self.clock = clock
+        self.libraries = CameraLibraries(make_library)
+        self.zoom_scale: ZoomScale = settings.lens.zoom_scale()
+        self.position_source: Callable[[float], Mapping[str, float]] | None = None
+        self.places: Places | None = None
+        self.found: tuple[CameraInfo, ...] = ()
+        self.peripherals = PeripheralThread(
+            open_lens, open_light, clock, policy, timeout_s=settings.lens.timeout_s
+        )
+        self.units: dict[str, CameraUnit] = {
+            place.name: CameraUnit(place, self.libraries, self._circumstances, policy)
+            for place in settings.camera
+        }
+        direct = Qt.ConnectionType.DirectConnection
+        self.peripherals.state_changed.connect(self._on_state_changed, direct)
+        for unit in self.units.values():
+            unit.thread.status_changed.connect(self._on_state_changed, direct)
+            unit.recordings.on_change(self._on_state_changed)
+
+    # Starting and ending
+
+    @override
+    def initialize(self) -> None:
+        """Begin to look for everything; nothing is waited for, and what is missing is told."""
+        self.start()
+        self.peripherals.start()
+        for unit in self.units.values():
+            unit.start()
+
+    @override
+    def shut_down(self) -> None:
+        """Close recordings, cameras, lens and light, and end all threads; any state."""
+        self.request_end()
+        for unit in self.units.values():
+            unit.request_end()
+        self.peripherals.request_end()
+        for unit in self.units.values():
+            unit.join()
+        self.peripherals.join()
+        self.libraries.close()
+        self.join()
+
+    def rescan(self) -> Task:
+        """Begin to look for cameras; what was found is in `found`."""
+
+        def job(task: Task) -> None:
+            self.found = self.libraries.found()
+            task.finish()
+            self.status_changed.emit()
+
+        return self.begin("Looking for cameras", job)
+
+    def unit(self, name: str) -> CameraUnit:
+        """Return a camera by its name.
+
+        Raises
+        ------
+        ConfigError
+            There is none; the text lists those there are.
+        """
+        if name not in self.units:
+            known = ", ".join(self.units) or "none"
+            raise ConfigError(f"there is no camera {name!r}; the platform has: {known}")
+        return self.units[name]
+
+    @property
+    def first_camera(self) -> str:
+        """Name of the camera that is meant where none is named.
+
+        Raises
+        ------
+        NotAvailable
+            The platform has none.
+        """
+        for name in self.units:
+            return name
+        raise NotAvailable("the platform file names no camera; add a [[vico.camera]]")
+
+    @property
+    def directory(self) -> Path:
+        """Where pictures go unless somebody says otherwise."""
+        return Path(self.settings.directory).expanduser() if self.settings.directory else Path.cwd()
+
+    # What was known of a frame
+
+    def _circumstances(
+        self, place: CameraPlace, frame: Frame, settings: CameraSettings
+    ) -> Circumstances:
+        """Tell what was set in the middle of an exposure; in the camera's thread."""
+        middle_s = frame.exposed_s + 0.5 * settings.exposure_s
+        history = self.peripherals.history
+        zoom = history.counts_at(LensAxis.ZOOM, middle_s) if place.behind_lens else None
+        focus = history.counts_at(LensAxis.FOCUS, middle_s) if place.behind_lens else None
+        positions = self.position_source(middle_s) if self.position_source is not None else {}
+        return Circumstances(
+            exposure_s=settings.exposure_s,
+            gain_db=settings.gain_db,
+            zoom_counts=zoom,
+            focus_counts=focus,
+            light_percent=history.light_at(middle_s),
+            scale_um_px=self._scale_um_px(place, zoom, settings.binning),
+            positions=positions,
+        )
+
+    def _scale_um_px(
+        self, place: CameraPlace, zoom_counts: float | None, binning: int
+    ) -> float | None:
+        """Return what a pixel is: as calibrated where it was, else as the lens is built."""
+        if self.places is not None:
+            scale = self.places.scale_um_px(place.name, zoom_counts)
+            if scale is not None:
+                return scale * binning
+        if not place.behind_lens:
+            return None if place.scale_um_px is None else place.scale_um_px * binning
+        if zoom_counts is None:
+            return None
+        return self.zoom_scale.scale_um_px(zoom_counts, binning)
+
+    def _on_state_changed(self, *_state: object) -> None:
+        self.status_changed.emit()

@@ -1,0 +1,335 @@
+"""One camera of ``rig.vico``; its view uses this as well."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.frame.file_names import space_left
+from cosmic.frame.task import Task
+from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.core.camera_recordings import PictureRecordingState
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.recording.formats import FORMATS, picture_bytes_per_s, recording_suffix
+from cosmic.vico.core.recording.snap import save_picture
+from cosmic.vico.core.recording.time_lapse import TimeLapsePlan
+from cosmic.vico.core.recording.video_writer import check_codec
+from cosmic.vico.core.vision.chain import Analysis, Unavailable
+from cosmic.vico.hw.interface import CameraCounters, CameraInfo, CameraRanges, CameraSettings
+
+if TYPE_CHECKING:
+    from cosmic.vico.core.vision.fibre import Fibre
+
+Pixel = tuple[float, float]
+
+BACKGROUND_FRAMES = 8
+DESCRIPTIONS = {
+    "focus": "how sharp the picture is",
+    "fibres": "find fibres and measure them",
+    "tips": "find the tips of grippers and probe",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class LinkShown:
+    """One link of the chain of machine vision.
+
+    Attributes
+    ----------
+    problem : str
+        Why it says nothing; empty when all is well.
+    """
+
+    name: str
+    description: str
+    on: bool
+    problem: str
+
+
+@dataclass(frozen=True, slots=True)
+class FormatShown:
+    """A way to record pictures."""
+
+    name: str
+    suffix: str
+    description: str
+    problem: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """What the chain found on one picture."""
+
+    picture: Picture
+    fibres: tuple["Fibre", ...]
+    tips: tuple[object, ...]
+
+
+class CameraHandle:
+    """One camera: its pictures, settings, recordings and what machine vision finds; any thread."""
+
+    def __init__(self, application: VicoApplication, name: str) -> None:
+        self._application = application
+        self._unit = application.unit(name)
+        self._thread = self._unit.thread
+        self.name = name
+
+    # What is in force
+
+    @property
+    def title(self) -> str:
+        """What the operator reads."""
+        return self._unit.place.shown
+
+    @property
+    def info(self) -> CameraInfo | None:
+        """Which camera it is; None while none is connected."""
+        return self._thread.info
+
+    @property
+    def ranges(self) -> CameraRanges | None:
+        """What it accepts now; None while it is not connected."""
+        return self._thread.ranges
+
+    @property
+    def settings(self) -> CameraSettings | None:
+        """What is in force, as read back; None while it is not connected."""
+        return self._thread.settings
+
+    @property
+    def counters(self) -> CameraCounters:
+        """What became of the frames since the start."""
+        return self._thread.counters
+
+    @property
+    def running(self) -> bool:
+        """It takes pictures, or waits for its trigger."""
+        return self._thread.running
+
+    @property
+    def problem(self) -> str:
+        """Why no pictures come; empty when all is well."""
+        return self._thread.problem
+
+    # Pictures
+
+    def latest(self) -> Picture | None:
+        """Return the newest whole picture, background corrected; None before the first."""
+        return self._unit.shown()
+
+    def next_picture(self, timeout_s: float = 5.0, since_s: float | None = None) -> Picture:
+        """Wait for a whole picture exposed from `since_s` of platform time on; None is now.
+
+        Raises
+        ------
+        NotAvailable
+            None came in time; the text says why.
+        WrongThreadError
+            Called in the GUI thread.
+        """
+        since = self._application.clock.now_s() if since_s is None else since_s
+        return self._thread.next_picture(since, timeout_s)
+
+    @property
+    def focus(self) -> float | None:
+        """How sharp the newest picture is; None while that is not measured."""
+        newest = self._unit.vision.newest
+        return newest.get("focus", float) if newest is not None else None
+
+    @property
+    def has_background(self) -> bool:
+        """Pictures are corrected by a background."""
+        return self._unit.background.frames > 0
+
+    def set_background(self) -> None:
+        """Correct pictures by the mean of the next few: show an empty ground meanwhile."""
+        self._unit.background.collect(BACKGROUND_FRAMES)
+        self._application.status_changed.emit()
+
+    def clear_background(self) -> None:
+        """Show pictures as they come."""
+        self._unit.background.reset()
+        self._application.status_changed.emit()
+
+    # Commands
+
+    def configure(self, settings: CameraSettings) -> Task:
+        """Begin to put settings in force; the task fails with what the camera refuses."""
+        return self._thread.configure(settings)
+
+    def start(self) -> Task:
+        """Begin to take pictures."""
+        return self._thread.start_pictures()
+
+    def stop(self) -> Task:
+        """End taking pictures; a recording is closed."""
+        self._unit.recordings.request_stop()
+        return self._thread.stop_pictures()
+
+    def trigger(self) -> None:
+        """Take one picture, with the software trigger; raises `NotAvailable` without it."""
+        self._thread.trigger()
+
+    # Machine vision
+
+    @property
+    def algorithms(self) -> Sequence[LinkShown]:
+        """The chain, in its order."""
+        newest = self._unit.vision.newest
+        return tuple(
+            LinkShown(
+                state.name,
+                DESCRIPTIONS.get(state.name, state.name),
+                state.on,
+                state.reason or (_reason(newest, state.name) if state.on else ""),
+            )
+            for state in self._unit.chain.states
+        )
+
+    def switch(self, algorithm: str, *, on: bool) -> None:
+        """Have an algorithm run on the pictures, or not; raises `ConfigError`."""
+        self._unit.chain.switch(algorithm, on=on)
+        self._application.status_changed.emit()
+
+    @property
+    def analysis(self) -> Seen | None:
+        """The newest result; None while nothing is on."""
+        newest = self._unit.vision.newest
+        if newest is None:
+            return None
+        fibres, tips = newest.results.get("fibres"), newest.results.get("tips")
+        return Seen(
+            newest.picture,
+            fibres if isinstance(fibres, tuple) else (),
+            tips if isinstance(tips, tuple) else (),
+        )
+
+    # Files
+
+    @property
+    def directory(self) -> Path:
+        """Where pictures go unless the operator says otherwise."""
+        return self._application.directory
+
+    @property
+    def formats(self) -> Sequence[FormatShown]:
+        """The ways to record; the first is the usual one."""
+        return tuple(
+            FormatShown(name, recording_suffix(name), found.text, self._format_problem(name))
+            for name, found in FORMATS.items()
+        )
+
+    def _format_problem(self, name: str) -> str:
+        settings = self.settings
+        try:
+            for each in FORMATS:
+                if each == name:
+                    check_codec(each)
+                    if settings is not None and not FORMATS[each].holds(settings.pixel_format):
+                        return f"it cannot keep {settings.pixel_format}"
+        except CosmicError as exc:
+            return str(exc)
+        return ""
+
+    @property
+    def recording(self) -> PictureRecordingState:
+        """The recording that runs, or the last one."""
+        return self._unit.recordings.state
+
+    def room_s(self, directory: Path, format_name: str) -> float | None:
+        """Return how long the disk lasts for a recording there; None while nobody knows."""
+        settings = self.settings
+        chosen = next((each for each in FORMATS if each == format_name), None)
+        if settings is None or chosen is None:
+            return None
+        return space_left(directory, picture_bytes_per_s(chosen, settings)).left_s
+
+    def snap(self, path: Path, *, overwrite: bool = False) -> Task:
+        """Begin to write the newest picture to a .tif or .png; the camera goes on meanwhile."""
+
+        def job(task: Task) -> None:
+            try:
+                picture = self._unit.shown()
+                if picture is None:
+                    raise NotAvailable(f"{self.name}: {self.problem or 'no picture yet'}")
+                axes = self._unit.recordings.axes
+                save_picture(picture, path, axes=axes, overwrite=overwrite)
+                task.finish()
+            except CosmicError as exc:
+                task.fail(exc)
+
+        return self._application.begin(f"Saving {path.name}", job)
+
+    def record(
+        self, path: Path | str, format_name: str = "ffv1", *, overwrite: bool = False
+    ) -> None:
+        """Begin to record; see `CameraRecordings.start` for what it raises."""
+        self._unit.recordings.start(Path(path), format_name, overwrite=overwrite)
+
+    def stop_recording(self, *, wait: bool = False) -> None:
+        """Ask for the file to be closed; it is when `recording.active` is False."""
+        if wait:
+            self._unit.recordings.stop()
+        else:
+            self._unit.recordings.request_stop()
+
+    def time_lapse(
+        self,
+        path: Path,
+        format_name: str = "tiff",
+        *,
+        interval_s: float,
+        count: int,
+        overwrite: bool = False,
+    ) -> Task:
+        """Begin to record one picture each `interval_s`, `count` in all; raises as `record`."""
+        plan = TimeLapsePlan(interval_s, count)
+        now_s = self._application.clock.now_s()
+        recordings = self._unit.recordings
+        return recordings.time_lapse(path, format_name, plan, now_s, overwrite=overwrite)
+
+    # Places
+
+    @property
+    def calibration_problem(self) -> str:
+        """Why pixels cannot be told as places on the platform; empty when they can."""
+        places, newest = self._application.places, self._thread.newest
+        if places is None:
+            return "micromanipulation is not hosted here"
+        return places.problem(newest) if newest is not None else "no picture yet"
+
+    def platform_um(self, place_px: Pixel) -> tuple[float, float] | None:
+        """Return where on the platform a pixel of the newest picture is; None where unknown."""
+        places, newest = self._application.places, self._thread.newest
+        if places is None or newest is None or places.problem(newest):
+            return None
+        return places.platform_um(newest, place_px)
+
+    @property
+    def targets(self) -> Sequence[str]:
+        """What can be moved to a place in the picture, such as "left"."""
+        places = self._application.places
+        return places.targets if places is not None else ()
+
+    def click_to_move(self, place_px: Pixel, what: str) -> str:
+        """Begin to move `what` to a pixel of the newest picture, and say what was begun.
+
+        Raises
+        ------
+        MoveRefused, NotAvailable
+            The gate says no, or the place cannot be told.
+        """
+        places, newest = self._application.places, self._thread.newest
+        if places is None or newest is None:
+            raise NotAvailable(self.calibration_problem)
+        return places.move_to(newest, place_px, what)
+
+
+def _reason(newest: Analysis | None, name: str) -> str:
+    if newest is None:
+        return ""
+    failure, found = newest.failures.get(name), newest.results.get(name)
+    if failure is not None:
+        return failure.text
+    return found.reason if isinstance(found, Unavailable) else ""

@@ -1,0 +1,94 @@
+"""Fibres in um and on the platform, from what was found in pixels."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from cosmic.frame.errors import NotAvailable
+from cosmic.vico.api.places import Places
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.vision.algorithms import grey
+from cosmic.vico.core.vision.fibre import Fibre
+from cosmic.vico.core.vision.finding import find_fibres
+from cosmic.vico.core.vision.grey import Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedFibre(Fibre):
+    """A fibre found on one picture, with its size and place where those can be told.
+
+    Attributes
+    ----------
+    picture : Picture
+        Where it was found; the values in px are those of its pixels.
+    scale_um_px : float or None
+        Of the zoom the picture was taken with; None where nobody knows: then every um is None.
+    centre_line_um, ends_um, grasp_points_um : ndarray, shape (n, 2), or None
+        x, y on the platform; None where the camera was not calibrated. `doubts` says why.
+    """
+
+    picture: Picture
+    scale_um_px: float | None
+    centre_line_um: Floats | None
+    ends_um: Floats | None
+    grasp_points_um: Floats | None
+
+    @property
+    def length_um(self) -> float | None:
+        """Along the centre line."""
+        return self._um(self.length_px)
+
+    @property
+    def length_std_um(self) -> float | None:
+        """Standard deviation of the length, without that of the scale."""
+        return self._um(self.length_std_px)
+
+    @property
+    def projected_length_um(self) -> float | None:
+        """The largest distance between two of its points."""
+        return self._um(self.projected_length_px)
+
+    @property
+    def width_um(self) -> float | None:
+        """Mean width."""
+        return self._um(self.width_px)
+
+    def _um(self, value_px: float) -> float | None:
+        return None if self.scale_um_px is None else value_px * self.scale_um_px
+
+
+def place_fibres(picture: Picture, places: Places | None) -> list[PlacedFibre]:
+    """Find the fibres on a picture and say how long they are and where."""
+    reason = "micromanipulation is not hosted here" if places is None else places.problem(picture)
+    return [_placed(each, picture, places, reason) for each in find_fibres(grey(picture.data))]
+
+
+def _placed(fibre: Fibre, picture: Picture, places: Places | None, reason: str) -> PlacedFibre:
+    scale = picture.circumstances.scale_um_px
+    doubts = list(fibre.doubts)
+    if scale is None:
+        doubts.append("no um: the scale of this picture is not known")
+    lines: list[Floats | None] = [None, None, None]
+    if places is None or reason:
+        doubts.append(f"no place on the platform: {reason}")
+    else:
+        wanted = (fibre.centre_line_px, fibre.ends_px, fibre.grasp_points_px)
+        try:
+            lines = [_on_platform(each, picture, places) for each in wanted]
+        except NotAvailable as exc:
+            doubts.append(f"no place on the platform: {exc}")
+    centre_line_um, ends_um, grasp_points_um = lines
+    known = {each.name: getattr(fibre, each.name) for each in fields(Fibre)}
+    return PlacedFibre(
+        **known | {"doubts": tuple(doubts)},
+        picture=picture,
+        scale_um_px=scale,
+        centre_line_um=centre_line_um,
+        ends_um=ends_um,
+        grasp_points_um=grasp_points_um,
+    )
+
+
+def _on_platform(points_px: Floats, picture: Picture, places: Places) -> Floats:
+    found = [places.platform_um(picture, (float(x), float(y))) for x, y in points_px]
+    return np.array(found, dtype=np.float64).reshape(-1, 2)

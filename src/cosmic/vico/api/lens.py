@@ -1,0 +1,136 @@
+"""The lens and the light of ``rig.vico``; their panels use these as well."""
+
+from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.frame.task import Task
+from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.api.autofocus import find_focus
+from cosmic.vico.core.zoom_scale import ZoomPoint, ZoomScale
+from cosmic.vico.hw.peripherals import LensAxis, LensState
+
+
+class LensHandle:
+    """The motorised lens; any thread, and everything returns at once."""
+
+    def __init__(self, application: VicoApplication) -> None:
+        self._application = application
+        self._thread = application.peripherals
+        self._search: Task | None = None
+
+    @property
+    def name(self) -> str:
+        """What the operator reads."""
+        return self._thread.lens_name or "Lens"
+
+    @property
+    def problem(self) -> str:
+        """Why it cannot be used; empty when all is well."""
+        return self._thread.state.lens_problem
+
+    @property
+    def scale(self) -> ZoomScale:
+        """Magnification and um per pixel for each position of the zoom."""
+        return self._application.zoom_scale
+
+    @property
+    def steps(self) -> tuple[ZoomPoint, ...]:
+        """Zoom positions with a name, from the smallest."""
+        return self.scale.steps
+
+    @property
+    def zoom_range(self) -> tuple[float, float]:
+        """Least and most magnification; raises `ConfigError` where the table is empty."""
+        return self.scale.zoom_range
+
+    @property
+    def zoom(self) -> float | None:
+        """Magnification now; None while unknown."""
+        state = self.state(LensAxis.ZOOM)
+        known = state is not None and state.homed
+        return self.scale.zoom(state.position_counts) if state is not None and known else None
+
+    def state(self, axis: LensAxis) -> LensState | None:
+        """Return what was last heard of a motor; None before."""
+        return self._thread.state.axis(axis)
+
+    def home(self) -> Task:
+        """Begin to run both motors to where counting begins."""
+        return self._thread.home()
+
+    def zoom_to(self, zoom: float) -> Task:
+        """Begin to zoom; the task fails where the lens has not been homed.
+
+        Raises
+        ------
+        ConfigError
+            The magnification is not in the table.
+        """
+        return self._thread.seek(LensAxis.ZOOM, self.scale.counts(zoom))
+
+    def seek_focus(self, target_counts: int) -> Task:
+        """Begin to focus there; the task fails with what the controller refuses."""
+        return self._thread.seek(LensAxis.FOCUS, target_counts)
+
+    def autofocus(self, camera: str = "") -> Task:
+        """Begin to look for the sharpest picture of a camera behind the lens.
+
+        Frames exposed before a movement ended are not looked at. Where none is found, the lens
+        goes back to where it was.
+
+        Raises
+        ------
+        NotAvailable
+            The camera is not behind the lens, or another long operation is under way.
+        """
+        application = self._application
+        unit = application.unit(camera or application.first_camera)
+        if not unit.place.behind_lens:
+            raise NotAvailable(f"{unit.place.name} has a lens of its own; there is no motor")
+        self._search = application.begin(
+            f"Autofocus of {unit.place.name}",
+            lambda task: find_focus(task, unit, self._thread, application.clock),
+        )
+        return self._search
+
+    def abort(self) -> None:
+        """Stop both motors and whatever moves them."""
+        if self._search is not None:
+            self._search.cancel()
+        self._thread.abort()
+
+    def reopen(self) -> Task:
+        """Begin to connect again what was lost."""
+        return self._thread.reopen()
+
+
+class LightHandle:
+    """The lamp; any thread, and everything returns at once."""
+
+    def __init__(self, application: VicoApplication) -> None:
+        self._thread = application.peripherals
+
+    @property
+    def name(self) -> str:
+        """What the operator reads."""
+        return self._thread.light_name or "Light"
+
+    @property
+    def problem(self) -> str:
+        """Why it cannot be used; empty when all is well."""
+        return self._thread.state.light_problem
+
+    @property
+    def percent(self) -> float | None:
+        """How bright it is, 0 to 100; None while unknown."""
+        return self._thread.state.light_percent
+
+    def set_percent(self, percent: float) -> Task:
+        """Begin to make it so bright; of several in a row the last counts.
+
+        Raises
+        ------
+        ConfigError
+            Outside 0 to 100.
+        """
+        if not 0.0 <= percent <= 100.0:
+            raise ConfigError(f"light: {percent!r} is not between 0 and 100 %")
+        return self._thread.set_light(percent)

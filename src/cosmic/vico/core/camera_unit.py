@@ -1,0 +1,134 @@
+"""`CameraUnit`: one camera of the platform and what hangs on it."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+
+from cosmic.frame.errors import ConfigError
+from cosmic.frame.failure import FailurePolicy
+from cosmic.vico.core.background import Background
+from cosmic.vico.core.camera_libraries import CameraLibraries
+from cosmic.vico.core.camera_recordings import CameraRecordings
+from cosmic.vico.core.camera_thread import CameraThread
+from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.core.settings import CameraPlace
+from cosmic.vico.core.vision.algorithms import make_chain
+from cosmic.vico.core.vision.chain import Analysis
+from cosmic.vico.core.vision_thread import VisionThread
+from cosmic.vico.hw.interface import Camera, CameraSettings, Frame, PixelFormat, Roi
+
+logger = logging.getLogger(__name__)
+
+CircumstancesOf = Callable[[CameraPlace, Frame, CameraSettings], Circumstances]
+
+
+class CameraUnit:
+    """A camera's thread, the chain of machine vision on its pictures, and its recordings.
+
+    Attributes
+    ----------
+    thread : CameraThread
+    recordings : CameraRecordings
+    vision : VisionThread
+        Runs `chain` on the newest picture, background corrected.
+    """
+
+    def __init__(
+        self,
+        place: CameraPlace,
+        libraries: CameraLibraries,
+        circumstances: CircumstancesOf,
+        policy: FailurePolicy,
+    ) -> None:
+        self._place = place
+        self._libraries = libraries
+        self.background = Background()
+        self.chain = make_chain()
+        for state in self.chain.states:
+            self.chain.switch(state.name, on=state.name in place.algorithms)
+        self.thread = CameraThread(
+            place.name,
+            lambda: libraries.open(self._place),
+            self._prepare,
+            lambda frame, settings: circumstances(self._place, frame, settings),
+            policy,
+        )
+        self.recordings = CameraRecordings(self.thread, policy)
+        self.vision: VisionThread[Analysis] = VisionThread(place.name, self._analyse, policy)
+        self.thread.subscribe(self._collect)
+        self.thread.subscribe(self.vision.put)
+
+    @property
+    def place(self) -> CameraPlace:
+        """Which camera it is meant to be."""
+        return self._place
+
+    def use(self, key: str) -> None:
+        """Take the pictures with another camera of the same backend."""
+        self._place = self._place.model_copy(update={"key": key})
+        self.thread.reopen()
+
+    def shown(self) -> Picture | None:
+        """Return the newest picture, background corrected; None before the first."""
+        newest = self.thread.newest
+        return self._corrected(newest) if newest is not None else None
+
+    def start(self) -> None:
+        """Begin to look for the camera and to take pictures."""
+        self.vision.start()
+        self.thread.start()
+
+    def request_end(self) -> None:
+        """Ask everything to end; returns at once."""
+        self.recordings.request_stop()
+        self.thread.request_end()
+        self.vision.request_end()
+
+    def join(self) -> None:
+        """Wait until everything has ended."""
+        self.recordings.stop()
+        self.thread.join()
+        self.vision.join()
+
+    def _collect(self, picture: Picture) -> None:
+        """Give the background what it waits for; in the camera's thread."""
+        if not self.background.missing:
+            return
+        try:
+            self.background.add(picture.frame, self._binning())
+        except ConfigError as exc:
+            logger.warning("%s: %s", self._place.name, exc)
+
+    def _corrected(self, picture: Picture) -> Picture:
+        binning = self._binning()
+        if not self.background.frames or self.background.misfit(picture.frame, binning):
+            return picture  # of another size it is shown as it comes
+        data = self.background.correct(picture.frame, binning)
+        return replace(picture, frame=replace(picture.frame, data=data))
+
+    def _binning(self) -> int:
+        settings = self.thread.settings
+        return settings.binning if settings is not None else 1
+
+    def _analyse(self, picture: Picture) -> Analysis | None:
+        if not any(state.on for state in self.chain.states):
+            return None
+        return self.chain.run(self._corrected(picture))
+
+    def _prepare(self, camera: Camera) -> CameraSettings:
+        """Return what is configured, and what the camera has where nothing is."""
+        place, now, ranges = self._place, camera.settings, camera.ranges
+        roi = now.roi
+        if place.binning != now.binning:
+            width, height = camera.info.sensor_px
+            roi = Roi(0, 0, width // place.binning, height // place.binning)
+        pixel_format = PixelFormat(place.pixel_format)
+        return CameraSettings(
+            exposure_s=now.exposure_s if place.exposure_s is None else place.exposure_s,
+            gain_db=now.gain_db if place.gain_db is None else place.gain_db,
+            rate_hz=now.rate_hz if place.rate_hz is None else place.rate_hz,
+            roi=roi,
+            binning=place.binning,
+            pixel_format=pixel_format if pixel_format in ranges.pixel_formats else now.pixel_format,
+            trigger=now.trigger,
+        )
