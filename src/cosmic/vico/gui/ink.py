@@ -1,5 +1,6 @@
 """Pens and labels that can be seen over any picture, bright or dark."""
 
+from collections.abc import Sequence
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, Qt
@@ -46,9 +47,19 @@ def line(painter: QPainter, begin: QPointF, end: QPointF, made: QPen) -> None:
 
 
 def label(
-    painter: QPainter, place: QPointF, text: str, colour: QColor, room: QRectF, *, gap: float = 8.0
+    painter: QPainter,
+    place: QPointF,
+    text: str,
+    colour: QColor,
+    room: QRectF,
+    *,
+    gap: float = 8.0,
+    taken: Sequence[QRectF] = (),
 ) -> QRectF:
-    """Write `text` beside a place on a dark ground, inside `room`; returns where it stands."""
+    """Write `text` beside a place on a dark ground, inside `room`; returns where it stands.
+
+    It goes below each of the labels `taken` that it would cover.
+    """
     font = number_font(12, bold=True)
     metrics = QFontMetricsF(font)
     width = max(metrics.horizontalAdvance(part) for part in text.splitlines())
@@ -56,6 +67,9 @@ def label(
     box = QRectF(place.x() + gap, place.y() - height - gap, width + STEP_PX, height + 4.0)
     box.moveLeft(min(max(box.left(), room.left() + 2), room.right() - box.width() - 2))
     box.moveTop(min(max(box.top(), room.top() + 2), room.bottom() - box.height() - 2))
+    for other in sorted(taken, key=QRectF.top):
+        if box.intersects(other):
+            box.moveTop(other.bottom() + 2.0)
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QColor(0, 0, 0, 165))
     painter.drawRoundedRect(box, 3.0, 3.0)

@@ -185,6 +185,7 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
     @property
     def to_screen(self) -> QTransform:
         """From pixels of the picture to those of the widget."""
+        self.box.updateMatrix()  # else as it was when last painted
         inner: QTransform = self.box.childGroup.sceneTransform()
         outer: QTransform = self.viewportTransform()
         return inner * outer

@@ -5,31 +5,67 @@ from typing import Final
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from cosmic.frame.gui.palette import INK
+from cosmic.frame.gui.palette import INK, OKABE_ITO
 from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
 from cosmic.frame.overrides import override
 
 BARS: Final = 24
+_MIDDLE: Final = int(Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
 
 
-class Reading(QLabel):
-    """A number with its name; as wide as `widest`, whatever it shows."""
+class Reading(QWidget):
+    """A number between its name and its unit, both dimmed; as wide as `widest` needs.
 
-    def __init__(self, widest: str, tip: str, parent: QWidget | None = None) -> None:
+    Parameters
+    ----------
+    before, after : str
+        Name and unit.
+    widest : str
+        The longest number.
+    """
+
+    def __init__(
+        self, before: str, widest: str, after: str, tip: str, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
+        self._before, self._after, self._number = before, after, "–"
+        self._alarm = False
         self.setFont(number_font())
         self.setToolTip(tip)
-        self.setTextFormat(Qt.TextFormat.PlainText)
-        self.setContentsMargins(STEP_PX // 2, 0, 0, 0)
-        self.setFixedWidth(self.fontMetrics().horizontalAdvance(widest) + STEP_PX)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        metrics = self.fontMetrics()
+        parts = [text for text in (before, widest, after) if text]
+        width = sum(metrics.horizontalAdvance(text) + STEP_PX // 2 for text in parts)
+        self.setFixedSize(width + STEP_PX, metrics.height() + 2)
 
-    def show_alarm(self, alarm: bool) -> None:
-        """Turn the number's ground while it is one that should be 0."""
-        wanted = f"background: {current_palette().refused}; color: {INK};" if alarm else ""
-        if self.styleSheet() != wanted:
-            self.setStyleSheet(wanted)
+    def text(self) -> str:
+        """Return the whole of it."""
+        return " ".join(part for part in (self._before, self._number, self._after) if part)
+
+    def show_number(self, number: str, *, alarm: bool = False) -> None:
+        """Show another number; `alarm` colours the ground, for one that should be 0."""
+        if (number, alarm) == (self._number, self._alarm):
+            return
+        self._number, self._alarm = number, alarm
+        self.setAccessibleName(self.text())
+        self.update()
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        colours = current_palette()
+        painter = QPainter(self)
+        if self._alarm:
+            painter.fillRect(self.rect(), QColor(OKABE_ITO["orange"]))
+        dim, ink = (INK, INK) if self._alarm else (colours.dim, colours.text)
+        x = STEP_PX // 2
+        for text, colour in ((self._before, dim), (self._number, ink), (self._after, dim)):
+            if text:
+                painter.setPen(QColor(colour))
+                width = self.fontMetrics().horizontalAdvance(text)
+                painter.drawText(x, 0, width + 1, self.height(), _MIDDLE, text)
+                x += width + STEP_PX // 2
 
 
 class FocusBars(QWidget):

@@ -47,6 +47,10 @@ class SeenLayer(Layer):
     def tip(self, place: QPointF, view: PictureView) -> str:
         return next((text for box, text in self.labels if box.contains(place)), "")
 
+    @property
+    def _taken(self) -> list[QRectF]:
+        return [box for box, _ in self.labels]
+
     @staticmethod
     def _fits(view: PictureView, found: Analysis) -> bool:
         """Tell whether it was found in a picture of the size shown."""
@@ -69,7 +73,7 @@ class SeenLayer(Layer):
         middle = line_px[len(line_px) // 2]
         text = fibre_text(fibre, scale)
         place = to.map(QPointF(*middle))
-        box = label(painter, place, text, colour, QRectF(view.rect()), gap=14.0)
+        box = label(painter, place, text, colour, QRectF(view.rect()), gap=14.0, taken=self._taken)
         said = "certain" if fibre.certain else f"{NOT_SURE}: " + "; ".join(fibre.doubts)
         self.labels.append((box, f"Fibre, {said}"))
 
@@ -82,7 +86,7 @@ class SeenLayer(Layer):
             path.lineTo(place + QPointF(dx, dy))
         stroke(painter, path, pen(colour, 2.0))
         text = tip.name if tip.certain else f"{tip.name}, {NOT_SURE}"
-        box = label(painter, place, text, WHITE, QRectF(view.rect()), gap=4.0)
+        box = label(painter, place, text, WHITE, QRectF(view.rect()), gap=4.0, taken=self._taken)
         self.labels.append((box, f"Tip of {text}"))
 
 

@@ -24,15 +24,21 @@ class StatusRow(QWidget):
         self._since_s, self._since_count = WALL.now_s(), port.counters.completed
         self._rate_hz: float | None = None
         self.badge = StateBadge(State.UNKNOWN)
-        self.rate = Reading("000.0 Hz", "Pictures a second that came from the camera")
-        self.completed = Reading("00000000 whole", "Pictures that came whole since the start")
-        self.failed = Reading("failed 00000", "Pictures that came with parts missing; not shown")
-        self.lost = Reading("lost 00000", "Pictures that never came, by the gaps in their numbers")
-        self.dropped = Reading(
-            "dropped 00000", "Pictures the camera had and this computer had no room for"
+        self.rate = Reading("", "000.0", "Hz", "Pictures a second that came from the camera")
+        self.completed = Reading("", "00000000", "whole", "Pictures that came whole")
+        self.failed = Reading(
+            "failed", "00000", "", "Pictures that came with parts missing; none is shown"
         )
-        self.over = Reading("over-exposed 00.00 %", "Share of the pixels that are over-exposed")
-        self.focus = Reading("focus 0000.0", "Sharpness of the newest picture; larger is sharper")
+        self.lost = Reading(
+            "lost", "00000", "", "Pictures that never came, by the gaps in their numbers"
+        )
+        self.dropped = Reading(
+            "dropped", "00000", "", "Pictures that this computer had no room for"
+        )
+        self.over = Reading("over-exposed", "00.00", "%", "Share of over-exposed pixels")
+        self.focus = Reading(
+            "focus", "0000.0", "", "Sharpness of the newest picture; larger is sharper"
+        )
         self.bars = FocusBars()
         flow = FlowLayout(STEP_PX // 2, self)
         for widget in self.readings:
@@ -52,20 +58,18 @@ class StatusRow(QWidget):
         """Show the numbers as they are now."""
         counters = self._port.counters
         self._measure_rate(counters.completed)
-        rate = "–" if self._rate_hz is None else f"{self._rate_hz:.1f}"
-        self.rate.setText(f"{rate} Hz")
-        self.completed.setText(f"{counters.completed} whole")
-        for reading, name, count in (
-            (self.failed, "failed", counters.failed),
-            (self.lost, "lost", counters.lost),
-            (self.dropped, "dropped", counters.underrun),
+        self.rate.show_number("–" if self._rate_hz is None else f"{self._rate_hz:.1f}")
+        self.completed.show_number(f"{counters.completed}")
+        for reading, count in (
+            (self.failed, counters.failed),
+            (self.lost, counters.lost),
+            (self.dropped, counters.underrun),
         ):
-            reading.setText(f"{name} {count}")
-            reading.show_alarm(count > 0)
+            reading.show_number(f"{count}", alarm=count > 0)
         over = 0.0 if histogram is None else 100.0 * histogram.over
-        self.over.setText(f"over-exposed {over:.2f} %")
+        self.over.show_number(f"{over:.2f}")
         focus = self._port.focus
-        self.focus.setText("focus –" if focus is None else f"focus {focus:.1f}")
+        self.focus.show_number("–" if focus is None else f"{focus:.1f}")
         if focus is not None:
             self.bars.add(focus)
 
