@@ -6,16 +6,16 @@ from typing import Any, Final
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 from typing_extensions import override
 
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
+from cosmic.vico.hw.interface import Pixels
 from cosmic.vico.hw.opencv_source import Kind, VideoSource
 
 PICTURES_HZ: Final = 15.0
 _ENDINGS: Final = (".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm")
 
-Raw = npt.NDArray[np.generic]
+Raw = Pixels
 
 
 class Film(ABC):
@@ -90,8 +90,8 @@ class PictureFilm(Film):
             raise _unreadable(folder, f"it holds no pictures ({', '.join(_ENDINGS)})")
         self.rate_hz = PICTURES_HZ
         self._next = 0
-        first = cv2.imread(str(self._paths[0]), cv2.IMREAD_UNCHANGED)
-        if first is None or first.dtype not in (np.uint8, np.uint16):
+        first = _decoded(self._paths[0])
+        if first is None:
             raise _unreadable(self._paths[0], "it is no picture of 8 or 16 bits")
         self.first = first
 
@@ -103,7 +103,7 @@ class PictureFilm(Film):
         self._next += 1
         if not path.is_file():
             raise _gone(path)
-        picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        picture = _decoded(path)
         if picture is None or picture.dtype != self.first.dtype:
             raise _unreadable(path, "it cannot be decoded, or its depth differs from the first")
         return picture
@@ -129,6 +129,12 @@ def open_film(source: VideoSource) -> Film:
     if not path.exists():
         raise _gone(path)
     return PictureFilm(path) if source.kind is Kind.PICTURES else VideoFilm(path)
+
+
+def _decoded(path: Path) -> Raw | None:
+    picture: Any = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    known = picture is not None and picture.dtype in (np.uint8, np.uint16)
+    return picture if known else None
 
 
 def _gone(path: Path) -> NotConnectedError:
