@@ -81,12 +81,33 @@ class AravisCalls:
         finally:
             self.plain("g_free", ctypes.cast(found, ctypes.c_void_p))
 
+    def owned_text(self, name: str, handle: int) -> str:
+        """Return the text of a function that cannot fail and gives one to be freed."""
+        address = self.plain(name, handle)
+        if not address:
+            return ""
+        try:
+            return (ctypes.cast(address, ctypes.c_char_p).value or b"").decode(errors="replace")
+        finally:
+            self.plain("g_free", address)
+
     def set_int_property(self, handle: int, name: str, value: int) -> None:
         """Set an integer or enumerated property of a GObject."""
         holder = arv.GValue()
         self.plain("g_value_init", byref(holder), arv.G_TYPE_INT)
         self.plain("g_value_set_int", byref(holder), value)
         self.plain("g_object_set_property", handle, name.encode(), byref(holder))
+
+    def release(self, handle: int, *, gone: bool = False) -> None:
+        """Give an object back; without waiting for it where its camera is gone.
+
+        Aravis says goodbye to a camera that no longer answers for up to five seconds an object.
+        """
+        if not gone:
+            self.plain("g_object_unref", handle)
+            return
+        unref = ctypes.cast(self._functions["g_object_unref"], ctypes.c_void_p)
+        self.plain("g_thread_unref", self.plain("g_thread_new", b"aravis-release", unref, handle))
 
     def _exception(self, error: Any, where: str) -> DeviceError:
         domain = self.plain("g_quark_to_string", error.contents.domain) or b"?"

@@ -10,12 +10,12 @@ import numpy as np
 from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errors import DeviceError, DeviceFault, NotAvailable
+from cosmic.frame.errors import ConfigError, DeviceError, DeviceFault, NotAvailable
 from cosmic.vico.hw import aravis_ctypes as arv
 from cosmic.vico.hw.aravis_calls import AravisCalls
 from cosmic.vico.hw.aravis_features import AravisFeatures
 from cosmic.vico.hw.aravis_frames import FrameNumbers, FrameTimes
-from cosmic.vico.hw.aravis_gvcp import QUIET_S, GvcpWatch
+from cosmic.vico.hw.aravis_gvcp import QUIET_S, GvcpWatch, ask_camera
 from cosmic.vico.hw.aravis_stream import AravisBuffer, AravisStream
 from cosmic.vico.hw.camera_checks import check_settings
 from cosmic.vico.hw.interface import (
@@ -118,7 +118,7 @@ class AravisCamera(Camera):
     @override
     def configure(self, settings: CameraSettings) -> CameraSettings:
         with self._lock:
-            self._require()
+            self._require_answer()
             present = self._settings
             check_settings(
                 self._whom,
@@ -132,8 +132,10 @@ class AravisCamera(Camera):
                 return present
             try:
                 self._features.write(settings, present)
-            finally:
+            except ConfigError:
                 self._settings = self._features.settings()
+                raise
+            self._settings = self._features.settings()
             self._ranges = self._features.ranges(self._settings.binning)
             logger.info("%s: %s", self._whom, self._settings)
             return self._settings
@@ -141,7 +143,7 @@ class AravisCamera(Camera):
     @override
     def start(self) -> None:
         with self._lock:
-            self._require()
+            self._require_answer()
             if self._stream is not None:
                 raise DeviceError(f"{self._whom} takes pictures already", fault=DeviceFault.STATE)
             stream = AravisStream(self._calls, self._camera, self._whom, self._settings)
@@ -186,7 +188,7 @@ class AravisCamera(Camera):
                 f"configure it first"
             )
         with self._lock:
-            self._require()
+            self._require_answer()
             self._calls.checked(self._whom, "arv_camera_software_trigger", self._camera)
 
     @override
@@ -200,12 +202,12 @@ class AravisCamera(Camera):
             if stream is None:
                 return
             try:
-                if self._failure is None:
-                    self._calls.checked(self._whom, "arv_camera_stop_acquisition", self._camera)
+                self._require_answer()
+                self._calls.checked(self._whom, "arv_camera_stop_acquisition", self._camera)
             except DeviceError as exc:
                 logger.warning("%s did not hear that it shall stop: %s", self._whom, exc)
             finally:
-                stream.close()
+                stream.close(gone=self._failure is not None)
 
     @override
     def close(self) -> None:
@@ -215,13 +217,25 @@ class AravisCamera(Camera):
             self.stop()
             self._closed = True
             self._calls.plain("g_signal_handler_disconnect", self._device, self._handler_id)
-            self._calls.plain("g_object_unref", self._camera)
+            gone = self._failure is not None or bool(self._address and ask_camera(self._address))
+            self._calls.release(self._camera, gone=gone)
 
-    def _require(self) -> None:
+    def _require_answer(self) -> None:
+        """Raise unless it is open and there."""
         if self._closed:
             raise DeviceError(f"{self._whom} is closed; open it again", fault=DeviceFault.STATE)
+        if self._failure is None and self._address:
+            self._fail(ask_camera(self._address))
         if self._failure is not None:
             raise self._failure
+
+    def _fail(self, reason: str) -> None:
+        """Note that it is gone, if there is a reason to think so."""
+        if reason:
+            self._failure = DeviceError(
+                f"{self._whom} is gone: {reason}. Check cable and power; open it again",
+                fault=DeviceFault.COMMUNICATION,
+            )
 
     def _begin_counting(self) -> None:
         self._completed = self._failed = self._underrun = 0
@@ -282,11 +296,8 @@ class AravisCamera(Camera):
             reason = self._watch.poll(now_s)
         elif not reason and now_s - self._last_sign_s >= QUIET_S:
             reason = self._ask_device()
-        if reason:
-            self._failure = DeviceError(
-                f"{self._whom} is gone: {reason}. Check cable and power; open it again",
-                fault=DeviceFault.COMMUNICATION,
-            )
+        self._fail(reason)
+        if self._failure is not None:
             raise self._failure
 
     def _ask_device(self) -> str:

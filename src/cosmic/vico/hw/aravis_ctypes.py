@@ -27,7 +27,6 @@ LIBRARY_NAME: Final = "libaravis-0.8.so.0"
 
 # ArvBufferStatus
 ARV_BUFFER_STATUS_SUCCESS: Final = 0
-ARV_BUFFER_STATUS_ABORTED: Final = 7
 # ArvAcquisitionMode, ArvAuto
 ARV_ACQUISITION_MODE_CONTINUOUS: Final = 0
 ARV_AUTO_OFF: Final = 0
@@ -98,6 +97,9 @@ PLAIN: Final[dict[str, Prototype]] = {
     "arv_camera_get_device": (_P, (_P,)),
     "arv_camera_is_gv_device": (c_int, (_P,)),
     "arv_gv_device_is_controller": (c_int, (_P,)),
+    "arv_gv_device_get_device_address": (_P, (_P,)),
+    "g_inet_socket_address_get_address": (_P, (_P,)),
+    "g_inet_address_to_string": (_P, (_P,)),
     "arv_stream_push_buffer": (None, (_P, _P)),
     "arv_stream_timeout_pop_buffer": (_P, (_P, c_uint64)),
     "arv_stream_get_statistics": (None, (_P, _U64_OUT, _U64_OUT, _U64_OUT)),
@@ -122,6 +124,8 @@ PLAIN: Final[dict[str, Prototype]] = {
     "g_error_free": (None, (POINTER(GError),)),
     "g_free": (None, (_P,)),
     "g_get_real_time": (c_int64, ()),
+    "g_thread_new": (_P, (c_char_p, _P, _P)),
+    "g_thread_unref": (None, (_P,)),
 }
 """What cannot fail, or says so by its answer."""
 
@@ -130,6 +134,9 @@ _IN_CAMERA_FLOATS = ("exposure_time", "gain", "frame_rate")
 
 FALLIBLE: Final[dict[str, Prototype]] = {
     "arv_camera_new": (_P, (c_char_p,)),
+    "arv_camera_get_vendor_name": (c_char_p, (_P,)),
+    "arv_camera_get_model_name": (c_char_p, (_P,)),
+    "arv_camera_get_device_serial_number": (c_char_p, (_P,)),
     "arv_camera_create_stream": (_P, (_P, _P, _P)),
     "arv_camera_get_sensor_size": (None, (_P, _INT_OUT, _INT_OUT)),
     "arv_camera_get_region": (None, (_P, _INT_OUT, _INT_OUT, _INT_OUT, _INT_OUT)),

@@ -1,10 +1,9 @@
 """Settings and ranges of a camera that Aravis drives."""
 
 import ctypes
-from dataclasses import replace
 from typing import Any, Final
 
-from cosmic.frame.errors import DeviceError, DeviceFault
+from cosmic.frame.errors import ConfigError, DeviceError, DeviceFault
 from cosmic.vico.hw import aravis_ctypes as arv
 from cosmic.vico.hw.aravis_calls import AravisCalls, as_refusal
 from cosmic.vico.hw.camera_checks import Sensor
@@ -83,7 +82,8 @@ class AravisFeatures:
         )
 
     def sensor(self, binning: int) -> Sensor:
-        """Return where a ROI may lie with a binning."""
+        """Return where a ROI may lie with a binning, which need not be one that it has."""
+        binning = max(1, binning)
         width, height = self.sensor_px
         steps = (1, 1)
         if self._has["region_offset"]:
@@ -106,11 +106,10 @@ class AravisFeatures:
         try:
             self._write(asked, present)
         except DeviceError as exc:
-            try:
-                self._write(present, replace(asked, trigger=self._trigger), everything=True)
-            except DeviceError as second:
-                raise second from exc
-            raise as_refusal(exc) from exc
+            refusal = as_refusal(exc)
+            if isinstance(refusal, ConfigError):
+                self._write(present, asked, everything=True)
+            raise refusal from exc
 
     def _write(
         self, asked: CameraSettings, present: CameraSettings, *, everything: bool = False

@@ -1,12 +1,15 @@
-"""Asks a GigE Vision camera whether it is there and still ours, without waiting for it.
+"""Asks a GigE Vision camera whether it is there and still ours.
 
 Aravis itself notices a camera that is gone only after some six seconds. Any program may read
 registers of a camera; this reads the one that says who controls it (GigE Vision, GVCP).
 """
 
+import select
 import socket
 import struct
 from typing import Final
+
+from cosmic.frame.clock import WALL
 
 _PORT: Final = 3956
 _COMMAND: Final = struct.Struct(">BBHHHI")
@@ -16,13 +19,35 @@ _READ_REGISTER, _READ_REGISTER_ACKNOWLEDGE = 0x0080, 0x0081
 _CONTROL_CHANNEL_PRIVILEGE: Final = 0x0A00
 _EXCLUSIVE_OR_CONTROL: Final = 0x3
 
-QUIET_S: Final = 0.5
-_ANSWER_S: Final = 0.3
+QUIET_S: Final = 0.4
+_ANSWER_S: Final = 0.25
 _TRIES: Final = 3
 
 
+def ask_camera(address: str) -> str:
+    """Return why a camera that this program controls is lost, or "" if it is not.
+
+    Takes up to 0.75 s where it is; Aravis takes five seconds a call to find out.
+    """
+    watch = GvcpWatch(address, WALL.now_s())
+    try:
+        return watch.ask()
+    finally:
+        watch.close()
+
+
+def controlled(address: str) -> bool | None:
+    """Return whether any program controls the camera at an address; None: it does not answer."""
+    watch = GvcpWatch(address, WALL.now_s())
+    try:
+        watch.ask()
+        return watch.controlled
+    finally:
+        watch.close()
+
+
 class GvcpWatch:
-    """Finds out within 1.5 s of silence that a camera is gone; one thread.
+    """Finds out within 1.3 s of silence that a camera is gone; one thread.
 
     Parameters
     ----------
@@ -30,6 +55,11 @@ class GvcpWatch:
         IP address of the camera.
     now_s : float
         Wall time of the last sign of life.
+
+    Attributes
+    ----------
+    controlled : bool or None
+        Whether any program controls it; None before it said so.
     """
 
     def __init__(self, address: str, now_s: float, *, port: int = _PORT) -> None:
@@ -40,13 +70,23 @@ class GvcpWatch:
         self._asked_s: float | None = None
         self._tries = 0
         self._request = 0
+        self.controlled: bool | None = None
 
     def alive(self, now_s: float) -> None:
         """Note a sign of life."""
         self._alive_s, self._asked_s, self._tries = now_s, None, 0
 
+    def ask(self) -> str:
+        """Return why the camera is lost, or "" if it is not; waits for its answer."""
+        self._ask(WALL.now_s())
+        while True:
+            select.select([self._socket], [], [], _ANSWER_S / 10.0)
+            reason = self.poll(WALL.now_s())
+            if reason or self._asked_s is None:
+                return reason
+
     def poll(self, now_s: float) -> str:
-        """Return why the camera is lost, or "" if it is not or not yet known; never waits."""
+        """Return why the camera is lost, or "" if it is not or not known yet; never waits."""
         if self._asked_s is not None:
             reason = self._read(now_s)
             if reason:
@@ -95,8 +135,10 @@ class GvcpWatch:
             if request != self._request or kind != _READ_REGISTER_ACKNOWLEDGE:
                 continue
             self.alive(now_s)
+            self.controlled = True  # it hides the register from all but who controls it
             if status == 0 and len(answer) >= _ACKNOWLEDGE.size:
                 privilege = _ACKNOWLEDGE.unpack_from(answer)[4]
-                if not privilege & _EXCLUSIVE_OR_CONTROL:
+                self.controlled = bool(privilege & _EXCLUSIVE_OR_CONTROL)
+                if not self.controlled:
                     return "it was started anew and no longer knows this program"
             return ""

@@ -84,9 +84,9 @@ class AravisStream:
             )
         return resent.value, missing.value
 
-    def close(self) -> None:
-        """End its thread and free its buffers."""
-        self._calls.plain("g_object_unref", self._stream)
+    def close(self, *, gone: bool = False) -> None:
+        """End its thread and free its buffers; `gone`: the camera is."""
+        self._calls.release(self._stream, gone=gone)
 
 
 class AravisBuffer:
@@ -117,19 +117,23 @@ class AravisBuffer:
         return int(self._get("system_timestamp"))
 
     def pixels(self, settings: CameraSettings) -> Pixels | None:
-        """Return a copy of the picture, None where it is not of the size and format in force."""
+        """Return a copy of the picture, None where it is not of the size in force."""
         layers = 3 if settings.pixel_format is PixelFormat.RGB8 else 1
         eight = settings.pixel_format in (PixelFormat.MONO8, PixelFormat.RGB8)
         pixel_bytes = layers if eight else 2
         width, height = settings.roi.width_px, settings.roi.height_px
-        if (self._get("image_width"), self._get("image_height")) != (width, height):
-            return None
-        gap, below = c_int(), c_int()
-        self._calls.plain("arv_buffer_get_image_padding", self._buffer, byref(gap), byref(below))
-        line = width * pixel_bytes + gap.value
+        gap = 0
+        if self.whole:  # else Aravis does not tell
+            if (self._get("image_width"), self._get("image_height")) != (width, height):
+                return None
+            across, down = c_int(), c_int()
+            name = "arv_buffer_get_image_padding"
+            self._calls.plain(name, self._buffer, byref(across), byref(down))
+            gap = across.value
+        line = width * pixel_bytes + gap
         size = c_size_t()
         start = self._calls.plain("arv_buffer_get_data", self._buffer, byref(size))
-        if not start or size.value < line * height - gap.value:
+        if not start or size.value < line * height - gap:
             return None
         shape = (height, width, 3) if layers == 3 else (height, width)
         picture: Pixels = np.empty(shape, np.uint8) if eight else np.empty(shape, np.uint16)
