@@ -14,7 +14,9 @@ import tifffile
 from cosmic.frame.failure import FailurePolicy
 from cosmic.vico.core.recording.formats import FORMATS, PictureFormat
 from cosmic.vico.core.recording.picture_recorder import PictureRecorder
+from cosmic.vico.core.recording.side_row import COLUMNS
 from cosmic.vico.hw.interface import PixelFormat
+from system.docs_blocks import ROOT, table_rows
 from unit.vico.recording.picture_helpers import AXES, noise, picture, settings
 
 COUNT, RATE_HZ = 30, 25.0
@@ -128,3 +130,10 @@ def test_pandas_reads_the_side_file_without_losing_a_digit(recorded):
     assert there["left.x_um"].iloc[3] == 13.0
     assert pd.to_datetime(there["utc"]).is_monotonic_increasing
     assert table["status"].iloc[-1] == "end"
+
+
+def test_the_page_of_the_reference_lists_every_format_and_column():
+    listed = [row[0].strip("`") for row in table_rows(ROOT / "docs/reference/picture-recording.md")]
+    assert listed[1 : 1 + len(PictureFormat)] == [each.value for each in PictureFormat]
+    first = listed.index(COLUMNS[0])
+    assert tuple(listed[first : first + len(COLUMNS)]) == COLUMNS
