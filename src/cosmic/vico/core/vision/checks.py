@@ -20,6 +20,8 @@ STUBBY = "too short for its width to be a fibre"
 LEFT_OVER = "beside it something stands out that belongs to no fibre"
 CROWDED = "the picture is full of fibres: no single one can be told apart"
 IMPRECISE = "its length is known to less than one per cent"
+PARTED = "it may be two fibres side by side: the ground shows between its edges"
+EDGING = "it lies along the edge of something wider"
 SHARP = "it bends more sharply than its own width"
 
 
@@ -27,8 +29,10 @@ SHARP = "it bends more sharply than its own width"
 class Limits:
     """When something is doubtful."""
 
-    blur_of_width: float = 0.33
-    blur_px: float = 2.5
+    blur_of_width: float = 0.22
+    blur_px: float = 2.0
+    dip: float = 0.15
+    tilt: float = 0.4
     contrast_to_noise: float = 1.5
     fade: float = 0.55
     width_spread: float = 0.3
@@ -47,6 +51,10 @@ def doubts_of(course: Course) -> list[str]:
     if course.blur_px > max(LIMITS.blur_px, LIMITS.blur_of_width * course.width):
         found.append(OUT_OF_FOCUS)
     typical = float(np.median(course.contrast[seen])) if seen.any() else 0.0
+    if parted(course):
+        found.append(PARTED)
+    if edging(course, typical) > 0.1:
+        found.append(EDGING)
     if typical < LIMITS.contrast_to_noise * course.noise:
         found.append(FAINT)
     if fades(course, typical):
@@ -60,6 +68,17 @@ def doubts_of(course: Course) -> list[str]:
     if sharpest_turn(course) > 1.6:
         found.append(SHARP)
     return found
+
+
+def parted(course: Course) -> bool:
+    """Return whether the ground shows in the middle of a fibre, as between two fibres."""
+    inner = course.mean[np.abs(course.across) < 0.3 * course.width]
+    return len(inner) > 0 and float(np.abs(inner).min()) < LIMITS.dip
+
+
+def edging(course: Course, typical: float) -> float:
+    """Return on what share of its length the ground differs between the two sides."""
+    return float((course.tilt > LIMITS.tilt * max(typical, 1e-6)).mean())
 
 
 def fades(course: Course, typical: float) -> bool:
@@ -98,20 +117,20 @@ def sharpest_turn(course: Course) -> float:
 
 
 def continued(lines: list[Floats], widths: list[float]) -> set[int]:
-    """Return the fibres at an end of which another one begins."""
+    """Return the fibres at an end of which another one, or their own other end, goes on."""
     found: set[int] = set()
-    ends = [(index, line[at], outward(line, at)) for index, line in enumerate(lines)
-            for at in (0, -1)]
-    if len(ends) < 4:
+    ends = [
+        (index, line[at], outward(line, at)) for index, line in enumerate(lines) for at in (0, -1)
+    ]
+    if not ends:
         return found
     places = np.array([place for _, place, _ in ends])
-    reach = 6.0 * max(widths) + 20.0
-    for first, last in cKDTree(places).query_pairs(reach):
+    for first, last in cKDTree(places).query_pairs(4.0 * max(widths) + 30.0):
         i, place, out = ends[first]
         j, other, other_out = ends[last]
         way = other - place
         gap = float(np.linalg.norm(way))
-        if i == j or gap > 4.0 * (widths[i] + widths[j]) / 2 + 10.0:
+        if gap > 2.0 * (widths[i] + widths[j]) + 30.0:
             continue
         way /= max(gap, 1e-9)
         if float(out @ way) > 0.8 and float(other_out @ -way) > 0.8:

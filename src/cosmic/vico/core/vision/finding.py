@@ -2,6 +2,7 @@
 
 from types import MappingProxyType
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
@@ -20,14 +21,16 @@ from cosmic.vico.core.vision.measures import (
 )
 from cosmic.vico.core.vision.profiles import Scene
 from cosmic.vico.core.vision.refine import Course, Neighbours, refine
-from cosmic.vico.core.vision.relief import Relief, find_relief
+from cosmic.vico.core.vision.relief import find_relief
 from cosmic.vico.core.vision.smoothing import arc_lengths, resampled
 
 MOST_FORKS = 400
 # A fibre is at least so many times longer than wide.
 SLENDER = 5.0
 LEAST_PX = 12.0
-LEAST_OF_PICTURE = 0.015
+LEAST_OF_PICTURE = 0.025
+# More cannot be told apart in time, nor in a network at all.
+MOST_STRANDS = 48
 
 
 def find_fibres(image: npt.NDArray[np.generic]) -> list[Fibre]:
@@ -65,13 +68,15 @@ def find_fibres(image: npt.NDArray[np.generic]) -> list[Fibre]:
     )
     least = max(LEAST_PX, LEAST_OF_PICTURE * float(np.hypot(*pixels.shape)))
     kept = [each for each in strands(graph) if long_enough(each, relief.factor, least)]
+    kept.sort(key=lambda each: -float(arc_lengths(each.points)[-1]))
     courses = []
+    crowd = len(kept) > MOST_STRANDS
+    kept = kept[:MOST_STRANDS]
     for index, strand in enumerate(kept):
         course = refine(scene, strand, neighbours(scene, kept, index))
         if course is not None and slender(course, least):
             courses.append((strand, course))
-    fibres = [fibre(scene, strand, course) for strand, course in courses]
-    return judged(fibres, relief)
+    return judged(scene, courses, crowd=crowd)
 
 
 def long_enough(strand: Strand, factor: int, least: float) -> bool:
@@ -84,7 +89,9 @@ def long_enough(strand: Strand, factor: int, least: float) -> bool:
 def slender(course: Course, least: float) -> bool:
     """Return whether what was measured is long and narrow."""
     length = float(arc_lengths(course.line)[-1])
-    return length >= max(least, SLENDER * course.width)
+    typical = float(np.median(course.contrast[course.good])) if course.good.any() else 0.0
+    beside = checks.edging(course, typical) < 0.5
+    return beside and typical > 0 and length >= max(least, SLENDER * course.width)
 
 
 def neighbours(scene: Scene, kept: list[Strand], index: int) -> Neighbours:
@@ -99,7 +106,7 @@ def neighbours(scene: Scene, kept: list[Strand], index: int) -> Neighbours:
     return Neighbours(cKDTree(points), margins)
 
 
-def fibre(scene: Scene, strand: Strand, course: Course) -> Fibre:
+def fibre(scene: Scene, course: Course, doubts: list[str]) -> Fibre:
     """Return what a course amounts to."""
     line = resampled(course.line, 2.0)
     fine = resampled(course.line, 0.5)
@@ -108,7 +115,6 @@ def fibre(scene: Scene, strand: Strand, course: Course) -> Fibre:
     widths = filled(course.widths, len(line))
     width = float(widths.mean())
     kinks = kink_angles_deg(line, width)
-    doubts = [*strand.doubts, *checks.doubts_of(course)]
     ends_std = np.array([end.std_px for end in course.ends])
     length_std = length_deviation(course, length)
     if length_std > 0.01 * length:
@@ -176,7 +182,43 @@ def clear_around(scene: Scene, line: Floats, width: float) -> npt.NDArray[np.boo
     return np.asarray(inside & (tree.query(line)[0] > reach))
 
 
-def judged(fibres: list[Fibre], relief: Relief) -> list[Fibre]:
-    """Return fibres in order of length with what is doubtful about them together."""
-    order = sorted(fibres, key=lambda each: -each.length_px)
-    return order
+def judged(scene: Scene, courses: list[tuple[Strand, Course]], *, crowd: bool) -> list[Fibre]:
+    """Return the fibres, the longest first, with what is doubtful about them together."""
+    lines = [course.line for _, course in courses]
+    widths = [course.width for _, course in courses]
+    apart = checks.continued(lines, widths)
+    beside = left_over(scene, lines, widths)
+    found = []
+    for index, (strand, course) in enumerate(courses):
+        doubts = [*strand.doubts, *checks.doubts_of(course)]
+        if crowd:
+            doubts.append(checks.CROWDED)
+        if index in apart:
+            doubts.append(checks.CONTINUES)
+        if index in beside:
+            doubts.append(checks.LEFT_OVER)
+        found.append(fibre(scene, course, doubts))
+    return sorted(found, key=lambda each: -each.length_px)
+
+
+def left_over(scene: Scene, lines: list[Floats], widths: list[float]) -> set[int]:
+    """Return the fibres to which something large clings that no fibre explains."""
+    explained = np.zeros(scene.taken.shape, np.uint8)
+    for line, width in zip(lines, widths, strict=True):
+        wide = np.full(len(line), width / scene.factor + 4.0)
+        paint(explained, scene.reduced(line), wide)
+    rest = ((scene.taken > 0) & (explained == 0)).astype(np.uint8)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
+    found: set[int] = set()
+    for number in range(1, count):
+        area = int(stats[number, cv2.CC_STAT_AREA])
+        if area < 12:
+            continue
+        rows, columns = np.nonzero(labels == number)
+        places = scene.full(np.column_stack([columns, rows]).astype(float))
+        for index, (line, width) in enumerate(zip(lines, widths, strict=True)):
+            near = float(cKDTree(line[::2]).query(places)[0].min())
+            reach = 0.5 * width + 4.0 * scene.factor
+            if near < reach and area > 3.0 * (width / scene.factor) ** 2:
+                found.add(index)
+    return found

@@ -27,6 +27,8 @@ class Profiles:
         Whether the place is ground or this fibre, as far as is known.
     noise : float
         Standard deviation of a single pixel of the ground.
+    ground, tilt : ndarray, shape (n,)
+        Level of the ground under the fibre, and how much it differs between the two sides.
     """
 
     across: Floats32
@@ -35,6 +37,7 @@ class Profiles:
     noise: float
     normals: Floats
     ground: Floats
+    tilt: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,12 +123,14 @@ def cross_sections(scene: Scene, line: Floats, width: float, reach: float) -> Pr
     clear = inside[None, :] | (other < 0.25)
     if (line < reach + 1.0).any() or (line > scene.corner - reach - 1.0).any():
         clear &= within(scene, x, y)
-    ground, noise = ground_of(values, clear & ~inside[None, :], across)
+    ground, tilt, noise = ground_of(values, clear & ~inside[None, :], across)
     height = np.float32(scene.sign) * (values - ground)
-    return Profiles(across, height, clear, noise, normals, ground[:, count].astype(np.float64))
+    return Profiles(across, height, clear, noise, normals, ground[:, count].astype(np.float64), tilt)
 
 
-def ground_of(values: Floats32, free: Flags, across: Floats32) -> tuple[Floats32, float]:
+def ground_of(
+    values: Floats32, free: Flags, across: Floats32
+) -> tuple[Floats32, Floats, float]:
     """Return the ground under each cross section, sloping from side to side, and its noise."""
     sides = []
     seen = []
@@ -148,7 +153,8 @@ def ground_of(values: Floats32, free: Flags, across: Floats32) -> tuple[Floats32
     ground = low + (high - low) * share
     thin = max(1, len(values) // 60)
     spread = np.abs(values[::thin] - ground[::thin])[free[::thin]]
-    return ground, 1.4826 * float(np.median(spread)) if len(spread) else 0.0
+    noise = 1.4826 * float(np.median(spread)) if len(spread) else 0.0
+    return ground, np.abs(levels[1] - levels[0]), noise
 
 
 def along(profiles: Profiles, sigma: float) -> Floats32:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cosmic.vico.core.vision.ends import End, EndKind, Level, find_end
-from cosmic.vico.core.vision.grey import Floats
+from cosmic.vico.core.vision.grey import Floats, Floats32
 from cosmic.vico.core.vision.joining import Strand
 from cosmic.vico.core.vision.profiles import (
     Edges,
@@ -47,8 +47,10 @@ class Course:
     noise: float = 0.0
     blur_px: float = 0.0
     scatter_px: float = 0.0
+    across: Floats32 = field(default_factory=lambda: np.zeros(0, np.float32))
     mean: Floats = field(default_factory=lambda: np.zeros(0))
     ground: Floats = field(default_factory=lambda: np.zeros(0))
+    tilt: Floats = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -187,8 +189,10 @@ def take(
     course.contrast = edges.contrast
     course.noise = profiles.noise
     course.ground = profiles.ground
+    course.tilt = profiles.tilt
     course.blur_px = edges.steepness_px
     course.mean = edges.mean
+    course.across = profiles.across
 
 
 def both_ends(scene: Scene, course: Course, strand: Strand, extra: float) -> list[End]:

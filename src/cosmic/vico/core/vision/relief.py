@@ -114,8 +114,10 @@ def find_relief(image: Pixels) -> Relief:
     strongest = max(float(np.percentile(height[::2, ::2], 99.8)) for _, height in hats)
     floor = max(floor, OF_STRONGEST * strongest)
     found = [(lighter, height, threshold(height, floor)) for lighter, height in hats]
-    lighter, height, level = max(found, key=lambda each: fibre_like(each[1], each[2]))
-    mask = thresholded(height, level)
+    found.sort(key=lambda each: -fibre_like(each[1], each[2]))
+    masks = [thresholded(height, level) for _, height, level in found]
+    chosen = 1 if lined(masks[0], masks[1]) else 0
+    (lighter, height, _), mask = found[chosen], masks[chosen]
     crowded = float(mask.mean()) > CROWDED
     hollow = np.zeros_like(mask) if crowded else insides(mask, 24 / factor)
     return Relief(factor, lighter, height, mask | hollow, hollow, crowded)
@@ -148,6 +150,17 @@ def fibre_like(height: Floats32, level: float) -> float:
     slender = np.maximum(pieces.areas / thickness - 4.0 * thickness - 4.0, 0.0)
     contrast = np.add.reduceat(height.ravel()[pieces.order], pieces.firsts) / pieces.areas
     return float((slender * contrast).sum())
+
+
+def lined(mask: Mask, other: Mask) -> bool:
+    """Return whether a mask is but the inside of hollow fibres whose walls the other one has."""
+    wide = np.ones((5, 5), np.uint8)
+    rings = [(cv2.dilate(each, wide) > 0) & (each == 0) for each in (mask, other)]
+    shares = [
+        float((ring & (walls > 0)).sum()) / max(1, int(ring.sum()))
+        for ring, walls in zip(rings, (other, mask), strict=True)
+    ]
+    return shares[0] > 0.5 and shares[0] > 1.2 * shares[1]
 
 
 def thresholded(height: Floats32, level: float) -> Mask:
