@@ -24,7 +24,8 @@ class OpenCvLibrary(CameraLibrary):
     clock : Clock
         The platform's: stamps frames and paces films.
     sources : sequence of VideoSource, str or Path
-        Films, folders, addresses; devices that Linux lists need not be named.
+        What is listed besides the devices that Linux knows, with how it is played. The path of
+        a film or a folder and an address open without being named here, as they are.
     sysfs : Path
         Where Linux lists video devices.
     make_capture : callable
@@ -64,13 +65,13 @@ class OpenCvLibrary(CameraLibrary):
     @override
     def open(self, key: str) -> OpenCvCamera:
         listed = {each.key: each for each in self.cameras()}
-        if key not in listed or self._closed:
+        source = self._sources.get(key, VideoSource(key))
+        if self._closed or (key not in listed and not _can_be_tried(source)):
             raise NotConnectedError(
                 f"OpenCV: there is no camera {key!r}; there are: {', '.join(listed) or 'none'}",
                 fault=DeviceFault.COMMUNICATION,
             )
-        source = self._sources.get(key, VideoSource(key))
-        camera = self._open(listed[key], source)
+        camera = self._open(listed.get(key, source.info), source)
         with self._lock:
             self._cameras.append(camera)
         return camera
@@ -96,3 +97,7 @@ class OpenCvLibrary(CameraLibrary):
         with self._lock:
             if camera in self._cameras:
                 self._cameras.remove(camera)
+
+
+def _can_be_tried(source: VideoSource) -> bool:
+    return source.kind is Kind.ADDRESS or (source.kind is not Kind.DEVICE and source.is_there)

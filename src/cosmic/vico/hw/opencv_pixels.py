@@ -25,9 +25,10 @@ def made_of(picture: Pixels, pixel_format: PixelFormat, roi: Roi) -> Pixels:
     wide = pixel_format is PixelFormat.MONO16
     if shaped.dtype == np.uint16 and not wide:
         shaped = shaped >> 8
-    data: Pixels = np.array(shaped, np.uint16 if wide else np.uint8, order="C")
+    data: Any = np.array(shaped, np.uint16 if wide else np.uint8, order="C")
     data.flags.writeable = False
-    return data
+    pixels: Pixels = data
+    return pixels
 
 
 def _layers(part: Pixels, *, colour: bool) -> npt.NDArray[Any]:
