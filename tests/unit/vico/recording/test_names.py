@@ -8,7 +8,12 @@ import pytest
 
 from cosmic.frame.errors import RecordingError, RecordingExistsError
 from cosmic.frame.file_names import NameOption
-from cosmic.vico.core.recording.formats import PictureFormat, picture_file_name, traits
+from cosmic.vico.core.recording.formats import (
+    PictureFormat,
+    picture_file_name,
+    recording_suffix,
+    traits,
+)
 from cosmic.vico.core.recording.picture_file import PictureFile
 from cosmic.vico.core.recording.side_row import row_of
 from unit.vico.recording.picture_helpers import noise, picture
@@ -89,6 +94,24 @@ def test_what_is_there_is_replaced_only_when_asked_to(tmp_path, there):
     PictureFile(tmp_path / "run", picture_format, overwrite=True).close(complete=True)
     left = [each.name for each in (tmp_path / "run").glob("*")]
     assert left == (["notes_000001.tif"] if there == "run" else [])
+
+
+@pytest.mark.parametrize("first", PictureFormat)
+@pytest.mark.parametrize("second", PictureFormat)
+def test_a_recording_in_another_format_keeps_its_side_file(tmp_path, first, second):
+    (tmp_path / "step 1.5").mkdir()  # of somebody else, and in nobody's way
+    file = PictureFile(tmp_path / "run", first)
+    file.append(noise(), row_of(picture(), None))
+    file.close(complete=True)
+    if recording_suffix(first) == recording_suffix(second):
+        PictureFile(tmp_path / "run", second, overwrite=True).close(complete=True)
+        return
+    before = file.side_path.read_bytes()
+    with pytest.raises(RecordingError, match="is a recording in another format"):
+        PictureFile(tmp_path / "run", second, overwrite=True)
+    assert file.side_path.read_bytes() == before
+    file = PictureFile(tmp_path / "step 1.5", PictureFormat.FFV1)
+    file.close(complete=True)
 
 
 def test_a_missing_codec_is_told_before_anything_is_written(tmp_path, monkeypatch):

@@ -10,6 +10,7 @@ from cosmic.vico.core.recording.formats import (
     PictureFormat,
     checked_path,
     kind_of,
+    recording_suffix,
     side_path_of,
     traits,
 )
@@ -80,6 +81,7 @@ class PictureFile:
         if not overwrite and self._path.exists():
             raise _exists(self._path)
         side_path = side_path_of(self._path)
+        _check_alone(self._path, side_path)
         self._side = SideFile(side_path, self._axes, overwrite=overwrite)
         try:
             self._create(overwrite=overwrite)
@@ -175,6 +177,18 @@ class PictureFile:
         if found.sequence:
             return SequenceWriter(self._path, self._format, self._stem, self._axes)
         return VideoWriter(self._path, self._format, shape, pixel_format, self._rate_hz)
+
+
+def _check_alone(path: Path, side_path: Path) -> None:
+    """Refuse to take the side file of a recording in another format."""
+    for suffix in {recording_suffix(each) for each in PictureFormat}:
+        other = side_path.with_name(side_path.stem + suffix)
+        there = picture_files(other, other.name) if other.is_dir() else other.is_file()
+        if other != path and there:
+            raise RecordingError(
+                f"{other} is a recording in another format, which {side_path.name} belongs to; "
+                "choose another name"
+            )
 
 
 def _said(kind: tuple[tuple[int, ...], str, PixelFormat] | None) -> str:

@@ -23,6 +23,7 @@ from cosmic.vico.core.recording.formats import (
     picture_bytes_per_s,
 )
 from cosmic.vico.core.recording.picture_file import PictureFile
+from cosmic.vico.core.recording.recording_stats import PictureRecordingStats
 from cosmic.vico.core.recording.side_row import DROPPED, SideRow, row_of
 from cosmic.vico.hw.interface import CameraSettings, FrameStatus, Pixels
 
@@ -32,48 +33,6 @@ FLUSH_S: Final = 0.25
 QUEUE_BYTES: Final = 256 * 1024 * 1024
 LONGEST_QUEUE: Final = 10_000
 """Rows of pictures dropped wait in the queue as well, and take memory."""
-
-
-@dataclass(frozen=True, slots=True)
-class PictureRecordingStats:
-    """How a recording of pictures stands.
-
-    Attributes
-    ----------
-    path, side_path : Path
-        Of the file or the directory, and of the side file.
-    written : int
-        Pictures in the file.
-    dropped : int
-        Pictures that came while the queue was full, or that waited when writing failed.
-    incomplete : int
-        Pictures with parts missing; never in the file.
-    lost : int
-        Frames that the camera lost between the pictures that came.
-    waiting, waiting_bytes : int
-        Pictures that wait to be written.
-    duration_s : float
-        Platform time between the first and the last picture in the file.
-    file_bytes : int
-        Size of the file, or of all files of a sequence.
-    left_s : float
-        How long it may go on before the disk is full.
-    paused : bool
-        Pictures that come now are not meant for the file.
-    """
-
-    path: Path
-    side_path: Path
-    written: int = 0
-    dropped: int = 0
-    incomplete: int = 0
-    lost: int = 0
-    waiting: int = 0
-    waiting_bytes: int = 0
-    duration_s: float = 0.0
-    file_bytes: int = 0
-    left_s: float = 0.0
-    paused: bool = False
 
 
 @dataclass(frozen=True, slots=True)

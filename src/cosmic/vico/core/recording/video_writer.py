@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from cosmic.frame.errors import RecordingError
-from cosmic.vico.core.recording.formats import PictureFormat, traits
+from cosmic.vico.core.recording.formats import PictureFormat, Traits, traits
 from cosmic.vico.core.recording.planes import to_video_frame
 from cosmic.vico.core.recording.side_row import SideRow
 from cosmic.vico.hw.interface import PixelFormat, Pixels
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 TICK: Final = Fraction(1, 1000)
 """What Matroska counts time in; it keeps nothing finer."""
 THREADS: Final = 2
+ONE_THREAD_HZ: Final = 60.0
 SMALLEST_SLICED_PX: Final = 16
 # A cluster of Matroska reaches the disk only when it is full, so it must not take long to fill.
 CONTAINER_OPTIONS: Final = {
@@ -108,19 +109,21 @@ class VideoWriter:
                 format=found.container,
                 container_options=CONTAINER_OPTIONS[found.container] | {"flush_packets": "1"},
             )
-            self._stream = self._added_stream(found.codec, shape, rate_hz)
+            self._stream = self._added_stream(found, shape, rate_hz)
             self._stream.codec_context.options = _options(found.options or {}, shape)
             self._stream.codec_context.thread_type = found.threads
         except av.FFmpegError as exc:
             raise _as_os_error(exc) from exc
 
-    def _added_stream(self, codec: str, shape: tuple[int, ...], rate_hz: float) -> Any:
+    def _added_stream(self, found: Traits, shape: tuple[int, ...], rate_hz: float) -> Any:
+        # Threads that share out whole pictures hold some back, which a kill takes.
+        threads = 1 if found.threads == "FRAME" and rate_hz <= ONE_THREAD_HZ else THREADS
         rate = Fraction(rate_hz if 0.0 < rate_hz < 1e4 else 15.0).limit_denominator(1000)
-        stream = self._container.add_stream(codec, rate=rate)
+        stream = self._container.add_stream(found.codec, rate=rate)
         stream.height, stream.width = shape[:2]
         stream.pix_fmt = self._coded
         stream.codec_context.time_base = TICK
-        stream.codec_context.thread_count = THREADS
+        stream.codec_context.thread_count = threads
         return stream
 
     @property

@@ -1,0 +1,46 @@
+"""`PictureRecordingStats`: how a recording of pictures stands."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class PictureRecordingStats:
+    """How a recording of pictures stands.
+
+    Attributes
+    ----------
+    path, side_path : Path
+        Of the file or the directory, and of the side file.
+    written : int
+        Pictures in the file.
+    dropped : int
+        Pictures that came while the queue was full, or that waited when writing failed.
+    incomplete : int
+        Pictures with parts missing; never in the file.
+    lost : int
+        Frames that the camera lost between the pictures that came.
+    waiting, waiting_bytes : int
+        Pictures that wait to be written.
+    duration_s : float
+        Platform time between the first and the last picture in the file.
+    file_bytes : int
+        Size of the file, or of all files of a sequence.
+    left_s : float
+        How long it may go on before the disk is full.
+    paused : bool
+        Pictures that come now are not meant for the file.
+    """
+
+    path: Path
+    side_path: Path
+    written: int = 0
+    dropped: int = 0
+    incomplete: int = 0
+    lost: int = 0
+    waiting: int = 0
+    waiting_bytes: int = 0
+    duration_s: float = 0.0
+    file_bytes: int = 0
+    left_s: float = 0.0
+    paused: bool = False
