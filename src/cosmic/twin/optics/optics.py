@@ -177,7 +177,7 @@ class Optics:
         Those that lie come first.
         """
         subject = self._ready()[0].at(at_s)
-        return tuple(strand.line_um for strand in (*subject.lying, *subject.held))
+        return tuple(strand.line_um for strand in (*subject.lying(), *subject.held))
 
     # ------------------------------------------------------------------ inside
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
+import cv2
 import numpy as np
 
 from cosmic.twin.optics.canvas import REACH, Floats, Layer, Patch, Single, darken, patch
@@ -13,6 +14,12 @@ STEPS: Final = 16
 """Steps a pixel in tables over a distance."""
 
 FAR: Final = 1e9
+
+TOLERANCE: Final = 0.02
+"""Nodes of a line that lie so near to the straight one between others, cells, are left out."""
+
+FAINTEST: Final = 0.01
+"""A speck that takes less of the light is not drawn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +54,9 @@ def stroke(layer: Layer, line_px: Floats, half_px: float, sigma_px: float, shade
         return
     sigma = round(sigma_px / where.cell, 2)
     table = _profile(round(half_px / where.cell, 2), sigma, shade)
-    distance, ends = _distances(where, where.cells(line_px), len(table) / STEPS, sigma)
+    reach = len(table) / STEPS
+    line = _pieces(where.cells(line_px), reach)
+    distance, ends = _distances(where, line, reach, sigma)
     index = np.minimum(distance * STEPS, len(table) - 1).astype(np.int32)
     darken(layer, where, 1.0 - table[index] * ends)
 
@@ -56,11 +65,13 @@ def speck(layer: Layer, place_px: Floats, radius_px: float, sigma_px: float, pas
     """Darken a layer in a soft round spot; blur makes it wider and fainter."""
     square = radius_px * radius_px
     spread = math.sqrt(0.5 * square + sigma_px * sigma_px)
+    peak = (1.0 - passes) * square / (2.0 * spread * spread)
+    if peak < FAINTEST:
+        return
     where = patch(layer, place_px[None, :], 0.0, spread)
     if where is None:
         return
     ((x, y),) = where.cells(place_px[None, :])
-    peak = (1.0 - passes) * square / (2.0 * spread * spread)
     per_cell = -0.5 * (where.cell / spread) ** 2
     across = np.exp(per_cell * (np.arange(where.width, dtype=np.float32) - x) ** 2)
     down = np.exp(per_cell * (np.arange(where.height, dtype=np.float32) - y) ** 2)
@@ -93,6 +104,25 @@ def _risen(values: Floats) -> Floats:
 
 _EDGE_AT: Final = np.linspace(-4.0, 4.0, 129)
 _EDGE: Final = _risen(_EDGE_AT)
+
+
+def _pieces(line: Floats, reach: float) -> Floats:
+    """Return a line with as few nodes as show it, but with short oblique pieces.
+
+    Each piece is drawn in the rectangle around it, which is mostly empty around a long oblique one.
+    """
+    middle = line.mean(axis=0)
+    few = cv2.approxPolyDP((line - middle).astype(np.float32), TOLERANCE, False)
+    nodes = few.reshape(-1, 2).astype(np.float64) + middle
+    ways = np.abs(np.diff(nodes, axis=0)).min(axis=1)
+    counts = np.maximum(np.ceil(ways / (2.0 * reach)), 1.0).astype(int)
+    if counts.max(initial=1) == 1:
+        return np.asarray(nodes)
+    parts = [
+        first + np.arange(count)[:, None] / count * (second - first)
+        for first, second, count in zip(nodes[:-1], nodes[1:], counts.tolist(), strict=True)
+    ]
+    return np.concatenate([*parts, nodes[-1:]])
 
 
 def _distances(where: Patch, line: Floats, reach: float, sigma: float) -> tuple[Single, Single]:

@@ -1,7 +1,7 @@
 """What there is to be seen at a moment: fibres, tools, the plate."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -54,14 +54,16 @@ class Subject:
     ----------
     plate : ndarray, shape (4, 4), float64
         `world_from_plate`, um.
-    lying, held : tuple of Strand
-        Fibres on the plate, and in the grippers.
+    lying : callable
+        Returns the fibres on the plate; seldom needed, because their picture is kept.
     lying_key : tuple
         Differs when a fibre lies elsewhere on the plate.
+    held : tuple of Strand
+        Fibres in the grippers.
     """
 
     plate: Floats
-    lying: tuple[Strand, ...]
+    lying: Callable[[], tuple[Strand, ...]]
     lying_key: tuple[tuple[float, ...], ...]
     held: tuple[Strand, ...]
     solids: tuple[Solid, ...]
@@ -106,7 +108,7 @@ class Subjects:
         tips = self._force_side.tips(at_s)
         return Subject(
             plate=plate,
-            lying=tuple(self._lying(pose, plate) for pose in poses),
+            lying=lambda: tuple(self._lying(pose, plate) for pose in poses),
             lying_key=poses,
             held=tuple(self._held(moment, number, tips) for number in self._which(moment, True)),
             solids=tuple(

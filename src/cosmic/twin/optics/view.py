@@ -145,7 +145,7 @@ class View:
             self._even_key = even_key
         layer = self._even.copy()
         soil(layer, self._dirt, projection, sensor, subject.plate)
-        for strand in subject.lying:
+        for strand in subject.lying():
             self._strand(layer, projection, strand)
         return layer
 
@@ -170,7 +170,8 @@ class View:
         corners = hull(points)
         silicon = solid.link.startswith("probe")
         value = (picture.silicon if silicon else picture.steel) * grey * PER_GREY
-        outline(layer, corners, sigma, RIM_SHADE * value)
-        inner = shrunk(corners, RIM_UM * projection.px_um)
+        rim_px = RIM_UM * projection.px_um
+        inner = shrunk(corners, rim_px) if rim_px > sigma else None
+        outline(layer, corners, sigma, value if inner is None else RIM_SHADE * value)
         if inner is not None:
             outline(layer, inner, sigma, value)
