@@ -164,6 +164,17 @@ def test_times_are_the_platforms_and_an_exposure_lies_before_its_frame(
     assert all(np.diff([frame.exposed_s for frame in frames]) >= 0.0)
 
 
+def test_a_frame_that_had_to_wait_is_not_said_to_be_newer_than_it_is(
+    rig: CameraRig, camera: Camera
+) -> None:
+    camera.start()
+    last = taken(rig, camera, 3)[-1]
+    threading.Event().wait(6.0 / rig.rate_hz)  # nobody receives for six periods
+    late = taken(rig, camera, 1)[0]
+    steps = late.frame_id - last.frame_id
+    assert late.exposed_s <= last.time_s + steps * 1.1 / rig.rate_hz
+
+
 def test_nothing_comes_before_the_start_or_after_the_stop(rig: CameraRig, camera: Camera) -> None:
     assert camera.receive(0.0) is None
     camera.start()
