@@ -174,6 +174,7 @@ def test_of_many_brightnesses_the_last_counts(make: Make) -> None:
     tasks = [bench.thread.set_light(percent) for percent in (10.0, 20.0, 30.0)]
     bench.start()
     tasks[-1].wait(5.0)
+    assert bench.thread.history.light_at(bench.clock.now_s()) == 30.0
     assert [isinstance(each.failure, MoveCancelled) for each in tasks] == [True, True, False]
     assert bench.thread.state.light_percent == 30.0
     assert bench.light.percent(bench.clock.now_s()) == 30.0
@@ -266,3 +267,23 @@ def test_the_past_can_be_looked_up_as_it_truly_was(make: Make) -> None:
         true = bench.lens.position_counts("zoom", time_s)
         assert told == pytest.approx(true, abs=400)  # 50 ms at 8000 counts/s
     assert history.light_at(after_s) == 50.0
+
+
+def test_a_motor_that_stops_short_of_its_target_is_said_at_once(make: Make) -> None:
+    bench = make(rate=1.0).start()
+    task = bench.thread.seek(FOCUS, 8000)
+    wait_until(lambda: bench.thread.state.moving)
+    bench.lens.abort("focus", bench.clock.now_s())  # somebody at the controller's own keys
+    stranded = failure(task)
+    assert isinstance(stranded, DeviceError) and "instead of 8000" in str(stranded)
+    assert bench.thread.state.lens_problem == "", "the line is well"
+
+
+def test_homing_that_somebody_stops_is_said(make: Make) -> None:
+    bench = make(cold=True, rate=1.0).start()
+    task = bench.thread.home(FOCUS)
+    wait_until(lambda: bench.lens.counter("focus", bench.clock.now_s()) < -100)
+    bench.lens.abort("focus", bench.clock.now_s())
+    stranded = failure(task)
+    assert isinstance(stranded, DeviceError) and stranded.fault == DeviceFault.REFERENCE
+    assert bench.thread.state.focus is not None and not bench.thread.state.focus.homed

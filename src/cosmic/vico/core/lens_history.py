@@ -36,13 +36,15 @@ class _Looks:
         before, after = self._around(time_s)
         if before is None:
             return None
+        if time_s == before.time_s:
+            return before.value
         if after is None:
-            return None if before.moving and time_s > before.time_s else before.value
+            return None if before.moving else before.value
         if before.value is None or after.value is None:
             return None
         if not before.moving:
-            # What rests goes on resting until it is told otherwise; that moment was looked at.
-            return before.value
+            # Every movement of ours begins with a look; another hand's began nobody knows when.
+            return before.value if before.value == after.value else None
         part = (time_s - before.time_s) / (after.time_s - before.time_s)
         return before.value + part * (after.value - before.value)
 
@@ -83,8 +85,8 @@ class LensHistory:
     def counts_at(self, axis: LensAxis, time_s: float) -> float | None:
         """Return where a motor was at `time_s` of platform time, straight between two looks.
 
-        None where nobody knows: before the first look, not homed, the line lost, or moving and
-        not looked at since.
+        None where nobody knows: before the first look, not homed, the line lost, moving and not
+        looked at since, or moved by somebody else between two looks.
         """
         return self._motors[axis].at(time_s)
 

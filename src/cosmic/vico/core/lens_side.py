@@ -64,6 +64,8 @@ class LightSide:
         if light is None:
             raise NotAvailable(self.problem or "the platform has no light that can be dimmed")
         try:
+            # What it was until now, for frames exposed before.
+            self._history.add_light(self._clock.now_s(), self.percent)
             light.set_percent(percent)
             self._ask(light)
         except CosmicError as exc:

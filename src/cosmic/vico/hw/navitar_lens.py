@@ -23,7 +23,7 @@ logger = logging.getLogger(__name__)
 START_S: Final = 0.5
 """A motor that was told to home has begun by then."""
 
-NEAR_HOME_COUNTS: Final = 100
+NEAR_HOME_COUNTS: Final = 5
 """Homing ends this near to 0, or something came in between."""
 
 

@@ -91,7 +91,7 @@ class SimNavitar(SimRegisters):
         if phase != LensPhase.IDLE:
             return _STATUS[phase, direction][slowing]
         counter = self._lens.counter(axis, now_s)
-        at_home = self._homed[axis] and counter <= 0
+        at_home = self._homed[axis] and counter == 0
         return (0x100 if at_home else 0) | (0x200 if counter >= limit else 0)
 
 

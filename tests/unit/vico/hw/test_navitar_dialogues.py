@@ -78,10 +78,12 @@ def test_home_and_abort_are_written_to_the_command_register() -> None:
 def test_the_light_counts_tenths_of_a_percent() -> None:
     line, serial_port = port(
         (hexed("FF C0 F4 01 00 00 4C"), hexed("FF 40 F4 01 00 00 CC")),
+        (hexed("FF C0 43 01 00 00 FD"), hexed("FF 40 43 01 00 00 7D")),
         (hexed("FF 40 00 00 00 00 C1"), hexed("FF 40 E8 03 00 00 D6")),
     )
     light = BrightLight(FrameRegisters(serial_port))
     light.set_percent(50.0)
+    light.set_percent(32.299999999999997)
     assert light.percent() == 100.0
     line.finish()
 
@@ -120,7 +122,7 @@ def test_an_answer_about_another_register_is_none() -> None:
 
 def test_it_gives_up_after_three_times_with_the_bytes_in_the_text() -> None:
     line, serial_port = port(*[(ASK_ID, hexed("DE AD BE EF 00 00 00 01"))] * 3)
-    with pytest.raises(ProtocolError, match="COM7.*3 times.*de ad be ef") as caught:
+    with pytest.raises(ProtocolError, match=r"COM7.*3 times.*de ad be ef") as caught:
         FrameRegisters(serial_port).read(0x01)
     assert "ff 01 00" in str(caught.value)
     line.finish()
@@ -181,7 +183,7 @@ def test_a_command_that_came_over_broken_is_sent_again() -> None:
 def test_a_complaint_is_an_error_with_its_bytes() -> None:
     complaint = (b"read 18\r", b"read 18\r\nunknown command" + PROMPT)
     line, serial_port = port(*[(CTRL_C, PROMPT), complaint] * 3)
-    with pytest.raises(ProtocolError, match="3 times.*" + b"unknown".hex(" ")):
+    with pytest.raises(ProtocolError, match=r"3 times.*" + b"unknown".hex(" ")):
         AsciiRegisters(serial_port).read(0x12)
     line.finish()
 
