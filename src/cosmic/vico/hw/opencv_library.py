@@ -25,7 +25,7 @@ class OpenCvLibrary(CameraLibrary):
         The platform's: stamps frames and paces films.
     sources : sequence of VideoSource, str or Path
         What is listed besides the devices that Linux knows, with how it is played. The path of
-        a film or a folder and an address open without being named here, as they are.
+        a film or a folder (played again and again) and an address open without being named here.
     sysfs : Path
         Where Linux lists video devices.
     make_capture : callable
@@ -65,7 +65,7 @@ class OpenCvLibrary(CameraLibrary):
     @override
     def open(self, key: str) -> OpenCvCamera:
         listed = {each.key: each for each in self.cameras()}
-        source = self._sources.get(key, VideoSource(key))
+        source = self._sources.get(key, VideoSource(key, loop=True))
         if self._closed or (key not in listed and not _can_be_tried(source)):
             raise NotConnectedError(
                 f"OpenCV: there is no camera {key!r}; there are: {', '.join(listed) or 'none'}",

@@ -155,10 +155,14 @@ def test_a_picture_of_another_size_ends_the_reception(tmp_path: Path) -> None:
     camera.close()
 
 
-def test_a_path_and_an_address_open_without_being_listed(tmp_path: Path) -> None:
-    write_film(tmp_path / "film.mkv", 3)
-    library = OpenCvLibrary(ManualClock())
-    assert library.open(str(tmp_path / "film.mkv")).info.sensor_px == (WIDTH, HEIGHT)
+def test_a_path_opens_without_being_listed_and_is_played_again_and_again(tmp_path: Path) -> None:
+    write_film(tmp_path / "film.mkv", 3, rate_hz=50.0)
+    clock = ManualClock()
+    library = OpenCvLibrary(clock)
+    camera = library.open(str(tmp_path / "film.mkv"))
+    camera.start()
+    clock.advance(0.2001)
+    assert len(all_of(camera)) == 10
     library.close()
 
 
