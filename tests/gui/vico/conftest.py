@@ -33,10 +33,24 @@ def camera(port):
 
 
 @pytest.fixture
-def view(qtbot, port):
+def own(qtbot):
+    """Keep widgets until the test ends, and delete them then and there.
+
+    Deleted later, they would cost each test a collection of garbage.
+    """
+    owned = []
+    yield owned.append
+    for widget in owned:
+        widget.close()
+        widget.deleteLater()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
+
+
+@pytest.fixture
+def view(own, port):
     """The view of the camera, on the screen, before the first picture."""
     made = CameraView(port, "top", now=lambda: WHEN)
-    qtbot.addWidget(made)
+    own(made)
     made.resize(900, 700)
     made.show()
     return made

@@ -59,7 +59,7 @@ class AmountField(QLineEdit):
         self._low, self._high, self._step = low, high, 1.0
         self._good: float | None = None
         self._before: float | None = None
-        self._shown = ""
+        self._shown = self._why_not = ""
         self.setFont(number_font())
         self.setAlignment(Qt.AlignmentFlag.AlignRight)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
@@ -97,6 +97,12 @@ class AmountField(QLineEdit):
         self._low, self._high = low, high
         finite = math.isfinite(high - low)
         self._step = step or (plain_steps(low, high) if finite else 1.0)
+        self._tell()
+
+    def set_usable(self, why_not: str) -> None:
+        """Disable it, with the reason in the tooltip; an empty reason enables it."""
+        self._why_not = why_not
+        self.setEnabled(not why_not)
         self._tell()
 
     def refuse(self, reason: str) -> None:
@@ -164,6 +170,9 @@ class AmountField(QLineEdit):
             self.refuse("")
 
     def _tell(self) -> None:
+        if self._why_not:
+            self.setToolTip(self._why_not)
+            return
         if self.reason:
             self.setToolTip(f"REFUSED: {self.reason}\nEsc goes back to the last good value")
             return

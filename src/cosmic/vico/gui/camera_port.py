@@ -159,11 +159,11 @@ class CameraPort(Protocol):
         """
 
     @abstractmethod
-    def start(self) -> None:
+    def start(self) -> object:
         """Begin to take pictures."""
 
     @abstractmethod
-    def stop(self) -> None:
+    def stop(self) -> object:
         """End taking pictures; a recording is closed."""
 
     @abstractmethod

@@ -180,11 +180,14 @@ class CameraView(QWidget):
         now_s = WALL.now_s()
         if now_s - self._drawn_s < LEAST_S or newest.frame.status is not FrameStatus.COMPLETE:
             return
+        first = self._newest is None
         self._newest, self._drawn_s = newest, now_s
         self._came, self._came_s = f"{self._now():%H:%M:%S}", now_s
         self.seen.analysis = self._camera.analysis
         self._show_old("")
         self.view.show_picture(newest)
+        if first:
+            self.recorder.refresh()
 
     def read_out(self) -> None:
         """Show numbers, histogram and state."""

@@ -161,7 +161,7 @@ class LensPanel(QWidget):
     def _show_light(self) -> None:
         lamp = self._port.light
         reason = NO_LIGHT if lamp is None else lamp.problem
-        self.light.set_usable(not reason, reason)
+        self.light.set_usable(reason)
         if lamp is not None:
             self.light.set_value(lamp.percent)
 
@@ -194,10 +194,8 @@ class LensPanel(QWidget):
         _enable(self.abort, gone, "Stop both motors now")
         nothing = unknown or ("" if self._port.cameras else "There is no camera")
         _enable(self.autofocus, nothing, "Look for the sharpest picture")
-        self.focus.set_usable(not unknown, unknown)
-        self.zoom.setEnabled(not unknown)
-        if unknown:
-            self.zoom.setToolTip(unknown)
+        self.focus.set_usable(unknown)
+        self.zoom.set_usable(unknown)
         for name, button in self.steps.items():
             _enable(button, unknown, f"Zoom to {name}")
         for step, button in self.focus_steps.items():

@@ -104,7 +104,7 @@ class LightPort(Protocol):
         """How bright it is, 0 to 100; None while unknown."""
 
     @abstractmethod
-    def set_percent(self, percent: float) -> None:
+    def set_percent(self, percent: float) -> object:
         """Begin to make it so bright; of several in a row the last counts."""
 
 

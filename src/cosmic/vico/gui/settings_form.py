@@ -106,7 +106,7 @@ class SettingsForm(QObject):
         )
         if settings is None or ranges is None:
             for field in (self.exposure, self.gain, self.rate):
-                field.set_usable(False, self._port.problem or _GONE)
+                field.set_usable(self._port.problem or _GONE)
             self.roi_text.setText("–")
             return
         _show(self.exposure, ranges.exposure_s, settings.exposure_s, MS)
@@ -133,11 +133,9 @@ class SettingsForm(QObject):
         settings, ranges = self._port.settings, self._port.ranges
         if settings is None or ranges is None:
             return
-        width = _fitting(width_px, ranges.width_px)
-        height = _fitting(height_px, ranges.height_px)
         sensor = self._sensor(settings)
-        x = _place(settings.roi.x_px + x_px, width, sensor[0])
-        y = _place(settings.roi.y_px + y_px, height, sensor[1])
+        x, width = _fitting(settings.roi.x_px + x_px, width_px, ranges.width_px, sensor[0])
+        y, height = _fitting(settings.roi.y_px + y_px, height_px, ranges.height_px, sensor[1])
         roi = Roi(x, y, width, height)
         self._wish(lambda now: replace(now, roi=roi))
 
@@ -233,7 +231,7 @@ class SettingsForm(QObject):
 
 
 def _show(field: SliderField, accepted: Range | None, value: float, factor: float = 1.0) -> None:
-    field.set_usable(accepted is not None, _LACKS)
+    field.set_usable("" if accepted is not None else _LACKS)
     if accepted is not None:
         field.set_range(accepted.low * factor, accepted.high * factor, accepted.step * factor)
     field.set_value(float(f"{value * factor:.9g}"))
@@ -248,13 +246,13 @@ def _choose(box: QComboBox, texts: list[str], value: object, values: tuple[objec
         box.setCurrentIndex(values.index(value))
 
 
-def _fitting(size_px: int, accepted: Range) -> int:
-    """Return the smallest size the camera can do that is at least `size_px`."""
-    step = max(1, round(accepted.step))
-    low = round(accepted.low)
-    steps = -(-(size_px - low) // step)
-    return min(max(low, low + steps * step), round(accepted.high))
+def _fitting(begin_px: int, size_px: int, accepted: Range, sensor_px: int) -> tuple[int, int]:
+    """Return the least begin and size that cover the wish and that the camera can do.
 
-
-def _place(begin_px: int, size_px: int, sensor_px: int) -> int:
-    return max(0, min(begin_px, sensor_px - size_px))
+    Cameras place a region in the steps in which they size it.
+    """
+    step, least = max(1, round(accepted.step)), round(accepted.low)
+    begin = begin_px // step * step
+    steps = -(-(begin_px + size_px - begin - least) // step)
+    size = min(max(least, least + steps * step), round(accepted.high))
+    return max(0, min(begin, sensor_px - size)), size

@@ -74,15 +74,12 @@ class SliderField(QWidget):
         self.field.refuse(reason)
         self._show_slider()
 
-    def set_usable(self, usable: bool, reason: str = "") -> None:
-        """Enable both, or disable them and say why in the tooltip."""
-        self.setEnabled(usable)
-        self.setToolTip("" if usable else reason)
-        self.slider.setToolTip(self._name if usable else reason)
-        if usable:
-            self.field.set_range(self._low, self._high, self._whole)
-        else:
-            self.field.setToolTip(reason)
+    def set_usable(self, why_not: str) -> None:
+        """Disable both, with the reason in the tooltip; an empty reason enables them."""
+        self.setEnabled(not why_not)
+        self.setToolTip(why_not)
+        self.slider.setToolTip(why_not or self._name)
+        self.field.set_usable(why_not)
 
     @property
     def _by_ratio(self) -> bool:

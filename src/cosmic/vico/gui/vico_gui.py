@@ -1,18 +1,18 @@
 """The widgets of ViCo together: one view a camera, and the lens."""
 
-from dataclasses import dataclass
-
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QObject, Qt
 from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 
+from cosmic.frame.application import CosmicApplicationBase
+from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.api.vico import Vico
 from cosmic.vico.gui.camera_view import CameraView
 from cosmic.vico.gui.lens_panel import LensPanel
 from cosmic.vico.gui.ports import VicoPort
 
 
-@dataclass(frozen=True, slots=True)
-class VicoGui:
-    """What a window makes docks of.
+class VicoGui(QObject):
+    """What a window makes docks of; none has a parent, whoever asks puts each into a dock.
 
     Attributes
     ----------
@@ -22,16 +22,17 @@ class VicoGui:
         Zoom, focus and light; says so where there are none.
     """
 
-    cameras: dict[str, CameraView]
-    lens: LensPanel
+    def __init__(self, port: VicoPort) -> None:
+        super().__init__()
+        self.cameras = {name: CameraView(port, name) for name in port.cameras}
+        self.lens = LensPanel(port)
 
 
-def make_vico_gui(port: VicoPort) -> VicoGui:
-    """Make a widget for each camera and one for the lens; GUI thread.
-
-    None has a parent: whoever asks puts each into a dock.
-    """
-    return VicoGui({name: CameraView(port, name) for name in port.cameras}, LensPanel(port))
+def make_vico_gui(application: CosmicApplicationBase) -> VicoGui:
+    """Make the GUI component of ViCo; GUI thread."""
+    if not isinstance(application, VicoApplication):
+        raise TypeError(f"{application.title} is not ViCo")
+    return VicoGui(Vico(application))
 
 
 class VicoWidget(QWidget):
@@ -40,7 +41,7 @@ class VicoWidget(QWidget):
     def __init__(self, port: VicoPort, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setWindowTitle("ViCo")
-        self.gui = make_vico_gui(port)
+        self.gui = VicoGui(port)
         side = QSplitter(Qt.Orientation.Horizontal)
         for view in self.gui.cameras.values():
             side.addWidget(view)

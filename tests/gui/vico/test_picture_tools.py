@@ -1,0 +1,177 @@
+"""Tools over the picture: distance, angle, region, click to move."""
+
+from math import dist
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QApplication
+
+from cosmic.vico.hw.interface import Roi
+
+
+def click(qtbot, button):
+    qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+
+
+def choose_target(qtbot, view, name):
+    click(qtbot, view.row.go)
+    menu = view.row.menu
+    action = next(each for each in menu.actions() if each.text() == name)
+    qtbot.mouseClick(menu, Qt.MouseButton.LeftButton, pos=menu.actionGeometry(action).center())
+
+
+def measured(view):
+    return [each.text for each in view.tools.measures.measures]
+
+
+def test_a_distance_is_told_in_micrometres(qtbot, shown, mouse):
+    click(qtbot, shown.row.tools["distance"])
+    mouse.drag((400, 300), (800, 600))
+    (text,) = measured(shown)
+    value, unit = text.split()
+    assert unit == "µm"
+    assert float(value) == pytest.approx(1.25 * dist((400, 300), (800, 600)), rel=0.01)
+
+
+def test_several_measurements_stand_side_by_side_and_can_be_deleted(qtbot, shown, mouse):
+    click(qtbot, shown.row.tools["distance"])
+    mouse.drag((400, 300), (800, 300))
+    mouse.drag((400, 500), (600, 500))
+    assert len(measured(shown)) == 2
+    longer = measured(shown)[0]
+    qtbot.keyClick(shown.view, Qt.Key.Key_Delete)
+    assert measured(shown) == [longer]
+    qtbot.keyClick(shown.view, Qt.Key.Key_Delete)
+    assert measured(shown) == []
+
+
+def test_the_menu_deletes_the_measurement_below_the_mouse(qtbot, shown, mouse):
+    click(qtbot, shown.row.tools["distance"])
+    mouse.drag((400, 300), (800, 300))
+    mouse.drag((400, 500), (600, 500))
+    shown.view.menu_requested.emit(mouse.screen((500, 301)))
+    menu = next(
+        x
+        for x in QApplication.topLevelWidgets()
+        if x.metaObject().className() == "QMenu" and x.isVisible()
+    )
+    first = menu.actions()[0]
+    qtbot.mouseClick(menu, Qt.MouseButton.LeftButton, pos=menu.actionGeometry(first).center())
+    (left,) = measured(shown)
+    assert float(left.split()[0]) == pytest.approx(250, rel=0.02)
+
+
+def test_a_click_without_a_drag_measures_nothing(qtbot, shown, mouse):
+    click(qtbot, shown.row.tools["distance"])
+    mouse.click((400, 300))
+    assert measured(shown) == []
+
+
+def test_an_angle_takes_three_clicks(qtbot, shown, mouse):
+    click(qtbot, shown.row.tools["angle"])
+    for place in ((800, 300), (400, 300), (400, 700)):
+        mouse.move(place)
+        mouse.click(place)
+    (text,) = measured(shown)
+    assert float(text.removesuffix("°")) == pytest.approx(90.0, abs=0.5)
+
+
+def test_escape_forgets_what_is_half_measured_and_puts_the_tool_away(qtbot, shown, mouse):
+    click(qtbot, shown.row.tools["angle"])
+    mouse.click((800, 300))
+    qtbot.keyClick(shown.view, Qt.Key.Key_Escape)
+    assert measured(shown) == []
+    assert not shown.row.tools["angle"].isChecked()
+    assert shown.view.tool is None
+
+
+def test_without_a_scale_distances_are_in_pixels(qtbot, shown, mouse, camera):
+    camera.scale_um_px = None
+    picture = camera.push()
+    qtbot.waitUntil(lambda: shown.view.picture is picture)
+    click(qtbot, shown.row.tools["distance"])
+    mouse.drag((400, 300), (800, 300))
+    (text,) = measured(shown)
+    assert text.endswith(" px")
+
+
+def test_a_measurement_keeps_the_scale_it_was_made_at(qtbot, shown, mouse, camera):
+    click(qtbot, shown.row.tools["distance"])
+    mouse.drag((400, 300), (800, 300))
+    before = measured(shown)
+    camera.scale_um_px = 0.5
+    picture = camera.push()
+    qtbot.waitUntil(lambda: shown.view.picture is picture)
+    shown.grab()
+    assert measured(shown) == before
+
+
+def test_a_region_that_is_dragged_becomes_that_of_the_camera(qtbot, shown, mouse, camera):
+    click(qtbot, shown.row.tools["region"])
+    mouse.drag((400, 300), (800, 600))
+    assert camera.settings.roi == Roi(400, 296, 400, 304)  # in steps of 8
+    assert shown.view.tool is None
+    click(qtbot, shown.row.tools["region"])
+    mouse.drag((100, 100), (200, 180))
+    assert camera.settings.roi == Roi(496, 392, 104, 88)  # a part of the part
+    click(qtbot, shown.row.more)
+    click(qtbot, shown.form.full_sensor)
+    assert camera.settings.roi == Roi(0, 0, 1600, 1200)
+
+
+def test_a_region_too_small_to_be_meant_is_none(qtbot, shown, mouse, camera):
+    click(qtbot, shown.row.tools["region"])
+    mouse.drag((400, 300), (403, 302))
+    assert camera.calls == []
+
+
+def test_click_to_move_is_off_with_its_reason_until_calibrated(qtbot, shown, camera):
+    assert not shown.row.go.isEnabled()
+    assert "not calibrated" in shown.row.go.toolTip()
+    camera.change(calibration_problem="")
+    qtbot.waitUntil(shown.row.go.isEnabled)
+
+
+def test_a_click_moves_what_was_chosen_and_says_so(qtbot, shown, mouse, camera):
+    camera.change(calibration_problem="")
+    qtbot.waitUntil(shown.row.go.isEnabled)
+    choose_target(qtbot, shown, "right gripper")
+    assert shown.view.viewport().cursor().shape() is Qt.CursorShape.PointingHandCursor
+    mouse.click((700, 400))
+    ((call, place, what),) = camera.calls
+    assert (call, what) == ("move", "right gripper")
+    assert place == pytest.approx((700, 400), abs=1.0)
+    assert shown.message.text == "right gripper goes there"
+
+
+def test_a_refused_move_is_told_over_the_picture(qtbot, shown, mouse, camera):
+    camera.change(calibration_problem="")
+    qtbot.waitUntil(shown.row.go.isEnabled)
+    choose_target(qtbot, shown, "left gripper")
+    camera.refuse = "left jaw would come within 12 µm of the plate"
+    mouse.click((700, 400))
+    assert shown.message.text == "◆ left jaw would come within 12 µm of the plate"
+    mouse.click((-30, 400))
+    assert "outside the picture" in shown.message.text
+    assert camera.calls == []
+
+
+def test_a_calibration_that_is_lost_ends_click_to_move(qtbot, shown, mouse, camera):
+    camera.change(calibration_problem="")
+    qtbot.waitUntil(shown.row.go.isEnabled)
+    choose_target(qtbot, shown, "left gripper")
+    camera.change(calibration_problem="the zoom has changed: calibrate again")
+    qtbot.waitUntil(lambda: shown.view.tool is None)
+    mouse.click((700, 400))
+    assert camera.calls == []
+    assert not shown.row.go.isChecked()
+
+
+def test_nothing_moves_while_the_choice_is_open(qtbot, shown, mouse, camera):
+    camera.change(calibration_problem="")
+    qtbot.waitUntil(shown.row.go.isEnabled)
+    click(qtbot, shown.row.go)
+    qtbot.keyClick(shown.row.menu, Qt.Key.Key_Escape)
+    mouse.click((700, 400))
+    assert camera.calls == []
+    assert shown.row.menu.pos() != QPoint(-1, -1)

@@ -1,0 +1,80 @@
+"""All widgets of ViCo together: docks, sizes, themes, and what they leave behind."""
+
+import pytest
+from PySide6.QtCore import QSettings
+from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit, QSlider
+
+from cosmic.frame.gui.server_gui import CosmicServerGui
+from cosmic.frame.gui.theme import apply_theme
+from cosmic.vico.gui.vico_gui import VicoWidget, make_vico_gui
+from gui.vico.fake_vico import FakeVico, Found, Seen, fibre_picture
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+def test_cameras_and_lens_become_docks_of_the_window(own, tmp_path, theme):
+    port = FakeVico(tmp_path, ("top", "side"))
+    store = QSettings(str(tmp_path / "layout.ini"), QSettings.Format.IniFormat)
+    window = CosmicServerGui(store, theme=theme)
+    own(window)
+    gui = make_vico_gui(port)
+    for name, view in gui.cameras.items():
+        window.add_panel(f"Camera {name}", view)
+    window.add_panel("Lens", gui.lens)
+    window.resize(1366, 768)
+    window.show()
+    pictures = {name: port.camera(name).push() for name in gui.cameras}
+    for name, view in gui.cameras.items():
+        view.window().raise_()
+        view.look()
+        assert view.view.picture is pictures[name]
+    assert gui.lens.camera.isVisibleTo(gui.lens)  # which camera is to become sharp
+
+
+@pytest.mark.parametrize("size", [(900, 700), (560, 400), None])
+@pytest.mark.parametrize("opened", [False, True])
+def test_nothing_is_clipped_in_a_small_window(qtbot, shown, size, opened):
+    if opened:
+        shown.recorder.more.click()
+    for _ in range(2):
+        shown.resize(*size) if size else shown.resize(shown.minimumSizeHint())
+        QApplication.processEvents()
+    kinds = (QAbstractButton, QLineEdit, QSlider)
+    widgets = [each for kind in kinds for each in shown.findChildren(kind) if each.isVisible()]
+    assert shown.recorder.snap in widgets
+    for widget in (*widgets, *shown.status.readings):
+        corner = widget.mapTo(shown, widget.rect().bottomRight())
+        assert shown.rect().contains(corner), widget
+        assert widget.width() >= widget.minimumSizeHint().width()
+    assert shown.view.height() >= 100
+
+
+def test_the_drawer_takes_its_room_from_the_picture_and_gives_it_back(qtbot, shown):
+    width = shown.view.width()
+    shown.row.more.click()
+    QApplication.processEvents()
+    assert shown.view.width() < width
+    assert shown.drawer.widget().sizeHint().width() <= shown.drawer.viewport().width()
+    shown.row.more.click()
+    QApplication.processEvents()
+    assert shown.view.width() == width
+
+
+def test_the_theme_can_change_under_a_picture(qtbot, qapp, shown, camera):
+    picture = camera.push(fibre_picture(800, 600))
+    camera.analysis = Found(picture, (Seen(),))
+    qtbot.waitUntil(lambda: shown.view.picture is picture)
+    dark = shown.grab().toImage()
+    apply_theme(qapp, "light")
+    QApplication.processEvents()
+    light = shown.grab().toImage()
+    assert light.pixelColor(2, 2).lightness() > dark.pixelColor(2, 2).lightness() + 100
+
+
+def test_a_widget_that_goes_stops_listening(qtbot, port):
+    widget = VicoWidget(port)
+    qtbot.addWidget(widget)
+    assert port.listened
+    widget.deleteLater()
+    with qtbot.waitSignal(widget.destroyed):
+        pass
+    assert port.listened == 0
