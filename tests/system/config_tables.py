@@ -31,6 +31,12 @@ from cosmic.twin.force_settings import (
     JointDrive,
 )
 from cosmic.twin.lens_settings import LensMotorSettings, LensSettings, LightSettings
+from cosmic.twin.optics.settings import (
+    OpticsSettings,
+    PictureSettings,
+    SensorSettings,
+    ViewSettings,
+)
 from cosmic.twin.settings import (
     ControllerSettings,
     DeviceWiring,
@@ -66,6 +72,10 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[lens]": LensSettings,
     "[lens.zoom]": LensMotorSettings,
     "[light]": LightSettings,
+    "[optics]": OpticsSettings,
+    "[optics.camera]": SensorSettings,
+    "[optics.views.NAME]": ViewSettings,
+    "[optics.picture]": PictureSettings,
 }
 WHOLE_FILES: Final = (PlatformFile, TwinSettings)
 
@@ -88,6 +98,10 @@ _UNITS: Final = (
     ("_um", "µm"),
     ("_deg", "°"),
     ("_hz", "Hz"),
+    ("_px", "px"),
+    ("_ppm", "ppm"),
+    ("_grey", "grey levels"),
+    ("_per_mm2", "1/mm²"),
     ("_dv", "0.1 V"),
     ("_v", "V"),
     ("_s", "s"),

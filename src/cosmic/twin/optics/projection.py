@@ -41,7 +41,7 @@ class Projection:
     px_um : float
         Pixels a micrometre at the height of the plate.
     cos, sin : float
-        Of the picture's rotation.
+        Of the angle by which the camera is turned.
     blur_um : float
         Standard deviation of the blur by diffraction, um.
     """

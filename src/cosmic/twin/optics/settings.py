@@ -48,7 +48,7 @@ class ViewSettings(StrictModel):
     lens : bool
         It looks through the motorised lens; otherwise zoom and focus stand at their low ends.
     rotation_deg : float
-        By which the picture is turned against the platform, counter-clockwise.
+        By which the camera is turned against the platform, counter-clockwise from above.
     centre_x_um, centre_y_um : float
         Place on the plate in the middle of the picture at the lowest zoom.
     zoom_shift_x_px, zoom_shift_y_px : float
