@@ -31,6 +31,7 @@ class Limits:
 
     blur_of_width: float = 0.22
     blur_px: float = 2.0
+    blur_most_px: float = 4.2
     dip: float = 0.15
     tilt: float = 0.4
     contrast_to_noise: float = 1.5
@@ -48,7 +49,8 @@ def doubts_of(course: Course) -> list[str]:
     found = [end.kind.value for end in course.ends if end.kind is not EndKind.FREE]
     found = [each for each in found if each != EndKind.HIDDEN.value]
     seen = course.good
-    if course.blur_px > max(LIMITS.blur_px, LIMITS.blur_of_width * course.width):
+    share = max(LIMITS.blur_px, LIMITS.blur_of_width * course.width)
+    if course.blur_px > min(share, LIMITS.blur_most_px):
         found.append(OUT_OF_FOCUS)
     typical = float(np.median(course.contrast[seen])) if seen.any() else 0.0
     if parted(course):

@@ -14,6 +14,7 @@ from cosmic.vico.core.vision.graph import build_graph, prune
 from cosmic.vico.core.vision.grey import Floats, Mask, grey_picture
 from cosmic.vico.core.vision.joining import Strand, strands
 from cosmic.vico.core.vision.measures import (
+    unblurred,
     grasp_points,
     kink_angles_deg,
     kink_index,
@@ -96,7 +97,14 @@ def slender(course: Course, least: float) -> bool:
 
 def neighbours(scene: Scene, kept: list[Strand], index: int) -> Neighbours:
     """Return all strands but one."""
-    others = [(each, scene.full(each.points)) for n, each in enumerate(kept) if n != index]
+    own = kept[index].points
+    reach = 3.0 * kept[index].half_width + 12.0
+    low, high = own.min(axis=0) - reach, own.max(axis=0) + reach
+    others = []
+    for n, each in enumerate(kept):
+        inside = ((each.points > low) & (each.points < high)).all(axis=1)
+        if n != index and inside.any():
+            others.append((each, scene.full(each.points[inside])))
     if not others:
         return Neighbours(None, np.zeros(0))
     points = np.concatenate([line for _, line in others])
@@ -108,18 +116,19 @@ def neighbours(scene: Scene, kept: list[Strand], index: int) -> Neighbours:
 
 def fibre(scene: Scene, course: Course, doubts: list[str]) -> Fibre:
     """Return what a course amounts to."""
-    line = resampled(course.line, 2.0)
-    fine = resampled(course.line, 0.5)
+    fine = resampled(course.line, 0.5, multiple=4)
+    line = fine[::4]
     length = float(arc_lengths(fine)[-1])
     projected, orientation = longest_extent(line)
-    widths = filled(course.widths, len(line))
+    sharp, blur_share = unblurred(course.width, course.blur_px)
+    widths = filled(course.widths, len(line)) * sharp
     width = float(widths.mean())
     kinks = kink_angles_deg(line, width)
     ends_std = np.array([end.std_px for end in course.ends])
     length_std = length_deviation(course, length)
     if length_std > 0.01 * length:
         doubts.append(checks.IMPRECISE)
-    width_std = float(np.nanstd(course.widths)) if course.good.any() else width
+    width_std = width_deviation(course, blur_share)
     free = clear_around(scene, line, width)
     contrast = float(np.median(course.contrast[course.good]))
     return Fibre(
@@ -142,7 +151,9 @@ def fibre(scene: Scene, course: Course, doubts: list[str]) -> Fibre:
         lighter=scene.sign > 0,
         certain=not doubts,
         doubts=tuple(dict.fromkeys(doubts)),
-        uncertainties=MappingProxyType({}),
+        uncertainties=MappingProxyType(
+            uncertainties(length, length_std, width, width_std, projected, ends_std)
+        ),
     )
 
 
@@ -151,6 +162,35 @@ def length_deviation(course: Course, length: float) -> float:
     ends = sum(end.std_px**2 for end in course.ends)
     hidden = float((~course.good).sum()) * 2.0
     return float(np.sqrt(ends + (2e-4 * length) ** 2 + (0.004 * hidden) ** 2))
+
+
+def width_deviation(course: Course, blur_share: float) -> float:
+    """Return the standard deviation of the mean width."""
+    spread = float(np.nanstd(course.widths)) / np.sqrt(max(1, int(course.good.sum()) // 4))
+    return float(np.hypot(np.hypot(0.05, spread), 0.3 * blur_share**2 * course.width))
+
+
+def uncertainties(
+    length: float,
+    length_std: float,
+    width: float,
+    width_std: float,
+    projected: float,
+    ends_std: Floats,
+) -> dict[str, float | str]:
+    """Return the standard deviation of each value, or why there is none."""
+    extent_std = float(np.hypot(*ends_std))
+    return {
+        "length_px": length_std,
+        "projected_length_px": extent_std,
+        "width_px": width_std,
+        "area_px2": float(np.hypot(width * length_std, length * width_std)),
+        "ends_px": float(ends_std.max()),
+        "curl": float(length / projected * np.hypot(length_std / length, extent_std / projected)),
+        "orientation_deg": float(np.degrees(extent_std / projected)),
+        "kink": "kinks are counted, so that one near a limit of angle counts or does not",
+        "grasp_points_px": "they are proposals, not measurements",
+    }
 
 
 def filled(widths: Floats, count: int) -> Floats:
@@ -169,17 +209,20 @@ def frozen(values: Floats) -> Floats:
 
 def clear_around(scene: Scene, line: Floats, width: float) -> npt.NDArray[np.bool_]:
     """Return where nothing but the fibre lies within a gripper's reach."""
-    own = np.zeros(scene.taken.shape, np.uint8)
-    wide = np.full(len(line), width / scene.factor + 3.0)
-    paint(own, scene.reduced(line), wide)
-    other = (scene.taken > 0) & (own == 0)
     reach = 1.5 * width + 6.0
     inside = ((line > reach) & (line < scene.corner - reach)).all(axis=1)
-    rows, columns = np.nonzero(other)
-    if not len(rows):
-        return np.asarray(inside)
-    tree = cKDTree(scene.full(np.column_stack([columns, rows]).astype(float)))
-    return np.asarray(inside & (tree.query(line)[0] > reach))
+    places = scene.reduced(line)
+    edge = int(np.ceil(reach / scene.factor)) + 2
+    low = np.maximum(np.floor(places.min(axis=0)).astype(int) - edge, 0)
+    high = np.ceil(places.max(axis=0)).astype(int) + edge + 1
+    part = scene.taken[low[1] : high[1], low[0] : high[0]]
+    own = np.zeros(part.shape, np.uint8)
+    paint(own, places - low, np.full(len(line), width / scene.factor + 3.0))
+    ground = ((part == 0) | (own > 0)).astype(np.uint8)
+    distance = np.minimum(cv2.distanceTransform(ground, cv2.DIST_L2, 3), 1e6)
+    last = np.array(part.shape)[::-1] - 1
+    columns, rows = np.clip(np.round(places - low).astype(int), 0, last).T
+    return np.asarray(inside & (distance[rows, columns] * scene.factor > reach))
 
 
 def judged(scene: Scene, courses: list[tuple[Strand, Course]], *, crowd: bool) -> list[Fibre]:
@@ -205,20 +248,18 @@ def left_over(scene: Scene, lines: list[Floats], widths: list[float]) -> set[int
     """Return the fibres to which something large clings that no fibre explains."""
     explained = np.zeros(scene.taken.shape, np.uint8)
     for line, width in zip(lines, widths, strict=True):
-        wide = np.full(len(line), width / scene.factor + 4.0)
-        paint(explained, scene.reduced(line), wide)
+        paint(explained, scene.reduced(line), np.full(len(line), width / scene.factor + 4.0))
     rest = ((scene.taken > 0) & (explained == 0)).astype(np.uint8)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
+    areas = stats[:, cv2.CC_STAT_AREA].copy()
+    areas[0] = 0
     found: set[int] = set()
-    for number in range(1, count):
-        area = int(stats[number, cv2.CC_STAT_AREA])
-        if area < 12:
-            continue
-        rows, columns = np.nonzero(labels == number)
-        places = scene.full(np.column_stack([columns, rows]).astype(float))
-        for index, (line, width) in enumerate(zip(lines, widths, strict=True)):
-            near = float(cKDTree(line[::2]).query(places)[0].min())
-            reach = 0.5 * width + 4.0 * scene.factor
-            if near < reach and area > 3.0 * (width / scene.factor) ** 2:
-                found.add(index)
+    if not (areas >= 12).any():
+        return found
+    for index, (line, width) in enumerate(zip(lines, widths, strict=True)):
+        around = np.zeros(rest.shape, np.uint8)
+        paint(around, scene.reduced(line), np.full(len(line), width / scene.factor + 8.0))
+        beside = np.unique(labels[(around > 0) & (rest > 0)])
+        if len(beside) and int(areas[beside].max()) > max(11.0, 3.0 * (width / scene.factor) ** 2):
+            found.add(index)
     return found

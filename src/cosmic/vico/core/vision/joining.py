@@ -268,7 +268,7 @@ def pair(graph: Graph, joint: Joint, half_width: list[float]) -> None:
         joint.partner[joint.stubs[j]] = joint.stubs[i]
     base = LOOSE * (count % 2)
     worth, next_worth = (float(np.sqrt(max(0.0, prices[k] - base))) for k in order[:2])
-    unclear = next_worth < 1.6 * worth + 0.15
+    unclear = next_worth < 1.6 * worth + 0.1
     judge(joint, costs, best, unclear)
 
 

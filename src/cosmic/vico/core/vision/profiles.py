@@ -204,7 +204,7 @@ def level_crossing(mean: Floats, across: Floats32, level: float, side: int) -> f
 def find_edges(profiles: Profiles, height: Floats32, good: Flags, width: float) -> Edges:
     """Return the outer edges of each cross section at half of its height."""
     across = profiles.across
-    near = np.abs(across) < 0.5 * width + 3.0
+    near = np.abs(across) < 0.8 * width + 3.0
     mean = np.where(near, typical_section(height, good), 0.0)
     weight = mean / max(float((mean**2).sum()), 1e-9)
     contrast = (height @ weight.astype(np.float32)).astype(np.float64)

@@ -126,6 +126,7 @@ def centre_roughly(scene: Scene, course: Course, neighbours: Neighbours) -> None
         offset = box_centres(profiles, height, course.width, reach)
         weights = np.where(excluded(course, neighbours), 0.0, 1.0)
         move(course, profiles, offset, weights, max(24.0, 3.0 * course.width))
+    course.line = resampled(course.line, STEP_PX)
 
 
 def move(
@@ -146,7 +147,6 @@ def move(
 
 def measure(scene: Scene, course: Course, neighbours: Neighbours) -> bool:
     """Find edges, width and contrast along a line and move it to the middle; False: no fibre."""
-    course.line = resampled(course.line, STEP_PX)
     profiles = cross_sections(scene, course.line, course.width, 1.2 * course.width + 8.0)
     free = ~excluded(course, neighbours)
     typical = float(np.median(profiles.height[::4, np.abs(profiles.across) < 0.4 * course.width]))

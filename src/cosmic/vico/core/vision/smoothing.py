@@ -39,23 +39,18 @@ def arc_lengths(line: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def resampled(line: Floats, step: float) -> Floats:
-    """Return points about `step` apart along a spline through a line."""
+def resampled(line: Floats, step: float, multiple: int = 1) -> Floats:
+    """Return points about `step` apart along a spline; a multiple of intervals if asked for."""
     s = arc_lengths(line)
     keep = np.concatenate([[True], np.diff(s) > 1e-6])
     s, line = s[keep], line[keep]
     if len(line) < 2:
         return line
-    count = max(2, round(float(s[-1]) / step) + 1)
+    count = multiple * max(1, round(float(s[-1]) / step / multiple)) + 1
     at = np.linspace(0.0, float(s[-1]), count)
     if len(line) < ORDER + 1:
         return np.column_stack([np.interp(at, s, line[:, axis]) for axis in (0, 1)])
     return np.asarray(CubicSpline(s, line)(at))
-
-
-def spline_length(line: Floats) -> float:
-    """Return the length of the spline through a line, past what its chords cut off."""
-    return float(arc_lengths(resampled(line, 0.5))[-1])
 
 
 def directions(line: Floats) -> Floats:
