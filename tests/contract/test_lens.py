@@ -18,10 +18,10 @@ from cosmic.vico.hw.peripheral_factory import make_lens
 from cosmic.vico.hw.peripherals import Lens, LensAxis
 
 ZOOM, FOCUS = LensAxis.ZOOM, LensAxis.FOCUS
+# The second generation is asked in frames first, a time-out: over a terminal once, at the end.
 KINDS = [
     pytest.param((generation, way), id=f"generation {generation}, {way}")
-    for generation in (1, 2)
-    for way in ("object", "terminal")
+    for generation, way in ((1, "object"), (1, "terminal"), (2, "object"))
 ]
 
 
@@ -204,3 +204,21 @@ def test_closing_twice_is_harmless_and_afterwards_it_is_closed(bench: Bench) -> 
     with pytest.raises(DeviceError) as caught:
         bench.lens.state(ZOOM)
     assert caught.value.fault == DeviceFault.STATE
+
+
+def test_the_second_generation_over_a_terminal_homes_seeks_and_stops() -> None:
+    bench = Bench((2, "terminal"), cold=True)
+    try:
+        bench.rig.simulation.faults.inject("garbage")
+        bench.lens.home(FOCUS)
+        bench.run(FOCUS)
+        bench.lens.seek(FOCUS, 5000)
+        bench.run(FOCUS)
+        assert bench.true_counts(FOCUS) == pytest.approx(5000, abs=1)
+        bench.lens.seek(FOCUS, 0)
+        bench.rig.clock.advance(0.5)
+        bench.lens.abort()
+        bench.run(FOCUS)
+        assert 0 < bench.lens.state(FOCUS).position_counts < 5000
+    finally:
+        bench.close()
