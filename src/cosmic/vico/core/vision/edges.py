@@ -1,0 +1,250 @@
+"""The end of a solid dark body, such as a jaw or a probe, measured by its straight edges."""
+
+import math
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.vico.hw.interface import Pixels
+
+Floats = npt.NDArray[np.float64]
+Floats32 = npt.NDArray[np.float32]
+Pair = tuple[float, float]
+
+DARKEST_PERCENT: Final = 2.0
+LEAST_CONTRAST: Final = 0.25
+BODY_LEVEL: Final = 0.4
+CLIP_PX: Final = 0.3
+FEWEST_PROFILES: Final = 5
+# Neighbouring profiles share noise: the picture is blurred, and each is the mean of three.
+SHARED_NOISE: Final = 2.0
+
+
+class Frame(NamedTuple):
+    """A part of the picture turned so that the tool points to the right.
+
+    Columns go forward, rows to the tool's side; `origin_px` is where (0, 0) lies.
+    """
+
+    pixels: Floats32
+    origin_px: Floats
+    forward: Floats
+    side: Floats
+
+    def picture_px(self, forward: float, aside: float) -> Pair:
+        """Return where a point lies in the picture."""
+        x, y = self.origin_px + forward * self.forward + aside * self.side
+        return float(x), float(y)
+
+
+class Levels(NamedTuple):
+    """Grey of the body and of the ground."""
+
+    body: float
+    ground: float
+
+    @property
+    def contrast(self) -> float:
+        """Grey levels between them."""
+        return self.ground - self.body
+
+
+class Blob(NamedTuple):
+    """A body to a pixel: its front and its sides, in the turned frame."""
+
+    front: int
+    low: int
+    high: int
+    back: int
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """An edge as a straight line, position over place along it.
+
+    Attributes
+    ----------
+    kept : float
+        Part of the profiles that agree with it.
+    """
+
+    offset: float
+    slope: float
+    middle: float
+    std: float
+    slope_std: float
+    kept: float
+
+    def at(self, place: float) -> float:
+        """Return the edge's position."""
+        return self.offset + self.slope * (place - self.middle)
+
+    def std_at(self, place: float) -> float:
+        """Return its standard deviation there."""
+        return math.hypot(self.std, self.slope_std * (place - self.middle))
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """The end of one body in its turned frame: front edge and both sides."""
+
+    front: Line
+    low: Line
+    high: Line
+
+    @property
+    def width(self) -> float:
+        """Between the sides, across."""
+        at = self.front.offset
+        lean = 0.5 * (self.low.slope + self.high.slope)
+        return (self.high.at(at) - self.low.at(at)) / math.hypot(1.0, lean)
+
+    def corner(self, side: Line) -> tuple[float, float]:
+        """Return where the front meets a side: forward, aside."""
+        aside = side.at(self.front.offset)
+        forward = self.front.at(aside)
+        return forward, side.at(forward)
+
+    @property
+    def tip(self) -> tuple[float, float]:
+        """The middle of the front."""
+        one, other = self.corner(self.low), self.corner(self.high)
+        return 0.5 * (one[0] + other[0]), 0.5 * (one[1] + other[1])
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of the tip, both directions together, per coordinate."""
+        at = self.front.offset
+        aside = 0.5 * math.hypot(self.low.std_at(at), self.high.std_at(at))
+        return max(aside, self.front.std)
+
+
+def turned(
+    image: Pixels, at_px: Pair, forward: Pair, *, back: float, ahead: float, aside: float
+) -> Frame:
+    """Return the surroundings of a place, turned; beyond the picture its rim goes on."""
+    ahead_of, side = np.array(forward), np.array([-forward[1], forward[0]])
+    origin = np.array(at_px) - back * ahead_of - aside * side
+    columns, rows = math.ceil(back + ahead) + 1, math.ceil(2.0 * aside) + 1
+    matrix = np.column_stack([ahead_of, side, origin])
+    pixels = cv2.warpAffine(
+        image,
+        matrix,
+        (columns, rows),
+        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    return Frame(np.asarray(pixels, dtype=np.float32), origin, ahead_of, side)
+
+
+def levels(frame: Frame) -> Levels | None:
+    """Return the greys of body and ground; None where nothing is dark enough to be a tool."""
+    low, high = np.percentile(frame.pixels[::2, ::2], [DARKEST_PERCENT, 100.0 - DARKEST_PERCENT])
+    ground = float(np.median(frame.pixels[frame.pixels >= 0.5 * (low + high)]))
+    found = Levels(float(low), ground)
+    return found if found.contrast > max(LEAST_CONTRAST * ground, 8.0) else None
+
+
+def blobs(frame: Frame, greys: Levels, width: float) -> list[Blob]:
+    """Return the bodies that come from behind, by their place aside; thin things are none."""
+    mask = (frame.pixels < greys.body + BODY_LEVEL * greys.contrast).astype(np.uint8)
+    size = max(3, round(0.5 * width))
+    shape = cv2.getStructuringElement(cv2.MORPH_RECT, (size, size))
+    solid = cv2.morphologyEx(mask, cv2.MORPH_OPEN, shape, borderType=cv2.BORDER_REPLICATE)
+    _, labels = cv2.connectedComponents(solid)
+    found = []
+    for label in np.unique(labels[:, 0]):
+        if label == 0:
+            continue
+        here = labels == label
+        thick = here.sum(axis=0)
+        columns = np.flatnonzero(thick >= 0.5 * width)
+        if len(columns) == 0:
+            continue
+        front = int(columns[-1])
+        back = max(0, front - round(4.0 * width))
+        rows = np.flatnonzero(here[:, back : front + 1].sum(axis=1) > 0.5 * (front - back))
+        if len(rows):
+            found.append(Blob(front, int(rows[0]), int(rows[-1]), back))
+    return sorted(found, key=lambda each: each.low)
+
+
+def measure(frame: Frame, greys: Levels, blob: Blob, width: float) -> Body | None:
+    """Fit the edges of a body; None where too few profiles cross from dark to light."""
+    reach = int(min(max(width, 12.0), 50.0))
+    across = blob.high - blob.low
+    inside = max(4, round(0.45 * across))
+    margin = round(0.22 * across)
+    middle = range(blob.low + margin, blob.high - margin + 1)
+    front = _edge(frame.pixels, greys, blob.front, middle, (reach, reach))
+    along = range(blob.back, max(blob.back, blob.front - round(0.4 * width)))
+    flat = np.ascontiguousarray(frame.pixels.T)
+    high = _edge(flat, greys, blob.high, along, (inside, reach))
+    mirrored = np.ascontiguousarray(flat[:, ::-1])
+    last = flat.shape[1] - 1
+    low = _edge(mirrored, greys, last - blob.low, along, (inside, reach))
+    if front is None or high is None or low is None:
+        return None
+    flipped = Line(last - low.offset, -low.slope, low.middle, low.std, low.slope_std, low.kept)
+    return Body(front, flipped, high)
+
+
+def _edge(
+    pixels: Floats32, greys: Levels, near: int, places: range, reach: tuple[int, int]
+) -> Line | None:
+    """Fit the edge that lies near a column, over some rows: dark before it, light after it."""
+    rows, columns = pixels.shape
+    at = np.array([each for each in places if 1 <= each < rows - 1])
+    first, last = max(0, near - reach[0]), min(columns, near + reach[1] + 1)
+    if len(at) < FEWEST_PROFILES or near - first < 4 or last - near < 4:
+        return None
+    part = pixels[:, first:last]
+    profiles = (part[at - 1] + part[at] + part[at + 1]) / 3.0
+    inner = np.median(profiles[:, : max(3, (near - first) // 2)], axis=1)
+    outer = np.median(profiles[:, -max(3, (last - near) // 2) :], axis=1)
+    # Where a fibre lies before the edge, the ground of the rest is what it would be seen against.
+    clear = np.abs(outer - greys.ground) < 0.15 * greys.contrast
+    middle = 0.5 * (inner + np.where(clear, outer, greys.ground))
+    light = profiles >= middle[:, None]
+    crossing = np.argmax(light, axis=1)
+    usable = crossing > 0
+    if usable.sum() < FEWEST_PROFILES:
+        return None
+    index, chosen = crossing[usable], np.flatnonzero(usable)
+    before, after = profiles[chosen, index - 1], profiles[chosen, index]
+    part_px = (middle[usable] - before) / np.maximum(after - before, 1e-6)
+    position = first + index - 1 + part_px
+    return _straight(at[usable].astype(np.float64), position.astype(np.float64), len(at))
+
+
+def _straight(place: Floats, position: Floats, asked: int) -> Line | None:
+    """Fit a line, leaving out what lies off it."""
+    kept = np.ones(len(place), dtype=np.bool_)
+    away = np.abs(position - np.median(position))
+    kept &= away <= max(3.0, 4.0 * float(np.median(away)))
+    for _ in range(4):
+        if kept.sum() < FEWEST_PROFILES:
+            return None
+        middle = float(place[kept].mean())
+        slope, offset = np.polyfit(place[kept] - middle, position[kept], 1)
+        error = position - offset - slope * (place - middle)
+        spread = 1.4826 * float(np.median(np.abs(error[kept])))
+        kept = np.abs(error) <= max(CLIP_PX, 3.0 * spread)
+    count = int(kept.sum())
+    if count < FEWEST_PROFILES:
+        return None
+    middle = float(place[kept].mean())
+    slope, offset = np.polyfit(place[kept] - middle, position[kept], 1)
+    error = position[kept] - offset - slope * (place[kept] - middle)
+    sigma = math.sqrt(float(error @ error) / (count - 2)) * SHARED_NOISE
+    return Line(
+        float(offset),
+        float(slope),
+        middle,
+        sigma / math.sqrt(count),
+        sigma / math.sqrt(float(np.sum((place[kept] - middle) ** 2))),
+        count / asked,
+    )
