@@ -1,0 +1,277 @@
+"""The C interface of libdc1394, one to one: structures, constants, prototypes.
+
+Names, numbers and the layout of the structures are those of the headers of libdc1394 2.2.6.
+Nothing is converted and nothing raises on a status here; that is one floor up in `dc1394_calls`.
+"""
+
+import ctypes
+from ctypes import (
+    POINTER,
+    c_char_p,
+    c_float,
+    c_int,
+    c_int32,
+    c_uint16,
+    c_uint32,
+    c_uint64,
+    c_void_p,
+)
+from typing import Any, Final
+
+from cosmic.frame.errors import DeviceFault, NotConnectedError
+
+LIBRARY_NAME: Final = "libdc1394.so.25"
+
+# dc1394error_t
+DC1394_SUCCESS: Final = 0
+DC1394_FAILURE: Final = -1
+DC1394_FUNCTION_NOT_SUPPORTED: Final = -3
+DC1394_NO_ISO_CHANNEL: Final = -7
+DC1394_NO_BANDWIDTH: Final = -8
+DC1394_IOCTL_FAILURE: Final = -9
+DC1394_FORMAT7_ERROR_FLAG_1: Final = -13
+DC1394_FORMAT7_ERROR_FLAG_2: Final = -14
+DC1394_INVALID_ARGUMENT_VALUE: Final = -15
+DC1394_REQ_VALUE_OUTSIDE_RANGE: Final = -16
+DC1394_INVALID_FEATURE: Final = -17
+DC1394_INVALID_FRAMERATE: Final = -20
+DC1394_INVALID_COLOR_CODING: Final = -25
+# dc1394bool_t, dc1394switch_t
+DC1394_OFF: Final = 0
+DC1394_ON: Final = 1
+# dc1394speed_t
+DC1394_ISO_SPEED_400: Final = 2
+DC1394_ISO_SPEED_800: Final = 3
+# dc1394operation_mode_t
+DC1394_OPERATION_MODE_1394B: Final = 481
+# dc1394framerate_t: 1.875 Hz and so on, each twice the one before
+DC1394_FRAMERATE_1_875: Final = 32
+DC1394_FRAMERATE_240: Final = 39
+# dc1394video_mode_t, those without colour
+DC1394_VIDEO_MODE_640x480_MONO8: Final = 69
+DC1394_VIDEO_MODE_640x480_MONO16: Final = 70
+DC1394_VIDEO_MODE_800x600_MONO8: Final = 73
+DC1394_VIDEO_MODE_1024x768_MONO8: Final = 76
+DC1394_VIDEO_MODE_800x600_MONO16: Final = 77
+DC1394_VIDEO_MODE_1024x768_MONO16: Final = 78
+DC1394_VIDEO_MODE_1280x960_MONO8: Final = 81
+DC1394_VIDEO_MODE_1600x1200_MONO8: Final = 84
+DC1394_VIDEO_MODE_1280x960_MONO16: Final = 85
+DC1394_VIDEO_MODE_1600x1200_MONO16: Final = 86
+DC1394_VIDEO_MODE_FORMAT7_0: Final = 88
+DC1394_VIDEO_MODE_NUM: Final = 32
+# dc1394color_coding_t
+DC1394_COLOR_CODING_MONO8: Final = 352
+DC1394_COLOR_CODING_MONO16: Final = 357
+DC1394_COLOR_CODING_NUM: Final = 11
+# dc1394trigger_mode_t, dc1394trigger_source_t
+DC1394_TRIGGER_MODE_0: Final = 384
+DC1394_TRIGGER_SOURCE_0: Final = 576
+DC1394_TRIGGER_SOURCE_SOFTWARE: Final = 580
+DC1394_TRIGGER_SOURCE_NUM: Final = 5
+# dc1394feature_t
+DC1394_FEATURE_SHUTTER: Final = 423
+DC1394_FEATURE_GAIN: Final = 424
+DC1394_FEATURE_TRIGGER: Final = 428
+# dc1394feature_mode_t, dc1394capture_policy_t, capture flags
+DC1394_FEATURE_MODE_MANUAL: Final = 736
+DC1394_CAPTURE_POLICY_POLL: Final = 673
+DC1394_CAPTURE_FLAGS_DEFAULT: Final = 4
+
+
+class dc1394camera_t(ctypes.Structure):  # noqa: N801 - the header's name
+    """An open camera; the fields up to those that are read here."""
+
+    _fields_ = (
+        ("guid", c_uint64),
+        ("unit", c_int),
+        ("unit_spec_ID", c_uint32),
+        ("unit_sw_version", c_uint32),
+        ("unit_sub_sw_version", c_uint32),
+        ("command_registers_base", c_uint32),
+        ("unit_directory", c_uint32),
+        ("unit_dependent_directory", c_uint32),
+        ("advanced_features_csr", c_uint64),
+        ("PIO_control_csr", c_uint64),
+        ("SIO_control_csr", c_uint64),
+        ("strobe_control_csr", c_uint64),
+        ("format7_csr", c_uint64 * 8),
+        ("iidc_version", c_int),
+        ("vendor", c_char_p),
+        ("model", c_char_p),
+        ("vendor_id", c_uint32),
+        ("model_id", c_uint32),
+        ("bmode_capable", c_int),
+        ("one_shot_capable", c_int),
+        ("multi_shot_capable", c_int),
+        ("can_switch_on_off", c_int),
+        ("has_vmode_error_status", c_int),
+        ("has_feature_error_status", c_int),
+        ("max_mem_channel", c_int),
+        ("flags", c_uint32),
+    )
+
+
+class dc1394camera_id_t(ctypes.Structure):  # noqa: N801 - the header's name
+    """Which camera, in a list."""
+
+    _fields_ = (("unit", c_uint16), ("guid", c_uint64))
+
+
+class dc1394camera_list_t(ctypes.Structure):  # noqa: N801 - the header's name
+    """The cameras on the bus; freed by `dc1394_camera_free_list`."""
+
+    _fields_ = (("num", c_uint32), ("ids", POINTER(dc1394camera_id_t)))
+
+
+class dc1394video_frame_t(ctypes.Structure):  # noqa: N801 - the header's name
+    """One frame in the ring of buffers."""
+
+    _fields_ = (
+        ("image", c_void_p),
+        ("size", c_uint32 * 2),
+        ("position", c_uint32 * 2),
+        ("color_coding", c_int),
+        ("color_filter", c_int),
+        ("yuv_byte_order", c_uint32),
+        ("data_depth", c_uint32),
+        ("stride", c_uint32),
+        ("video_mode", c_int),
+        ("total_bytes", c_uint64),
+        ("image_bytes", c_uint32),
+        ("padding_bytes", c_uint32),
+        ("packet_size", c_uint32),
+        ("packets_per_frame", c_uint32),
+        ("timestamp", c_uint64),
+        ("frames_behind", c_uint32),
+        ("camera", c_void_p),
+        ("id", c_uint32),
+        ("allocated_image_bytes", c_uint64),
+        ("little_endian", c_int),
+        ("data_in_padding", c_int),
+    )
+
+
+class dc1394framerates_t(ctypes.Structure):  # noqa: N801 - the header's name
+    """Rates of a fixed mode."""
+
+    _fields_ = (("num", c_uint32), ("framerates", c_int * 8))
+
+
+class dc1394video_modes_t(ctypes.Structure):  # noqa: N801 - the header's name
+    """Modes of a camera."""
+
+    _fields_ = (("num", c_uint32), ("modes", c_int * DC1394_VIDEO_MODE_NUM))
+
+
+class dc1394color_codings_t(ctypes.Structure):  # noqa: N801 - the header's name
+    """Codings of a scalable mode."""
+
+    _fields_ = (("num", c_uint32), ("codings", c_int * DC1394_COLOR_CODING_NUM))
+
+
+class dc1394trigger_sources_t(ctypes.Structure):  # noqa: N801 - the header's name
+    """Where a trigger may come from."""
+
+    _fields_ = (("num", c_uint32), ("sources", c_int * DC1394_TRIGGER_SOURCE_NUM))
+
+
+_CAMERA = POINTER(dc1394camera_t)
+_FRAME = POINTER(dc1394video_frame_t)
+_U, _I = c_uint32, c_int
+_U_OUT, _I_OUT, _F_OUT = POINTER(c_uint32), POINTER(c_int), POINTER(c_float)
+
+_STATUS: Final[dict[str, tuple[Any, ...]]] = {
+    "dc1394_camera_enumerate": (c_void_p, POINTER(POINTER(dc1394camera_list_t))),
+    "dc1394_video_get_supported_modes": (_CAMERA, POINTER(dc1394video_modes_t)),
+    "dc1394_video_get_supported_framerates": (_CAMERA, _I, POINTER(dc1394framerates_t)),
+    "dc1394_video_get_framerate": (_CAMERA, _I_OUT),
+    "dc1394_video_set_framerate": (_CAMERA, _I),
+    "dc1394_video_get_mode": (_CAMERA, _I_OUT),
+    "dc1394_video_set_mode": (_CAMERA, _I),
+    "dc1394_video_set_operation_mode": (_CAMERA, _I),
+    "dc1394_video_set_iso_speed": (_CAMERA, _I),
+    "dc1394_video_get_transmission": (_CAMERA, _I_OUT),
+    "dc1394_video_set_transmission": (_CAMERA, _I),
+    "dc1394_format7_get_max_image_size": (_CAMERA, _I, _U_OUT, _U_OUT),
+    "dc1394_format7_get_unit_size": (_CAMERA, _I, _U_OUT, _U_OUT),
+    "dc1394_format7_get_unit_position": (_CAMERA, _I, _U_OUT, _U_OUT),
+    "dc1394_format7_get_color_codings": (_CAMERA, _I, POINTER(dc1394color_codings_t)),
+    "dc1394_format7_get_packet_parameters": (_CAMERA, _I, _U_OUT, _U_OUT),
+    "dc1394_format7_set_roi": (_CAMERA, _I, _I, c_int32, c_int32, c_int32, c_int32, c_int32),
+    "dc1394_format7_get_roi": (_CAMERA, _I, _I_OUT, _U_OUT, _U_OUT, _U_OUT, _U_OUT, _U_OUT),
+    "dc1394_feature_is_present": (_CAMERA, _I, _I_OUT),
+    "dc1394_feature_get_value": (_CAMERA, _I, _U_OUT),
+    "dc1394_feature_set_value": (_CAMERA, _I, _U),
+    "dc1394_feature_get_boundaries": (_CAMERA, _I, _U_OUT, _U_OUT),
+    "dc1394_feature_set_mode": (_CAMERA, _I, _I),
+    "dc1394_feature_has_absolute_control": (_CAMERA, _I, _I_OUT),
+    "dc1394_feature_set_absolute_control": (_CAMERA, _I, _I),
+    "dc1394_feature_get_absolute_boundaries": (_CAMERA, _I, _F_OUT, _F_OUT),
+    "dc1394_feature_get_absolute_value": (_CAMERA, _I, _F_OUT),
+    "dc1394_feature_set_absolute_value": (_CAMERA, _I, c_float),
+    "dc1394_external_trigger_set_power": (_CAMERA, _I),
+    "dc1394_external_trigger_set_mode": (_CAMERA, _I),
+    "dc1394_external_trigger_set_source": (_CAMERA, _I),
+    "dc1394_external_trigger_get_supported_sources": (_CAMERA, POINTER(dc1394trigger_sources_t)),
+    "dc1394_software_trigger_set_power": (_CAMERA, _I),
+    "dc1394_capture_setup": (_CAMERA, _U, _U),
+    "dc1394_capture_stop": (_CAMERA,),
+    "dc1394_capture_dequeue": (_CAMERA, _I, POINTER(_FRAME)),
+    "dc1394_capture_enqueue": (_CAMERA, _FRAME),
+}
+"""What answers with a dc1394error_t."""
+
+_OTHERS: Final[dict[str, tuple[Any, tuple[Any, ...]]]] = {
+    "dc1394_new": (c_void_p, ()),
+    "dc1394_free": (None, (c_void_p,)),
+    "dc1394_camera_free_list": (None, (POINTER(dc1394camera_list_t),)),
+    "dc1394_camera_new_unit": (_CAMERA, (c_void_p, c_uint64, c_int)),
+    "dc1394_camera_free": (None, (_CAMERA,)),
+    "dc1394_capture_get_fileno": (c_int, (_CAMERA,)),
+    "dc1394_capture_is_frame_corrupt": (c_int, (_CAMERA, _FRAME)),
+    "dc1394_error_get_string": (c_char_p, (c_int,)),
+}
+
+
+def bind(library: object) -> dict[str, Any]:
+    """Return every function above by name, with its types set on those of a `ctypes.CDLL`.
+
+    Raises
+    ------
+    NotConnectedError
+        A function is missing: it is not libdc1394 2.2.
+    """
+    functions = {}
+    wanted = _OTHERS | {name: (c_int, arguments) for name, arguments in _STATUS.items()}
+    for name, (answer, arguments) in wanted.items():
+        function = getattr(library, name, None)
+        if function is None:
+            raise NotConnectedError(
+                f"the library {LIBRARY_NAME} has no function {name}: libdc1394 2.2 is needed "
+                f"(Debian: package libdc1394-25)",
+                fault=DeviceFault.UNSUPPORTED,
+            )
+        if isinstance(library, ctypes.CDLL):
+            function.restype, function.argtypes = answer, arguments
+        functions[name] = function
+    return functions
+
+
+def load_library(path: str = "") -> ctypes.CDLL:
+    """Load libdc1394 from `path`, or from where the system looks when it is empty.
+
+    Raises
+    ------
+    NotConnectedError
+        It is not installed.
+    """
+    wanted = path or LIBRARY_NAME
+    try:
+        return ctypes.CDLL(wanted)
+    except OSError as exc:
+        raise NotConnectedError(
+            f"cannot load {wanted}: {exc}. Install libdc1394: on Debian the package "
+            f"libdc1394-25 (apt install libdc1394-25); there is none for Windows",
+            fault=DeviceFault.COMMUNICATION,
+        ) from exc
