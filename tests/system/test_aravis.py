@@ -15,11 +15,19 @@ from contract.cameras.gige_process import GigeCamera, missing
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceError, NotConnectedError
 from cosmic.vico.hw.aravis_library import AravisLibrary
-from cosmic.vico.hw.interface import Camera, CameraSettings, Frame, FrameStatus, Pixels, Roi
+from cosmic.vico.hw.interface import (
+    Camera,
+    CameraSettings,
+    Frame,
+    FrameStatus,
+    Pixels,
+    Roi,
+    Trigger,
+)
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
 
-FULL = Roi(0, 0, 1600, 1200)
+FULL, ROI = Roi(0, 0, 1600, 1200), Roi(0, 0, 320, 240)
 
 
 @pytest.fixture(scope="module")
@@ -88,6 +96,16 @@ def test_another_program_reads_the_settings_from_the_camera(
         *(64, 32, 640, 480)
     ]
     assert float(seen["ExposureTimeAbs"]) == pytest.approx(12300.0)
+
+
+def test_a_trigger_stays_in_force_when_the_rate_changes(camera: Camera) -> None:
+    armed = camera.configure(replace(fast(camera, 30.0, ROI), trigger=Trigger.SOFTWARE))
+    slower = camera.configure(replace(armed, rate_hz=20.0))
+    assert slower.trigger is Trigger.SOFTWARE
+    camera.start()
+    assert camera.receive(0.2) is None
+    camera.trigger()
+    assert camera.receive(2.0) is not None
 
 
 def test_a_camera_in_use_cannot_be_opened_a_second_time(
