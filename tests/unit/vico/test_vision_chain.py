@@ -1,6 +1,7 @@
 """The chain runs what is on, in order, and one bad link does not stop the rest."""
 
 import logging
+from collections.abc import Mapping
 
 import cv2
 import numpy as np
@@ -8,9 +9,13 @@ import pytest
 
 from cosmic.frame.errors import ConfigError
 from cosmic.vico.core.picture import Circumstances, Picture
-from cosmic.vico.core.vision.algorithms import make_chain
-from cosmic.vico.core.vision.chain import Analysis, Chain, Registry, Results, Unavailable
+from cosmic.vico.core.vision.algorithms import FindTools, TrackFibre, TrackPlace, make_chain
+from cosmic.vico.core.vision.chain import Chain, Registry, Results, Unavailable
+from cosmic.vico.core.vision.fibre_tracking import FibreTrack
+from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen
+from cosmic.vico.core.vision.tracking import Track
 from cosmic.vico.hw.interface import Frame, Pixels, Roi
+from unit.vico.tool_pictures import tool_picture
 
 
 def picture(data: Pixels | None = None, number: int = 1) -> Picture:
@@ -83,7 +88,6 @@ def test_one_that_is_switched_off_does_not_run_until_it_is_switched_on() -> None
     assert all(state.last_s is not None for state in chain.states)
 
 
-@pytest.mark.usefixtures("caplog")
 def test_one_that_raises_is_named_and_the_rest_runs(caplog: pytest.LogCaptureFixture) -> None:
     chain = Chain([Moody(), Mean()])
     with caplog.at_level(logging.ERROR):
@@ -153,17 +157,15 @@ def test_one_line_above_a_class_adds_it_to_every_chain() -> None:
 # --- what is built in -------------------------------------------------------------------------
 
 
-def run_only(name: str, shown: Picture) -> Analysis:
+def only(*names: str) -> Chain:
     chain = make_chain()
-    for other in set(chain.names) - {name}:
+    for other in set(chain.names) - set(names):
         chain.switch(other, on=False)
-    return chain.run(shown)
+    return chain
 
 
 def test_the_focus_measure_says_when_its_region_is_not_on_the_picture() -> None:
-    chain = make_chain()
-    for other in set(chain.names) - {"focus"}:
-        chain.switch(other, on=False)
+    chain = only("focus")
     textured = np.random.default_rng(0).integers(0, 255, (60, 80), np.uint8)
     assert chain.run(picture(textured)).get("focus", float)
     chain.algorithm("focus").region = Roi(50, 0, 60, 60)  # type: ignore[attr-defined]
@@ -192,6 +194,65 @@ def drawn(*lines: np.ndarray, width_px: int = 10, seed: int = 0) -> np.ndarray:
 def test_fibres_are_found_on_grey_and_on_coloured_pictures() -> None:
     grey = drawn(strand())
     for data in (grey, np.ascontiguousarray(np.stack([grey] * 3, axis=2))):
-        analysis = run_only("fibres", picture(data))
+        analysis = only("fibres").run(picture(data))
         (fibre,) = analysis.results["fibres"]  # type: ignore[misc]
         assert fibre.width_px == pytest.approx(11.0, abs=1.5)
+
+
+def test_a_fibre_that_was_found_is_followed_until_it_is_ended() -> None:
+    chain = only("fibres", "fibre track")
+    tracker = chain.algorithm("fibre track")
+    assert isinstance(tracker, TrackFibre)
+    first = chain.run(picture(drawn(strand(), strand(shift=(0.0, 120.0)))))
+    assert first.get("fibre track", Unavailable) == Unavailable("no fibre is followed")
+    fibres = first.results["fibres"]
+    mine = min(fibres, key=lambda each: each.ends_px[0, 1])  # type: ignore[attr-defined]
+    tracker.follow(mine)
+    moved = chain.run(picture(drawn(strand(shift=(6.0, 10.0)), strand(shift=(0.0, 120.0)), seed=1)))
+    track = moved.get("fibre track", FibreTrack)
+    assert track is not None
+    assert track.moved_px == pytest.approx((6.0, 10.0), abs=1.0)
+    chain.switch("fibres", on=False)
+    assert chain.run(picture(drawn())).get("fibre track", Unavailable) is not None
+    tracker.end()
+    ended = chain.run(picture(drawn())).get("fibre track", Unavailable)
+    assert ended == Unavailable("no fibre is followed")
+
+
+def test_a_place_is_followed_or_refused_without_a_failure() -> None:
+    chain = only("place track")
+    tracker = chain.algorithm("place track")
+    assert isinstance(tracker, TrackPlace)
+    tracker.follow((590.0, 20.0))
+    refused = chain.run(picture(drawn(strand()))).get("place track", Unavailable)
+    assert refused is not None
+    assert "within the picture" in refused.reason
+    line = strand()
+    tracker.follow((60.0, float(line[0, 1])))
+    assert chain.run(picture(drawn(line))).get("place track", Track) is not None
+    track = chain.run(picture(drawn(strand(shift=(5.0, 0.0)), seed=1))).get("place track", Track)
+    assert track is not None
+    assert track.position_px == pytest.approx((65.0, line[0, 1]), abs=0.5)
+
+
+def test_tools_are_looked_for_where_they_are_expected() -> None:
+    chain = only("tools")
+    finder = chain.algorithm("tools")
+    assert isinstance(finder, FindTools)
+    drawing = tool_picture(1, gap=80.0)
+    nobody = chain.run(picture(drawing.image)).get("tools", Unavailable)
+    assert nobody is not None
+    away = ExpectedTool((-5.0, 0.0), (1.0, 0.0), 20.0)
+    finder.expected = {"left": drawing.expected, "probe": away}
+    tools = chain.run(picture(drawing.image)).results["tools"]
+    assert isinstance(tools, Mapping)
+    assert isinstance(tools["left"], GripperTips)
+    assert isinstance(tools["probe"], NotSeen)
+
+
+def test_everything_built_in_runs_on_an_empty_picture_without_a_failure() -> None:
+    chain = make_chain()
+    assert chain.names == ("focus", "fibres", "fibre track", "place track", "tools")
+    analysis = chain.run(picture(np.full((400, 600), 150, np.uint8)))
+    assert analysis.failures == {}
+    assert analysis.results["fibres"] == ()

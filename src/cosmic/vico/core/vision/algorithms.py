@@ -1,6 +1,7 @@
 """The algorithms that come with ViCo, as links of the chain."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import cast
 
 import cv2
@@ -9,6 +10,11 @@ from cosmic.frame.errors import ConfigError
 from cosmic.vico.core.focus import FocusMeasure, sharpness
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.vision.chain import ALGORITHMS, Chain, Results, Unavailable, algorithm
+from cosmic.vico.core.vision.fibre import Fibre
+from cosmic.vico.core.vision.fibre_tracking import FibreTracker
+from cosmic.vico.core.vision.tips import find_gripper, find_probe
+from cosmic.vico.core.vision.tool_types import ExpectedTool
+from cosmic.vico.core.vision.tracking import TemplateTracker
 from cosmic.vico.hw.interface import Pixels, Roi
 
 
@@ -64,3 +70,104 @@ class FindFibres:
         from cosmic.vico.core.vision.finding import find_fibres
 
         return tuple(find_fibres(grey(picture.data)))
+
+
+@algorithm
+class TrackFibre:
+    """One of the fibres found, followed from picture to picture; the result is a `FibreTrack`."""
+
+    name = "fibre track"
+
+    def __init__(self) -> None:
+        self._tracker = FibreTracker()
+        self._wish: Fibre | None = None
+        self._end = False
+
+    def follow(self, fibre: Fibre) -> None:
+        """Follow `fibre` from the next picture on; any thread."""
+        self._end, self._wish = False, fibre
+
+    def end(self) -> None:
+        """Follow none from the next picture on; any thread."""
+        self._end, self._wish = True, None
+
+    def run(self, picture: Picture, results: Results) -> object:  # noqa: ARG002
+        """Say which it is among the fibres found."""
+        wish, self._wish = self._wish, None
+        if wish is not None:
+            self._tracker.start(wish)
+        if self._end:
+            self._tracker.end()
+        if not self._tracker.followed:
+            return Unavailable("no fibre is followed")
+        found = results.get("fibres")
+        if not isinstance(found, tuple):
+            return Unavailable("no fibres were looked for on this picture")
+        return self._tracker.follow([each for each in found if isinstance(each, Fibre)])
+
+
+@algorithm
+class TrackPlace:
+    """A place on the picture, followed by how it looks; the result is a `Track`."""
+
+    name = "place track"
+
+    def __init__(self) -> None:
+        self._tracker: TemplateTracker | None = None
+        self._wish: tuple[float, float] | None = None
+        self._end = False
+
+    def follow(self, at_px: tuple[float, float]) -> None:
+        """Follow what is there on the next picture; any thread."""
+        self._end, self._wish = False, at_px
+
+    def end(self) -> None:
+        """Follow nothing from the next picture on; any thread."""
+        self._end, self._wish = True, None
+
+    def run(self, picture: Picture, results: Results) -> object:  # noqa: ARG002
+        """Find it again."""
+        data = grey(picture.data)
+        wish, self._wish = self._wish, None
+        if self._end:
+            self._tracker = None
+        if wish is not None:
+            fresh = TemplateTracker()
+            try:
+                fresh.start(data, wish)
+            except ConfigError as exc:
+                return Unavailable(str(exc))
+            self._tracker = fresh
+        if self._tracker is None:
+            return Unavailable("no place is followed")
+        return self._tracker.follow(data)
+
+
+@algorithm
+class FindTools:
+    """Grippers and probe; the result maps each name to `GripperTips`, `ToolEnd` or `NotSeen`.
+
+    Attributes
+    ----------
+    expected : mapping of str to ExpectedTool
+        Where each should be on the next picture, from the stages; replaced whole, by any thread.
+        One with a gap is a gripper.
+    """
+
+    name = "tools"
+
+    def __init__(self) -> None:
+        self.expected: Mapping[str, ExpectedTool] = MappingProxyType({})
+
+    def run(self, picture: Picture, results: Results) -> object:  # noqa: ARG002
+        """Find those expected."""
+        expected = self.expected
+        if not expected:
+            return Unavailable("nobody says where the tools should be")
+        data = grey(picture.data)
+        return MappingProxyType(
+            {
+                name: (find_gripper if tool.gap_px > 0.0 else find_probe)(data, tool)
+                for name, tool in expected.items()
+            }
+        )

@@ -222,29 +222,42 @@ def _edge(
 
 def _straight(place: Floats, position: Floats, asked: int) -> Line | None:
     """Fit a line, leaving out what lies off it."""
-    kept = np.ones(len(place), dtype=np.bool_)
     away = np.abs(position - np.median(position))
-    kept &= away <= max(3.0, 4.0 * float(np.median(away)))
-    for _ in range(4):
+    kept = away <= max(3.0, 4.0 * float(np.median(away)))
+    for _ in range(3):
         if kept.sum() < FEWEST_PROFILES:
             return None
-        middle = float(place[kept].mean())
-        slope, offset = np.polyfit(place[kept] - middle, position[kept], 1)
-        error = position - offset - slope * (place - middle)
-        spread = 1.4826 * float(np.median(np.abs(error[kept])))
-        kept = np.abs(error) <= max(CLIP_PX, 3.0 * spread)
+        fit = _Fit.of(place[kept], position[kept])
+        error = np.abs(fit.error(place, position))
+        kept = error <= max(CLIP_PX, 3.0 * 1.4826 * float(np.median(error[kept])))
     count = int(kept.sum())
     if count < FEWEST_PROFILES:
         return None
-    middle = float(place[kept].mean())
-    slope, offset = np.polyfit(place[kept] - middle, position[kept], 1)
-    error = position[kept] - offset - slope * (place[kept] - middle)
-    sigma = math.sqrt(float(error @ error) / (count - 2)) * SHARED_NOISE
+    fit = _Fit.of(place[kept], position[kept])
+    error = fit.error(place[kept], position[kept])
+    sigma = SHARED_NOISE * math.sqrt(float(error @ error) / (count - 2))
     return Line(
-        float(offset),
-        float(slope),
-        middle,
+        fit.offset,
+        fit.slope,
+        fit.middle,
         sigma / math.sqrt(count),
-        sigma / math.sqrt(float(np.sum((place[kept] - middle) ** 2))),
+        sigma / math.sqrt(fit.power),
         count / asked,
     )
+
+
+class _Fit(NamedTuple):
+    middle: float
+    offset: float
+    slope: float
+    power: float
+
+    @classmethod
+    def of(cls, place: Floats, position: Floats) -> "_Fit":
+        middle, offset = float(place.mean()), float(position.mean())
+        along = place - middle
+        power = float(along @ along)
+        return cls(middle, offset, float(along @ (position - offset)) / power, power)
+
+    def error(self, place: Floats, position: Floats) -> Floats:
+        return position - self.offset - self.slope * (place - self.middle)
