@@ -161,3 +161,8 @@ class NavitarLens(Lens):
 
     def _write(self, motor: _Motor, register: Register, value: int) -> None:
         self._registers.write(register + motor.first, value)
+
+
+def counts_anew(registers: Registers) -> bool:
+    """Whether both motors count 0, as they do after the controller was switched on."""
+    return not any(registers.read(Register.POSITION + first) for first in (0, SECOND_AXIS))

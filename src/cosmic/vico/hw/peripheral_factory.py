@@ -1,11 +1,12 @@
 """Makes the lens and the lamp that the configuration names."""
 
+import logging
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Literal
 
-from cosmic.frame.errors import ConfigError, DeviceFault, NotConnectedError
+from cosmic.frame.errors import ConfigError, CosmicError, DeviceFault, NotConnectedError
 from cosmic.vico.hw.brightlight import BrightLight
-from cosmic.vico.hw.navitar_lens import NavitarLens
+from cosmic.vico.hw.navitar_lens import NavitarLens, counts_anew
 from cosmic.vico.hw.navitar_probe import Found, probe
 from cosmic.vico.hw.navitar_protocol import Product
 from cosmic.vico.hw.peripherals import Lens, LensAxis, Light
@@ -14,6 +15,8 @@ from cosmic.vico.hw.serial_port import SerialPort, open_serial_port
 if TYPE_CHECKING:
     from cosmic.vico.hw.sim_line import SimLine
     from cosmic.vico.hw.sim_peripherals import SimPeripherals
+
+logger = logging.getLogger(__name__)
 
 LensBackend = Literal["simulated", "navitar", "none"]
 LightBackend = Literal["simulated", "brightlight", "none"]
@@ -37,7 +40,8 @@ def make_lens(
     port : str
         For "navitar": the serial port, such as "/dev/ttyUSB0" or "COM3".
     homed : bool
-        It has been homed and kept under power since. A simulated lens that was found warm has.
+        It has been homed and kept under power since; not believed when both motors count 0. A
+        simulated lens that was found warm has.
     simulation : SimPeripherals or None
         For "simulated": the platform's.
 
@@ -45,6 +49,8 @@ def make_lens(
     ------
     NotConnectedError
         The port is not there, or something else answers on it.
+    DeviceError, ProtocolError
+        The line failed right after it was opened.
     ConfigError
         No port, or no simulation, is given.
     """
@@ -60,6 +66,7 @@ def make_lens(
     _expect(found, "a lens controller", Product.MOTORS, Product.MOTORS_2)
     kind = "simulated lens" if backend == "simulated" else "Navitar"
     name = f"{kind}, generation {found.generation}"
+    homed = homed and _believable(found)
     return NavitarLens(found.registers, name=name, homed=homed, limits_counts=limits_counts)
 
 
@@ -103,6 +110,20 @@ def _named(port: str, backend: str) -> str:
     if not port:
         raise ConfigError(f"backend {backend!r} needs a port, such as /dev/ttyUSB0 or COM3")
     return port
+
+
+def _believable(found: Found) -> bool:
+    """Whether the counters can be those of a lens that was homed."""
+    try:
+        anew = counts_anew(found.registers)
+    except CosmicError:
+        found.registers.close()
+        raise
+    if anew:
+        logger.warning(
+            "%s: both motors count 0, as after switching on; home the lens", found.registers.name
+        )
+    return not anew
 
 
 def _expect(found: Found, what: str, *products: Product) -> None:

@@ -102,3 +102,10 @@ def test_faults_have_names() -> None:
     rig = PeripheralRig()
     with pytest.raises(ValueError, match="known: lens, light"):
         rig.simulation.faults.inject("silent", where="camera")
+
+
+def test_a_lens_said_to_be_homed_is_not_believed_when_both_motors_count_zero() -> None:
+    for cold in (True, False):
+        lens = make_lens("simulated", homed=True, simulation=PeripheralRig(cold=cold).simulation)
+        assert lens is not None
+        assert [lens.state(axis).homed for axis in LensAxis] == [not cold] * 2
