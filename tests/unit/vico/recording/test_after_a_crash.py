@@ -18,7 +18,8 @@ from unit.vico.recording.picture_helpers import AXES, noise, picture
 
 TESTS = Path(__file__).resolve().parents[3]
 SECONDS = 1.6
-CHILD_ENVIRONMENT = {**os.environ, "PYTHONPATH": str(TESTS)}
+PYTHONPATH = os.pathsep.join([str(TESTS), os.environ.get("PYTHONPATH", "")])
+CHILD_ENVIRONMENT = {**os.environ, "PYTHONPATH": PYTHONPATH}
 
 
 def child(*arguments):
