@@ -67,11 +67,15 @@ def test_black_above_white_is_refused_and_keeps_its_text(qtbot, panel, view):
     assert (panel.low.text(), panel.low.reason) == ("0", "")
 
 
-@pytest.mark.parametrize("text", ["256", "-1", "nan", "inf", "a", "", "1,5"])
-def test_a_level_outside_the_range_is_refused(qtbot, panel, view, text):
-    enter(qtbot, panel.high, text) if text else (panel.high.clear(), panel.high.commit())
-    assert panel.high.reason
-    assert view.view.levels == Levels(0.0, 255.0)
+def test_a_level_outside_the_range_is_refused(qtbot, panel, view):
+    for text in ("256", "-1", "nan", "inf", "a", "", "1,5"):
+        panel.high.clear()
+        enter(qtbot, panel.high, text)
+        assert panel.high.reason, text
+        assert panel.high.text() == text
+        assert view.view.levels == Levels(0.0, 255.0)
+        qtbot.keyClick(panel.high, Qt.Key.Key_Escape)
+        assert panel.high.reason == ""
 
 
 def test_the_range_is_that_of_the_pixel_format(qtbot, panel, view, camera):

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPointF, Qt
-from PySide6.QtGui import QColor
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QColor, QWheelEvent
 from PySide6.QtWidgets import QApplication
 
 from cosmic.frame.gui.theme import State
@@ -93,6 +93,30 @@ def test_dragging_pans_and_the_part_stays_for_the_next_picture(qtbot, shown, mou
     newest = camera.push()
     qtbot.waitUntil(lambda: shown.view.picture is newest)
     assert shown.view.pixel_at(QPointF(100, 100)) == pytest.approx(after)
+
+
+def test_the_wheel_zooms_about_the_place_below_the_mouse(qtbot, shown, camera):
+    place = QPointF(300.0, 200.0)
+    before, zoom = shown.view.pixel_at(place), shown.view.zoom
+    turn = QWheelEvent(
+        place,
+        shown.view.viewport().mapToGlobal(place),
+        QPoint(),
+        QPoint(0, 240),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    QApplication.sendEvent(shown.view.viewport(), turn)
+    assert shown.view.zoom > 1.2 * zoom
+    assert shown.view.pixel_at(place) == pytest.approx(before, abs=2.0)
+    zoom = shown.view.zoom
+    newest = camera.push()
+    qtbot.waitUntil(lambda: shown.view.picture is newest)
+    shown.resize(800, 600)
+    QApplication.processEvents()
+    assert shown.view.zoom == pytest.approx(zoom, rel=0.01)
 
 
 @pytest.mark.parametrize(

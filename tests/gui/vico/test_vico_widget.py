@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit, QSlider
 
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.frame.gui.theme import apply_theme
-from cosmic.vico.gui.vico_gui import VicoWidget, make_vico_gui
+from cosmic.vico.gui.vico_gui import VicoGui, VicoWidget
 from gui.vico.fake_vico import FakeVico, Found, Seen, fibre_picture
 
 
@@ -16,7 +16,7 @@ def test_cameras_and_lens_become_docks_of_the_window(own, tmp_path, theme):
     store = QSettings(str(tmp_path / "layout.ini"), QSettings.Format.IniFormat)
     window = CosmicServerGui(store, theme=theme)
     own(window)
-    gui = make_vico_gui(port)
+    gui = VicoGui(port)
     for name, view in gui.cameras.items():
         window.add_panel(f"Camera {name}", view)
     window.add_panel("Lens", gui.lens)

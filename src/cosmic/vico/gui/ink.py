@@ -1,10 +1,11 @@
 """Pens and labels that can be seen over any picture, bright or dark."""
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPainterPath, QPen
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen
 
 from cosmic.frame.gui.palette import OKABE_ITO
 from cosmic.frame.gui.theme import STEP_PX, number_font
@@ -17,6 +18,12 @@ GREEN: Final = QColor("#35D0A0")
 ORANGE: Final = QColor(OKABE_ITO["orange"])
 YELLOW: Final = QColor(OKABE_ITO["yellow"])
 PINK: Final = QColor(OKABE_ITO["reddish purple"])
+
+
+@cache
+def ink_font(size_px: int = 12, *, bold: bool = True) -> QFont:
+    """Return the font over pictures; kept, as finding it takes longer than drawing a fibre."""
+    return number_font(size_px, bold=bold)
 
 
 def pen(colour: QColor, width: float = 1.5, *, dashed: bool = False) -> QPen:
@@ -60,7 +67,7 @@ def label(
 
     It goes below each of the labels `taken` that it would cover.
     """
-    font = number_font(12, bold=True)
+    font = ink_font()
     metrics = QFontMetricsF(font)
     width = max(metrics.horizontalAdvance(part) for part in text.splitlines())
     height = metrics.height() * len(text.splitlines())

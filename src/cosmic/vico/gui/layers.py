@@ -6,9 +6,9 @@ from typing import Final
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPen
 
-from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font, ui_font
+from cosmic.frame.gui.theme import STEP_PX, current_palette
 from cosmic.frame.overrides import override
-from cosmic.vico.gui.ink import HALO, SKY, WHITE, line, pen
+from cosmic.vico.gui.ink import HALO, SKY, WHITE, ink_font, line, pen
 from cosmic.vico.gui.picture_view import Layer, PictureView
 
 BAR_SHARE: Final = 0.25
@@ -59,7 +59,7 @@ class ScaleBar(Layer):
             return
         self._measure(view)
         ratio = float(view.devicePixelRatioF())
-        font = number_font(12, bold=True)
+        font = ink_font()
         metrics = QFontMetricsF(font)
         width = max(self.length_px, metrics.horizontalAdvance(self.text)) + 2 * STEP_PX
         height = metrics.height() + 2 * STEP_PX
@@ -109,7 +109,7 @@ class CornerText(Layer):
     def paint(self, painter: QPainter, view: PictureView) -> None:
         if not self.text:
             return
-        font = number_font(12)
+        font = ink_font(bold=False)
         metrics = QFontMetricsF(font)
         room = QRectF(view.rect()).adjusted(STEP_PX, STEP_PX, -STEP_PX, -STEP_PX)
         most = room.width() - 2 * STEP_PX
@@ -136,7 +136,7 @@ class Note(Layer):
     def paint(self, painter: QPainter, view: PictureView) -> None:
         if not self.text:
             return
-        font = ui_font(15, bold=True)
+        font = ink_font(15)
         metrics = QFontMetricsF(font)
         room = QRectF(view.rect()).adjusted(STEP_PX, STEP_PX, -STEP_PX, -STEP_PX)
         flags = int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap)

@@ -2,9 +2,8 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import Final, Protocol
+from typing import Protocol
 
-import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import (
@@ -22,12 +21,9 @@ from PySide6.QtWidgets import QToolTip, QWidget
 from cosmic.frame.gui.theme import current_palette
 from cosmic.frame.overrides import override
 from cosmic.vico.core.picture import Picture
-from cosmic.vico.gui.levels import Levels, colour_picture, full_scale, index_table, palette
+from cosmic.vico.gui.levels import Levels
+from cosmic.vico.gui.picture_item import PictureItem
 from cosmic.vico.gui.seen import Pixel
-from cosmic.vico.hw.interface import Pixels
-
-MARGIN: Final = 0.0
-LEAST_ZOOM, MOST_ZOOM = 0.02, 64.0
 
 
 class Layer(Protocol):
@@ -91,17 +87,12 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         self.paints = 0
         self.tool: Tool | None = None
         self.picture: Picture | None = None
-        self._levels = Levels(0.0, 255.0)
-        self._marks = self._greyed = False
         self._fitted = True
-        self._full = 255
-        self._index = index_table(255)
+        self._pixels = PictureItem()
         self.box = pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False, defaultPadding=0)
         self.box.disableAutoRange()
         self.setCentralItem(self.box)
-        self.image = pg.ImageItem(axisOrder="row-major", autoLevels=False)
-        self.image.setPos(-0.5, -0.5)  # the middle of a pixel is where its number says
-        self.box.addItem(self.image)
+        self.box.addItem(self._pixels.item)
         self.box.sigRangeChangedManually.connect(self._on_moved_by_hand)
         self.box.sigTransformChanged.connect(self.zoom_changed)
         self.setMouseTracking(True)
@@ -112,68 +103,31 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
     @property
     def levels(self) -> Levels:
         """What is shown black and white."""
-        return self._levels
+        return self._pixels.levels
 
     @property
     def full(self) -> int:
         """Brightness of an over-exposed pixel of the picture shown."""
-        return self._full
+        return self._pixels.full
 
     def set_levels(self, levels: Levels) -> None:
         """Change the contrast."""
-        if levels != self._levels:
-            self._levels = levels
-            self._look_changed()
+        self._pixels.set_levels(levels)
 
     def set_marks(self, marks: bool) -> None:
         """Colour pixels that are over-exposed or quite black, or not."""
-        self._marks = marks
-        self._look_changed()
+        self._pixels.set_marks(marks)
 
     def set_greyed(self, greyed: bool) -> None:
         """Show that the picture is old."""
-        if greyed != self._greyed:
-            self._greyed = greyed
-            self._look_changed()
+        self._pixels.set_greyed(greyed)
 
     def show_picture(self, picture: Picture) -> None:
         """Show `picture` instead of the one before."""
-        before, self.picture = self.picture, picture
-        full = full_scale(picture.frame.pixel_format)
-        if full != self._full:
-            share = full / self._full
-            self._full, self._index = full, index_table(full)
-            self._levels = Levels(self._levels.low * share, self._levels.high * share)
-        resized = before is None or before.data.shape != picture.data.shape
-        if resized or full != 255:
-            self._look_changed()
-        else:
-            self._put(picture.data)
-        if resized and self._fitted:
+        self.picture = picture
+        if self._pixels.show(picture) and self._fitted:
             self.fit()
-
-    def _look_changed(self) -> None:
-        if self.picture is None:
-            return
-        if self.picture.data.ndim == 2:
-            table = palette(self._levels, self._full, marks=self._marks, greyed=self._greyed)
-            self.image.setLookupTable(table, update=False)
-        self._put(self.picture.data)
-
-    def _put(self, data: Pixels) -> None:
-        if data.ndim == 3:
-            plain = self._levels == Levels(0.0, 255.0) and not self._marks and not self._greyed
-            shown = (
-                np.asarray(data)
-                if plain
-                else colour_picture(data, self._levels, marks=self._marks, greyed=self._greyed)
-            )
-        else:
-            shown = data if self._index is None else np.take(self._index, data)
-        self.image.setImage(shown, autoLevels=False)
-        if not self.layers:
-            return
-        self.viewport().update()  # the layers lie over margins as well
+        self.redraw()  # the layers lie over the margins as well
 
     # Which part is shown
 
@@ -212,7 +166,7 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         self._fitted = True
         width, height = self.size_px
         if width:
-            self.box.setRange(QRectF(-0.5, -0.5, width, height), padding=MARGIN)
+            self.box.setRange(QRectF(-0.5, -0.5, width, height), padding=0.0)
 
     def one_to_one(self) -> None:
         """Show a pixel of the picture by one of the screen, around the middle of the view."""
@@ -220,19 +174,30 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         middle = self.pixel_at(QPointF(self.width() / 2, self.height() / 2))
         if not self.is_inside(middle):
             middle = (self.size_px[0] / 2, self.size_px[1] / 2)
-        ratio = self.devicePixelRatioF()
-        width, height = self.width() * ratio, self.height() * ratio
-        around = QRectF(middle[0] - width / 2, middle[1] - height / 2, width, height)
-        self.box.setRange(around, padding=0.0)
+        self._show_around(middle, 1.0 / float(self.devicePixelRatioF()))
+
+    def _show_around(self, middle: Pixel, scale: float) -> None:
+        """Show a pixel in the middle of the view, at `scale` pixels of the widget for one."""
+        width, height = self.width() / scale, self.height() / scale
+        corner = QPointF(middle[0] - width / 2.0, middle[1] - height / 2.0)
+        self.box.setRange(QRectF(corner.x(), corner.y(), width, height), padding=0.0)
 
     def _on_moved_by_hand(self) -> None:
         self._fitted = False
 
     @override
     def resizeEvent(self, event: QResizeEvent) -> None:
+        if getattr(self, "picture", None) is None:  # pyqtgraph calls it while it is being made
+            super().resizeEvent(event)
+            return
+        before = event.oldSize()
+        middle = self.pixel_at(QPointF(before.width() / 2.0, before.height() / 2.0))
+        scale = abs(self.to_screen.m11())
         super().resizeEvent(event)
-        if getattr(self, "_fitted", False) and self.picture is not None:
+        if self._fitted:
             self.fit()
+        else:
+            self._show_around(middle, scale)
 
     @override
     def close(self) -> bool:

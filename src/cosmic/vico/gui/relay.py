@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
+from shiboken6 import isValid
 
 from cosmic.frame.task import Progress, Task
 from cosmic.vico.gui.ports import Unsubscribe, VicoPort
@@ -64,8 +65,12 @@ class TaskWatch(QObject):
     def follow(self, task: Task) -> None:
         """Tell of `task` from now on."""
         self.task = task
-        tell = self._told.emit
-        task.subscribe(lambda progress: tell(task, progress))
+
+        def tell(progress: Progress) -> None:
+            if isValid(self):  # the widget may go while its task goes on
+                self._told.emit(task, progress)
+
+        task.subscribe(tell)
 
     def _on_told(self, task: Task, progress: Progress) -> None:
         if task is self.task:

@@ -1,5 +1,7 @@
 """What machine vision found, drawn over the picture: fibres, their ends, tips."""
 
+from typing import Final
+
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QPainter, QPainterPath, QPolygonF
@@ -10,8 +12,8 @@ from cosmic.vico.gui.picture_view import Layer, PictureView
 from cosmic.vico.gui.seen import Analysis, FibreSeen, TipSeen
 from cosmic.vico.gui.texts import length_text
 
-NOT_SURE = "not sure"
-MOST_POINTS = 400
+NOT_SURE: Final = "not sure"
+MOST_POINTS: Final = 150
 
 
 def fibre_text(fibre: FibreSeen, scale_um_px: float | None) -> str:
