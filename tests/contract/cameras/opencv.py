@@ -44,7 +44,7 @@ class FilmRig(CameraRig):
     can = frozenset({Can.RATE, Can.ROI})
     rate_hz = 100.0
     roi = Roi(8, 16, 64, 48)
-    quiet_rate_hz = 0.5
+    quiet_rate_hz = 0.05
 
     @override
     def __enter__(self) -> Self:

@@ -17,6 +17,8 @@ class FakeDevice:
         Pictures that wait in the driver.
     stubborn : set of int
         Properties that keep their value whatever is set.
+    most : dict of int to float
+        What properties are clipped to.
     """
 
     def __init__(self, *, ready: int = 4, exposure: float = 100.0) -> None:
@@ -25,6 +27,7 @@ class FakeDevice:
         self.ready = ready
         self.taken = 0
         self.stubborn: set[int] = set()
+        self.most: dict[int, float] = {}
         self.values = {
             int(cv2.CAP_PROP_FPS): 30.0,
             int(cv2.CAP_PROP_EXPOSURE): exposure,
@@ -78,7 +81,8 @@ class FakeCapture:
 
     def set(self, prop: int, value: float) -> bool:
         if prop not in self.device.stubborn:
-            self.device.values[prop] = float(round(value))
+            most = self.device.most.get(prop, float("inf"))
+            self.device.values[prop] = float(min(round(value), most))
         return True
 
     def read(self) -> tuple[bool, Any]:

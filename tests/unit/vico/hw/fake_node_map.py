@@ -33,6 +33,11 @@ class Number:
 
     @value.setter
     def value(self, value: float) -> None:
+        nodes = self._camera.node_map
+        if self is nodes.Width and value + nodes.OffsetX.value > nodes.SensorWidth.value:
+            raise NodeError(f"width {value} reaches off the sensor")
+        if self is nodes.OffsetX and value + nodes.Width.value > nodes.SensorWidth.value:
+            raise NodeError(f"offset {value} reaches off the sensor")
         if not self.min <= value <= self.max or self in self._camera.broken:
             raise NodeError(f"value {value} must lie between {self.min} and {self.max}")
         self._value = value

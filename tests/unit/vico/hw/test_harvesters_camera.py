@@ -100,6 +100,11 @@ def test_a_roi_lies_on_the_steps_of_its_corner_and_its_size(
         with pytest.raises(ConfigError, match=r"multiple|steps"):
             camera.configure(replace(settings, roi=wrong))
     assert camera.settings.roi == made.roi
+    whole = camera.configure(replace(settings, roi=Roi(0, 0, 640, 480)))
+    assert whole.roi == Roi(0, 0, 640, 480)
+    moved = camera.configure(replace(settings, roi=Roi(320, 0, 320, 200)))
+    wider = camera.configure(replace(moved, roi=Roi(8, 0, 624, 200)))
+    assert wider.roi == Roi(8, 0, 624, 200)
 
 
 def test_both_binnings_go_together(camera: HarvestersCamera, device: FakeGenTL) -> None:

@@ -116,9 +116,26 @@ def test_a_value_that_nothing_came_of_is_refused(
 ) -> None:
     before = camera.settings
     device.stubborn.add(prop)
-    with pytest.raises(ConfigError, match=what):
-        camera.configure(replace(before, exposure_s=0.03, rate_hz=20.0))
+    _expect_refusal(camera, device, what)
     assert camera.settings == before
+
+
+@pytest.mark.parametrize(
+    ("prop", "what", "most"),
+    [(cv2.CAP_PROP_EXPOSURE, "exposure", 150.0), (cv2.CAP_PROP_FPS, "rate", 35.0)],
+)
+def test_a_value_that_the_device_clips_is_put_back(
+    camera: Camera, device: FakeDevice, prop: int, what: str, most: float
+) -> None:
+    before = camera.settings
+    device.most[prop] = most
+    _expect_refusal(camera, device, what)
+    assert camera.settings == before
+
+
+def _expect_refusal(camera: Camera, device: FakeDevice, what: str) -> None:
+    with pytest.raises(ConfigError, match=what):
+        camera.configure(replace(camera.settings, exposure_s=0.02, rate_hz=40.0))
     assert device.values[cv2.CAP_PROP_FPS] == 30.0
     assert device.values[cv2.CAP_PROP_EXPOSURE] == 100.0
 
