@@ -6,7 +6,6 @@ from ctypes import create_string_buffer
 from dataclasses import replace
 from typing import Final
 
-import numpy as np
 from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
@@ -14,9 +13,9 @@ from cosmic.frame.errors import ConfigError, DeviceError, DeviceFault, NotAvaila
 from cosmic.vico.hw import aravis_ctypes as arv
 from cosmic.vico.hw.aravis_calls import AravisCalls
 from cosmic.vico.hw.aravis_features import AravisFeatures
-from cosmic.vico.hw.aravis_frames import FrameNumbers, FrameTimes
 from cosmic.vico.hw.aravis_gvcp import QUIET_S, GvcpWatch, ask_camera
 from cosmic.vico.hw.aravis_stream import AravisBuffer, AravisStream
+from cosmic.vico.hw.aravis_tally import AravisTally
 from cosmic.vico.hw.camera_checks import check_settings
 from cosmic.vico.hw.interface import (
     Camera,
@@ -25,9 +24,6 @@ from cosmic.vico.hw.interface import (
     CameraRanges,
     CameraSettings,
     Frame,
-    FrameStatus,
-    PixelFormat,
-    Pixels,
     Trigger,
 )
 
@@ -35,8 +31,6 @@ logger = logging.getLogger(__name__)
 
 # How long `stop` may have to wait for a `receive`.
 _SLICE_S: Final = 0.05
-# Aravis keeps an incomplete frame this long for its last packets, and some.
-_INCOMPLETE_AGE_S: Final = 0.5
 
 
 class AravisCamera(Camera):
@@ -107,7 +101,7 @@ class AravisCamera(Camera):
     @property
     @override
     def counters(self) -> CameraCounters:
-        return CameraCounters(self._completed, self._failed, self._numbers.lost, self._underrun)
+        return self._tally.counters
 
     @property
     def packets(self) -> tuple[int, int]:
@@ -171,9 +165,10 @@ class AravisCamera(Camera):
                 left_s = until_s - WALL.now_s()
                 buffer = stream.pop(max(0.0, min(left_s, _SLICE_S)))
                 if buffer is not None:
-                    frame = self._taken(buffer)
+                    found = AravisBuffer(self._calls, buffer)
+                    frame = self._tally.frame(found, self._settings, self._ranges)
                     stream.push(buffer)
-                    self._underrun = stream.underruns()
+                    self._tally.underrun = stream.underruns()
                     self._note_life()
                     return frame
                 self._look_for_life()
@@ -238,50 +233,8 @@ class AravisCamera(Camera):
             )
 
     def _begin_counting(self) -> None:
-        self._completed = self._failed = self._underrun = 0
-        self._numbers, self._times = FrameNumbers(), FrameTimes()
+        self._tally = AravisTally(self._calls, self._clock)
         self._last_sign_s = WALL.now_s()
-
-    def _taken(self, address: int) -> Frame:
-        """Return the frame in a buffer, counted; in the thread that receives."""
-        buffer, settings = AravisBuffer(self._calls, address), self._settings
-        data = buffer.pixels(settings)
-        if not buffer.whole or data is None:
-            return self._incomplete(buffer, data, settings)
-        self._completed += 1
-        now_s, rate = self._clock.now_s(), self._clock.rate
-        age_s = (self._calls.plain("g_get_real_time") * 1000 - buffer.system_ns) / 1e9
-        complete_s = self._times.complete_s(now_s, age_s, rate)
-        before_s = max(0.0, age_s) + self._times.delay_s(buffer.system_ns, buffer.device_ns)
-        return Frame(
-            data=data,
-            frame_id=self._numbers.whole(buffer.number),
-            time_s=complete_s,
-            exposed_s=min(now_s - (before_s + self._exposing_s()) * rate, complete_s),
-            device_ns=buffer.device_ns,
-            pixel_format=settings.pixel_format,
-        )
-
-    def _incomplete(
-        self, buffer: AravisBuffer, data: Pixels | None, settings: CameraSettings
-    ) -> Frame:
-        self._failed += 1
-        now_s = self._clock.now_s()
-        before_s = _INCOMPLETE_AGE_S + self._exposing_s()
-        return Frame(
-            data=_blank(settings) if data is None else data,
-            frame_id=self._numbers.doubtful(buffer.number),
-            time_s=now_s,
-            exposed_s=now_s - before_s * self._clock.rate,
-            status=FrameStatus.INCOMPLETE,
-            pixel_format=settings.pixel_format,
-        )
-
-    def _exposing_s(self) -> float:
-        """Return the most that lies between the beginning of an exposure and its first packet."""
-        fastest = self._ranges.rate_hz
-        reading_s = 0.0 if fastest is None else 1.0 / fastest.high
-        return self._settings.exposure_s + reading_s
 
     def _note_life(self) -> None:
         self._last_sign_s = WALL.now_s()
@@ -314,12 +267,3 @@ class AravisCamera(Camera):
     def _on_control_lost(self, _device: int | None, _data: int | None) -> None:
         """Note it; in a thread of Aravis."""
         self._control_lost = True
-
-
-def _blank(settings: CameraSettings) -> Pixels:
-    shape = (settings.roi.height_px, settings.roi.width_px)
-    eight = settings.pixel_format in (PixelFormat.MONO8, PixelFormat.RGB8)
-    colour = settings.pixel_format is PixelFormat.RGB8
-    data = np.zeros((*shape, 3) if colour else shape, np.uint8 if eight else np.uint16)
-    data.flags.writeable = False
-    return data

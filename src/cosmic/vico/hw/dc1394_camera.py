@@ -2,7 +2,6 @@
 
 import logging
 import threading
-import time
 from dataclasses import replace
 from typing import Any, Final
 
@@ -14,7 +13,8 @@ from cosmic.vico.hw import dc1394_ctypes as dc
 from cosmic.vico.hw.camera_checks import check_settings
 from cosmic.vico.hw.dc1394_calls import Dc1394Calls, Dc1394Handle, as_refusal
 from cosmic.vico.hw.dc1394_features import Dc1394Feature, Dc1394Trigger
-from cosmic.vico.hw.dc1394_ring import Dc1394Ring, FrameCount
+from cosmic.vico.hw.dc1394_ring import Dc1394Ring
+from cosmic.vico.hw.dc1394_tally import Dc1394Tally
 from cosmic.vico.hw.dc1394_video import make_video
 from cosmic.vico.hw.interface import (
     Camera,
@@ -23,7 +23,6 @@ from cosmic.vico.hw.interface import (
     CameraRanges,
     CameraSettings,
     Frame,
-    FrameStatus,
     Trigger,
 )
 
@@ -103,7 +102,7 @@ class Dc1394Camera(Camera):
     @property
     @override
     def counters(self) -> CameraCounters:
-        return CameraCounters(self._completed, self._failed, self._count.lost, self._underrun)
+        return self._tally.counters
 
     @override
     def configure(self, settings: CameraSettings) -> CameraSettings:
@@ -209,8 +208,7 @@ class Dc1394Camera(Camera):
             raise self._failure
 
     def _begin_counting(self) -> None:
-        self._completed = self._failed = self._underrun = 0
-        self._count = FrameCount()
+        self._tally = Dc1394Tally(self._clock)
         self._last_sign_s = WALL.now_s()
 
     def _set_speed(self, fast: bool) -> None:
@@ -266,7 +264,7 @@ class Dc1394Camera(Camera):
             finally:
                 if ring is not None:
                     self._ring = Dc1394Ring(self._handle, asked)
-                    self._count.pause()
+                    self._tally.pause()
                     self._handle.call("dc1394_video_set_transmission", dc.DC1394_ON)
 
     def _next(self, ring: Dc1394Ring, timeout_s: float) -> Frame | None:
@@ -277,24 +275,7 @@ class Dc1394Camera(Camera):
             raise self._failure or exc from exc
         if taken is None:
             return None
-        settings, rate = self._settings, self._clock.rate
-        free = settings.trigger is Trigger.FREE_RUN
-        frame_id = self._count.number(taken.received_us, settings.rate_hz if free else 0.0)
-        self._completed += not taken.corrupt
-        self._failed += taken.corrupt
-        self._underrun += taken.ring_full
-        now_s, real_us = self._clock.now_s(), time.clock_gettime_ns(time.CLOCK_REALTIME) // 1000
-        age_s = min(max(0.0, (real_us - taken.received_us) / 1e6), 5.0)
-        # On the bus a frame takes up to a period.
-        begun_s = age_s + settings.exposure_s + 1.0 / settings.rate_hz
-        return Frame(
-            data=taken.data,
-            frame_id=frame_id,
-            time_s=now_s - age_s * rate,
-            exposed_s=now_s - begun_s * rate,
-            status=FrameStatus.INCOMPLETE if taken.corrupt else FrameStatus.COMPLETE,
-            pixel_format=settings.pixel_format,
-        )
+        return self._tally.frame(taken, self._settings)
 
     def _look_for_life(self) -> None:
         """Raise when the camera is gone or was reset; no frame has come for a while."""

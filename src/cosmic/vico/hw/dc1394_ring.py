@@ -15,7 +15,6 @@ from cosmic.vico.hw.interface import CameraSettings, PixelFormat, Pixels
 
 _SECONDS_OF_BUFFERS: Final = 0.5
 _BUFFERS: Final = (8, 64)
-_LATE: Final = 1.5  # periods between two frames from which on one is missing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,27 +102,3 @@ class Dc1394Ring:
             corrupt=bool(corrupt) or not fits,
             ring_full=found.frames_behind >= self._buffers - 1,
         )
-
-
-class FrameCount:
-    """Numbers frames by the times at which they were received."""
-
-    def __init__(self) -> None:
-        self.lost = 0
-        self._next = 0
-        self._last_us: int | None = None
-
-    def pause(self) -> None:
-        """Take the next gap for what it is: the camera was stopped on purpose."""
-        self._last_us = None
-
-    def number(self, received_us: int, rate_hz: float) -> int:
-        """Return the number of a frame; with a rate of 0 no gap is a loss."""
-        if self._last_us is not None and rate_hz > 0.0:
-            periods = (received_us - self._last_us) * rate_hz / 1e6
-            missing = round(periods) - 1 if periods > _LATE else 0
-            self.lost += missing
-            self._next += missing
-        self._last_us = received_us
-        self._next += 1
-        return self._next - 1

@@ -13,7 +13,7 @@ from cosmic.frame.errors import ConfigError, DeviceError, DeviceFault, NotConnec
 from cosmic.vico.hw import dc1394_ctypes as dc
 from cosmic.vico.hw.dc1394_calls import Dc1394Calls
 from cosmic.vico.hw.dc1394_library import Dc1394Library
-from cosmic.vico.hw.dc1394_ring import FrameCount
+from cosmic.vico.hw.dc1394_tally import FrameCount
 from cosmic.vico.hw.interface import Camera, Frame, FrameStatus, PixelFormat, Roi, Trigger
 
 needs_compiler = pytest.mark.skipif(bool(ScalableRig.missing()), reason=ScalableRig.missing())
@@ -191,6 +191,13 @@ def test_frames_in_time_are_not_lost_and_late_ones_are_counted_by_periods() -> N
 def test_a_trigger_may_come_whenever_it_likes() -> None:
     count = FrameCount()
     assert [count.number(us, 0.0) for us in (0, 10_000_000)] == [0, 1]
+
+
+def test_a_stop_on_purpose_loses_nothing() -> None:
+    count = FrameCount()
+    count.number(0, 60.0)
+    count.pause()
+    assert (count.number(10_000_000, 60.0), count.lost) == (1, 0)
 
 
 @needs_compiler
