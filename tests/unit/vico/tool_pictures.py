@@ -45,13 +45,15 @@ def tool_picture(
     specks: int = 25,
     fibre: bool = False,
     off_px: float = 20.0,
+    shift: tuple[float, float] = (0.0, 0.0),
+    noise_seed: int | None = None,
 ) -> ToolPicture:
     """Draw a probe (no gap) or a gripper in a random pose, expected some pixels off."""
     rng = np.random.default_rng(seed)
     angle = rng.uniform(0.0, 2.0 * math.pi)
     forward = np.array([math.cos(angle), math.sin(angle)])
     side = np.array([-forward[1], forward[0]])
-    hold = np.array([WIDTH / 2, HEIGHT / 2]) + rng.uniform(-40.0, 40.0, 2)
+    hold = np.array([WIDTH / 2, HEIGHT / 2]) + rng.uniform(-40.0, 40.0, 2) + shift
     y, x = np.mgrid[:HEIGHT, :WIDTH] / HEIGHT
     ground = 150.0 * (1.0 - uneven * ((x - 0.4) ** 2 + (y - 0.6) ** 2))
     layer = np.ones((HEIGHT, WIDTH), np.float32)
@@ -68,7 +70,8 @@ def tool_picture(
     for aside in offsets:
         cover = box(hold + aside * side, forward, width, blur)
         image = image * (1.0 - cover) + 0.24 * ground * cover
-    image = image + rng.normal(0.0, noise, image.shape)
+    grain = rng if noise_seed is None else np.random.default_rng(noise_seed)
+    image = image + grain.normal(0.0, noise, image.shape)
     turn = math.radians(rng.uniform(-2.0, 2.0))
     told = np.array(
         [
