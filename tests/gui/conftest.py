@@ -8,7 +8,7 @@ from threading import Lock
 import pytest
 from typing_extensions import override
 
-from cosmic.app import platform
+from cosmic.app import platform_file
 from cosmic.mico.core.collision import collision_manager, scene_loader
 from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
 from cosmic.mico.core.collision.collision_manager import Answering
@@ -55,7 +55,7 @@ class InProcess(Answering):
 
 def _cached(path: Path) -> SceneModel:
     """Load the shipped scene once, and any other one each time."""
-    shipped = platform.platform_path(None).parent
+    shipped = platform_file.platform_path(None).parent
     return _load_scene(path) if shipped in path.parents else _load_scene.__wrapped__(path)
 
 

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from cosmic.app.run_window import WindowOptions
 
 NOT_BUILT: Final = {
-    "vico": "vision in a window of its own",
     "serve": "a station without a window",
 }
 _WINDOW_SIZE: Final = (1600, 1000)
@@ -176,6 +175,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     commands.add_parser("mico", help="the window of MiCo alone", parents=[window])
     commands.add_parser("daqco", help="the window of DAQCo alone", parents=[window])
+    commands.add_parser("vico", help="the window of ViCo alone", parents=[window])
     check = commands.add_parser("check", help="check a platform file and the twin it names")
     check.add_argument("platform", type=Path, metavar="PLATFORM.toml")
     init = commands.add_parser("init", help="copy the shipped configuration out, to change it")

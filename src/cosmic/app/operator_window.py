@@ -10,6 +10,7 @@ import cosmic
 from cosmic.app.collision_bar import CollisionBar
 from cosmic.app.control_mode import ECM, ControlMode
 from cosmic.app.hint_bar import HintBar, first_steps
+from cosmic.app.instrument_panels import add_force, add_vision
 from cosmic.app.platform import Platform
 from cosmic.app.rig import Rig
 from cosmic.app.scene_panel import ScenePanel
@@ -27,17 +28,18 @@ from cosmic.frame.gui.top_bar import NO_COLLISION_MODEL
 from cosmic.frame.log import RingBufferHandler
 from cosmic.mico.core.stop_latch import StopState
 from cosmic.mico.gui.mico_widget import MicoWidget
+from cosmic.vico.gui.vico_gui import VicoGui
 
 logger = logging.getLogger(__name__)
 
 MICO: Final = "MiCo"
-DAQCO: Final = "DAQCo"
 LOW_SCREEN_PX: Final = 1000
 CONSOLE: Final = "Console"
 SCENE: Final = "Scene"
 
 NO_ECM: Final = f"{NO_COLLISION_MODEL}; name a scene in the platform file"
 
+_WITH_PICTURE: Final = [10, 11, 7]
 _SHARES: Final = [3, 2]
 """How panels beside each other share the width at a first start."""
 
@@ -93,7 +95,7 @@ class OperatorWindow(CosmicServerGui):
         self._forget_policy = platform.policy.subscribe(self._bridge.tell_failure)
         self._stop_filter = StopKeyFilter(_application(), stop_key, self)
         self._add_mico(settings)
-        self._add_daqco()
+        self._add_instruments()
         self._mode = self._make_mode(settings)
         self._add_log(ring, console=console)
         self._connect_all()
@@ -119,7 +121,6 @@ class OperatorWindow(CosmicServerGui):
         application.manager.latch.subscribe(self._bridge.tell_latch)
         self._scene = ScenePanel(gui, settings)
         self.add_panel(SCENE, self._scene, Qt.DockWidgetArea.RightDockWidgetArea, scroll=False)
-        self.resizeDocks([self.dock(MICO), self.dock(SCENE)], _SHARES, Qt.Orientation.Horizontal)
         self._collision_bar = CollisionBar(self.top_bar, gui, self)
         way_bar = WayBar()
         self._scene.set_bar(way_bar)
@@ -133,25 +134,21 @@ class OperatorWindow(CosmicServerGui):
         mode.restore()
         return mode
 
-    def _add_daqco(self) -> None:
-        if self._platform.mico is None:
+    def _add_instruments(self) -> None:
+        """Picture and force stand in the middle, what belongs to the scene on the right."""
+        platform, low = self._platform, self.screen().availableGeometry().height() < LOW_SCREEN_PX
+        if platform.mico is None:
             self.top_bar.set_collision_model(present=True)  # nothing moves that could collide
-        application = self._platform.daqco
-        gui = application.get_gui() if application is not None else None
-        if isinstance(gui, UDaqMainWidget):
-            # Below the scene where the screen is high enough for both, else in a tab beside it.
-            low = self.screen().availableGeometry().height() < LOW_SCREEN_PX
-            self.add_panel(
-                DAQCO,
-                gui,
-                Qt.DockWidgetArea.RightDockWidgetArea,
-                scroll=False,
-                beside=SCENE if low and self._scene is not None else "",
-                tabbed=low,
-            )
-            if low and self._scene is not None:
-                self.dock(SCENE).raise_()
-            gui.close_requested.connect(self.dock(DAQCO).close)
+        scene = SCENE if self._scene is not None else ""
+        vision = platform.vico.get_gui() if platform.vico is not None else None
+        pictures = add_vision(self, vision, scene, low=low) if isinstance(vision, VicoGui) else ""
+        force = platform.daqco.get_gui() if platform.daqco is not None else None
+        if isinstance(force, UDaqMainWidget):
+            add_force(self, force, pictures or scene, low=low)
+        columns = [title for title in (MICO if scene else "", pictures, scene) if title]
+        shares = _WITH_PICTURE if pictures else _SHARES
+        docks = [self.dock(title) for title in columns]
+        self.resizeDocks(docks, shares[: len(docks)], Qt.Orientation.Horizontal)
 
     def _add_log(self, ring: RingBufferHandler, *, console: bool) -> None:
         below = Qt.DockWidgetArea.BottomDockWidgetArea
@@ -230,6 +227,8 @@ class OperatorWindow(CosmicServerGui):
             self._platform.mico.initialize_later()
         if self._platform.daqco is not None:
             self._platform.daqco.initialize_later()
+        if self._platform.vico is not None:
+            self._platform.vico.initialize()
 
     def stop(self, reason: str) -> None:
         """Stop everything and keep it stopped."""

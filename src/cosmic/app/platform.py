@@ -7,7 +7,11 @@ from typing import TYPE_CHECKING
 import cosmic
 from cosmic.app.platform_file import KNOWN_APPLICATIONS, PlatformFile, load_platform, load_twin
 from cosmic.app.scene_fit import load_checker
-from cosmic.autonomy.interlocks import join_force_limits, join_positions
+from cosmic.autonomy.interlocks import (
+    join_force_limits,
+    join_positions,
+    join_stage_positions,
+)
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.daqco.hw.factory import make_library
@@ -20,6 +24,13 @@ from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.hw.factory import make_controller, make_simulated
 from cosmic.mico.hw.interface import Controller
 from cosmic.twin.scene import Scene
+from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.core.settings import Backend, VicoSettings
+from cosmic.vico.hw.factory import make_camera_library
+from cosmic.vico.hw.interface import CameraLibrary
+from cosmic.vico.hw.peripheral_factory import make_lens, make_light
+from cosmic.vico.hw.peripherals import Lens
+from cosmic.vico.hw.sim_peripherals import SimPeripherals
 
 if TYPE_CHECKING:
     from cosmic.mico.hw.sim_scu3d_faults import Faults
@@ -36,6 +47,7 @@ class Platform:
     mico: MicoApplication | None
     faults: "Faults | None" = None
     daqco: DaqcoApplication | None = None
+    vico: VicoApplication | None = None
 
     @property
     def simulated(self) -> bool:
@@ -48,6 +60,8 @@ class Platform:
             self.mico.initialize()
         if self.daqco is not None:
             self.daqco.initialize()
+        if self.vico is not None:
+            self.vico.initialize()
 
     def shut_down(self) -> None:
         """Stop and close every application; any state. Motion ends first."""
@@ -55,6 +69,8 @@ class Platform:
             self.mico.shut_down()
         if self.daqco is not None:
             self.daqco.shut_down()
+        if self.vico is not None:
+            self.vico.shut_down()
 
 
 def build_platform(
@@ -66,6 +82,7 @@ def build_platform(
     seed: int = 0,
     mico_gui: GuiFactory | None = None,
     daqco_gui: GuiFactory | None = None,
+    vico_gui: GuiFactory | None = None,
 ) -> Platform:
     """Read the configuration and make the applications; opens no hardware yet.
 
@@ -77,7 +94,7 @@ def build_platform(
         Which to make, as far as the platform file names them.
     rate, cold, seed
         Of the simulated platform; see `cosmic.connect`.
-    mico_gui, daqco_gui : callable or None
+    mico_gui, daqco_gui, vico_gui : callable or None
         Make the applications' GUI components, where there is a window.
 
     Raises
@@ -103,14 +120,18 @@ def build_platform(
         scene = Scene.from_settings(twin, clock, seed=seed, cold=cold, folder=path.parent)
     site = _Site(file, path, clock, FailurePolicy(), scene, seed)
     hosted = [name for name in applications if name in file.platform.applications]
-    mico, faults, daqco = None, None, None
+    mico, faults, daqco, vico = None, None, None, None
     if "mico" in hosted:
         mico, faults = _build_mico(site, mico_gui)
     if "daqco" in hosted and file.daqco is not None:
         daqco = _build_daqco(site, file.daqco, daqco_gui)
+    if "vico" in hosted and file.vico is not None:
+        vico = _build_vico(site, file.vico, vico_gui)
     if daqco is not None and mico is not None:
         join_force_limits(daqco, mico)
         join_positions(daqco.recorder, mico, clock)
+    if vico is not None and mico is not None:
+        join_stage_positions(vico, mico)
     return Platform(
         file=file,
         path=path,
@@ -119,6 +140,7 @@ def build_platform(
         mico=mico,
         faults=faults,
         daqco=daqco,
+        vico=vico,
     )
 
 
@@ -172,6 +194,44 @@ def _build_daqco(
         policy=site.policy,
         software=f"CoSMic {cosmic.__version__}",
         configuration=site.path.read_text(encoding="utf-8"),
+        gui_factory=gui_factory,
+    )
+
+
+def _build_vico(
+    site: _Site, settings: VicoSettings, gui_factory: GuiFactory | None
+) -> VicoApplication:
+    scene, simulation = site.scene, None
+    if scene is not None and scene.lens is not None and scene.light is not None:
+        simulation = SimPeripherals(scene.lens, scene.light, site.clock, site.seed)
+
+    def make_library(backend: Backend) -> CameraLibrary:
+        return make_camera_library(
+            backend,
+            clock=site.clock,
+            scene=scene,
+            sources=settings.sources,
+            producers=settings.producers,
+            seed=site.seed,
+        )
+
+    def open_lens() -> Lens | None:
+        lens = settings.lens
+        return make_lens(
+            lens.backend,
+            port=lens.port,
+            homed=lens.homed,
+            limits_counts=lens.limits_counts,
+            simulation=simulation,
+        )
+
+    return VicoApplication(
+        make_library,
+        open_lens,
+        lambda: make_light(settings.light.backend, port=settings.light.port, simulation=simulation),
+        settings,
+        clock=site.clock,
+        policy=site.policy,
         gui_factory=gui_factory,
     )
 

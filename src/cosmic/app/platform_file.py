@@ -10,9 +10,9 @@ from cosmic.frame.config import StrictModel, load_model, shipped_config_dir
 from cosmic.frame.errors import ConfigError
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.twin.settings import TwinSettings
+from cosmic.vico.core.settings import VicoSettings
 
 KNOWN_APPLICATIONS: Final = ("mico", "daqco", "vico")
-BUILT_APPLICATIONS: Final = ("mico", "daqco")
 
 
 class PlatformSettings(StrictModel):
@@ -22,7 +22,7 @@ class PlatformSettings(StrictModel):
     twin: str = "twin.toml"
     scene: str = ""
     stop_key: str = "F12"
-    applications: Annotated[tuple[str, ...], Field(strict=False)] = BUILT_APPLICATIONS
+    applications: Annotated[tuple[str, ...], Field(strict=False)] = KNOWN_APPLICATIONS
 
 
 class PlatformFile(StrictModel):
@@ -31,6 +31,7 @@ class PlatformFile(StrictModel):
     platform: PlatformSettings
     mico: MicoSettings
     daqco: DaqcoSettings | None = None
+    vico: VicoSettings | None = None
 
 
 def platform_path(config: str | Path | None) -> Path:

@@ -5,7 +5,7 @@ import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, NoReturn, Self
+from typing import TYPE_CHECKING, Self
 
 from typing_extensions import override
 
@@ -14,6 +14,7 @@ from cosmic.app.platform_file import KNOWN_APPLICATIONS
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.errors import ConfigError, NotAvailable, NotConnectedError
 from cosmic.mico.api.mico import Mico
+from cosmic.vico.api.vico import Vico
 
 if TYPE_CHECKING:
     from cosmic.mico.hw.sim_scu3d_faults import Faults
@@ -32,6 +33,7 @@ class Rig:
         self._platform = platform
         self._mico = Mico(platform.mico, source) if platform.mico is not None else None
         self._daqco = Daqco(platform.daqco) if platform.daqco is not None else None
+        self._vico = Vico(platform.vico) if platform.vico is not None else None
         self._closed = False
 
     @override
@@ -59,9 +61,11 @@ class Rig:
         return self._daqco
 
     @property
-    def vico(self) -> NoReturn:
-        """Vision; raises `NotAvailable`: it is not built yet."""
-        raise NotAvailable("vico is not built yet")
+    def vico(self) -> Vico:
+        """Vision; raises `NotAvailable` where it is not hosted."""
+        if self._vico is None:
+            raise NotAvailable("vico is not hosted here; name it in the platform file")
+        return self._vico
 
     @property
     def stopped(self) -> str | None:

@@ -25,6 +25,7 @@ from cosmic.frame.hooks import install_hooks
 from cosmic.frame.log import RingBufferHandler, set_up_logging
 from cosmic.frame.threads import declare_gui_thread
 from cosmic.mico.gui.mico_widget import make_mico_gui
+from cosmic.vico.gui.vico_gui import make_vico_gui
 
 logger = logging.getLogger(__name__)
 
@@ -132,6 +133,7 @@ def _build(options: WindowOptions) -> Platform:
         cold=options.cold,
         mico_gui=make_mico_gui,
         daqco_gui=make_daqco_gui,
+        vico_gui=make_vico_gui,
     )
     mistakes = key_mistakes(platform.file, platform.path)
     if mistakes:

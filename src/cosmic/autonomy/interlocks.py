@@ -7,6 +7,7 @@ from cosmic.daqco.api.recorder import Recorder
 from cosmic.daqco.core.recording_format import AxisPosition
 from cosmic.frame.clock import WALL, Clock
 from cosmic.mico.api.application import MicoApplication
+from cosmic.vico.api.application import VicoApplication
 
 
 def join_force_limits(daqco: DaqcoApplication, mico: MicoApplication) -> None:
@@ -38,3 +39,19 @@ def join_positions(recorder: Recorder, mico: MicoApplication, clock: Clock) -> N
             )
 
     recorder.position_source = positions
+
+
+def join_stage_positions(vico: VicoApplication, mico: MicoApplication) -> None:
+    """Have the positions of all axes stand beside every picture; gate coordinates."""
+
+    def positions(_time_s: float) -> dict[str, float]:
+        return {
+            state.name: state.position
+            for state in mico.manager.states().values()
+            if state.position is not None
+        }
+
+    axes = {each.name: each.unit for each in mico.manager.settings.positioner}
+    for unit in vico.units.values():
+        unit.recordings.axes = axes
+    vico.position_source = positions

@@ -1,1 +1,1 @@
-"""DAQCo: control of the data acquisition system (thesis 5.5, 6.2). Not built yet."""
+"""DAQCo: control of the data acquisition system (thesis 5.5, 6.2)."""

@@ -1,1 +1,1 @@
-"""ViCo: control of the vision system (thesis 3.2.2). Not built yet."""
+"""ViCo: control of the vision system (thesis 5.2)."""

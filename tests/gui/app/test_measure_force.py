@@ -8,7 +8,8 @@ from PySide6.QtCore import QSettings, Qt
 from pytestqt.qtbot import QtBot
 
 import cosmic
-from cosmic.app.operator_window import DAQCO, OperatorWindow
+from cosmic.app.instrument_panels import DAQCO
+from cosmic.app.operator_window import OperatorWindow
 from cosmic.app.platform import build_platform
 from cosmic.daqco.gui.main_widget import UDaqMainWidget, make_daqco_gui
 from cosmic.frame.log import RingBufferHandler

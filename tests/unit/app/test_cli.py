@@ -164,7 +164,7 @@ def test_init_into_a_file_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 @pytest.mark.parametrize(
     "arguments",
-    [["vico"], ["serve", "--applications", "mico"], ["--rate", "2", "vico"]],
+    [["serve"], ["serve", "--applications", "mico"], ["--rate", "2", "serve"]],
 )
 def test_what_is_not_built_says_so(
     arguments: list[str], capsys: pytest.CaptureFixture[str]

@@ -110,6 +110,7 @@ class CosmicServerGui(QMainWindow):
         *,
         scroll: bool = True,
         beside: str = "",
+        below: str = "",
         tabbed: bool = False,
     ) -> PanelDock:
         """Host `panel` in a dock, and in the View menu.
@@ -120,22 +121,24 @@ class CosmicServerGui(QMainWindow):
             Where it stands at a first start.
         scroll : bool
             Let the panel scroll where there is too little room.
-        beside : str
-            Title of a panel that it stands beside, or is tabbed with.
+        beside, below : str
+            Title of a panel that it stands beside or below, or is tabbed with.
         tabbed : bool
-            Share the place of `beside` instead of dividing it.
+            Share the place of that panel instead of dividing it.
         """
         dock = PanelDock(title, panel, scroll=scroll, stop_key=self._stop_key, parent=self)
         dock.stop_requested.connect(self.stop_requested)
         dock.rescan_requested.connect(self.rescan_requested)
         self._docks[title] = dock
         self._menus.add_dock(dock)
-        if not beside:
+        neighbour = self._docks.get(beside or below)
+        if neighbour is None:
             self.addDockWidget(area, dock)
         elif tabbed:
-            self.tabifyDockWidget(self._docks[beside], dock)
+            self.tabifyDockWidget(neighbour, dock)
         else:
-            self.splitDockWidget(self._docks[beside], dock, Qt.Orientation.Horizontal)
+            way = Qt.Orientation.Vertical if below else Qt.Orientation.Horizontal
+            self.splitDockWidget(neighbour, dock, way)
         if self._restored:
             self.restoreDockWidget(dock)
         return dock

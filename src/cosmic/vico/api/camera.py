@@ -57,13 +57,22 @@ class FormatShown:
     problem: str
 
 
+@dataclass(frozen=True, slots=True)
+class TipSeen:
+    """The tip of a tool on a picture; a link named "tips" gives a tuple of these."""
+
+    name: str
+    place_px: Pixel
+    certain: bool
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
     """What the chain found on one picture."""
 
     picture: Picture
     fibres: tuple["Fibre", ...]
-    tips: tuple[object, ...]
+    tips: tuple[TipSeen, ...]
 
 
 class CameraHandle:
@@ -202,7 +211,9 @@ class CameraHandle:
         return Seen(
             newest.picture,
             fibres if isinstance(fibres, tuple) else (),
-            tips if isinstance(tips, tuple) else (),
+            tuple(each for each in tips if isinstance(each, TipSeen))
+            if isinstance(tips, tuple)
+            else (),
         )
 
     # Files

@@ -56,12 +56,15 @@ class VicoSettings(StrictModel):
         Where pictures go; empty: where the program was started.
     calibration : str
         File that calibrations are kept in, beside the platform file; empty: none are kept.
+    sources : tuple of str
+        Films, folders of pictures and addresses, for the backend "opencv".
     producers : tuple of str
         GenTL producers (.cti files), for the backend "harvesters".
     """
 
     directory: str = ""
     calibration: str = ""
+    sources: Annotated[tuple[str, ...], Field(strict=False)] = ()
     producers: Annotated[tuple[str, ...], Field(strict=False)] = ()
     camera: Annotated[tuple[CameraPlace, ...], Field(strict=False)] = ()
     lens: MotorLensSettings = Field(default_factory=lambda: MotorLensSettings(backend="none"))
