@@ -4,7 +4,7 @@ A fibre is a curve of given curvature with a constant width and flat ends. Each 
 fibre follows from its distance to the curve; light, blur, dirt and noise come on top.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -29,7 +29,6 @@ class Recipe:
     turns: float = 2.0
     fibres: int = 1
     crossing: bool = False
-    loops: int = 0
     lumen: float = 0.0
     bits: int = 8
     margin_px: float = 30.0
@@ -119,10 +118,8 @@ def good_crossings(line: np.ndarray, crossings: list[tuple[int, int]], width: fl
         if first < far or last > len(line) - far:
             return False
     body = line[far:-far:8]
-    for end in (line[0], line[-1]):
-        if np.linalg.norm(body - end, axis=1).min() < 2 * width:
-            return False
-    return True
+    apart = [float(np.linalg.norm(body - end, axis=1).min()) for end in (line[0], line[-1])]
+    return min(apart) >= 2 * width
 
 
 def truths(rng: np.random.Generator, recipe: Recipe) -> list[Truth]:
@@ -233,8 +230,3 @@ ROWS = {
     "uneven 60 %, 80 specks": Recipe(uneven=0.6, specks=80),
     "crossing itself": Recipe(crossing=True, turns=3.0, length_px=(900.0, 2000.0)),
 }
-
-
-def without_noise(recipe: Recipe) -> Recipe:
-    """Return the same without noise and dirt."""
-    return replace(recipe, noise=0.0, specks=0)

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from cosmic.vico.core.vision.grey import Floats
-from cosmic.vico.core.vision.profiles import Scene, sample, within
+from cosmic.vico.core.vision.profiles import Flags, Scene, sample, within
 from cosmic.vico.core.vision.smoothing import directions
 
 
@@ -57,18 +57,16 @@ def find_end(scene: Scene, line: Floats, level: Level) -> End:
     half = max(1.0, 0.45 * level.width)
     lateral = np.linspace(-half, half, max(3, 2 * round(half) + 1))
     axis = bent(line, outward, along)
-    x, y = (
-        (axis[:, n, None] + lateral[None, :] * normal[n]).astype(np.float32) for n in (0, 1)
-    )
-    inside = within(scene, x, y).all(axis=1)
+    x, y = ((axis[:, n, None] + lateral[None, :] * normal[n]).astype(np.float32) for n in (0, 1))
+    inside: Flags = np.all(within(scene, x, y), axis=1)
     values = scene.sign * (sample(scene.image, x, y) - level.ground)
     mean = values.mean(axis=1, dtype=np.float64)
     blur = max(1.0, min(4.0, 12.0 * level.noise / max(level.contrast, 1e-6) / np.sqrt(half)))
     mean = gaussian_filter1d(mean, blur / spacing * 0.8, mode="nearest")
-    return crossing(along, mean, inside, plateau(along, mean, level), level)
+    return crossing(along, mean, inside, plateau(mean), level)
 
 
-def plateau(along: Floats, mean: Floats, level: Level) -> float:
+def plateau(mean: Floats) -> float:
     """Return the height of the fibre before its end."""
     first = mean[: max(3, len(mean) // 5)]
     return float(np.median(first))
@@ -77,8 +75,9 @@ def plateau(along: Floats, mean: Floats, level: Level) -> float:
 def leaving(line: Floats, width: float) -> Floats:
     """Return the direction in which a line leaves its end."""
     count = int(np.clip(round(0.6 * width), 3, max(3, len(line) // 3)))
-    return np.asarray(directions(line[-count - 1 :]).mean(axis=0) if len(line) > 3 else
-                      directions(line)[-1])
+    return np.asarray(
+        directions(line[-count - 1 :]).mean(axis=0) if len(line) > 3 else directions(line)[-1]
+    )
 
 
 def bent(line: Floats, outward: Floats, along: Floats) -> Floats:
@@ -91,9 +90,7 @@ def bent(line: Floats, outward: Floats, along: Floats) -> Floats:
     return np.asarray(inner + np.maximum(along, 0.0)[:, None] * outward[None, :])
 
 
-def crossing(
-    along: Floats, mean: Floats, inside: np.ndarray, height: float, level: Level
-) -> End:
+def crossing(along: Floats, mean: Floats, inside: Flags, height: float, level: Level) -> End:
     """Return the first place that stays below half of the height."""
     if not height > 0.4 * level.contrast:
         return End(EndKind.LOST, 0.0, level.width)

@@ -8,17 +8,16 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from cosmic.vico.core.vision import checks
-from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre, paint
 from cosmic.vico.core.vision.graph import build_graph, prune
-from cosmic.vico.core.vision.grey import Floats, Mask, grey_picture
+from cosmic.vico.core.vision.grey import Floats, grey_picture
 from cosmic.vico.core.vision.joining import Strand, strands
 from cosmic.vico.core.vision.measures import (
-    unblurred,
     grasp_points,
     kink_angles_deg,
     kink_index,
     longest_extent,
+    unblurred,
 )
 from cosmic.vico.core.vision.profiles import Scene
 from cosmic.vico.core.vision.refine import Course, Neighbours, refine
@@ -250,7 +249,7 @@ def left_over(scene: Scene, lines: list[Floats], widths: list[float]) -> set[int
     for line, width in zip(lines, widths, strict=True):
         paint(explained, scene.reduced(line), np.full(len(line), width / scene.factor + 4.0))
     rest = ((scene.taken > 0) & (explained == 0)).astype(np.uint8)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
     areas = stats[:, cv2.CC_STAT_AREA].copy()
     areas[0] = 0
     found: set[int] = set()

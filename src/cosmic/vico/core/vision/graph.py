@@ -1,5 +1,6 @@
 """The skeleton of a mask as branches between nodes."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import cv2
@@ -11,6 +12,7 @@ from cosmic.vico.core.vision.grey import Floats, Floats32, Mask
 from cosmic.vico.core.vision.smoothing import arc_lengths
 
 FREE = -1
+THINNED: Callable[[Mask], Mask] = skeletonize
 NEIGHBOURS = ((-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1))
 
 
@@ -36,8 +38,10 @@ class Branch:
     @property
     def closed(self) -> bool:
         """Whether it is a ring without any node."""
-        return self.nodes == [FREE, FREE] and len(self.points) > 8 and bool(
-            np.abs(self.points[0] - self.points[-1]).max() <= 1.5
+        return (
+            self.nodes == [FREE, FREE]
+            and len(self.points) > 8
+            and bool(np.abs(self.points[0] - self.points[-1]).max() <= 1.5)
         )
 
 
@@ -64,7 +68,7 @@ class Graph:
 
 def skeleton_of(mask: Mask) -> Mask:
     """Return the skeleton of a mask."""
-    return np.asarray(skeletonize(mask > 0), dtype=np.uint8)
+    return np.asarray(THINNED(mask), dtype=np.uint8)
 
 
 def build_graph(mask: Mask, most: int) -> Graph | None:
@@ -74,7 +78,8 @@ def build_graph(mask: Mask, most: int) -> Graph | None:
     skeleton = skeleton_of(mask)
     around = cv2.filter2D(skeleton, -1, np.ones((3, 3)), borderType=cv2.BORDER_CONSTANT)
     forks = ((skeleton > 0) & (around > 3)).astype(np.uint8)
-    count, labels, _, centres = cv2.connectedComponentsWithStats(forks, connectivity=8)
+    count, found, _, centres = cv2.connectedComponentsWithStats(forks, connectivity=8)
+    labels = np.asarray(found, dtype=np.int32)
     if count - 1 > most:
         return None
     pieces = ((skeleton > 0) & (forks == 0)).astype(np.uint8)

@@ -41,7 +41,7 @@ def grey_picture(image: npt.NDArray[np.generic]) -> Pixels:
             f"the picture of {image.shape[1]} x {image.shape[0]} pixels is too small; fibres are "
             f"looked for from {LEAST_SIDE_PX} x {LEAST_SIDE_PX} on"
         )
-    pixels = cast(Pixels, image)
+    pixels = cast("Pixels", image)
     if pixels.ndim == LAYERS:
-        pixels = cast(Pixels, cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY))
+        pixels = cast("Pixels", cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY))
     return pixels

@@ -6,7 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from cosmic.vico.core.vision.graph import FREE, Branch, Graph
+from cosmic.vico.core.vision.bending import bending, leaving
+from cosmic.vico.core.vision.graph import FREE, Graph
 from cosmic.vico.core.vision.grey import Floats
 from cosmic.vico.core.vision.smoothing import arc_lengths
 
@@ -142,13 +143,9 @@ def crosses(graph: Graph, bridge: int, half_width: list[float]) -> bool:
         ]
         if len(stubs) != 2:
             return False
-        sides.append(
-            [leaving(graph.branches[i], i, end, half_width[i]) for i, end in stubs]
-        )
+        sides.append([leaving(graph.branches[i], i, end, half_width[i]) for i, end in stubs])
     (a, b), (c, d) = sides
-    return min(
-        max(bending(a, c), bending(b, d)), max(bending(a, d), bending(b, c))
-    ) < EASY
+    return min(max(bending(a, c), bending(b, d)), max(bending(a, d), bending(b, c))) < EASY
 
 
 def make_joints(graph: Graph, bridges: set[int], group: list[int]) -> dict[int, Joint]:
@@ -163,61 +160,7 @@ def make_joints(graph: Graph, bridges: set[int], group: list[int]) -> dict[int, 
     places: dict[int, list[Floats]] = defaultdict(list)
     for node, label in enumerate(group):
         places[label].append(graph.nodes[node])
-    return {
-        label: Joint(found, np.mean(places[label], axis=0)) for label, found in stubs.items()
-    }
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Exit:
-    """How a branch leaves its crossing: place, direction and curvature."""
-
-    branch: int
-    place: Floats
-    direction: Floats
-    curvature: float
-
-
-def leaving(branch: Branch, number: int, end: int, half_width: float) -> Exit:
-    """Return how a branch leaves its crossing, where its skeleton is no longer bent by it."""
-    points = branch.points if end == 0 else branch.points[::-1]
-    s = arc_lengths(points)
-    total = float(s[-1])
-    near = min(2.0 * half_width + 1.0, 0.3 * total)
-    far = min(near + max(12.0, 10.0 * half_width), 0.9 * total if total > 12 else total)
-    chosen = (s >= near) & (s <= far)
-    if chosen.sum() < 3:
-        chosen[:] = True
-    t = s[chosen] - near
-    part = points[chosen]
-    order = 2 if len(part) >= 10 else 1
-    x, y = (np.polyfit(t, part[:, axis], order) for axis in (0, 1))
-    slope = np.array([x[-2], y[-2]])
-    speed = max(float(np.linalg.norm(slope)), 1e-6)
-    bow = 2.0 * np.array([x[0], y[0]]) if order == 2 else np.zeros(2)
-    curvature = float(slope[0] * bow[1] - slope[1] * bow[0]) / speed**3
-    most = 0.3 / half_width
-    place = np.array([x[-1], y[-1]])
-    return Exit(number, place, slope / speed, float(np.clip(curvature, -most, most)))
-
-
-def turn(first: Floats, last: Floats) -> float:
-    """Return the angle from one direction to another, -pi to pi."""
-    return float(np.arctan2(first[0] * last[1] - first[1] * last[0], first @ last))
-
-
-def bending(first: Exit, last: Exit) -> float:
-    """Return how much a curve must leave its bow to enter by one branch and leave by another."""
-    way = last.place - first.place
-    gap = float(np.linalg.norm(way))
-    if gap < 1e-6 or first.branch == last.branch:
-        # A fibre has ends: a branch is not joined to itself.
-        return float(np.pi**2)
-    bow = 0.5 * (last.curvature - first.curvature) * gap
-    change = (last.curvature + first.curvature) * gap
-    enter = turn(way, -first.direction) + 0.5 * bow
-    leave = turn(way, last.direction) - 0.5 * bow
-    return enter**2 + enter * leave + leave**2 + change**2 / 12.0
+    return {label: Joint(found, np.mean(places[label], axis=0)) for label, found in stubs.items()}
 
 
 @cache
@@ -253,8 +196,7 @@ def pair(graph: Graph, joint: Joint, half_width: list[float]) -> None:
             joint.doubts[stub].append(CLUSTER)
         return
     exits = [
-        leaving(graph.branches[index], index, end, half_width[index])
-        for index, end in joint.stubs
+        leaving(graph.branches[index], index, end, half_width[index]) for index, end in joint.stubs
     ]
     costs = np.array([[bending(a, b) for b in exits] for a in exits])
     ways = pairings(count, count % 2 + (2 if count > 3 else 0))

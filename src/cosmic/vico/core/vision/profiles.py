@@ -105,9 +105,16 @@ class Scene:
         """Return full-size places in pixels of the reduced picture."""
         return (places - 0.5 * (self.factor - 1)) / self.factor
 
+    def reduced_by_axis(self, places: Floats32) -> Floats32:
+        """Return full-size x, or y, in pixels of the reduced picture."""
+        shift, factor = np.float32(0.5 * (self.factor - 1)), np.float32(self.factor)
+        return np.asarray((places - shift) / factor)
 
-def cross_sections(scene: Scene, line: Floats, width: float, reach: float) -> Profiles:
-    """Return the cross sections at the points of a line."""
+
+def cross_sections(
+    scene: Scene, line: Floats, width: float, reach: float, margin: float = 2.0
+) -> Profiles:
+    """Return the cross sections at the points of a line; ground begins `margin` off an edge."""
     tangent = directions(line)
     normals = np.column_stack([-tangent[:, 1], tangent[:, 0]])
     spacing = 0.5 if width < 12 else 1.0
@@ -118,19 +125,19 @@ def cross_sections(scene: Scene, line: Floats, width: float, reach: float) -> Pr
         for axis in (0, 1)
     )
     values = sample(scene.image, x, y)
-    inside = np.abs(across) < 0.5 * width + 2.0
-    other = sample(scene.taken, *(np.asarray(scene.reduced(places)) for places in (x, y)))
+    inside = np.abs(across) < 0.5 * width + margin
+    other = sample(scene.taken, scene.reduced_by_axis(x), scene.reduced_by_axis(y))
     clear = inside[None, :] | (other < 0.25)
     if (line < reach + 1.0).any() or (line > scene.corner - reach - 1.0).any():
         clear &= within(scene, x, y)
     ground, tilt, noise = ground_of(values, clear & ~inside[None, :], across)
     height = np.float32(scene.sign) * (values - ground)
-    return Profiles(across, height, clear, noise, normals, ground[:, count].astype(np.float64), tilt)
+    return Profiles(
+        across, height, clear, noise, normals, ground[:, count].astype(np.float64), tilt
+    )
 
 
-def ground_of(
-    values: Floats32, free: Flags, across: Floats32
-) -> tuple[Floats32, Floats, float]:
+def ground_of(values: Floats32, free: Flags, across: Floats32) -> tuple[Floats32, Floats, float]:
     """Return the ground under each cross section, sloping from side to side, and its noise."""
     sides = []
     seen = []

@@ -147,7 +147,10 @@ def move(
 
 def measure(scene: Scene, course: Course, neighbours: Neighbours) -> bool:
     """Find edges, width and contrast along a line and move it to the middle; False: no fibre."""
-    profiles = cross_sections(scene, course.line, course.width, 1.2 * course.width + 8.0)
+    # The tail of a blurred edge is not ground yet.
+    margin = 2.0 + 2.0 * min(course.blur_px, 0.3 * course.width)
+    reach = 1.2 * course.width + 6.0 + margin
+    profiles = cross_sections(scene, course.line, course.width, reach, margin)
     free = ~excluded(course, neighbours)
     typical = float(np.median(profiles.height[::4, np.abs(profiles.across) < 0.4 * course.width]))
     ratio = profiles.noise / max(typical, 1e-6)
@@ -178,9 +181,7 @@ def near_ends(course: Course) -> Flags:
     return near
 
 
-def take(
-    course: Course, edges: Edges, widths: Floats, good: Flags, profiles: Profiles
-) -> None:
+def take(course: Course, edges: Edges, widths: Floats, good: Flags, profiles: Profiles) -> None:
     """Keep what the cross sections say."""
     typical = float(np.median(widths[good]))
     course.width = typical

@@ -105,9 +105,8 @@ def find_relief(image: Pixels) -> Relief:
     factor = reduction(image.shape)
     small = reduced(image, factor)
     side = int(min(WIDEST_PX, 0.3 * min(image.shape)) / factor) | 1
-    square = np.ones((max(3, side), max(3, side)), np.uint8)
     hats = [
-        (lighter, stands_out(cv2.morphologyEx(small, kind, square)))
+        (lighter, stands_out(hat(small, max(3, side), kind)))
         for lighter, kind in ((False, cv2.MORPH_BLACKHAT), (True, cv2.MORPH_TOPHAT))
     ]
     floor = LEAST_LEVELS if image.dtype == np.uint8 else LEAST_LEVELS * level_step(image)
@@ -123,15 +122,23 @@ def find_relief(image: Pixels) -> Relief:
     return Relief(factor, lighter, height, mask | hollow, hollow, crowded)
 
 
+def hat(small: Floats32, side: int, kind: int) -> Floats32:
+    """Return what is narrower than `side`; light that falls off goes on beyond the border."""
+    edge = min(side // 2 + 1, min(small.shape) - 1)
+    framed = np.pad(small, edge, mode="reflect", reflect_type="odd")
+    found = cv2.morphologyEx(framed, kind, np.ones((side, side), np.uint8))
+    return np.asarray(found[edge:-edge, edge:-edge], dtype=np.float32)
+
+
 def level_step(image: Pixels) -> float:
     """Return how many levels of a 16-bit picture make one of 256 over the range it uses."""
     low, high = (float(value) for value in np.percentile(image[::8, ::8], (0.5, 99.5)))
     return max(1.0, (high - low) / 256.0)
 
 
-def stands_out(hat: Floats32) -> Floats32:
+def stands_out(found: Floats32) -> Floats32:
     """Return a hat without the offset that noise gives it."""
-    return np.asarray(hat - np.median(hat[::3, ::3]), dtype=np.float32)
+    return np.asarray(found - np.median(found[::3, ::3]), dtype=np.float32)
 
 
 def threshold(height: Floats32, floor: float) -> float:
