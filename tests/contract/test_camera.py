@@ -1,7 +1,6 @@
 """What ViCo relies on in any `Camera`; see contract.cameras for the cameras under test."""
 
 import importlib
-import importlib.util
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -35,9 +34,8 @@ BACKENDS = ("simulated", "aravis", "opencv", "harvesters", "dc1394")
 
 
 def _rigs() -> list[type[CameraRig]]:
-    names = [f"contract.cameras.{each}" for each in BACKENDS]
-    there = [each for each in names if importlib.util.find_spec(each) is not None]
-    return [rig for each in there for rig in importlib.import_module(each).RIGS]
+    modules = [importlib.import_module(f"contract.cameras.{each}") for each in BACKENDS]
+    return [rig for module in modules for rig in module.RIGS]
 
 
 @pytest.fixture(scope="module", params=_rigs(), ids=lambda each: each.name)
