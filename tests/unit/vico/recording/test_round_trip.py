@@ -18,7 +18,8 @@ SIZES = [(1, 1), (2, 3), (37, 23), (64, 48), (129, 17)]
 
 
 def record(path, picture_format, shots, *, complete=True, **how):
-    file = PictureFile(path, picture_format, axes=AXES, rate_hz=20.0, **how)
+    how = {"axes": AXES, "rate_hz": 20.0, **how}
+    file = PictureFile(path, picture_format, **how)
     try:
         for shot in shots:
             file.append(shot.data, row_of(shot, None))
@@ -62,6 +63,14 @@ def test_the_small_format_comes_close_and_is_small(tmp_path, pixel_format):
             difference = np.abs(read.data.astype(int) - data)
             assert difference.mean() < 2.0
             assert difference.max() < 20
+
+
+def test_pictures_that_threads_hold_back_are_written_at_the_end(tmp_path):
+    shots = [picture(number, time_s=number / 200.0) for number in range(5)]
+    file = record(tmp_path / "run", PictureFormat.FAST, shots, rate_hz=200.0)
+    with open_picture_recording(file.path) as found:
+        for shot, read in zip(shots, found, strict=True):
+            np.testing.assert_array_equal(read.data, shot.data)
 
 
 def test_the_small_format_refuses_deep_pixels(tmp_path):
