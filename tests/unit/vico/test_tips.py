@@ -154,6 +154,19 @@ def test_a_jaw_whose_front_is_hidden_is_doubted() -> None:
     assert isinstance(found, NotSeen) or any("front lies" in doubt for doubt in found.doubts)
 
 
+def test_a_front_that_a_fibre_crosses_is_doubted() -> None:
+    picture = tool_picture(7, noise=2.0, specks=0)
+    x, y = picture.forward
+    rows, columns = np.mgrid[:400, :480]
+    ahead = (columns - picture.hold[0]) * x + (rows - picture.hold[1]) * y
+    aside = -(columns - picture.hold[0]) * y + (rows - picture.hold[1]) * x
+    crossed = picture.image.copy()
+    crossed[(ahead > -1.0) & (ahead < 0.25 * (aside + 5.0)) & (np.abs(aside) < 60.0)] = 50
+    found = find_probe(crossed, picture.expected)
+    assert isinstance(found, ToolEnd)
+    assert any("askew" in doubt or "hidden" in doubt for doubt in found.doubts)
+
+
 @pytest.mark.parametrize(
     "change",
     [

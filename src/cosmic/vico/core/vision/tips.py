@@ -24,8 +24,10 @@ Pair = tuple[float, float]
 
 LEAST_KEPT: Final = 0.6
 LARGEST_STD_PX: Final = 0.5
-WIDTH_TOLERANCE: Final = 0.2
+WIDTH_TOLERANCE: Final = 0.05
+WIDTH_TOLERANCE_PX: Final = 1.0
 LARGEST_LEAN_DEG: Final = 8.0
+LARGEST_SKEW_DEG: Final = 2.0
 FILLED: Final = 0.2
 BROADER_PX: Final = 0.6
 BROADER: Final = 0.02
@@ -139,11 +141,16 @@ def _doubts(body: Body, lean: float, expected: ExpectedTool) -> tuple[str, ...]:
         doubts.append("its edges are hidden in part")
     if not body.std <= LARGEST_STD_PX:
         doubts.append(f"its tip is known to {body.std:.1f} px only")
-    if not abs(body.width / expected.width_px - 1.0) <= WIDTH_TOLERANCE:
+    tolerance_px = max(WIDTH_TOLERANCE_PX, WIDTH_TOLERANCE * expected.width_px)
+    if not abs(body.width - expected.width_px) <= tolerance_px:
         doubts.append(f"it is {body.width:.0f} px wide, and should be {expected.width_px:.0f} px")
     angle_deg = math.degrees(math.atan(abs(lean)))
     if not angle_deg <= LARGEST_LEAN_DEG:
         doubts.append(f"it points {angle_deg:.0f} degrees away from where it should")
+    # A fibre that lies across a corner of the front moves that corner.
+    skew = abs(body.front.slope + lean)
+    if not skew <= math.tan(math.radians(LARGEST_SKEW_DEG)) + body.front.slope_std:
+        doubts.append(f"its front is askew by {math.degrees(math.atan(skew)):.0f} degrees")
     return tuple(doubts)
 
 
@@ -172,8 +179,8 @@ def _gripper(
     # What lies against a jaw makes it look broader; its outer edge is free.
     one = _inner(first, first.high, first.low, width if broad[0] else None)
     other = _inner(second, second.low, second.high, -width if broad[1] else None)
-    if any(broad):
-        doubts.append("something lies against a jaw: taken from its outer edge and its width")
+    if max(first.width, second.width) > limit:
+        doubts.append("something lies against a jaw, which looks broader than the other")
     gap_std = math.hypot(
         (first.low if broad[0] else first.high).std_at(one[0]),
         (second.high if broad[1] else second.low).std_at(other[0]),
