@@ -71,6 +71,7 @@ def test_jaws_are_seen_where_they_are_and_as_far_open(opening_um: float) -> None
 def test_the_table_turns_what_lies_on_it() -> None:
     bench = PictureBench()
     before = lying_near_the_middle(bench)
+    bench.picture()
     bench.go(table_rotation=30.0)
     lines = bench.optics.centre_lines_um(bench.now_s)
     radius = math.hypot(200.0, 150.0)
@@ -81,6 +82,53 @@ def test_the_table_turns_what_lies_on_it() -> None:
     assert abs(offset_px(bench, picture, line_px, 20, 12.0)) < 0.05
     x, y = np.round(before[20]).astype(int)
     assert picture[y, x] > picture.max() - 3.0
+
+
+def test_a_fibre_far_out_of_focus_is_a_wide_shade_at_the_same_place() -> None:
+    bench = PictureBench().zoom(5.0).focus(700.0)
+    picture, line = bench.picture(), lying_near_the_middle(bench)
+    reach = 3.5 * bench.optics.projection(bench.now_s).sigma_px(0.0)
+    assert reach > 80.0  # drawn on a coarser grid
+    offsets = [offset_px(bench, picture, line, at, reach) for at in (16, 20, 24)]
+    assert np.abs(offsets).max() < 1.0
+
+
+def test_a_fibre_that_is_let_go_is_seen_on_the_plate() -> None:
+    bench = PictureBench()
+    bench.picture()
+    (held,) = (
+        each for each in bench.optics.centre_lines_um(bench.now_s) if each[:, 2].min() > 1000.0
+    )
+    bench.go(left_gripper=400.0)
+    (fallen,) = (
+        each
+        for each in bench.optics.centre_lines_um(bench.now_s)
+        if abs(each[:, 0].mean() - held[[0, -1], 0].mean()) < 20.0
+    )
+    assert fallen[:, 2].max() < 10.0
+    x, y = np.round(bench.px(*fallen[-1] - [300.0, 0.0, 0.0])).astype(int)
+    assert np.ptp(bench.picture()[y - 8 : y + 9, x]) > 20.0
+
+
+def test_a_picture_shows_its_own_time_though_the_force_side_was_asked_later() -> None:
+    ends = []
+    for ahead_s in (0.0, 0.08):
+        bench = PictureBench().go(left_z=LEFT_LOWERED, left_x=3000.0, probe_x=-500.0)
+        bench.go(probe_y=-5000.0)
+        stage = bench.scene.stages["probe.y"]
+        route = stage.route(bench.now_s)
+        route.go(-5200.0, 500.0)
+        stage.follow(route, held_until_s=1e9)
+        assert bench.scene.force_side is not None
+        bench.scene.force_side.moment(bench.now_s + 0.2 + ahead_s)
+        (line,) = (
+            each
+            for each in bench.optics.centre_lines_um(bench.now_s + 0.2)
+            if each[:, 2].min() > 500.0
+        )
+        ends.append(line[-1, 1])
+    assert ends[0] < -100.0
+    assert ends[1] == pytest.approx(ends[0], abs=2.0)
 
 
 def test_the_probe_is_seen_bending_the_fibre() -> None:
@@ -235,6 +283,7 @@ def test_binned_pixels_are_means_of_four() -> None:
     assert binned.shape == (600, 800)
     means = whole.reshape(600, 2, 800, 2).mean(axis=(1, 3))
     assert abs((binned - means).mean()) < 0.2
+    assert np.diff(binned[:200].astype(float)).std() < 0.7 * np.diff(whole[:400]).std()
     assert np.abs(binned - means).max() < 20.0
 
 

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -175,11 +176,11 @@ def test_a_trigger_before_the_start_is_refused(stand: Stand) -> None:
 
 
 def test_a_frame_shows_the_middle_of_its_exposure(stand: Stand) -> None:
-    camera = stand.open(exposure_s=0.06)
+    camera = stand.open(exposure_s=0.01)
     camera.start()
     (frame,) = stand.after(camera, 0.2)[:1]
     assert stand.scene.optics is not None
-    there = stand.scene.optics.render(10.03, exposure_s=0.06, roi=SMALL)
+    there = stand.scene.optics.render(10.005, exposure_s=0.01, roi=SMALL)
     assert np.array_equal(frame.data, there)
 
 
@@ -219,6 +220,32 @@ def test_a_scene_of_bare_stages_has_no_cameras() -> None:
     clock = ManualClock()
     with pytest.raises(ValueError, match="bare stages"):
         SimulatedCameraLibrary(Scene.from_layout("LLL", shipped_settings(), clock), clock)
+
+
+def test_a_stop_while_a_frame_is_drawn_keeps_it_back(
+    stand: Stand, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera = stand.open()
+    camera.start()
+    assert stand.scene.optics is not None
+    draw = stand.scene.optics.render
+
+    def stopped_meanwhile(*args: Any, **how: Any) -> Any:
+        camera.stop()
+        return draw(*args, **how)
+
+    monkeypatch.setattr(stand.scene.optics, "render", stopped_meanwhile)
+    assert not stand.after(camera, 0.1)
+    assert camera.counters.completed == 0
+
+
+def test_closing_twice_does_not_take_the_camera_from_who_has_it_now(stand: Stand) -> None:
+    first = stand.open()
+    first.close()
+    stand.open()
+    first.close()
+    with pytest.raises(NotConnectedError, match="another program"):
+        stand.open()
 
 
 # --- troubles -------------------------------------------------------------------------------------
