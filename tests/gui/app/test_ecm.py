@@ -39,7 +39,7 @@ def make(qtbot: QtBot, stored: QSettings) -> Iterator[Make]:
     made: list[OperatorWindow] = []
 
     def make_window(*, rate: float = 20.0, config: Path | None = None) -> OperatorWindow:
-        platform = build_platform(config, rate=rate, mico_gui=make_mico_gui)
+        platform = build_platform(config, applications=("mico",), rate=rate, mico_gui=make_mico_gui)
         window = OperatorWindow(platform, stored, RingBufferHandler(), console=False)
         made.append(window)
         qtbot.addWidget(window)

@@ -22,7 +22,12 @@ LEFT = Qt.MouseButton.LeftButton
 
 @pytest.fixture
 def window(qtbot: QtBot, tmp_path: Path) -> Iterator[OperatorWindow]:
-    platform = build_platform(None, rate=4.0, mico_gui=make_mico_gui, daqco_gui=make_daqco_gui)
+    platform = build_platform(
+        applications=("mico", "daqco"),
+        rate=4.0,
+        mico_gui=make_mico_gui,
+        daqco_gui=make_daqco_gui,
+    )
     stored = QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
     window = OperatorWindow(platform, stored, RingBufferHandler(), console=False)
     qtbot.addWidget(window)

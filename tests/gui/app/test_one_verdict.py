@@ -31,7 +31,7 @@ BEYOND_UM = 60.0
 
 @pytest.fixture
 def window(qtbot: QtBot, tmp_path: Path) -> Iterator[OperatorWindow]:
-    platform = build_platform(rate=10.0, mico_gui=make_mico_gui)
+    platform = build_platform(applications=("mico",), rate=10.0, mico_gui=make_mico_gui)
     settings = QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
     window = OperatorWindow(platform, settings, RingBufferHandler())
     qtbot.addWidget(window)

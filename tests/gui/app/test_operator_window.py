@@ -36,7 +36,9 @@ def make(qtbot: QtBot, stored: QSettings) -> Iterator[Make]:
     def make_window(
         platform: Platform | None = None, *, rate: float = 20.0, console: bool = False
     ) -> OperatorWindow:
-        platform = platform or build_platform(rate=rate, mico_gui=make_mico_gui)
+        platform = platform or build_platform(
+            applications=("mico",), rate=rate, mico_gui=make_mico_gui
+        )
         window = OperatorWindow(platform, stored, RingBufferHandler(), console=console)
         made.append(window)
         qtbot.addWidget(window)

@@ -32,7 +32,9 @@ def make(qtbot: QtBot, stored: QSettings) -> Iterator[Make]:
     made: list[OperatorWindow] = []
 
     def make_window(*, rate: float = 20.0, cold: bool = False) -> OperatorWindow:
-        platform = build_platform(rate=rate, cold=cold, mico_gui=make_mico_gui)
+        platform = build_platform(
+            applications=("mico",), rate=rate, cold=cold, mico_gui=make_mico_gui
+        )
         window = OperatorWindow(platform, stored, RingBufferHandler(), console=False)
         made.append(window)
         qtbot.addWidget(window)
@@ -93,7 +95,7 @@ def refuse_left_z(window: OperatorWindow, qtbot: QtBot) -> SceneWidget:
 
 
 def test_the_scene_is_made_once_the_window_was_painted(qtbot: QtBot, stored: QSettings) -> None:
-    platform = build_platform(rate=20.0, mico_gui=make_mico_gui)
+    platform = build_platform(applications=("mico",), rate=20.0, mico_gui=make_mico_gui)
     window = OperatorWindow(platform, stored, RingBufferHandler(), console=False)
     qtbot.addWidget(window)
     try:

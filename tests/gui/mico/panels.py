@@ -20,7 +20,7 @@ W = TypeVar("W", bound=QWidget)
 def simulated_panel(
     qtbot: QtBot, *, rate: float = 50.0, cold: bool = False
 ) -> Iterator[MicoWidget]:
-    platform = build_platform(rate=rate, cold=cold, mico_gui=make_mico_gui)
+    platform = build_platform(applications=("mico",), rate=rate, cold=cold, mico_gui=make_mico_gui)
     assert platform.mico is not None
     platform.initialize()
     panel = platform.mico.get_gui()
