@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QWheelEvent
 from PySide6.QtWidgets import QApplication
 
 from cosmic.frame.gui.theme import State
+from cosmic.vico.gui.camera_view import CameraView
 from cosmic.vico.gui.levels import OVER_RGB, UNDER_RGB
 from cosmic.vico.hw.interface import FrameStatus, PixelFormat, Trigger
 from gui.vico.fake_vico import HEIGHT, SETTINGS, WIDTH, Found, Seen, SeenTip
@@ -50,11 +51,15 @@ def test_an_incomplete_picture_is_not_shown_as_good(qtbot, shown, camera):
     assert shown.view.picture is whole
 
 
-def test_nothing_is_drawn_while_nobody_looks(qtbot, shown, camera):
+def test_nothing_is_drawn_while_nobody_looks(qtbot, own, port, shown, camera):
+    other = CameraView(port, "top")
+    own(other)
+    other.show()
     before = shown.view.picture
     shown.hide()
-    newest = camera.push()
-    QApplication.processEvents()
+    for _ in range(3):
+        newest = camera.push()
+        qtbot.waitUntil(lambda newest=newest: other.view.picture is newest)
     assert shown.view.picture is before
     shown.show()
     qtbot.waitUntil(lambda: shown.view.picture is newest)
@@ -140,6 +145,18 @@ def test_every_depth_is_shown_over_its_range_and_lost_pixels_are_marked(
     assert colour_at(view, (100, 300)) == UNDER_RGB
     assert colour_at(view, (100, 900)) == OVER_RGB
     assert colour_at(view, (1200, 300)) == pytest.approx((127, 127, 127), abs=2)
+
+
+def test_a_pixel_is_where_its_number_says(qtbot, view, camera):
+    data = np.zeros((30, 40), np.uint8)
+    data[10, 20] = 200
+    picture = camera.push(data)
+    qtbot.waitUntil(lambda: view.view.picture is picture)
+    bright = {
+        (x, y) for x in (19, 20, 21) for y in (9, 10, 11) if colour_at(view, (x, y))[0] == 200
+    }
+    assert bright == {(20, 10)}
+    assert colour_at(view, (19.6, 9.6))[0] == colour_at(view, (20.4, 10.4))[0] == 200
 
 
 def test_colours_are_shown_as_they_are(qtbot, view, camera):
@@ -276,7 +293,7 @@ def test_findings_in_a_picture_of_another_size_are_not_drawn(qtbot, shown, camer
 
 def test_the_focus_measure_is_a_number_and_a_history(qtbot, shown, camera):
     camera.focus = 12.5
-    qtbot.waitUntil(lambda: shown.status.focus.text() == "focus 12.5")
+    qtbot.waitUntil(lambda: shown.status.focus.text() == "focus 12.50")
     camera.focus = 25.0
     qtbot.waitUntil(lambda: shown.status.bars.best == 25.0)
     click(qtbot, shown.status.bars)

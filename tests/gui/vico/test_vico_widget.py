@@ -2,7 +2,7 @@
 
 import pytest
 from PySide6.QtCore import QSettings
-from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit, QSlider
+from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit, QScrollArea, QSlider
 
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.frame.gui.theme import apply_theme
@@ -46,6 +46,21 @@ def test_nothing_is_clipped_in_a_small_window(qtbot, shown, size, opened):
         assert shown.rect().contains(corner), widget
         assert widget.width() >= widget.minimumSizeHint().width()
     assert shown.view.height() >= 100
+
+
+def test_in_a_low_dock_the_picture_shrinks_before_anything_scrolls(own, shown):
+    dock = QScrollArea()
+    own(dock)
+    dock.setWidgetResizable(True)
+    dock.setWidget(shown)
+    dock.resize(900, 320)
+    dock.show()
+    QApplication.processEvents()
+    assert dock.verticalScrollBar().maximum() == 0
+    shown.row.more.click()
+    QApplication.processEvents()
+    assert dock.verticalScrollBar().maximum() == 0
+    dock.takeWidget()
 
 
 def test_the_drawer_takes_its_room_from_the_picture_and_gives_it_back(qtbot, shown):

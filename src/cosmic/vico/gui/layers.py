@@ -23,6 +23,14 @@ def round_length(most: float) -> float:
     return max(factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= most * 1.0001)
 
 
+def _visible(view: PictureView) -> QRectF:
+    """Return where the picture lies on the screen; all of the view where that is too little."""
+    width, height = view.size_px
+    whole = QRectF(view.rect())
+    seen = view.to_screen.mapRect(QRectF(-0.5, -0.5, width, height)).intersected(whole)
+    return seen if min(seen.width(), 2.0 * seen.height()) >= 20 * STEP_PX else whole
+
+
 class Crosshair(Layer):
     """Marks the middle of the picture."""
 
@@ -57,14 +65,15 @@ class ScaleBar(Layer):
         if not self.shown or view.picture is None:
             self.text = ""
             return
-        self._measure(view)
+        room = _visible(view)
+        self._measure(view, room.width())
         ratio = float(view.devicePixelRatioF())
         font = ink_font()
         metrics = QFontMetricsF(font)
         width = max(self.length_px, metrics.horizontalAdvance(self.text)) + 2 * STEP_PX
         height = metrics.height() + 2 * STEP_PX
-        bottom = view.height() - EDGE_PX
-        box = QRectF(view.width() - EDGE_PX - width, bottom - height, width, height)
+        bottom = room.bottom() - EDGE_PX
+        box = QRectF(room.right() - EDGE_PX - width, bottom - height, width, height)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(HALO)
         painter.drawRoundedRect(box, 3.0, 3.0)
@@ -78,11 +87,11 @@ class ScaleBar(Layer):
         painter.setPen(QPen(WHITE, 3.0 / ratio if ratio > 1 else 3.0))
         painter.drawLine(QPointF(left, y), QPointF(left + self.length_px, y))
 
-    def _measure(self, view: PictureView) -> None:
+    def _measure(self, view: PictureView, width: float) -> None:
         picture = view.picture
         scale = picture.circumstances.scale_um_px if picture is not None else None
         screen_px = abs(view.to_screen.m11())  # for one pixel of the picture
-        room = BAR_SHARE * view.width()
+        room = BAR_SHARE * width
         if scale is None:
             length = round_length(room / screen_px)
             self.text, self.length_px = f"{length:g} px", length * screen_px

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QContextMenuEvent,
@@ -97,6 +97,11 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         self.box.sigTransformChanged.connect(self.zoom_changed)
         self.setMouseTracking(True)
         self.setAccessibleName("Live picture")
+
+    @override
+    def sizeHint(self) -> QSize:
+        # A dock would rather scroll than make it smaller than its hint.
+        return QSize(self.minimumWidth(), self.minimumHeight())
 
     # What is shown
 

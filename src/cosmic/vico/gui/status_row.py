@@ -11,6 +11,7 @@ from cosmic.vico.gui.camera_port import CameraPort
 from cosmic.vico.gui.flow_layout import FlowLayout
 from cosmic.vico.gui.levels import Histogram
 from cosmic.vico.gui.readings import FocusBars, Reading
+from cosmic.vico.gui.texts import measure_text
 
 RATE_OVER_S: Final = 1.0
 
@@ -37,7 +38,7 @@ class StatusRow(QWidget):
         )
         self.over = Reading("over-exposed", "00.00", "%", "Share of over-exposed pixels")
         self.focus = Reading(
-            "focus", "0000.0", "", "Sharpness of the newest picture; larger is sharper"
+            "focus", "000000.0", "", "Sharpness of the newest picture; larger is sharper"
         )
         self.bars = FocusBars()
         flow = FlowLayout(STEP_PX // 2, self)
@@ -69,7 +70,7 @@ class StatusRow(QWidget):
         over = 0.0 if histogram is None else 100.0 * histogram.over
         self.over.show_number(f"{over:.2f}")
         focus = self._port.focus
-        self.focus.show_number("–" if focus is None else f"{focus:.1f}")
+        self.focus.show_number("–" if focus is None else measure_text(focus))
         if focus is not None:
             self.bars.add(focus)
 

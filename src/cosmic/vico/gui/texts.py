@@ -38,6 +38,13 @@ def _four(value: float) -> str:
     return f"{value:.{decimals}f}"
 
 
+def measure_text(value: float) -> str:
+    """Return a measure of any size in so many figures that a change is seen."""
+    size = abs(value)
+    decimals = 0 if size >= 1000 else 1 if size >= 100 else 2 if size >= 1 else 5
+    return f"{value:.{decimals}f}"
+
+
 def number_text(value: float, figures: int = 6) -> str:
     """Return a number as short as it can be typed."""
     return f"{value:.{figures}g}"
