@@ -82,7 +82,7 @@ class CameraView(QWidget):
         self.pointer, self.message = CornerText(top=False), CornerText(top=True)
         self.tools = PictureTools(self.view, self.row, self._camera, self)
         corners = (self.scale_bar, self.pointer, self.message)
-        self.view.layers = [self.seen, self.cross, *self.tools.layers, *corners, self.note]
+        self.view.layers = [self.cross, self.seen, *self.tools.layers, *corners, self.note]
         self._look = QTimer(self, timerType=Qt.TimerType.PreciseTimer, interval=LOOK_MS)
         self._readout = QTimer(self, interval=READOUT_MS)
         self._build()
