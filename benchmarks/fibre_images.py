@@ -154,7 +154,7 @@ def coverage(shape: tuple[int, int], truth: Truth, width: float) -> np.ndarray:
     for index, inner in ((0, 4), (len(line) - 1, len(line) - 5)):
         out = line[index] - line[inner]
         out /= np.linalg.norm(out)
-        at_end = nearest == index
+        at_end = np.abs(nearest - index) <= 4
         away = pixels[at_end] - line[index]
         axial = away @ out
         lateral = np.abs(away @ np.array([-out[1], out[0]]))

@@ -16,12 +16,12 @@ UNEVEN = "its width varies so much that it may be more than one fibre, or none"
 UNSEEN = "its edges are seen on too small a part of its length"
 HIDDEN_STRETCH = "a long stretch of it lies on or beside another fibre"
 CONTINUES = "another piece begins where it ends: it may be one broken fibre"
-STUBBY = "too short for its width to be a fibre"
 LEFT_OVER = "beside it something stands out that belongs to no fibre"
 CROWDED = "the picture is full of fibres: no single one can be told apart"
 IMPRECISE = "its length is known to less than one per cent"
 PARTED = "it may be two fibres side by side: the ground shows between its edges"
 EDGING = "it lies along the edge of something wider"
+DIRTY_END = "at an end its edges are not seen: dirt may lie there"
 SHARP = "it bends more sharply than its own width"
 
 
@@ -33,6 +33,8 @@ class Limits:
     blur_px: float = 2.0
     blur_most_px: float = 4.2
     dip: float = 0.15
+    edging: float = 0.1
+    turn: float = 1.6
     tilt: float = 0.4
     contrast_to_noise: float = 1.5
     fade: float = 0.55
@@ -46,30 +48,26 @@ LIMITS = Limits()
 
 def doubts_of(course: Course) -> list[str]:
     """Return what is doubtful about one fibre by itself."""
-    found = [end.kind.value for end in course.ends if end.kind is not EndKind.FREE]
-    found = [each for each in found if each != EndKind.HIDDEN.value]
+    found = [
+        end.kind.value for end in course.ends if end.kind not in (EndKind.FREE, EndKind.HIDDEN)
+    ]
     seen = course.good
-    share = max(LIMITS.blur_px, LIMITS.blur_of_width * course.width)
-    if course.blur_px > min(share, LIMITS.blur_most_px):
-        found.append(OUT_OF_FOCUS)
     typical = float(np.median(course.contrast[seen])) if seen.any() else 0.0
-    if parted(course):
-        found.append(PARTED)
-    if edging(course, typical) > 0.1:
-        found.append(EDGING)
-    if typical < LIMITS.contrast_to_noise * course.noise:
-        found.append(FAINT)
-    if fades(course, typical):
-        found.append(FADES)
-    if width_spread(course) > LIMITS.width_spread:
-        found.append(UNEVEN)
-    if float(seen.mean()) < LIMITS.seen:
-        found.append(UNSEEN)
-    if longest_gap(seen) * STEP_PX > max(30.0, LIMITS.gap_widths * course.width):
-        found.append(HIDDEN_STRETCH)
-    if sharpest_turn(course) > 1.6:
-        found.append(SHARP)
-    return found
+    hidden_px = longest_gap(seen) * STEP_PX
+    blurred_px = max(LIMITS.blur_px, LIMITS.blur_of_width * course.width)
+    reasons = (
+        (course.blur_px > min(blurred_px, LIMITS.blur_most_px), OUT_OF_FOCUS),
+        (parted(course), PARTED),
+        (edging(course, typical) > LIMITS.edging, EDGING),
+        (typical < LIMITS.contrast_to_noise * course.noise, FAINT),
+        (fades(course, typical), FADES),
+        (dirty_end(course), DIRTY_END),
+        (width_spread(course) > LIMITS.width_spread, UNEVEN),
+        (float(seen.mean()) < LIMITS.seen, UNSEEN),
+        (hidden_px > max(30.0, LIMITS.gap_widths * course.width), HIDDEN_STRETCH),
+        (sharpest_turn(course) > LIMITS.turn, SHARP),
+    )
+    return [*found, *(reason for doubtful, reason in reasons if doubtful)]
 
 
 def parted(course: Course) -> bool:
@@ -89,6 +87,19 @@ def fades(course: Course, typical: float) -> bool:
     count = max(3, int(1.5 * course.width / STEP_PX))
     parts = (course.contrast[skip : skip + count], course.contrast[-skip - count : -skip])
     return any(len(part) > 0 and float(np.median(part)) < LIMITS.fade * typical for part in parts)
+
+
+def dirty_end(course: Course) -> bool:
+    """Return whether a fibre is wider before an end than on the whole, or has no edges there."""
+    skip = int(np.ceil((1.0 + 1.5 * course.blur_px) / STEP_PX))
+    count = max(3, int(1.2 * course.width / STEP_PX))
+    usual = np.abs(course.widths) < 1.3 * course.width + 0.7
+    for end, part in zip(
+        course.ends, (usual[skip:][:count], usual[::-1][skip:][:count]), strict=True
+    ):
+        if end.kind is EndKind.FREE and len(part) > 0 and float(part.mean()) < 0.6:
+            return True
+    return False
 
 
 def width_spread(course: Course) -> float:

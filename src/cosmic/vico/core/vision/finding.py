@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from cosmic.vico.core.vision import checks
 from cosmic.vico.core.vision.fibre import Fibre, paint
 from cosmic.vico.core.vision.graph import build_graph, prune
-from cosmic.vico.core.vision.grey import Floats, grey_picture
+from cosmic.vico.core.vision.grey import Floats, Mask, grey_picture
 from cosmic.vico.core.vision.joining import Strand, strands
 from cosmic.vico.core.vision.measures import (
     grasp_points,
@@ -216,7 +216,7 @@ def clear_around(scene: Scene, line: Floats, width: float) -> npt.NDArray[np.boo
     high = np.ceil(places.max(axis=0)).astype(int) + edge + 1
     part = scene.taken[low[1] : high[1], low[0] : high[0]]
     own = np.zeros(part.shape, np.uint8)
-    paint(own, places - low, np.full(len(line), width / scene.factor + 3.0))
+    strip(own, places - low, width / scene.factor + 3.0)
     ground = ((part == 0) | (own > 0)).astype(np.uint8)
     distance = np.minimum(cv2.distanceTransform(ground, cv2.DIST_L2, 3), 1e6)
     last = np.array(part.shape)[::-1] - 1
@@ -243,11 +243,18 @@ def judged(scene: Scene, courses: list[tuple[Strand, Course]], *, crowd: bool) -
     return sorted(found, key=lambda each: -each.length_px)
 
 
+def strip(mask: Mask, line: Floats, width: float) -> None:
+    """Paint a strip of one width, in as few pieces as its purpose allows."""
+    thin = line[:: max(1, len(line) // 120)]
+    part = thin if len(thin) > 1 else line
+    paint(mask, np.concatenate([part, line[-1:]]), np.full(len(part) + 1, width))
+
+
 def left_over(scene: Scene, lines: list[Floats], widths: list[float]) -> set[int]:
     """Return the fibres to which something large clings that no fibre explains."""
     explained = np.zeros(scene.taken.shape, np.uint8)
     for line, width in zip(lines, widths, strict=True):
-        paint(explained, scene.reduced(line), np.full(len(line), width / scene.factor + 4.0))
+        strip(explained, scene.reduced(line), width / scene.factor + 4.0)
     rest = ((scene.taken > 0) & (explained == 0)).astype(np.uint8)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(rest, connectivity=8)
     areas = stats[:, cv2.CC_STAT_AREA].copy()
@@ -257,7 +264,7 @@ def left_over(scene: Scene, lines: list[Floats], widths: list[float]) -> set[int
         return found
     for index, (line, width) in enumerate(zip(lines, widths, strict=True)):
         around = np.zeros(rest.shape, np.uint8)
-        paint(around, scene.reduced(line), np.full(len(line), width / scene.factor + 8.0))
+        strip(around, scene.reduced(line), width / scene.factor + 8.0)
         beside = np.unique(labels[(around > 0) & (rest > 0)])
         if len(beside) and int(areas[beside].max()) > max(11.0, 3.0 * (width / scene.factor) ** 2):
             found.add(index)

@@ -45,6 +45,8 @@ def unblurred(width: float, flank: float) -> tuple[float, float]:
     """
     half, ratio = blurred_boxes()
     seen = flank / max(width, 1e-6)
+    # Beyond this what is seen is nearly a Gaussian, whatever the width.
+    seen = min(seen, 0.264)
     return float(1.0 / np.interp(seen, ratio, half)), float(np.interp(seen, ratio, _BLURS))
 
 
