@@ -35,6 +35,8 @@ from cosmic.vico.hw.interface import (
 logger = logging.getLogger(__name__)
 
 LOOK_S: Final = 0.05
+SHOWN_HZ: Final = 40.0
+LOOKED_S: Final = 1.0
 SEARCH_S: Final = 1.0
 REFUSALS: Final = frozenset({DeviceFault.BUSY, DeviceFault.PARAMETER, DeviceFault.UNSUPPORTED})
 """What a camera may answer without being lost."""
@@ -93,6 +95,8 @@ class CameraThread(WorkerThread):
         self._last_id: int | None = None
         self._reopen = False
         self._newest: Picture | None = None
+        self._shown: Picture | None = None
+        self._looked_s = self._drawn_s = -SEARCH_S
         self._arrived = Condition()
         self._receivers: tuple[Receiver, ...] = ()
         self._lock = Lock()
@@ -134,8 +138,13 @@ class CameraThread(WorkerThread):
 
     @property
     def newest(self) -> Picture | None:
-        """The newest whole picture; None before the first."""
-        return self._newest
+        """The newest whole picture; None before the first.
+
+        While somebody looks again and again it is one whose pixels are at hand, `SHOWN_HZ` times
+        a second; a simulated camera would else draw it in the thread that looks.
+        """
+        self._looked_s = WALL.now_s()
+        return self._shown or self._newest
 
     def subscribe(self, receiver: Receiver) -> Unsubscribe:
         """Call `receiver(picture)` with every frame, in the camera's thread."""
@@ -205,6 +214,8 @@ class CameraThread(WorkerThread):
             self._wanted_running = False
             self._running = False
             camera.stop()
+            if self._newest is not None:
+                self._newest.data.view()  # it stays, and is drawn while that can be
 
         return self._put(f"Stopping {self.camera_name}", command)
 
@@ -317,9 +328,19 @@ class CameraThread(WorkerThread):
         )
         tell(self._receivers, picture)
         if frame.status is FrameStatus.COMPLETE:
+            self._show(picture)
             with self._arrived:
                 self._newest = picture
                 self._arrived.notify_all()
+
+    def _show(self, picture: Picture) -> None:
+        now_s = WALL.now_s()
+        if now_s - self._looked_s > LOOKED_S:
+            self._shown = None
+        elif now_s - self._drawn_s >= 1.0 / SHOWN_HZ:
+            self._drawn_s = now_s
+            picture.data.view()
+            self._shown = picture
 
     def _lose(self, error: CosmicError) -> None:
         """Say why there are no pictures, and wait before the camera is looked for again."""

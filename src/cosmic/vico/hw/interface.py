@@ -131,7 +131,8 @@ class Frame:
     Attributes
     ----------
     data : ndarray, shape (height, width) or (height, width, 3), uint8 or uint16
-        Read-only, a copy that no driver writes to again. MONO10 and MONO12 count from 0 to 1023
+        Read-only, a copy that no driver writes to again; a simulated camera draws it when it is
+        first read, which should be soon. MONO10 and MONO12 count from 0 to 1023
         and 4095. Three layers are red, green, blue.
     frame_id : int
         Counts up by one a frame since `start`, 64 bit: a gap is a loss.

@@ -11,6 +11,7 @@ from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import DeviceError, DeviceFault, NotAvailable, NotConnectedError
 from cosmic.twin.optics.optics import Optics
 from cosmic.vico.hw.camera_checks import check_settings
+from cosmic.vico.hw.drawn_frame import DrawnFrame
 from cosmic.vico.hw.interface import (
     Camera,
     CameraCounters,
@@ -74,7 +75,7 @@ class SimulatedCamera(Camera):
         self._run: CameraRun | None = None
         self._underrun = 0
         self._counters = CameraCounters()
-        self._frozen: Pixels | None = None
+        self._last: Frame | None = None
         width, height = info.sensor_px
         self._settings = CameraSettings(
             exposure_s=optics.settings.picture.full_exposure_s,
@@ -135,7 +136,7 @@ class SimulatedCamera(Camera):
             if self._run is not None:
                 raise self._error("start: it takes pictures already", DeviceFault.STATE)
             self._counters = CameraCounters()
-            self._underrun, self._frozen = 0, None
+            self._underrun, self._last = 0, None
             # The receiver is late by the wall: on a fast clock more frames come meanwhile.
             buffers = round(BUFFERS * max(1.0, self._clock.rate))
             self._run = CameraRun(self._settings, self._clock.now_s(), buffers)
@@ -149,9 +150,7 @@ class SimulatedCamera(Camera):
                 return None
             if self._faults.strikes("lost", self._info.key, exposure.frame_id):
                 continue
-            # Outside the lock: drawing takes its time, and a stop must not wait for it.
-            frame = self._frame(exposure)
-            return self._counted(run, frame)
+            return self._counted(run, self._frame(exposure))
 
     @override
     def trigger(self) -> None:
@@ -218,40 +217,42 @@ class SimulatedCamera(Camera):
         return self._optics.settings.camera.readout_s * roi.height_px / self._info.sensor_px[1]
 
     def _frame(self, exposure: Exposure) -> Frame:
-        status = FrameStatus.COMPLETE
         key, settings = self._info.key, exposure.settings
-        data = self._data(exposure)
-        if self._faults.strikes("incomplete", key, exposure.frame_id):
-            status = FrameStatus.INCOMPLETE
-            data = data.copy()
-            data[round(MISSING_FROM * settings.roi.height_px) :] = 0
-        data.flags.writeable = False
+        whole = not self._faults.strikes("incomplete", key, exposure.frame_id)
+        before = self._last if self._faults.hit("frozen", key) else None
         camera = self._optics.settings.camera
         fast = 1.0 + 1e-6 * camera.clock_drift_ppm
-        return Frame(
-            data=data,
+        frame = DrawnFrame(
+            lambda: self._draw(exposure, before, whole=whole),
             frame_id=exposure.frame_id,
             time_s=self._arrives_s(exposure),
             exposed_s=exposure.exposed_s,
             device_ns=round(1e9 * (camera.clock_offset_s + exposure.exposed_s * fast)),
-            status=status,
+            status=FrameStatus.COMPLETE if whole else FrameStatus.INCOMPLETE,
             pixel_format=settings.pixel_format,
         )
+        self._last = before or frame
+        return frame
 
-    def _data(self, exposure: Exposure) -> Pixels:
+    def _draw(self, exposure: Exposure, before: Frame | None, *, whole: bool) -> Pixels:
         settings = exposure.settings
-        if self._frozen is not None and self._faults.hit("frozen", self._info.key):
-            return self._frozen
-        self._frozen = self._optics.render(
-            exposure.exposed_s + 0.5 * settings.exposure_s,
-            exposure_s=settings.exposure_s,
-            gain_db=settings.gain_db,
-            roi=settings.roi,
-            binning=settings.binning,
-            bits=8 if settings.pixel_format is PixelFormat.MONO8 else 16,
-            view=self._view,
-        )
-        return self._frozen
+        if before is not None:
+            data = before.data
+        else:
+            data = self._optics.render(
+                exposure.exposed_s + 0.5 * settings.exposure_s,
+                exposure_s=settings.exposure_s,
+                gain_db=settings.gain_db,
+                roi=settings.roi,
+                binning=settings.binning,
+                bits=8 if settings.pixel_format is PixelFormat.MONO8 else 16,
+                view=self._view,
+            )
+        if not whole:
+            data = data.copy()
+            data[round(MISSING_FROM * settings.roi.height_px) :] = 0
+        data.flags.writeable = False
+        return data
 
     def _counted(self, run: CameraRun, frame: Frame) -> Frame | None:
         with self._faults.changed:
