@@ -68,7 +68,7 @@ def calibration(magnification: float, checks: int) -> list[Figure]:
     bench = jaw_stage(magnification)
     scale_um = 4.4 / magnification
     rng = np.random.default_rng(7)
-    room_px = 140.0
+    room_px = 115.0
     tip = bench.scene.tips(bench.now_s)["right.jaw_b"]
     start = bench.px(*tip)
     tracker = TemplateTracker(size_px=96, reach_px=60.0)

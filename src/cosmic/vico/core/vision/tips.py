@@ -24,7 +24,9 @@ Pair = tuple[float, float]
 
 LEAST_KEPT: Final = 0.6
 LARGEST_STD_PX: Final = 0.5
-WIDTH_TOLERANCE: Final = 0.05
+# Of a jaw, at which a fibre may lie; and of a probe, which is narrow and often out of focus.
+JAW_TOLERANCE: Final = 0.05
+PROBE_TOLERANCE: Final = 0.15
 WIDTH_TOLERANCE_PX: Final = 1.0
 LARGEST_LEAN_DEG: Final = 8.0
 LARGEST_SKEW_DEG: Final = 2.0
@@ -141,7 +143,8 @@ def _doubts(body: Body, lean: float, expected: ExpectedTool) -> tuple[str, ...]:
         doubts.append("its edges are hidden in part")
     if not body.std <= LARGEST_STD_PX:
         doubts.append(f"its tip is known to {body.std:.1f} px only")
-    tolerance_px = max(WIDTH_TOLERANCE_PX, WIDTH_TOLERANCE * expected.width_px)
+    share = JAW_TOLERANCE if expected.gap_px > 0.0 else PROBE_TOLERANCE
+    tolerance_px = max(WIDTH_TOLERANCE_PX, share * expected.width_px)
     if not abs(body.width - expected.width_px) <= tolerance_px:
         doubts.append(f"it is {body.width:.0f} px wide, and should be {expected.width_px:.0f} px")
     angle_deg = math.degrees(math.atan(abs(lean)))
