@@ -12,6 +12,7 @@ from cosmic.autonomy.interlocks import (
     join_positions,
     join_stage_positions,
 )
+from cosmic.autonomy.places import join_places
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.daqco.hw.factory import make_library
@@ -132,6 +133,8 @@ def build_platform(
         join_positions(daqco.recorder, mico, clock)
     if vico is not None and mico is not None:
         join_stage_positions(vico, mico)
+        kept_in = vico.settings.calibration
+        join_places(vico, mico, path.parent / kept_in if kept_in else None)
     return Platform(
         file=file,
         path=path,

@@ -2,17 +2,62 @@
 
 from abc import abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
 from typing import Protocol
 
+from cosmic.frame.task import Task
 from cosmic.vico.core.picture import Picture
 
 Pixel = tuple[float, float]
 
 
-class Places(Protocol):
-    """Calibrations in use, and what can be moved to a place in a picture; any thread.
+@dataclass(frozen=True, slots=True)
+class CalibrationShown:
+    """One map from platform to picture that is in force.
 
-    Pixels are those of the picture they were read in, its ROI and binning.
+    Attributes
+    ----------
+    zoom_counts, height_um : float
+        Where it was measured; the height is that of the tool's tip on the platform.
+    residual_px : float
+        RMS distance between where the tip was seen and where the map says.
+    measured : datetime
+        With its time zone.
+    """
+
+    camera: str
+    tool: str
+    zoom_counts: float
+    height_um: float
+    scale_um_px: float
+    residual_px: float
+    measured: datetime
+
+
+@dataclass(frozen=True, slots=True)
+class RotationShown:
+    """About which place on the platform an axis turns the plate.
+
+    Attributes
+    ----------
+    std_um : float
+        Standard deviation of the centre, in the direction that is known least.
+    residual_um : float
+        RMS distance from the circle.
+    """
+
+    axis: str
+    centre_um: tuple[float, float]
+    std_um: float
+    residual_um: float
+    measured: datetime
+
+
+class Places(Protocol):
+    """Calibrations in use, how they are measured, and what can be moved to a place in a picture.
+
+    Any thread. Pixels are those of the picture they were read in, its ROI and binning.
     """
 
     @abstractmethod
@@ -49,3 +94,28 @@ class Places(Protocol):
         NotAvailable
             Not calibrated for that tool.
         """
+
+    @abstractmethod
+    def calibrate_stage(self, tool: str, camera: str) -> Task:
+        """Begin to measure the map from platform to picture by moving a tool.
+
+        Raises
+        ------
+        ConfigError
+            There is no such tool or camera.
+        NotAvailable
+            Another long operation is under way.
+        """
+
+    @abstractmethod
+    def find_rotation_centre(self, camera: str) -> Task:
+        """Begin to measure about which place the plate turns; raises as `calibrate_stage`."""
+
+    @property
+    @abstractmethod
+    def calibrated(self) -> Sequence[CalibrationShown]:
+        """The maps in force, by camera, tool, zoom and height."""
+
+    @abstractmethod
+    def rotation_centre(self, camera: str) -> RotationShown | None:
+        """Return the rotation centre as a camera saw it last; None before."""

@@ -5,7 +5,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cosmic.frame.errors import CosmicError
+from PySide6.QtCore import Qt
+
+from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.listeners import tell
 from cosmic.frame.task import Task
 from cosmic.vico.api.application import VicoApplication
@@ -15,6 +17,7 @@ from cosmic.vico.hw.interface import CameraInfo, Pixels
 
 if TYPE_CHECKING:
     from cosmic.vico.api.fibres import PlacedFibre
+    from cosmic.vico.api.places import CalibrationShown, Places, RotationShown
 
 
 class Vico:
@@ -27,7 +30,10 @@ class Vico:
         self.lens = LensHandle(application) if settings.lens.backend != "none" else None
         self.light = LightHandle(application) if settings.light.backend != "none" else None
         self._listeners: tuple[Callable[[], object], ...] = ()
-        application.status_changed.connect(self._tell)
+        # At once and by a function that keeps this object: a call that still waits in a queue when
+        # a plain object goes would reach what is no more.
+        direct = Qt.ConnectionType.DirectConnection
+        application.status_changed.connect(lambda: self._tell(), direct)
 
     @property
     def application(self) -> VicoApplication:
@@ -99,6 +105,62 @@ class Vico:
 
         picture = self.camera(camera).next_picture(timeout_s)
         return place_fibres(picture, self._application.places)
+
+    # Places on the platform
+
+    @property
+    def tools(self) -> Sequence[str]:
+        """What can be moved to a place in a picture, and what calibrates, such as "left"."""
+        places = self._application.places
+        return places.targets if places is not None else ()
+
+    @property
+    def calibrated(self) -> "Sequence[CalibrationShown]":
+        """The maps from platform to picture that are in force."""
+        places = self._application.places
+        return places.calibrated if places is not None else ()
+
+    def calibrate_stage(self, tool: str, camera: str = "") -> Task:
+        """Begin to measure where on the platform the pixels of a camera lie, by moving a tool.
+
+        The tip of `tool` must be in the picture and sharp, near the height that matters. It goes
+        to nine places about where it stands, through the gate, and back.
+
+        Raises
+        ------
+        ConfigError
+            There is no such tool or camera.
+        NotAvailable
+            Another long operation is under way, or micromanipulation is not hosted.
+        """
+        return self._places.calibrate_stage(tool, camera or self._application.first_camera)
+
+    def find_rotation_centre(self, camera: str = "") -> Task:
+        """Begin to measure about which place the plate turns, by a fibre that lies on it.
+
+        The table turns by 24 degrees to both sides, through the gate, and back.
+
+        Raises
+        ------
+        NotAvailable
+            Another long operation is under way, or micromanipulation is not hosted.
+        """
+        return self._places.find_rotation_centre(camera or self._application.first_camera)
+
+    def rotation_centre(self, camera: str = "") -> "RotationShown | None":
+        """Return about which place the plate turns, as a camera saw it last; None before."""
+        places = self._application.places
+        chosen = camera or self._application.first_camera
+        return places.rotation_centre(chosen) if places is not None else None
+
+    @property
+    def _places(self) -> "Places":
+        places = self._application.places
+        if places is None:
+            raise NotAvailable("micromanipulation is not hosted here: no tool can be moved")
+        return places
+
+    # Recording
 
     @contextmanager
     def record(

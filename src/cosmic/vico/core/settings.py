@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 
 from cosmic.frame.config import StrictModel
 from cosmic.vico.core.peripheral_settings import LampSettings, MotorLensSettings
+from cosmic.vico.core.tool_settings import ToolSettings
 
 Backend = Literal["simulated", "aravis", "opencv", "dc1394", "harvesters"]
 
@@ -55,7 +56,11 @@ class VicoSettings(StrictModel):
     directory : str
         Where pictures go; empty: where the program was started.
     calibration : str
-        File that calibrations are kept in, beside the platform file; empty: none are kept.
+        Folder that calibrations are kept in, beside the platform file; empty: until the end.
+    plate_um : float
+        Height of the sample plate in platform coordinates.
+    table_axis : str
+        Positioner that turns the plate; empty: none does.
     sources : tuple of str
         Films, folders of pictures and addresses, for the backend "opencv".
     producers : tuple of str
@@ -64,9 +69,12 @@ class VicoSettings(StrictModel):
 
     directory: str = ""
     calibration: str = ""
+    plate_um: float = 0.0
+    table_axis: str = ""
     sources: Annotated[tuple[str, ...], Field(strict=False)] = ()
     producers: Annotated[tuple[str, ...], Field(strict=False)] = ()
     camera: Annotated[tuple[CameraPlace, ...], Field(strict=False)] = ()
+    tool: Annotated[tuple[ToolSettings, ...], Field(strict=False)] = ()
     lens: MotorLensSettings = Field(default_factory=lambda: MotorLensSettings(backend="none"))
     light: LampSettings = Field(default_factory=lambda: LampSettings(backend="none"))
 
@@ -75,4 +83,7 @@ class VicoSettings(StrictModel):
         for name, count in Counter(each.name for each in self.camera).items():
             if count > 1:
                 raise ValueError(f"two cameras are named {name!r}")
+        for name, count in Counter(each.name for each in self.tool).items():
+            if count > 1:
+                raise ValueError(f"two tools are named {name!r}")
         return self

@@ -1,0 +1,217 @@
+"""Pixels and places on the platform: what is calibrated, and moving a tool to a pixel."""
+
+import logging
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from typing_extensions import override
+
+from cosmic.autonomy.calibrations import Calibrations
+from cosmic.autonomy.rotation_procedure import RotationProcedure
+from cosmic.autonomy.stage_procedure import StageProcedure
+from cosmic.autonomy.tools import axis_targets, expected, tip_um
+from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.frame.task import Task
+from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.core.orders import MoveTo
+from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.api.places import CalibrationShown, Pixel, Places, RotationShown
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.pixel_map import PixelMap
+from cosmic.vico.core.tool_settings import ToolSettings
+from cosmic.vico.core.vision.tool_types import ExpectedTool
+
+logger = logging.getLogger(__name__)
+
+SOURCE: Final = "click"
+REACH_PX: Final = 40.0
+
+
+class PlatformPlaces(Places):
+    """Joins the cameras of ViCo and the axes of MiCo; any thread.
+
+    Parameters
+    ----------
+    folder : Path or None
+        Where calibrations are kept; None: until the end of the program.
+
+    Raises
+    ------
+    ConfigError
+        A tool names an axis that is not there, or a file of calibrations is broken.
+    """
+
+    def __init__(self, vico: VicoApplication, mico: MicoApplication, folder: Path | None) -> None:
+        self._vico = vico
+        self._manager = mico.manager
+        self._tools = {each.name: each for each in vico.settings.tool}
+        _check_axes(vico.settings.tool, [each.name for each in mico.manager.settings.positioner])
+        self.calibrations = Calibrations(vico.units, self._tools, folder)
+
+    # Pixels to places
+
+    @override
+    def scale_um_px(self, camera: str, zoom_counts: float | None) -> float | None:
+        zoom = self._zoom(camera, zoom_counts)
+        if zoom is None:
+            return None
+        try:
+            found = self.calibrations.find(camera, zoom, self._vico.settings.plate_um)
+        except NotAvailable:
+            return None
+        return found.map.scale_um_px
+
+    @override
+    def problem(self, picture: Picture) -> str:
+        try:
+            self._plate_map(picture)
+        except NotAvailable as exc:
+            return str(exc)
+        return ""
+
+    @override
+    def platform_um(self, picture: Picture, place_px: Pixel) -> tuple[float, float]:
+        x, y = self._plate_map(picture).to_um(place_px)
+        return float(x), float(y)
+
+    def map_of(self, picture: Picture, height_um: float, tool: str | None = None) -> PixelMap:
+        """Return the map for the pixels of a picture, of things at a height.
+
+        Raises
+        ------
+        NotAvailable
+            Not calibrated there; the text says what to do.
+        """
+        settings = self._vico.unit(picture.camera).thread.settings
+        zoom = self._zoom(picture.camera, picture.circumstances.zoom_counts)
+        if zoom is None:
+            raise NotAvailable(f"{picture.camera}: the zoom is not known; home the lens")
+        if (
+            settings is None
+            or (settings.roi.height_px, settings.roi.width_px) != (picture.data.shape[:2])
+        ):
+            raise NotAvailable(f"{picture.camera}: the picture was taken with other settings")
+        found = self.calibrations.find(picture.camera, zoom, height_um, tool)
+        roi = settings.roi
+        return found.map.for_window(x_px=roi.x_px, y_px=roi.y_px, binning=settings.binning)
+
+    def _plate_map(self, picture: Picture) -> PixelMap:
+        return self.map_of(picture, self._vico.settings.plate_um)
+
+    def _zoom(self, camera: str, zoom_counts: float | None) -> float | None:
+        return zoom_counts if self._vico.unit(camera).place.behind_lens else 0.0
+
+    # Tools
+
+    @property
+    @override
+    def targets(self) -> Sequence[str]:
+        return tuple(self._tools)
+
+    @override
+    def move_to(self, picture: Picture, place_px: Pixel, what: str) -> str:
+        tool = self._tool(what)
+        running = self._vico.running_task
+        if running is not None and not running.done:
+            raise NotAvailable(f"{running.title} is under way; click to move when it has ended")
+        tip = tip_um(tool, self.positions())
+        if tip is None:
+            raise NotAvailable(f"{what}: where it stands is not known; initialise the platform")
+        x_um, y_um = self.map_of(picture, tip[2], what).to_um(place_px).tolist()
+        motions = {
+            axis: MoveTo(target, "um") for axis, target in axis_targets(tool, x_um, y_um).items()
+        }
+        self._manager.order_together(motions, source=SOURCE)
+        logger.info("click: %s to %.1f, %.1f um", what, x_um, y_um)
+        return f"{tool.shown} moves to x {x_um:.1f}, y {y_um:.1f} µm"
+
+    def expected_tools(self, picture: Picture) -> Mapping[str, ExpectedTool]:
+        """Return where the tips should be on a picture; those that cannot be told are missing."""
+        positions = picture.circumstances.positions
+        found: dict[str, ExpectedTool] = {}
+        for tool in self._tools.values():
+            tip = tip_um(tool, positions)
+            if tip is None:
+                continue
+            try:
+                mapped = self.map_of(picture, tip[2], tool.name)
+            except NotAvailable:
+                continue
+            wanted = expected(tool, mapped, tip[:2], positions, REACH_PX)
+            height, width = picture.data.shape[:2]
+            if wanted is not None and _inside(wanted.tip_px, width, height):
+                found[tool.name] = wanted
+        return found
+
+    def positions(self) -> dict[str, float]:
+        """Return where the axes are that are known, in gate coordinates."""
+        states = self._manager.states().values()
+        return {each.name: each.position for each in states if each.position is not None}
+
+    # Measuring
+
+    @override
+    def calibrate_stage(self, tool: str, camera: str) -> Task:
+        settings = self._tool(tool)
+        procedure = StageProcedure(self._vico, self._manager, self.calibrations, settings, camera)
+        title = f"Calibrating {camera} by {settings.shown}"
+        return self._vico.begin(title, procedure.run)
+
+    @override
+    def find_rotation_centre(self, camera: str) -> Task:
+        axis = self._vico.settings.table_axis
+        if not axis:
+            raise NotAvailable("no axis turns the plate; name it as vico.table_axis")
+        procedure = RotationProcedure(
+            self._vico, self._manager, self.calibrations, self._plate_map, camera, axis
+        )
+        return self._vico.begin(f"Rotation centre of {axis}", procedure.run)
+
+    @property
+    @override
+    def calibrated(self) -> Sequence[CalibrationShown]:
+        return tuple(
+            CalibrationShown(
+                camera,
+                tool,
+                plane.zoom_counts,
+                plane.height_um,
+                plane.fit.map.scale_um_px,
+                plane.fit.rms_px,
+                plane.measured,
+            )
+            for camera in self._vico.units
+            for tool in self._tools
+            for plane in self.calibrations.get(camera, tool).planes
+        )
+
+    @override
+    def rotation_centre(self, camera: str) -> RotationShown | None:
+        found = self.calibrations.get(camera, "").rotation
+        if found is None:
+            return None
+        fit = found.fit
+        return RotationShown(found.axis, fit.centre_um, fit.std_um, fit.rms_um, found.measured)
+
+    def _tool(self, name: str) -> ToolSettings:
+        if name not in self._tools:
+            known = ", ".join(self._tools) or "none"
+            raise ConfigError(f"there is no tool {name!r}; the platform has: {known}")
+        return self._tools[name]
+
+
+def _inside(place_px: Pixel, width: int, height: int) -> bool:
+    return 0.0 <= place_px[0] <= width - 1.0 and 0.0 <= place_px[1] <= height - 1.0
+
+
+def _check_axes(tools: Sequence[ToolSettings], axes: Sequence[str]) -> None:
+    for index, tool in enumerate(tools):
+        for axis in tool.axes:
+            if axis not in axes:
+                raise ConfigError(f"vico.tool[{index}]: there is no positioner {axis!r}")
+
+
+def join_places(vico: VicoApplication, mico: MicoApplication, folder: Path | None) -> None:
+    """Have the pixels of ViCo's cameras mean places on the platform; raises `ConfigError`."""
+    vico.places = PlatformPlaces(vico, mico, folder)

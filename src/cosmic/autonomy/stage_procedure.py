@@ -1,0 +1,266 @@
+"""Measuring the map from platform to picture: a tool goes to places, its tip is looked for."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from cosmic.autonomy.calibrations import Calibrations
+from cosmic.autonomy.moving import Mover
+from cosmic.autonomy.tip_search import Floats, middle, uncovered
+from cosmic.autonomy.tools import axis_targets, tip_um
+from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.frame.task import Task
+from cosmic.mico.core.device_manager import DeviceManager
+from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.core.calibration import Plane
+from cosmic.vico.core.calibration_fit import CalibrationRefused, MapFit, Sighting, fit_map
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.tool_settings import ToolSettings
+from cosmic.vico.core.vision.algorithms import grey
+from cosmic.vico.core.vision.tips import find_gripper, find_probe
+from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen
+from cosmic.vico.hw.interface import CameraSettings
+
+PICTURE_S: Final = 5.0
+SEARCH_PART: Final = 0.8
+"""Of the tool's width: how far it moves at once while it is looked for."""
+REACH_PX: Final = 40.0
+GRID: Final = 3
+LARGEST_PART: Final = 0.25
+"""Of the picture: how far the grid reaches to each side."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Guess:
+    """A first idea of the map: where the tip is seen at a place, and what moves do."""
+
+    place_um: Floats
+    tip_px: Floats
+    px_um: Floats
+
+    def px(self, place_um: Floats) -> Floats:
+        return np.asarray(self.tip_px + self.px_um @ (place_um - self.place_um))
+
+    def um(self, place_px: Floats) -> Floats:
+        return np.asarray(self.place_um + np.linalg.solve(self.px_um, place_px - self.tip_px))
+
+
+class StageProcedure:
+    """One calibration of a camera by one tool; run in ViCo's thread."""
+
+    def __init__(
+        self,
+        vico: VicoApplication,
+        manager: DeviceManager,
+        calibrations: Calibrations,
+        tool: ToolSettings,
+        camera: str,
+    ) -> None:
+        self._unit = vico.unit(camera)
+        self._calibrations = calibrations
+        self._tool = tool
+        self._camera = camera
+        self._mover = Mover(manager, {tool.x_axis: "um", tool.y_axis: "um"}, vico.clock)
+        self._clock = vico.clock
+        self._source = f"calibration of {camera}"
+
+    def run(self, task: Task) -> None:
+        """Measure, keep, and go back where the tool was."""
+        try:
+            begun = self._place()
+            self._mover.remember()
+            try:
+                plane = self._measure(task, begun)
+            finally:
+                self._mover.go_back(task, self._source)
+            self._calibrations.add_plane(self._camera, self._tool.name, plane)
+            task.report(1.0, _said(plane.fit))
+            task.finish()
+        except CosmicError as exc:
+            task.fail(exc)
+
+    def _measure(self, task: Task, begun: Floats) -> Plane:
+        first = self._picture(self._clock.now_s())
+        guess = self._search(task, first, begun[:2])
+        places = self._grid(guess, first)
+        sightings = []
+        for number, place in enumerate(places, start=1):
+            task.report(number / (len(places) + 1), f"place {number} of {len(places)}")
+            seen = self._sight(task, place, guess)
+            if seen is not None:
+                sightings.append(seen)
+        zoom = self._zoom(first)
+        after = self._picture(self._clock.now_s())
+        if abs(self._zoom(after) - zoom) > 0.5:
+            raise CalibrationRefused(
+                "calibration: the zoom was moved meanwhile; leave it, and try again"
+            )
+        return Plane(zoom, float(begun[2]), fit_map(sightings), datetime.now(UTC))
+
+    # Where things are
+
+    def _place(self) -> Floats:
+        tip = tip_um(self._tool, self._mover.positions())
+        if tip is None:
+            raise NotAvailable(
+                f"{self._tool.name}: where it stands is not known; initialise the platform"
+            )
+        return np.array(tip)
+
+    def _picture(self, since_s: float) -> Picture:
+        return self._unit.thread.next_picture(since_s, PICTURE_S)
+
+    def _zoom(self, picture: Picture) -> float:
+        if not self._unit.place.behind_lens:
+            return 0.0
+        zoom = picture.circumstances.zoom_counts
+        if zoom is None:
+            raise NotAvailable("the zoom is not known; home the lens, then try again")
+        return zoom
+
+    # The first idea
+
+    def _search(self, task: Task, first: Picture, place_um: Floats) -> _Guess:
+        """Find the tip by drawing it back twice, then what a step aside does."""
+        self._zoom(first)
+        scale = first.circumstances.scale_um_px
+        if scale is None:
+            raise NotAvailable(
+                f"{self._camera}: about how large a pixel is must be known; give scale_um_px"
+            )
+        task.report(0.02, f"looking for {self._tool.shown}")
+        ahead = np.array(self._tool.forward) / math.hypot(*self._tool.forward)
+        step_um = SEARCH_PART * self._tool.width_um * ahead
+        pictures = [first]
+        for times in (1, 2):
+            since_s = self._go(task, place_um - times * step_um)
+            pictures.append(self._picture(since_s))
+        greys = [grey(each.data) for each in pictures]
+        strips = [
+            middle(uncovered(one, other, self._tool.width_um / scale))
+            for one, other in pairwise(greys)
+        ]
+        if strips[0] is None or strips[1] is None:
+            raise NotAvailable(self._unseen("nothing like it moved on the picture"))
+        back_px = strips[1] - strips[0]
+        guess = self._similar(place_um - 2.0 * step_um, strips[1] + 0.5 * back_px, step_um, back_px)
+        seen = self._look(pictures[-1], guess, guess.place_um, REACH_PX)
+        if isinstance(seen, NotSeen):
+            raise NotAvailable(self._unseen(seen.reason))
+        return self._aside(task, guess, seen, step_um)
+
+    def _aside(self, task: Task, guess: _Guess, tip_px: Floats, step_um: Floats) -> _Guess:
+        """Learn what a step aside does: no idea of the camera's handedness is taken for granted."""
+        aside_um = np.array([-step_um[1], step_um[0]])
+        place = guess.place_um + aside_um
+        picture = self._picture(self._go(task, place))
+        moved_px = float(np.linalg.norm(guess.px_um @ step_um))
+        at = _Guess(place, tip_px, guess.px_um)
+        seen = self._look(picture, at, place, moved_px + REACH_PX)
+        if isinstance(seen, NotSeen):
+            raise NotAvailable(self._unseen(seen.reason))
+        both_um = np.column_stack([step_um, aside_um])
+        both_px = np.column_stack([guess.px_um @ step_um, seen - tip_px])
+        return _Guess(guess.place_um, tip_px, both_px @ np.linalg.inv(both_um))
+
+    @staticmethod
+    def _similar(place: Floats, tip_px: Floats, step_um: Floats, back_px: Floats) -> _Guess:
+        """Return a map that turns and stretches, from what a step back did; y is up, rows down."""
+        one = complex(*(-back_px)) / complex(step_um[0], -step_um[1])
+        turn = np.array([[one.real, -one.imag], [one.imag, one.real]])
+        return _Guess(place, tip_px, turn @ np.array([[1.0, 0.0], [0.0, -1.0]]))
+
+    # Places
+
+    def _grid(self, guess: _Guess, first: Picture) -> Sequence[Floats]:
+        """Return places at which the tip and enough of the tool are on the picture, to and fro."""
+        height, width = first.data.shape[:2]
+        scale_px_um = math.sqrt(abs(float(np.linalg.det(guess.px_um))))
+        jaw_px = self._tool.width_um * scale_px_um
+        gap_px = max(0.0, self._mover.positions().get(self._tool.gap_axis, 0.0)) * scale_px_um
+        forward = guess.px_um @ np.array(self._tool.forward)
+        forward = forward / np.linalg.norm(forward)
+        back, ahead = 5.0 * jaw_px + REACH_PX, 2.0 * jaw_px + REACH_PX
+        aside = 0.5 * gap_px + 2.5 * jaw_px + REACH_PX
+        low, high = np.empty(2), np.empty(2)
+        for axis, size in enumerate((width, height)):
+            along, across = abs(forward[axis]), abs(forward[1 - axis])
+            behind, before = (back, ahead) if forward[axis] > 0.0 else (ahead, back)
+            low[axis] = behind * along + aside * across
+            high[axis] = size - 1.0 - before * along - aside * across
+        if not (high - low >= 4.0 * REACH_PX).all():
+            raise NotAvailable(f"{self._tool.shown} is too large on this picture; zoom out")
+        half = np.minimum(LARGEST_PART * np.array([width, height]), 0.5 * (high - low))
+        centre = np.clip(guess.tip_px, low + half, high - half)
+        steps = np.linspace(-1.0, 1.0, GRID)
+        rows = [
+            [guess.um(centre + half * (x, y)) for x in (steps if i % 2 == 0 else steps[::-1])]
+            for i, y in enumerate(steps)
+        ]
+        return [place for row in rows for place in row]
+
+    def _sight(self, task: Task, place_um: Floats, guess: _Guess) -> Sighting | None:
+        picture = self._picture(self._go(task, place_um))
+        stood = tip_um(self._tool, picture.circumstances.positions) or tuple(self._place())
+        seen = self._look(picture, guess, np.array(stood[:2]), REACH_PX)
+        if isinstance(seen, NotSeen):
+            return None
+        sensor = self._on_sensor(seen, picture)
+        return Sighting((stood[0], stood[1]), (float(sensor[0]), float(sensor[1])))
+
+    def _look(
+        self, picture: Picture, guess: _Guess, place_um: Floats, reach_px: float
+    ) -> Floats | NotSeen:
+        """Return where the tip is seen, in the picture's pixels."""
+        tip = guess.px(place_um)
+        forward = guess.px_um @ np.array(self._tool.forward)
+        scale_px_um = math.sqrt(abs(float(np.linalg.det(guess.px_um))))
+        gap_um = max(0.0, picture.circumstances.positions.get(self._tool.gap_axis, 0.0))
+        wanted = ExpectedTool(
+            (float(tip[0]), float(tip[1])),
+            (float(forward[0]), float(forward[1])),
+            self._tool.width_um * scale_px_um,
+            gap_um * scale_px_um if self._tool.gap_axis else 0.0,
+            reach_px,
+        )
+        find = find_gripper if self._tool.gap_axis else find_probe
+        found = find(grey(picture.data), wanted)
+        if isinstance(found, NotSeen):
+            return found
+        return np.array(found.hold_px if isinstance(found, GripperTips) else found.tip_px)
+
+    def _on_sensor(self, place_px: Floats, picture: Picture) -> Floats:
+        """Return a place in unbinned pixels of the whole sensor."""
+        settings = self._unit.thread.settings
+        if settings is None:
+            raise NotAvailable(f"{picture.camera}: the camera was lost")
+        return whole_sensor_px(place_px, settings)
+
+    def _go(self, task: Task, place_um: Floats) -> float:
+        x_um, y_um = place_um.tolist()
+        return self._mover.go(axis_targets(self._tool, x_um, y_um), task, self._source)
+
+    def _unseen(self, reason: str) -> str:
+        return (
+            f"{self._tool.shown} was not found: {reason}; bring its tip into the picture, focus on "
+            "it, and light it evenly"
+        )
+
+
+def whole_sensor_px(place_px: Floats, settings: CameraSettings) -> Floats:
+    """Return a place of a picture in unbinned pixels of the whole sensor."""
+    corner = np.array([settings.roi.x_px, settings.roi.y_px], dtype=np.float64)
+    return np.asarray((place_px + corner) * settings.binning + 0.5 * (settings.binning - 1))
+
+
+def _said(fit: MapFit) -> str:
+    left_out = f", {len(fit.outliers)} left out" if fit.outliers else ""
+    return (
+        f"{fit.map.scale_um_px:.4g} µm a pixel, residual {fit.rms_px:.2f} px at "
+        f"{fit.map.points} places{left_out}"
+    )
