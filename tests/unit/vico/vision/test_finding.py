@@ -136,6 +136,14 @@ def test_a_gripper_is_not_a_fibre() -> None:
     assert not certain(np.clip(noisy, 0, 255).astype(np.uint8))
 
 
+def test_the_edge_of_something_wide_is_not_a_fibre() -> None:
+    image = np.full((480, 640), 150.0, np.float32)
+    cv2.circle(image, (320, 240), 150, 60.0, -1)
+    noise = np.random.default_rng(6).normal(0.0, 3.0, image.shape)
+    noisy = cv2.GaussianBlur(image, (0, 0), 1.0) + noise
+    assert find_fibres(np.clip(noisy, 0, 255).astype(np.uint8)) == []
+
+
 def test_a_network_holds_no_fibre_that_is_certain() -> None:
     rng = np.random.default_rng(4)
     lines = [

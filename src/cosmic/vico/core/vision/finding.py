@@ -8,6 +8,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from cosmic.vico.core.vision import checks
+from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre, paint
 from cosmic.vico.core.vision.graph import build_graph, prune
 from cosmic.vico.core.vision.grey import Floats, Mask, grey_picture
@@ -233,6 +234,8 @@ def judged(scene: Scene, courses: list[tuple[Strand, Course]], *, crowd: bool) -
     found = []
     for index, (strand, course) in enumerate(courses):
         doubts = [*strand.doubts, *checks.doubts_of(course)]
+        if touches_border(scene, course):
+            doubts.append(EndKind.BORDER.value)
         if crowd:
             doubts.append(checks.CROWDED)
         if index in apart:
@@ -241,6 +244,12 @@ def judged(scene: Scene, courses: list[tuple[Strand, Course]], *, crowd: bool) -
             doubts.append(checks.LEFT_OVER)
         found.append(fibre(scene, course, doubts))
     return sorted(found, key=lambda each: -each.length_px)
+
+
+def touches_border(scene: Scene, course: Course) -> bool:
+    """Return whether a fibre lies partly beyond the picture's border."""
+    room = 0.5 * course.width - 0.5
+    return bool((course.line < room).any() or (course.line > scene.corner - room).any())
 
 
 def strip(mask: Mask, line: Floats, width: float) -> None:

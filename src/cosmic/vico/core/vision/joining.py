@@ -210,8 +210,23 @@ def pair(graph: Graph, joint: Joint, half_width: list[float]) -> None:
         joint.partner[joint.stubs[j]] = joint.stubs[i]
     base = LOOSE * (count % 2)
     worth, next_worth = (float(np.sqrt(max(0.0, prices[k] - base))) for k in order[:2])
-    unclear = next_worth < 1.6 * worth + 0.1
+    unclear = next_worth < 1.6 * worth + 0.1 or ends_meet(graph, joint, half_width)
     judge(joint, costs, best, unclear)
+
+
+def ends_meet(graph: Graph, joint: Joint, half_width: list[float]) -> bool:
+    """Return whether two fibres may just lie with their ends on each other, not cross.
+
+    Two short loose ends leave that open, unless what remains is one loop.
+    """
+    loose = [
+        index
+        for index, end in joint.stubs
+        if graph.branches[index].nodes[1 - end] == FREE
+        and graph.branches[index].length < 12.0 * half_width[index]
+    ]
+    others = [index for index, _ in joint.stubs if index not in loose]
+    return len(loose) >= 2 and len(set(others)) == len(others)
 
 
 def judge(joint: Joint, costs: Floats, best: Pairing, unclear: bool) -> None:

@@ -118,14 +118,12 @@ def excluded(course: Course, neighbours: Neighbours) -> Flags:
 
 def centre_roughly(scene: Scene, course: Course, neighbours: Neighbours) -> None:
     """Move a line onto its fibre, from where the skeleton of the reduced picture lies."""
-    for reach in (scene.factor + 0.35 * course.width, 1.0 + 0.25 * course.width):
-        profiles = cross_sections(
-            scene, course.line, course.width, 1.1 * course.width + 2 * scene.factor + 4
-        )
-        height = along(profiles, 2.0)
-        offset = box_centres(profiles, height, course.width, reach)
-        weights = np.where(excluded(course, neighbours), 0.0, 1.0)
-        move(course, profiles, offset, weights, max(24.0, 3.0 * course.width))
+    reach = 1.1 * course.width + 2 * scene.factor + 4
+    profiles = cross_sections(scene, course.line, course.width, reach)
+    most = scene.factor + 0.35 * course.width
+    offset = box_centres(profiles, along(profiles, 2.0), course.width, most)
+    weights = np.where(excluded(course, neighbours), 0.0, 1.0)
+    move(course, profiles, offset, weights, max(24.0, 3.0 * course.width))
     course.line = resampled(course.line, STEP_PX)
 
 

@@ -11,6 +11,7 @@ from cosmic.vico.hw.interface import Pixels
 
 # Wider bodies are tools, not fibres: the ground is what remains of them. Full-size pixels.
 WIDEST_PX = 64
+WIDEST_OF_PICTURE = 0.04
 QUARTER = 4
 SMALL_PX = 420
 # Of 8-bit levels: less cannot be told from the steps of the converter.
@@ -104,7 +105,8 @@ def find_relief(image: Pixels) -> Relief:
     """Return what stands out, choosing between darker and lighter by what looks like fibres."""
     factor = reduction(image.shape)
     small = reduced(image, factor)
-    side = int(min(WIDEST_PX, 0.3 * min(image.shape)) / factor) | 1
+    widest = max(WIDEST_PX, WIDEST_OF_PICTURE * max(image.shape))
+    side = int(min(widest, 0.3 * min(image.shape)) / factor) | 1
     hats = [
         (lighter, stands_out(hat(small, max(3, side), kind)))
         for lighter, kind in ((False, cv2.MORPH_BLACKHAT), (True, cv2.MORPH_TOPHAT))
