@@ -10,45 +10,64 @@ from cosmic.vico.gui.vico_gui import VicoGui
 
 DAQCO: Final = "DAQCo"
 LENS: Final = "Lens and light"
-_SHARES: Final = [3, 2]
+_SHARES: Final = [2, 1]
 """How picture and force share their column."""
+_WITH_LENS: Final = [3, 1]
+"""How picture and lens share the width where they stand alone."""
 
 
-def add_vision(window: CosmicServerGui, gui: VicoGui, scene: str, *, low: bool) -> str:
-    """Put the first camera beside the scene, the others behind it, the lens below.
+def add_instruments(
+    window: CosmicServerGui,
+    pictures: VicoGui | None,
+    force: UDaqMainWidget | None,
+    scene: str,
+    *,
+    low: bool,
+) -> str:
+    """Put picture and force between the actuators and the scene, the lens below the scene.
 
-    Returns the title of the first camera's panel; "" where there is none.
+    Parameters
+    ----------
+    scene : str
+        Title of the scene's panel; "" where there is none.
+    low : bool
+        The screen is too low for two panels above each other: they share a tab.
+
+    Returns
+    -------
+    str
+        Title of the first camera's panel; "" where there is none.
     """
-    first = ""
-    for view in gui.cameras.values():
-        if not first:
-            area = Qt.DockWidgetArea.RightDockWidgetArea
-            window.add_panel(view.windowTitle(), view, area, scroll=False)
-            first = view.windowTitle()
-            if scene:  # the picture stands between the actuators and the scene
-                way = Qt.Orientation.Horizontal
-                window.splitDockWidget(window.dock(first), window.dock(scene), way)
-        else:
-            window.add_panel(view.windowTitle(), view, scroll=False, beside=first, tabbed=True)
+    views = list(pictures.cameras.values()) if pictures is not None else []
+    first = views[0].windowTitle() if views else ""
     if first:
-        if scene:
-            window.add_panel(LENS, gui.lens, below=scene, tabbed=low)
-        else:
-            window.add_panel(LENS, gui.lens, beside=first)
-            docks = [window.dock(first), window.dock(LENS)]
-            window.resizeDocks(docks, [3, 1], Qt.Orientation.Horizontal)
-        window.dock(first).raise_()
-        if scene:
-            window.dock(scene).raise_()
+        window.add_panel(first, views[0], Qt.DockWidgetArea.RightDockWidgetArea, scroll=False)
+    if first and scene:
+        window.splitDockWidget(window.dock(first), window.dock(scene), Qt.Orientation.Horizontal)
+    if force is not None:
+        _add_force(window, force, first or scene, low=low)
+    # Only now, for a dock that has tabs cannot be divided any more.
+    for view in views[1:]:
+        window.add_panel(view.windowTitle(), view, scroll=False, beside=first, tabbed=True)
+    if first and pictures is not None:
+        _add_lens(window, pictures, first, scene, low=low)
+    for title in (scene, first):
+        if title:
+            window.dock(title).raise_()
     return first
 
 
-def add_force(window: CosmicServerGui, gui: UDaqMainWidget, above: str, *, low: bool) -> None:
-    """Put the force below the picture; in a tab with it where the screen is low."""
+def _add_force(window: CosmicServerGui, gui: UDaqMainWidget, above: str, *, low: bool) -> None:
     area = Qt.DockWidgetArea.RightDockWidgetArea
     window.add_panel(DAQCO, gui, area, scroll=False, below=above, tabbed=low and bool(above))
-    if above:
-        docks = [window.dock(above), window.dock(DAQCO)]
-        window.resizeDocks(docks, _SHARES, Qt.Orientation.Vertical)
-        window.dock(above).raise_()
+    if above and not low:
+        window.share_out((above, DAQCO), _SHARES, Qt.Orientation.Vertical)
     gui.close_requested.connect(window.dock(DAQCO).close)
+
+
+def _add_lens(window: CosmicServerGui, gui: VicoGui, first: str, scene: str, *, low: bool) -> None:
+    if scene:
+        window.add_panel(LENS, gui.lens, below=scene, tabbed=low)
+        return
+    window.add_panel(LENS, gui.lens, beside=first)
+    window.share_out((first, LENS), _WITH_LENS, Qt.Orientation.Horizontal)

@@ -10,7 +10,7 @@ import cosmic
 from cosmic.app.collision_bar import CollisionBar
 from cosmic.app.control_mode import ECM, ControlMode
 from cosmic.app.hint_bar import HintBar, first_steps
-from cosmic.app.instrument_panels import add_force, add_vision
+from cosmic.app.instrument_panels import add_instruments
 from cosmic.app.platform import Platform
 from cosmic.app.rig import Rig
 from cosmic.app.scene_panel import ScenePanel
@@ -39,7 +39,7 @@ SCENE: Final = "Scene"
 
 NO_ECM: Final = f"{NO_COLLISION_MODEL}; name a scene in the platform file"
 
-_WITH_PICTURE: Final = [10, 11, 7]
+_WITH_PICTURE: Final = [10, 12, 6]
 _SHARES: Final = [3, 2]
 """How panels beside each other share the width at a first start."""
 
@@ -141,18 +141,21 @@ class OperatorWindow(CosmicServerGui):
             self.top_bar.set_collision_model(present=True)  # nothing moves that could collide
         scene = SCENE if self._scene is not None else ""
         vision = platform.vico.get_gui() if platform.vico is not None else None
-        pictures = add_vision(self, vision, scene, low=low) if isinstance(vision, VicoGui) else ""
         force = platform.daqco.get_gui() if platform.daqco is not None else None
-        if isinstance(force, UDaqMainWidget):
-            add_force(self, force, pictures or scene, low=low)
+        pictures = add_instruments(
+            self,
+            vision if isinstance(vision, VicoGui) else None,
+            force if isinstance(force, UDaqMainWidget) else None,
+            scene,
+            low=low,
+        )
         columns = [title for title in (MICO if scene else "", pictures, scene) if title]
         shares = _WITH_PICTURE if pictures else _SHARES
-        docks = [self.dock(title) for title in columns]
-        self.resizeDocks(docks, shares[: len(docks)], Qt.Orientation.Horizontal)
+        self.share_out(columns, shares[: len(columns)], Qt.Orientation.Horizontal)
 
     def _add_log(self, ring: RingBufferHandler, *, console: bool) -> None:
         below = Qt.DockWidgetArea.BottomDockWidgetArea
-        docks = [self.add_panel(LOG_TITLE, LogPanel(ring), below, scroll=False)]
+        self.add_panel(LOG_TITLE, LogPanel(ring), below, scroll=False)
         if console:
             rig = Rig(self._platform, source="console")
             self._console = ConsolePanel(
@@ -162,8 +165,8 @@ class OperatorWindow(CosmicServerGui):
                 banner='Python console: try rig.mico["left.x"].move_by("0.2 mm"). '
                 "Ctrl+C or Interrupt breaks what runs.\n",
             )
-            docks.append(self.add_panel(CONSOLE, self._console, scroll=False, beside=LOG_TITLE))
-            self.resizeDocks(docks, _SHARES, Qt.Orientation.Horizontal)
+            self.add_panel(CONSOLE, self._console, scroll=False, beside=LOG_TITLE)
+            self.share_out((LOG_TITLE, CONSOLE), _SHARES, Qt.Orientation.Horizontal)
 
     def _connect_all(self) -> None:
         self.stop_requested.connect(self._on_stop_button)

@@ -1,5 +1,6 @@
 """The main window that hosts the GUI components of applications (thesis 5.3.1)."""
 
+from collections.abc import Sequence
 from typing import Final
 
 from PySide6.QtCore import QSettings, Qt, Signal
@@ -16,11 +17,12 @@ from cosmic.frame.gui.top_bar import TopBar
 from cosmic.frame.overrides import override
 
 Area = Qt.DockWidgetArea
+Way = Qt.Orientation
 
 LOG_TITLE: Final = "Log"
 """A click on the message in the bar brings the panel with this title to the front."""
 
-_BOTTOM_LEAST_PX: Final = 24 * STEP_PX
+_BOTTOM_LEAST_PX: Final = 22 * STEP_PX
 
 
 class CosmicServerGui(QMainWindow):
@@ -68,6 +70,7 @@ class CosmicServerGui(QMainWindow):
         self._docks: dict[str, PanelDock] = {}
         self._keys: KeyList = ()
         self._keys_dialog: KeysDialog | None = None
+        self._shares: list[tuple[tuple[str, ...], tuple[int, ...], Way]] = []
         self._restored = False
         self._bar = TopBar(title, stop_key=stop_key)
         self._menus = ServerMenus(self)
@@ -143,6 +146,10 @@ class CosmicServerGui(QMainWindow):
             self.restoreDockWidget(dock)
         return dock
 
+    def share_out(self, titles: Sequence[str], shares: Sequence[int], way: Way) -> None:
+        """Have panels that stand in a row or a column share its length so at a first start."""
+        self._shares.append((tuple(titles), tuple(shares), way))
+
     def set_failed(self, title: str, reason: str) -> None:
         """Grey the panel `title`, say why and offer a rescan."""
         self._docks[title].set_failed(reason)
@@ -194,16 +201,20 @@ class CosmicServerGui(QMainWindow):
         if LOG_TITLE in self._docks:
             self.raise_panel(LOG_TITLE)
 
-    def _size_bottom(self) -> None:
-        """Give log and console a quarter of the height at a first start."""
+    def _size_panels(self) -> None:
+        """Give log and console a sixth of the height, and the others what was asked for."""
         bottom = {
             dock: self.dockWidgetArea(dock) == Area.BottomDockWidgetArea
             for dock in self._docks.values()
         }
-        height = max(_BOTTOM_LEAST_PX, self.height() // 4)
+        height = max(_BOTTOM_LEAST_PX, self.height() // 6)
         # Those above are named, too: Qt shares out anew only among the docks it is given.
         heights = [height if below else self.height() - height for below in bottom.values()]
         self.resizeDocks(list(bottom), heights, Qt.Orientation.Vertical)
+        for titles, shares, way in self._shares:
+            room = self.height() - height if way is Way.Vertical else self.width()
+            lengths = [room * share // sum(shares) for share in shares]
+            self.resizeDocks([self._docks[title] for title in titles], lengths, way)
 
     def _on_theme_requested(self) -> None:
         self.set_theme("light" if self.theme == "dark" else "dark")
@@ -212,7 +223,7 @@ class CosmicServerGui(QMainWindow):
     def showEvent(self, event: QShowEvent) -> None:
         if not self._restored:
             self._restored = True
-            self._size_bottom()
+            self._size_panels()
             self._store.remember_default(self)
             self._store.restore(self)
         super().showEvent(event)
