@@ -217,7 +217,7 @@ def pair(graph: Graph, joint: Joint, half_width: list[float]) -> None:
 def ends_meet(graph: Graph, joint: Joint, half_width: list[float]) -> bool:
     """Return whether two fibres may just lie with their ends on each other, not cross.
 
-    Two short loose ends leave that open, unless what remains is one loop.
+    Short loose ends leave that open, unless what remains is one loop.
     """
     loose = [
         index
@@ -226,7 +226,8 @@ def ends_meet(graph: Graph, joint: Joint, half_width: list[float]) -> bool:
         and graph.branches[index].length < 12.0 * half_width[index]
     ]
     others = [index for index, _ in joint.stubs if index not in loose]
-    return len(loose) >= 2 and len(set(others)) == len(others)
+    least = 1 if len(joint.stubs) == 3 else 2
+    return len(loose) >= least and len(set(others)) == len(others)
 
 
 def judge(joint: Joint, costs: Floats, best: Pairing, unclear: bool) -> None:
