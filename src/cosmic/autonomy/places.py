@@ -20,6 +20,7 @@ from cosmic.vico.api.places import CalibrationShown, Pixel, Places, RotationShow
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.pixel_map import PixelMap
 from cosmic.vico.core.tool_settings import ToolSettings
+from cosmic.vico.core.vision.algorithms import FindTips, FindTools
 from cosmic.vico.core.vision.tool_types import ExpectedTool
 
 logger = logging.getLogger(__name__)
@@ -214,4 +215,9 @@ def _check_axes(tools: Sequence[ToolSettings], axes: Sequence[str]) -> None:
 
 def join_places(vico: VicoApplication, mico: MicoApplication, folder: Path | None) -> None:
     """Have the pixels of ViCo's cameras mean places on the platform; raises `ConfigError`."""
-    vico.places = PlatformPlaces(vico, mico, folder)
+    places = PlatformPlaces(vico, mico, folder)
+    for unit in vico.units.values():
+        for link in map(unit.chain.algorithm, ("tools", "tips")):
+            if isinstance(link, FindTools | FindTips):
+                link.expect = places.expected_tools
+    vico.places = places

@@ -16,6 +16,7 @@ from cosmic.vico.core.recording.snap import save_picture
 from cosmic.vico.core.recording.time_lapse import TimeLapsePlan
 from cosmic.vico.core.recording.video_writer import check_codec
 from cosmic.vico.core.vision.chain import Analysis, Unavailable
+from cosmic.vico.core.vision.tool_tips import TipSeen
 from cosmic.vico.hw.interface import CameraCounters, CameraInfo, CameraRanges, CameraSettings
 
 if TYPE_CHECKING:
@@ -27,6 +28,9 @@ BACKGROUND_FRAMES = 8
 DESCRIPTIONS = {
     "focus": "how sharp the picture is",
     "fibres": "find fibres and measure them",
+    "fibre track": "follow one fibre from picture to picture",
+    "place track": "follow one place from picture to picture",
+    "tools": "measure the ends of grippers and probe",
     "tips": "find the tips of grippers and probe",
 }
 
@@ -55,15 +59,6 @@ class FormatShown:
     suffix: str
     description: str
     problem: str
-
-
-@dataclass(frozen=True, slots=True)
-class TipSeen:
-    """The tip of a tool on a picture; a link named "tips" gives a tuple of these."""
-
-    name: str
-    place_px: Pixel
-    certain: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import cast
+from typing import Final, cast
 
 import cv2
 
@@ -12,10 +12,12 @@ from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.vision.chain import ALGORITHMS, Chain, Results, Unavailable, algorithm
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.fibre_tracking import FibreTracker
-from cosmic.vico.core.vision.tips import find_gripper, find_probe
+from cosmic.vico.core.vision.tool_tips import Expect, find_tool, tip_seen
 from cosmic.vico.core.vision.tool_types import ExpectedTool
 from cosmic.vico.core.vision.tracking import TemplateTracker
 from cosmic.vico.hw.interface import Pixels, Roi
+
+NO_TOOL: Final = "no tool is expected on the picture: calibrate with it, and bring it there"
 
 
 def make_chain(*, off: Iterable[str] = ()) -> Chain:
@@ -152,22 +154,50 @@ class FindTools:
     expected : mapping of str to ExpectedTool
         Where each should be on the next picture, from the stages; replaced whole, by any thread.
         One with a gap is a gripper.
+    expect : callable or None
+        Tells it from each picture instead.
     """
 
     name = "tools"
 
     def __init__(self) -> None:
         self.expected: Mapping[str, ExpectedTool] = MappingProxyType({})
+        self.expect: Expect | None = None
 
     def run(self, picture: Picture, results: Results) -> object:  # noqa: ARG002
         """Find those expected."""
-        expected = self.expected
+        expected = self.expected if self.expect is None else self.expect(picture)
         if not expected:
-            return Unavailable("nobody says where the tools should be")
+            return Unavailable(NO_TOOL if self.expect else "nobody says where the tools should be")
         data = grey(picture.data)
-        return MappingProxyType(
-            {
-                name: (find_gripper if tool.gap_px > 0.0 else find_probe)(data, tool)
-                for name, tool in expected.items()
-            }
-        )
+        return MappingProxyType({name: find_tool(data, tool) for name, tool in expected.items()})
+
+
+@algorithm
+class FindTips:
+    """The tips of grippers and probe in short, for the display; a tuple of `TipSeen`.
+
+    What the link "tools" found on the same picture is taken where it is on.
+
+    Attributes
+    ----------
+    expect : callable or None
+        Tells from a picture where the tools should be on it.
+    """
+
+    name = "tips"
+
+    def __init__(self) -> None:
+        self.expect: Expect | None = None
+
+    def run(self, picture: Picture, results: Results) -> object:
+        """Find those expected."""
+        found = results.get("tools")
+        if not isinstance(found, Mapping):
+            expected = self.expect(picture) if self.expect is not None else {}
+            if not expected:
+                return Unavailable(NO_TOOL)
+            data = grey(picture.data)
+            found = {name: find_tool(data, tool) for name, tool in expected.items()}
+        seen = (tip_seen(name, each) for name, each in found.items())
+        return tuple(each for each in seen if each is not None)

@@ -1,0 +1,41 @@
+"""What machine vision says about the tips of grippers and probe, in short."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.vision.tips import find_gripper, find_probe
+from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen, ToolEnd
+from cosmic.vico.hw.interface import Pixels
+
+Expect = Callable[[Picture], Mapping[str, ExpectedTool]]
+Found = GripperTips | ToolEnd | NotSeen
+
+
+@dataclass(frozen=True, slots=True)
+class TipSeen:
+    """The tip of a tool on a picture.
+
+    Attributes
+    ----------
+    place_px : (float, float)
+        Of a gripper the middle between its jaws' inner corners.
+    certain : bool
+        It can be relied on; what the link "tools" gives says why not.
+    """
+
+    name: str
+    place_px: tuple[float, float]
+    certain: bool
+
+
+def find_tool(image: Pixels, expected: ExpectedTool) -> Found:
+    """Return the tip of a gripper, or of what has no gap."""
+    return (find_gripper if expected.gap_px > 0.0 else find_probe)(image, expected)
+
+
+def tip_seen(name: str, found: object) -> TipSeen | None:
+    """Return what was found in short; None where nothing was."""
+    if isinstance(found, GripperTips):
+        return TipSeen(name, found.hold_px, found.certain)
+    return TipSeen(name, found.tip_px, found.certain) if isinstance(found, ToolEnd) else None
