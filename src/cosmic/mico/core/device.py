@@ -61,13 +61,15 @@ class Device(WorkerThread):
     Signals
     -------
     position_changed(PositionChanged), state_changed(PositionerState),
-    movement_ended(MovementEnded), movement_refused(MoveVerdict), lost(DeviceLost)
+    movement_begun(MovementBegun), movement_ended(MovementEnded), movement_refused(MoveVerdict),
+    lost(DeviceLost)
     """
 
     may_wait = False
 
     position_changed = Signal(object)
     state_changed = Signal(object)
+    movement_begun = Signal(object)
     movement_ended = Signal(object)
     movement_refused = Signal(object)
     lost = Signal(object)
@@ -103,6 +105,7 @@ class Device(WorkerThread):
             on_finished=self._emit_finished,
             on_failed=self._emit_failed,
             on_state=self._emit_state,
+            on_begun=self.movement_begun.emit,
         )
         self._introduction = Introduction(self._context)
         container.observe(lambda event, _state: self._inbox.put(event))

@@ -13,6 +13,7 @@ from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.core.data_container import DeviceDataContainer
 from cosmic.mico.core.gate import Gate
 from cosmic.mico.core.jog import JogRun
+from cosmic.mico.core.messages import MovementBegun
 from cosmic.mico.core.orders import Grant, Jog, Order, Step
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.core.settings import MicoSettings
@@ -78,6 +79,10 @@ class Flight:
         return patience_s
 
 
+def _nobody(_begun: MovementBegun) -> None:
+    """Hear of a movement where nobody listens."""
+
+
 @dataclass(slots=True)
 class PilotContext:
     """What the pilots of one device share."""
@@ -91,6 +96,7 @@ class PilotContext:
     on_finished: Callable[[str, float | None], None]
     on_failed: Callable[[str, CosmicError], None]
     on_state: Callable[[int], None]
+    on_begun: Callable[[MovementBegun], None] = _nobody
     poll_s: float = 0.05
 
 

@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 
 from cosmic.frame.errors import CosmicError, DeviceError
+from cosmic.frame.units import AxisUnit
 from cosmic.mico.core.movement import Movement
+from cosmic.mico.core.orders import Motion
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +21,31 @@ class PositionChanged:
     name: str
     position: float
     unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class MovementBegun:
+    """A movement that the gate allowed was sent to the controller.
+
+    Attributes
+    ----------
+    from_position : float or None
+        Where the axis stood, or was, as it was last read; in gate coordinates and `unit`.
+    target : float or None
+        Where a movement to a position goes.
+    time_s : float
+        Platform time.
+    source : str
+        Where it came from: "window", "key", "script" ...
+    """
+
+    name: str
+    motion: Motion
+    from_position: float | None
+    target: float | None
+    unit: AxisUnit
+    time_s: float
+    source: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from cosmic.mico.core.flight import Flight
 from cosmic.mico.core.follower import ChannelFollower
 from cosmic.mico.core.gate import Request
 from cosmic.mico.core.jog import SLOWER, JogRun
+from cosmic.mico.core.messages import MovementBegun
 from cosmic.mico.core.orders import (
     FREQUENCY_HZ,
     Grant,
@@ -111,6 +112,7 @@ class ChannelPilot(ChannelFollower):
 
     def _tell_begun(self, order: Order, replaced: Flight | None) -> None:
         """Tell everybody that `order` was sent, and that it ended the one before."""
+        state = self._positioner.state
         failed = self.flight is not None and self.flight.error is not None
         error = self._positioner.state.error if failed else ""
         self._context.container.update(self._address.channel, in_motion=True, error=error)
@@ -122,6 +124,18 @@ class ChannelPilot(ChannelFollower):
                 replaced.order.movement.fail(over)
                 self._context.on_failed(self.name, over)
         logger.info("%s: %s (%s)", self.name, order.motion, order.source)
+        if self.flight is not None:
+            self._context.on_begun(
+                MovementBegun(
+                    name=self.name,
+                    motion=order.motion,
+                    from_position=state.position,
+                    target=self.flight.grant.target,
+                    unit=state.unit,
+                    time_s=self.flight.started_s,
+                    source=order.source,
+                )
+            )
         self._announce()
 
     def _send(self, motion: Motion, grant: Grant) -> None:

@@ -1,0 +1,171 @@
+"""Named poses: where some axes stand, under a name, kept in a readable file."""
+
+import logging
+import math
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from threading import RLock
+from typing import Final
+
+from cosmic.frame.config import read_toml
+from cosmic.frame.errors import ConfigError, NotAvailable
+
+logger = logging.getLogger(__name__)
+
+NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_. -]{0,79}", re.ASCII)
+HEAD: Final = (
+    "# Named poses: where axes stand, um (deg of a rotary axis), as the gate counts them.\n"
+)
+_BARE: Final = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where some axes stand, in gate coordinates and the unit of each."""
+
+    name: str
+    positions: Mapping[str, float]
+
+
+def check_pose_name(name: str) -> str:
+    """Return `name`; raises `NotAvailable` where it is none for a pose."""
+    if not NAME.fullmatch(name) or name != name.strip():
+        raise NotAvailable(
+            f"{name[:80]!r} is no name of a pose: up to 80 letters, digits, spaces and . - _"
+        )
+    return name
+
+
+class PoseBook:
+    """The named poses of a platform; any thread.
+
+    Parameters
+    ----------
+    path : Path or None
+        The file; None keeps them in memory. It is made with the first pose.
+
+    Raises
+    ------
+    ConfigError
+        The file is there and wrong.
+    """
+
+    def __init__(self, path: Path | None = None) -> None:
+        self._path = path
+        self._guard = RLock()
+        self._poses = read_poses(path) if path is not None and path.exists() else {}
+
+    @property
+    def path(self) -> Path | None:
+        """The file they are kept in; None while they are kept in memory only."""
+        return self._path
+
+    @property
+    def poses(self) -> dict[str, Pose]:
+        """All poses by name, in the order of the file."""
+        with self._guard:
+            return dict(self._poses)
+
+    def __getitem__(self, name: str) -> Pose:
+        poses = self.poses
+        if name not in poses:
+            known = ", ".join(poses) or "none"
+            raise NotAvailable(f"there is no pose {name!r}; known poses: {known}")
+        return poses[name]
+
+    def put(self, pose: Pose) -> None:
+        """Keep a pose, in the place of one of the same name.
+
+        Where the file cannot be written all poses stay in memory, and `path` is None from then on.
+
+        Raises
+        ------
+        NotAvailable
+            The name is none, or there is no axis to go to.
+        """
+        check_pose_name(pose.name)
+        if not pose.positions:
+            raise NotAvailable(f"the pose {pose.name!r} has no axis to go to")
+        with self._guard:
+            self._poses[pose.name] = pose
+            self._write(pose.name)
+
+    def remove(self, name: str) -> None:
+        """Forget a pose; raises `NotAvailable` where there is none."""
+        with self._guard:
+            self[name]
+            del self._poses[name]
+            self._write(name)
+
+    def _write(self, name: str) -> None:
+        """Write what became of one pose; the rest of the file stays as the user left it."""
+        path = self._path
+        if path is None:
+            return
+        part = path.with_name(f"{path.name}.part")
+        try:
+            text = path.read_text(encoding="utf-8") if path.exists() else HEAD
+            part.write_text(_replaced(text, name, self._poses.get(name)), encoding="utf-8")
+            part.replace(path)
+        except (OSError, UnicodeDecodeError) as exc:
+            self._path = None
+            logger.warning("%s cannot be written (%s): poses are kept in memory only", path, exc)
+
+
+def read_poses(path: Path) -> dict[str, Pose]:
+    """Return the poses in a file; raises `ConfigError`."""
+    poses: dict[str, Pose] = {}
+    for name, table in read_toml(path).items():
+        if not NAME.fullmatch(name) or not isinstance(table, dict) or not table:
+            raise ConfigError(f"{path}: {name}: is no pose: [name] and a position for each axis")
+        for axis, value in table.items():
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not number or not math.isfinite(value):
+                raise ConfigError(f"{path}: {name}.{axis}: {value!r} is no position")
+        poses[name] = Pose(name, {axis: float(value) for axis, value in table.items()})
+    return poses
+
+
+def _replaced(text: str, name: str, pose: Pose | None) -> str:
+    """Return `text` with the section of one pose replaced, added, or taken out."""
+    before, inside, after = _parted(text.splitlines(), name)
+    comments = [line for line in inside if line.lstrip().startswith("#")]
+    section: list[str] = []
+    if pose is not None:
+        if before and before[-1].strip() and not inside:
+            before.append("")
+        section = [f"[{_key(name)}]", *comments]
+        section += [f"{_key(axis)} = {float(f'{v:.4f}')}" for axis, v in pose.positions.items()]
+        if after:
+            section.append("")
+    return "\n".join([*before, *section, *after]) + "\n"
+
+
+def _parted(lines: list[str], name: str) -> tuple[list[str], list[str], list[str]]:
+    """Return what stands before, in and after the section of a pose."""
+    before: list[str] = []
+    inside: list[str] = []
+    after: list[str] = []
+    place = before
+    for line in lines:
+        if line.lstrip().startswith("["):
+            if _section(line) == name:
+                place = inside
+            elif place is inside:
+                place = after
+        place.append(line)
+    return before, inside, after
+
+
+def _section(line: str) -> str:
+    try:
+        return next(iter(tomllib.loads(line)), "")
+    except tomllib.TOMLDecodeError:
+        return ""
+
+
+def _key(name: str) -> str:
+    return name if _BARE.fullmatch(name) else f'"{name}"'

@@ -1,0 +1,1 @@
+"""Trajectories: movements as readable text, checked and rehearsed before they are made."""

@@ -1,0 +1,38 @@
+"""What platform.toml says about trajectories."""
+
+from collections import Counter
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from cosmic.frame.config import StrictModel
+
+Pair = Annotated[tuple[str, str], Field(strict=False)]
+
+
+class MirrorSettings(StrictModel):
+    """Which axes correspond to each other in the two assemblies that face each other.
+
+    An axis without counterpart, such as a table between them, is paired with itself.
+    """
+
+    pairs: Annotated[tuple[Pair, ...], Field(strict=False)] = ()
+    reversed: Annotated[tuple[str, ...], Field(strict=False)] = ()
+
+    def partners(self) -> dict[str, str]:
+        """Return the counterpart of each axis."""
+        return dict(self.pairs) | {second: first for first, second in self.pairs}
+
+    @model_validator(mode="after")
+    def _once_each(self) -> Self:
+        counts = Counter(name for pair in self.pairs for name in set(pair))
+        twice = [name for name, count in counts.items() if count > 1]
+        if twice:
+            raise ValueError(f"{twice[0]} stands in two pairs")
+        partners = self.partners()
+        for name in self.reversed:
+            if name not in partners:
+                raise ValueError(f"reversed: {name} stands in no pair")
+            if partners[name] not in self.reversed:
+                raise ValueError(f"reversed: name {partners[name]} too, which mirrors {name}")
+        return self
