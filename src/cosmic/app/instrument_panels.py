@@ -10,8 +10,10 @@ from cosmic.vico.gui.vico_gui import VicoGui
 
 DAQCO: Final = "DAQCo"
 LENS: Final = "Lens and light"
-_SHARES: Final = [2, 1]
-"""How picture and force share their column."""
+_SHARES: Final = [1, 1]
+"""How scene and force share their column."""
+_ABOVE_LENS: Final = [3, 1]
+"""How picture and lens share theirs."""
 _WITH_LENS: Final = [3, 1]
 """How picture and lens share the width where they stand alone."""
 
@@ -24,7 +26,7 @@ def add_instruments(
     *,
     low: bool,
 ) -> str:
-    """Put picture and force between the actuators and the scene, the lens below the scene.
+    """Put the picture between the actuators and the scene, lens and force below these two.
 
     Parameters
     ----------
@@ -45,12 +47,12 @@ def add_instruments(
     if first and scene:
         window.splitDockWidget(window.dock(first), window.dock(scene), Qt.Orientation.Horizontal)
     if force is not None:
-        _add_force(window, force, first or scene, low=low)
+        _add_force(window, force, first or scene if low else scene or first, low=low)
+    if first and pictures is not None:
+        _add_lens(window, pictures, first, scene, low=low)
     # Only now, for a dock that has tabs cannot be divided any more.
     for view in views[1:]:
         window.add_panel(view.windowTitle(), view, scroll=False, beside=first, tabbed=True)
-    if first and pictures is not None:
-        _add_lens(window, pictures, first, scene, low=low)
     for title in (scene, first):
         if title:
             window.dock(title).raise_()
@@ -66,8 +68,11 @@ def _add_force(window: CosmicServerGui, gui: UDaqMainWidget, above: str, *, low:
 
 
 def _add_lens(window: CosmicServerGui, gui: VicoGui, first: str, scene: str, *, low: bool) -> None:
-    if scene:
-        window.add_panel(LENS, gui.lens, below=scene, tabbed=low)
-        return
-    window.add_panel(LENS, gui.lens, beside=first)
-    window.share_out((first, LENS), _WITH_LENS, Qt.Orientation.Horizontal)
+    if low and scene:
+        window.add_panel(LENS, gui.lens, beside=scene, tabbed=True)
+    elif scene:
+        window.add_panel(LENS, gui.lens, below=first)
+        window.share_out((first, LENS), _ABOVE_LENS, Qt.Orientation.Vertical)
+    else:
+        window.add_panel(LENS, gui.lens, beside=first)
+        window.share_out((first, LENS), _WITH_LENS, Qt.Orientation.Horizontal)

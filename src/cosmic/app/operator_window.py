@@ -39,7 +39,7 @@ SCENE: Final = "Scene"
 
 NO_ECM: Final = f"{NO_COLLISION_MODEL}; name a scene in the platform file"
 
-_WITH_PICTURE: Final = [10, 12, 6]
+_WITH_PICTURE: Final = [5, 5, 4]
 _SHARES: Final = [3, 2]
 """How panels beside each other share the width at a first start."""
 
