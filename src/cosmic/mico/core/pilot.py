@@ -22,8 +22,10 @@ from cosmic.mico.core.orders import (
     MoveTo,
     Order,
     Reference,
+    Steer,
 )
 from cosmic.mico.core.rules import malformed
+from cosmic.mico.core.steer import SteerRun
 
 logger = logging.getLogger(__name__)
 
@@ -123,7 +125,9 @@ class ChannelPilot(ChannelFollower):
                 over = MoveCancelled(f"{self.name}: replaced by a newer command")
                 replaced.order.movement.fail(over)
                 self._context.on_failed(self.name, over)
-        logger.info("%s: %s (%s)", self.name, order.motion, order.source)
+        # What goes on from an order told already would fill the log.
+        level = logging.INFO if order.follows is None else logging.DEBUG
+        logger.log(level, "%s: %s (%s)", self.name, order.motion, order.source)
         if self.flight is not None:
             self._context.on_begun(
                 MovementBegun(
@@ -172,12 +176,25 @@ class ChannelPilot(ChannelFollower):
         if flight is not None and flight.jog is not None and flight.order.number == order_number:
             flight.jog.renew()
 
+    def steer(self, order_number: int, velocity: float) -> bool:
+        """Say how fast a steered axis is to go; True if the thread should look. Any thread."""
+        flight = self.flight
+        if flight is None or flight.order.number != order_number:
+            return False
+        return isinstance(flight.jog, SteerRun) and flight.jog.steer(velocity)
+
+    def _jog_run(self, motion: Jog) -> JogRun:
+        settings, top_speed = self._context.settings, self._top_speed()
+        if isinstance(motion, Steer):
+            return SteerRun(motion, settings, top_speed, self._context.clock.rate or 1.0)
+        return JogRun(motion, settings, top_speed)
+
     def _start_jog(self, order: Order, motion: Jog) -> None:
         senseless = malformed(motion, self._positioner.state)
         if senseless is not None:
             self.turn_away(order, senseless)
             return
-        jog = JogRun(motion, self._context.settings, self._top_speed())
+        jog = self._jog_run(motion)
         jog.slow_down(self._free_share(order, jog))
         packet = jog.packet(self._positioner.state, self._context.clock.now_s())
         if packet is None:
@@ -215,7 +232,8 @@ class ChannelPilot(ChannelFollower):
         if not self._context.gate.still_valid(flight.grant):
             self.halt(refusal(_stopped(self.name)))
             return
-        if jog.slow_down(self._free_share(flight.order, jog)):
+        jog.follow_hand()
+        if jog.must_look() and jog.slow_down(self._free_share(flight.order, jog)):
             self._quietly(lambda: self._limit_jog_speed(jog.speed))
         packet = jog.packet(self._positioner.state, now_s)
         if packet is None:
@@ -227,6 +245,8 @@ class ChannelPilot(ChannelFollower):
             self._give_back(before)
             self._send(packet, grant)
             flight.progress_s = now_s
+            if isinstance(jog, SteerRun) and jog.must_locate():
+                self.ask_position()
 
 
 def _stopped(name: str) -> MoveVerdict:
