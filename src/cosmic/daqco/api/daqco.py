@@ -6,6 +6,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from PySide6.QtCore import Qt
+
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.core.chunk import DataChunk
@@ -47,7 +49,10 @@ class Daqco:
         self._application = application
         self._recorder = application.recorder
         self._listeners: tuple[Callable[[], object], ...] = ()
-        application.status_changed.connect(self._tell)
+        # At once and by a function that keeps this object: a call that still waits in a queue when
+        # a plain object goes would reach what is no more.
+        direct = Qt.ConnectionType.DirectConnection
+        application.status_changed.connect(lambda: self._tell(), direct)
         self._recorder.on_change(self._tell)
         application.guard.subscribe(self._on_crossing)
 
