@@ -92,6 +92,7 @@ class Device(WorkerThread):
         self._inbox: SimpleQueue[_Message] = SimpleQueue()
         self._intake = Lock()
         self._open = False
+        self._nudged = False
         self._newest: dict[int, int] = {}
         self._void: dict[int, int] = {}
         self._shown: dict[int, PositionerState] = {}
@@ -151,6 +152,13 @@ class Device(WorkerThread):
         pilot = self._pilots.get(order.channel)
         if pilot is not None:
             pilot.renew(order.number)
+
+    def steer_jog(self, order: Order, velocity: float) -> None:
+        """Keep the movement started by `order` alive at a signed speed; only the newest counts."""
+        pilot = self._pilots.get(order.channel)
+        if pilot is not None and pilot.steer(order.number, velocity) and not self._nudged:
+            self._nudged = True
+            self._inbox.put(Wake())
 
     def halt(self, channel: int, why: str) -> None:
         """Stop one channel past every queue; its movement fails with `MoveCancelled`."""
@@ -245,10 +253,11 @@ class Device(WorkerThread):
         moving = any(pilot.flight is not None for pilot in self._pilots.values())
         if not moving:
             return self._settings.watch.idle_poll_s
-        jogging = any(pilot.flight and pilot.flight.jog for pilot in self._pilots.values())
-        if jogging:
+        flights = [pilot.flight for pilot in self._pilots.values()]
+        jogs = [flight.jog for flight in flights if flight is not None and flight.jog is not None]
+        if jogs:
             rate = self._context.clock.rate or 1.0
-            return max(0.002, 0.2 * self._settings.jog.packet_s / rate)
+            return max(0.002, min(jog.pause_s for jog in jogs) / rate)
         return self._context.poll_s
 
     def _guarded(self, action: Callable[[], None]) -> None:
@@ -272,7 +281,7 @@ class Device(WorkerThread):
             case Halt() | SetFrequency():
                 self._on_channel_message(message)
             case Wake():
-                pass
+                self._nudged = False
             case Tell():
                 self._emit_state(message.channel)
             case _:

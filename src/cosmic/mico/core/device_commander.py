@@ -17,6 +17,7 @@ from cosmic.mico.core.orders import (
     MoveTo,
     Order,
     Reference,
+    Steer,
     Step,
     ToEndStop,
 )
@@ -58,6 +59,7 @@ class DeviceCommander(QObject):
 
     order_issued = Signal(object)
     jog_renewed = Signal(object)
+    jog_steered = Signal(object, float)
     halt_requested = Signal(int, str)
     frequency_requested = Signal(int, int)
     position_changed = Signal(object)
@@ -131,6 +133,15 @@ class DeviceCommander(QObject):
         """Keep the jog begun by `order` alive."""
         self.jog_renewed.emit(order)
 
+    def steer(self, channel: int, velocity: float, *, dead_man_s: float) -> Order:
+        """Begin to move at a signed speed that `steer_on` changes; it ends when that stays away."""
+        direction = 1 if velocity > 0.0 else -1
+        return self._issue(channel, Steer(direction, abs(velocity), dead_man_s), consent=False)
+
+    def steer_on(self, order: Order, velocity: float) -> None:
+        """Keep the movement begun by `steer` alive at `velocity`; only the newest counts."""
+        self.jog_steered.emit(order, velocity)
+
     def stop(self, channel: int, why: str = "stopped") -> None:
         """Stop one channel; nothing is latched."""
         self.halt_requested.emit(channel, why)
@@ -171,6 +182,7 @@ def join(device: Device, commander: DeviceCommander, kind: CommanderType) -> Non
         pairs += [
             (commander.order_issued, device.submit),
             (commander.jog_renewed, device.renew_jog),
+            (commander.jog_steered, device.steer_jog),
             (commander.halt_requested, device.halt),
             (commander.frequency_requested, device.set_frequency),
         ]

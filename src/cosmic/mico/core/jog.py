@@ -37,6 +37,18 @@ class JogRun:
         """Speed now, in the axis' unit per second, or Hz without a sensor."""
         return self._share * self._jog.speed
 
+    @property
+    def pause_s(self) -> float:
+        """How long may pass before somebody looks whether a packet is due."""
+        return 0.2 * self._settings.jog.packet_s
+
+    def follow_hand(self) -> None:
+        """Take over what is wanted now; a plain jog keeps its speed."""
+
+    def must_look(self) -> bool:
+        """Return True when the way ahead must be looked at before the next packet."""
+        return True
+
     def slow_down(self, share: float) -> bool:
         """Go at `share` of the speed asked for; returns True when that is a change."""
         changed = share != self._share

@@ -49,6 +49,16 @@ class Jog:
 
 
 @dataclass(frozen=True, slots=True)
+class Steer(Jog):
+    """A jog whose speed and direction follow somebody's hand; ends `dead_man_s` after it is lost.
+
+    The dead-man time counts on the wall clock.
+    """
+
+    dead_man_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class Calibrate:
     """Calibrate the sensor; sweeps several millimetres both ways."""
 
@@ -70,6 +80,7 @@ MOTION_WORDS: Final[dict[type, str]] = {
     MoveBy: "a distance to go",
     Step: "making steps",
     Jog: "jogging",
+    Steer: "steering",
     Calibrate: "calibrating a sensor",
     Reference: "finding a reference",
     ToEndStop: "driving to an end stop",
