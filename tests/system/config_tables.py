@@ -13,9 +13,9 @@ from cosmic.daqco.core.settings import (
     LimitSettings,
     ScaleSettings,
 )
+from cosmic.mico.core.sequence.settings import InitialisationSettings, StepSettings
 from cosmic.mico.core.settings import (
     GroupSettings,
-    InitialisationSettings,
     JogSettings,
     MicoSettings,
     MotionDefaults,

@@ -115,7 +115,8 @@ def test_the_shipped_scene_is_ok(folder: Path, capsys: pytest.CaptureFixture[str
 def test_a_mistake_in_the_scene_is_named(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = folder / "scenes" / "fiberstation.toml"
     edit(folder / "platform.toml", 'name = "left.x"', 'name = "left.q"')
-    edit(folder / "platform.toml", '["left.x", "right.x"]', '["left.q", "right.x"]')
+    for _ in "reference", "move":
+        edit(folder / "platform.toml", '["left.x", "right.x"]', '["left.q", "right.x"]')
     edit(folder / "platform.toml", '"left.x"', '"left.q"')
     assert main(["scene", "check", str(folder / "scenes" / "nothing.toml")]) == 1
     assert "nothing.toml" in complaints(capsys)[0]

@@ -7,7 +7,7 @@ from unit.mico.rigs import mico, wait_until
 
 @pytest.mark.defects
 def test_a_defect_in_a_long_operation_ends_it_and_stops_everything(monkeypatch):
-    def broken(manager):
+    def broken(manager, **how):
         raise RuntimeError("defect")
 
     monkeypatch.setattr(initialisation, "plan", broken)

@@ -200,7 +200,8 @@ def test_initialise_references_in_the_configured_order_and_takes_the_start_pose(
     def power_up(controller):
         controller.known = False
 
-    order = {"order": [["d0.c1"], ["d0.c0"]]}
+    steps = [("reference", "d0.c1"), ("reference", "d0.c0"), ("move", "d0.c0"), ("move", "d0.c1")]
+    order = {"step": [{"do": do, "axes": [name]} for do, name in steps]}
     seen = []
     with mico(prepare=power_up, initialisation=order) as (rig, controller):
         rig.initialise(progress=seen.append)

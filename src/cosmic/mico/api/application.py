@@ -13,7 +13,7 @@ from cosmic.frame.errors import CosmicError, DeviceError, MoveRefused, NotAvaila
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.task import Task
 from cosmic.frame.task_application import TaskApplication
-from cosmic.mico.api import initialisation
+from cosmic.mico.api.initialisation import Confirm, InitialisationRun
 from cosmic.mico.api.ways import Way, follow, way_from_plan
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT, CollisionChecker
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
@@ -36,6 +36,8 @@ class MicoApplication(TaskApplication):
     -------
     way_found(Way), way_missing(MoveVerdict)
         How `search_way` ended.
+    initialisation_changed(SequenceReport)
+        The initialisation sequence is further; in the application's thread.
     status_changed()
         Devices came or went, or MiCo failed.
     """
@@ -43,6 +45,7 @@ class MicoApplication(TaskApplication):
     rescanned = Signal()
     way_found = Signal(object)
     way_missing = Signal(object)
+    initialisation_changed = Signal(object)
 
     def __init__(
         self,
@@ -104,15 +107,26 @@ class MicoApplication(TaskApplication):
         if self.clearance_watch is not None:
             self.clearance_watch.start()
 
-    def initialise_platform(self) -> Task:
-        """Find the reference of every axis in the configured order; returns at once.
+    def initialise_platform(
+        self, *, skip_known: bool = False, confirm: Confirm | None = None
+    ) -> Task:
+        """Carry the initialisation sequence out; returns at once.
+
+        `initialisation_changed` tells how far it is; the arguments are those of
+        `Mico.initialise`.
 
         Raises
         ------
         NotAvailable
             Another long operation is under way.
         """
-        return self.begin("Initialisation", lambda task: initialisation.run(self.manager, task))
+        run = InitialisationRun(
+            self.manager,
+            skip_known=skip_known,
+            confirm=confirm,
+            on_report=self.initialisation_changed.emit,
+        )
+        return self.begin("Initialisation", run.run)
 
     def rescan(self) -> Task:
         """Look again for the hardware; returns at once.

@@ -16,6 +16,7 @@ from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.entry import Number, as_number
 from cosmic.mico.api.group import GroupMovement, waited_for
+from cosmic.mico.api.initialisation import Confirm
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
@@ -102,9 +103,16 @@ class Mico:
         return len(self.names)
 
     def initialise(
-        self, progress: Callable[[Progress], None] | None = None, *, wait: bool = True
+        self,
+        progress: Callable[[Progress], None] | None = None,
+        *,
+        wait: bool = True,
+        skip_known: bool = False,
+        confirm: Confirm | None = None,
     ) -> Task:
-        """Find the reference of every axis in the configured order, then go to the start pose.
+        """Carry out the initialisation sequence of the platform file, step by step.
+
+        Starting it is the consent to move axes whose position is unknown.
 
         Parameters
         ----------
@@ -112,15 +120,21 @@ class Mico:
             Called with each `Progress`.
         wait : bool
             False returns at once; the task has `progress`, `cancel` and `wait`.
+        skip_known : bool
+            Leave out of the steps that find positions those axes whose position is known.
+        confirm : callable
+            Called with the text of a step that asks; True goes on. Without one the answer is no.
 
         Raises
         ------
         NotAvailable
             Another long operation is under way.
         CosmicError
-            An axis failed or was stopped; the others were stopped with it.
+            A step failed, was refused, stopped or answered with no; the text says which and what
+            to do. What moved with it was stopped, and no further step is made.
         """
-        return self._follow(self._application.initialise_platform(), progress, wait=wait)
+        task = self._application.initialise_platform(skip_known=skip_known, confirm=confirm)
+        return self._follow(task, progress, wait=wait)
 
     def rescan(
         self, progress: Callable[[Progress], None] | None = None, *, wait: bool = True

@@ -151,13 +151,6 @@ class GroupSettings(StrictModel):
     positioners: Names
 
 
-class InitialisationSettings(StrictModel):
-    """The safe order in which axes are referenced; a group moves at once, one after another."""
-
-    order: Annotated[tuple[Names, ...], Field(strict=False)] = ()
-    go_to_start: bool = True
-
-
 class MicoSettings(StrictModel):
     """Section ``[mico]`` of platform.toml."""
 
@@ -183,6 +176,11 @@ class MicoSettings(StrictModel):
         if wrong:
             raise ValueError("; ".join(wrong))
         return self
+            *misfits(
+                self.initialisation.step,
+                {each.name: each.kind for each in self.positioner},
+                tuple(group.title for group in self.group),
+            ),
 
     def _keys(self) -> list[str]:
         keys = [key for each in self.positioner for key in (each.forward_key, each.backward_key)]
@@ -209,7 +207,6 @@ class MicoSettings(StrictModel):
     def _unknown_names(self) -> list[str]:
         known = {each.name for each in self.positioner}
         used = [(f"group {group.title!r}", group.positioners) for group in self.group]
-        used += [("initialisation.order", names) for names in self.initialisation.order]
         return [
             f"{where}: there is no positioner {name!r}"
             for where, names in used

@@ -1,0 +1,1 @@
+"""The initialisation sequence as data: what is configured, and what it comes to."""

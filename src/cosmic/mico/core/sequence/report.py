@@ -1,0 +1,37 @@
+"""How far the initialisation sequence is, as frozen data for whoever shows it."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class StepState(StrEnum):
+    """What became of a step."""
+
+    WAITING = "waiting"
+    RUNNING = "running"
+    DONE = "done"
+    SKIPPED = "skipped"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class StepReport:
+    """One step: what it does, what became of it, and what there is to say about that."""
+
+    title: str
+    state: StepState
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceReport:
+    """All steps of a sequence in their order.
+
+    Attributes
+    ----------
+    question : str
+        What the operator is asked; empty while nobody is asked anything.
+    """
+
+    steps: tuple[StepReport, ...]
+    question: str = ""
