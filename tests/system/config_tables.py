@@ -22,6 +22,7 @@ from cosmic.mico.core.settings import (
     PositionerSettings,
     WatchSettings,
 )
+from cosmic.mico.core.trajectory.settings import MirrorSettings
 from cosmic.twin.force_settings import (
     ContactSettings,
     FibreSettings,
@@ -53,6 +54,8 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[mico.jog]": JogSettings,
     "[mico.watch]": WatchSettings,
     "[mico.initialisation]": InitialisationSettings,
+    "[[mico.initialisation.step]]": StepSettings,
+    "[mico.mirror]": MirrorSettings,
     "[[mico.group]]": GroupSettings,
     "[[mico.positioner]]": PositionerSettings,
     "[daqco]": DaqcoSettings,

@@ -8,6 +8,8 @@ from pydantic import Field, model_validator
 
 from cosmic.frame.config import StrictModel
 from cosmic.frame.units import AxisUnit
+from cosmic.mico.core.sequence.settings import InitialisationSettings, misfits
+from cosmic.mico.core.trajectory.settings import MirrorSettings
 from cosmic.mico.hw.interface import Channel, PositionerKind
 
 Range = Annotated[tuple[float, float], Field(strict=False)]
@@ -161,6 +163,8 @@ class MicoSettings(StrictModel):
     jog: JogSettings = JogSettings()
     watch: WatchSettings = WatchSettings()
     initialisation: InitialisationSettings = InitialisationSettings()
+    poses: str = "poses.toml"
+    mirror: MirrorSettings = MirrorSettings()
     positioner: Annotated[tuple[PositionerSettings, ...], Field(strict=False)]
     group: Annotated[tuple[GroupSettings, ...], Field(strict=False)] = ()
 
@@ -172,15 +176,15 @@ class MicoSettings(StrictModel):
             *self._twice("key", self._keys()),
             *self._twice("serial", [str(serial) for serial in self.serials]),
             *self._unknown_names(),
-        ]
-        if wrong:
-            raise ValueError("; ".join(wrong))
-        return self
             *misfits(
                 self.initialisation.step,
                 {each.name: each.kind for each in self.positioner},
                 tuple(group.title for group in self.group),
             ),
+        ]
+        if wrong:
+            raise ValueError("; ".join(wrong))
+        return self
 
     def _keys(self) -> list[str]:
         keys = [key for each in self.positioner for key in (each.forward_key, each.backward_key)]
