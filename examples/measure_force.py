@@ -38,6 +38,7 @@ def be_stopped(rig: cosmic.Rig) -> None:
     print(f"crossed: {limit.crossed}, after {limit.reaction_ms:.0f} ms")
     rig.reset_stop()
     probe.move_to(-4900.0)
+    rig.daqco.reset_limit("force")  # until then it stays told that it was crossed
 
 
 def main() -> None:
