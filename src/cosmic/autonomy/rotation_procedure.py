@@ -59,7 +59,7 @@ class RotationProcedure:
                 fit = self._measure(task, begun)
             finally:
                 self._mover.go_back(task, self._source)
-            now = datetime.now(UTC)
+            now = datetime.now(UTC).replace(microsecond=0)
             self._calibrations.set_rotation(self._camera, RotationCentre(self._axis, fit, now))
             x_um, y_um = fit.centre_um
             text = f"x {x_um:.1f}, y {y_um:.1f} µm, known to {fit.std_um:.1f} µm"

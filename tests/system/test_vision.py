@@ -1,0 +1,381 @@
+"""The whole simulated platform seen by its cameras, checked against what the twin knows."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from shutil import copytree
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import cosmic
+from cosmic.app import platform as platform_module
+from cosmic.frame.config import shipped_config_dir
+from cosmic.frame.errors import MoveCancelled
+from cosmic.twin.scene import Scene
+from cosmic.vico.core.camera_thread import CameraThread
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.recording.reading import open_picture_recording
+from cosmic.vico.hw.interface import CameraLibrary, Roi
+from cosmic.vico.hw.sim_camera_library import SimulatedCameraLibrary
+from unit.mico.rigs import wait_until
+
+Floats = npt.NDArray[np.float64]
+
+NEAR_UM = 5.0
+HEIGHT_UM = 50.0
+
+
+@dataclass
+class Lab:
+    """A rig, and what only its twin knows."""
+
+    rig: cosmic.Rig
+    scene: Scene
+    cameras: SimulatedCameraLibrary
+
+    @property
+    def now_s(self) -> float:
+        return self.scene.clock.now_s()
+
+    def tip_px(self, what: str = "right", roi: Roi | None = None) -> Floats:
+        """Where the tip truly lies in the picture now."""
+        optics = self.scene.optics
+        assert optics is not None
+        tip = self.scene.tips(self.now_s)[f"{what}.hold"]
+        low = (tip[0], tip[1], tip[2] - 10.0)  # the fibre is held above the jaws' lower edges
+        return optics.world_to_picture_px(low, self.now_s, roi)
+
+    def fibre_um(self, length_um: float) -> Floats:
+        """The true line of the fibre of that length."""
+        optics = self.scene.optics
+        assert optics is not None
+        return min(
+            optics.centre_lines_um(self.now_s), key=lambda line: abs(length(line) - length_um)
+        )
+
+
+def length(line: Floats) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The shipped platform, with a folder for what is calibrated."""
+    folder = tmp_path_factory.mktemp("vision")
+    copytree(shipped_config_dir(), folder, dirs_exist_ok=True)
+    file = folder / "platform.toml"
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text.replace('calibration = ""', 'calibration = "measured"'), encoding="utf-8")
+    return file
+
+
+@pytest.fixture(scope="module")
+def lab(config: Path) -> Iterator[Lab]:
+    scenes: list[Scene] = []
+    libraries: list[CameraLibrary] = []
+    real_scene, real_library = Scene.from_settings, platform_module.make_camera_library
+
+    def scene(*args: Any, **kwargs: Any) -> Scene:
+        scenes.append(real_scene(*args, **kwargs))
+        return scenes[-1]
+
+    def library(*args: Any, **kwargs: Any) -> CameraLibrary:
+        libraries.append(real_library(*args, **kwargs))
+        return libraries[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Scene, "from_settings", scene)
+        patch.setattr(platform_module, "make_camera_library", library)
+        with cosmic.connect(config, ("mico", "vico"), rate=6.0) as rig:
+            zoom_to(rig, 2.0)
+            rig.vico.snap()
+            (cameras,) = libraries
+            assert isinstance(cameras, SimulatedCameraLibrary)
+            lab = Lab(rig, scenes[0], cameras)
+            lower(lab)
+            rig.vico.calibrate_stage("right").wait(30.0)
+            patch.undo()
+            yield lab
+
+
+def zoom_to(rig: cosmic.Rig, zoom: float) -> None:
+    assert rig.vico.lens is not None
+    rig.vico.lens.zoom_to(zoom).wait(30.0)
+
+
+def at_right(rig: cosmic.Rig) -> list[float]:
+    return [rig.mico[f"right.{axis}"].position_um for axis in "xyz"]
+
+
+def put_right(lab: Lab, x_um: float, y_um: float = 0.0) -> None:
+    lab.rig.mico.move({"right.x": x_um, "right.y": y_um})
+
+
+def lift(lab: Lab) -> None:
+    """Lift the gripper and draw it out of the picture, past the clip of the plate."""
+    lab.rig.mico["right.z"].move_to(0.0)
+    put_right(lab, 0.0)
+
+
+def lower(lab: Lab) -> None:
+    """Bring it to where it calibrated."""
+    put_right(lab, -3000.0)
+    lab.rig.mico["right.z"].move_to(HEIGHT_UM - 1500.0)
+
+
+# ------------------------------------------------------------------ what the picture says
+
+
+def test_a_fibre_is_as_long_and_lies_where_the_twin_has_it(lab: Lab) -> None:
+    lift(lab)
+    true = lab.fibre_um(1200.0)
+    fibres = lab.rig.vico.find_fibres()
+    (found,) = [each for each in fibres if each.certain]
+    assert found.length_um == pytest.approx(length(true), rel=0.005)
+    assert found.width_um == pytest.approx(30.0, abs=2.0)
+    assert found.ends_um is not None and found.centre_line_um is not None
+    ends = found.ends_um if found.ends_um[0][0] < found.ends_um[1][0] else found.ends_um[::-1]
+    assert np.linalg.norm(ends - true[[0, -1], :2], axis=1).max() < NEAR_UM
+    finely = np.linspace(0.0, len(true) - 1.0, 2000)
+    line = np.column_stack([np.interp(finely, range(len(true)), true[:, axis]) for axis in (0, 1)])
+    off = [np.linalg.norm(line - place, axis=1).min() for place in found.centre_line_um]
+    assert max(off) < NEAR_UM
+
+
+def test_a_part_of_the_sensor_means_the_same_places(lab: Lab) -> None:
+    camera = lab.rig.vico.camera()
+    whole = camera.next_picture()
+    there = camera.platform_um((700.0, 500.0))
+    settings = camera.settings
+    assert settings is not None
+    camera.configure(replace(settings, roi=Roi(200, 100, 800, 600))).wait(10.0)
+    try:
+        part = camera.next_picture()
+        assert part.data.shape == (600, 800) != whole.data.shape
+        assert not camera.calibration_problem
+        assert camera.platform_um((500.0, 400.0)) == pytest.approx(there)
+    finally:
+        camera.configure(settings).wait(10.0)
+        camera.next_picture()
+
+
+def test_at_a_zoom_without_calibration_no_place_is_told(lab: Lab) -> None:
+    zoom_to(lab.rig, 1.0)
+    try:
+        camera = lab.rig.vico.camera()
+        camera.next_picture()
+        assert "zoom" in camera.calibration_problem
+        assert camera.platform_um((700.0, 500.0)) is None
+        stood = at_right(lab.rig)
+        with pytest.raises(cosmic.NotAvailable, match="zoom"):
+            camera.click_to_move((900.0, 600.0), "right")
+        assert at_right(lab.rig) == stood
+    finally:
+        zoom_to(lab.rig, 2.0)
+        lab.rig.vico.snap()
+
+
+def test_the_tips_are_seen_where_stages_and_calibration_expect_them(lab: Lab) -> None:
+    lower(lab)
+    camera = lab.rig.vico.camera()
+    camera.switch("tips", on=True)
+    try:
+        since = camera.next_picture().frame.frame_id
+        wait_until(
+            lambda: camera.analysis is not None and camera.analysis.picture.frame.frame_id > since
+        )
+        assert camera.analysis is not None
+        (tip,) = camera.analysis.tips
+    finally:
+        camera.switch("tips", on=False)
+    assert tip.name == "right"
+    assert tip.certain
+    assert tip.place_px == pytest.approx(lab.tip_px(), abs=1.5)
+
+
+# ------------------------------------------------------------------ calibrating
+
+
+def test_a_calibration_is_told_with_zoom_height_and_residual(lab: Lab) -> None:
+    (shown,) = lab.rig.vico.calibrated
+    assert (shown.camera, shown.tool) == ("microscope", "right")
+    assert shown.scale_um_px == pytest.approx(2.2, rel=0.003)
+    assert 0.0 < shown.residual_px < 0.5
+    assert shown.zoom_counts == pytest.approx(5964.0)
+    assert shown.height_um == pytest.approx(HEIGHT_UM, abs=1.0)
+
+
+def test_a_calibration_is_found_again_at_the_next_start(lab: Lab, config: Path) -> None:
+    assert (config.parent / "measured" / "microscope-right.toml").exists()
+    again = platform_module.build_platform(config).vico
+    assert again is not None
+    assert again.places is not None
+    assert again.places.calibrated == lab.rig.vico.calibrated
+
+
+def test_a_tool_that_is_not_on_the_picture_calibrates_nothing_and_stands_where_it_was(
+    lab: Lab,
+) -> None:
+    before, stood = lab.rig.vico.calibrated, lab.rig.mico["left.x"].position_um
+    task = lab.rig.vico.calibrate_stage("left")
+    with pytest.raises(cosmic.NotAvailable, match="Left gripper was not found"):
+        task.wait(30.0)
+    assert lab.rig.vico.calibrated == before
+    assert lab.rig.mico["left.x"].position_um == pytest.approx(stood, abs=1.0)
+
+
+def test_a_refused_move_ends_a_calibration_and_the_gripper_goes_back(
+    lab: Lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lower(lab)
+    stood, before = at_right(lab.rig), lab.rig.vico.calibrated
+    refused = cosmic.LimitError(lab.rig.mico["right.x"].check(9999.0))
+    manager = lab.rig.mico.application.manager
+    real, moves = manager.order_together, iter(range(100))
+
+    def refuse_the_sixth(motions: Any, **kwargs: Any) -> Any:
+        if next(moves) == 5:
+            raise refused
+        return real(motions, **kwargs)
+
+    monkeypatch.setattr(manager, "order_together", refuse_the_sixth)
+    with pytest.raises(cosmic.LimitError):
+        lab.rig.vico.calibrate_stage("right").wait(30.0)
+    assert at_right(lab.rig) == pytest.approx(stood, abs=1.0)
+    assert lab.rig.vico.calibrated == before
+
+
+def test_a_cancelled_calibration_ends_at_once_and_keeps_what_was_known(lab: Lab) -> None:
+    lower(lab)
+    before = lab.rig.vico.calibrated
+    task = lab.rig.vico.calibrate_stage("right")
+    with pytest.raises(cosmic.NotAvailable, match="under way"):
+        lab.rig.vico.camera().click_to_move((900.0, 600.0), "right")
+    wait_until(lambda: "place" in task.progress.text)
+    task.cancel()
+    with pytest.raises(MoveCancelled):
+        task.wait(10.0)
+    assert lab.rig.vico.calibrated == before
+
+
+def test_the_table_turns_about_the_centre_the_twin_has(lab: Lab) -> None:
+    lift(lab)
+    lab.rig.vico.find_rotation_centre().wait(30.0)
+    found = lab.rig.vico.rotation_centre()
+    assert found is not None
+    assert found.axis == "table.rotation"
+    assert np.linalg.norm(found.centre_um) < NEAR_UM
+    assert found.std_um < 2.0
+    assert lab.rig.mico["table.rotation"].angle_deg == pytest.approx(0.0, abs=0.01)
+
+
+# ------------------------------------------------------------------ click to move
+
+
+def test_a_click_brings_the_tip_to_the_pixel_and_keeps_its_height(lab: Lab) -> None:
+    lower(lab)
+    height = lab.rig.mico["right.z"].position_um
+    pixel = (1210.0, 520.0)
+    camera = lab.rig.vico.camera()
+    camera.next_picture()
+    said = camera.click_to_move(pixel, "right")
+    assert said.startswith("Right gripper moves to x")
+    wait_until(lambda: 2.2 * float(np.linalg.norm(lab.tip_px() - pixel)) < NEAR_UM)
+    wait_until(lambda: all(axis.state == "OK" for axis in lab.rig.mico))
+    assert 2.2 * float(np.linalg.norm(lab.tip_px() - pixel)) < NEAR_UM
+    assert lab.rig.mico["right.z"].position_um == height
+
+
+def test_a_click_that_the_gate_refuses_moves_nothing(lab: Lab) -> None:
+    lower(lab)
+    stood = at_right(lab.rig)
+    camera = lab.rig.vico.camera()
+    camera.next_picture()
+    lab.rig.stop("a test")
+    try:
+        with pytest.raises(cosmic.StoppedError) as refused:
+            camera.click_to_move((1000.0, 500.0), "right")
+        assert refused.value.verdict.reason == "STOPPED"
+    finally:
+        lab.rig.reset_stop()
+    with pytest.raises(cosmic.NotAvailable):
+        camera.click_to_move((1000.0, 500.0), "left")
+    with pytest.raises(cosmic.ConfigError, match="there is no tool"):
+        camera.click_to_move((1000.0, 500.0), "nobody")
+    assert at_right(lab.rig) == pytest.approx(stood, abs=0.5)
+
+
+# ------------------------------------------------------------------ trouble
+
+
+def test_autofocus_looks_at_no_picture_exposed_before_its_movement(
+    lab: Lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lift(lab)
+    lens = lab.rig.vico.lens
+    assert lens is not None
+    twin_lens = lab.scene.lens
+    assert twin_lens is not None
+    asked: list[float] = []
+    moved: list[float] = []
+    real = CameraThread.next_picture
+
+    def watched(self: CameraThread, since_s: float, timeout_s: float) -> Picture:
+        picture = real(self, since_s, timeout_s)
+        exposed_s = picture.frame.exposed_s
+        asked.append(exposed_s)
+        places = [twin_lens.position_counts("focus", exposed_s + part) for part in (0.0, 0.02)]
+        if abs(places[1] - places[0]) > 0.5:
+            moved.append(exposed_s)
+        return picture
+
+    monkeypatch.setattr(CameraThread, "next_picture", watched)
+    lens.seek_focus(4300).wait(10.0)
+    lens.autofocus().wait(60.0)
+    assert len(asked) > 20
+    assert not moved, "the lens moved while these were exposed"
+    optics = lab.scene.optics
+    assert optics is not None
+    height_um = optics.projection(lab.now_s).focus_um
+    assert abs(height_um) < 60.0, "the plate lies at 0"
+
+
+def test_a_camera_unplugged_while_it_records_leaves_a_file_that_can_be_read(
+    lab: Lab, tmp_path: Path
+) -> None:
+    camera = lab.rig.vico.camera()
+    file = tmp_path / "lost.mkv"
+    camera.record(file)
+    wait_until(lambda: camera.recording.written >= 3)
+    lab.cameras.faults.inject("unplugged", camera="Sim1")
+    try:
+        wait_until(lambda: bool(camera.problem))
+        assert camera.info is None
+    finally:
+        lab.cameras.faults.clear()
+    wait_until(lambda: camera.info is not None and camera.running)
+    camera.next_picture()
+    camera.stop_recording(wait=True)
+    with open_picture_recording(file) as recording:
+        assert recording.complete
+        assert len(recording) >= 3
+        row = recording[0].row
+        assert row is not None
+        assert row.circumstances.scale_um_px == pytest.approx(2.2, rel=0.003)
+        assert set(row.circumstances.positions) == set(lab.rig.mico.names)
+
+
+def test_a_lens_that_was_not_homed_says_so_and_nothing_is_told_in_um() -> None:
+    with cosmic.connect(None, ("mico", "vico"), rate=6.0, cold=True) as rig:
+        camera, lens = rig.vico.camera(), rig.vico.lens
+        assert lens is not None
+        assert camera.next_picture(10.0).circumstances.scale_um_px is None
+        assert "home the lens" in camera.calibration_problem
+        for task in (lens.autofocus(), lens.zoom_to(2.0)):
+            with pytest.raises(cosmic.CosmicError, match="home"):
+                task.wait(10.0)
+        with pytest.raises(cosmic.CosmicError):
+            rig.vico.calibrate_stage("left").wait(10.0)
