@@ -28,7 +28,7 @@ from cosmic.vico.core.recording.picture_recorder import PictureRecorder
 from cosmic.vico.core.recording.reading import open_picture_recording
 from cosmic.vico.hw.interface import CameraSettings, Frame, Roi
 
-NAME = "picture recorder"
+NAME = "picture_recorder"
 WIDTH, HEIGHT, RATE_HZ, SIGMA = 1600, 1200, 60.0, 2.5
 SEEDS = 8
 WAITING = 12

@@ -33,6 +33,12 @@ NAMES = (
     "recorder",
     "plot",
     "acquisition",
+    "twin_picture",
+    "live_view",
+    "picture_recorder",
+    "aravis_camera",
+    "fibres",
+    "vision_tools",
 )
 ALL = (*NAMES, "collision_oracles", "soak", "acquisition_soak")
 ROOT = Path(__file__).resolve().parents[1]

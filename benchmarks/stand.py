@@ -190,9 +190,10 @@ def _enlarged(
     mico = MicoSettings.model_validate({"positioner": positioners})
     wiring = tuple(DeviceWiring(channels=(row[0], row[1], row[2])) for row in names)
     places = {name: StagePlace(kind="linear", start=0.0) for row in names for name in row}
+    stages = {**twin.stages, **places}  # the tools of the twin stand on its own ones
     return (
         file.model_copy(update={"mico": mico}),
-        twin.model_copy(update={"devices": wiring, "stages": places}),
+        twin.model_copy(update={"devices": wiring, "stages": stages}),
     )
 
 

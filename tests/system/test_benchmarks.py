@@ -32,6 +32,21 @@ def test_every_benchmark_offers_the_same_command(repository):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["stop", "completion", "load", "start", "soak"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "stop",
+        "completion",
+        "load",
+        "start",
+        "soak",
+        "twin_picture",
+        "live_view",
+        "picture_recorder",
+        "aravis_camera",
+        "fibres",
+        "vision_tools",
+    ],
+)
 def test_each_benchmark_runs_quickly(repository, name):
     assert f"| {name} |" in quick(repository, name)
