@@ -7,6 +7,13 @@ from typing import Any, Final
 from pydantic import BaseModel
 
 import cosmic
+from cosmic.autonomy.control.control import Control
+from cosmic.autonomy.control.handle import ControlHandle
+from cosmic.autonomy.control.law import ControlState
+from cosmic.autonomy.control.loop import ControlEnding, ControlReading, ControlStatistics
+from cosmic.autonomy.control.pace import PaceStatistics
+from cosmic.autonomy.control.pid import PidGains
+from cosmic.autonomy.control.trace import ControlTrace
 from cosmic.daqco.api.daqco import Daqco, DaqCounters, DaqLimit
 from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.core.chunk import DataChunk
@@ -54,6 +61,13 @@ CLASSES: Final[dict[str, type]] = {
     "RecordedEvent": RecordedEvent,
     "Overrun": Overrun,
     "AxisPosition": AxisPosition,
+    "Control": Control,
+    "ControlHandle": ControlHandle,
+    "ControlReading": ControlReading,
+    "ControlStatistics": ControlStatistics,
+    "PaceStatistics": PaceStatistics,
+    "ControlTrace": ControlTrace,
+    "PidGains": PidGains,
 }
 ENUMS: Final[dict[str, type[Enum]]] = {
     "Reason": cosmic.Reason,
@@ -63,11 +77,14 @@ ENUMS: Final[dict[str, type[Enum]]] = {
     "PositionerKind": PositionerKind,
     "Direction": Direction,
     "DeviceFault": DeviceFault,
+    "ControlState": ControlState,
+    "ControlEnding": ControlEnding,
 }
 # Exceptions that a script may want to name and that `cosmic` does not export.
 FURTHER_EXCEPTIONS: Final = (RecordingExistsError, ExportCancelled)
 # Attributes that an object gets when it is made, which the class does not show.
 MADE_LATER: Final = {
+    "Control": ("settings",),
     "Axis": ("commander",),
     "Approach": ("bodies", "distance_um", "places_um", "pose"),
     "Way": ("start", "waypoints", "method", "length", "straight_length", "duration_s"),

@@ -7,6 +7,7 @@ from typing import Any, Final
 from pydantic import BaseModel
 
 from cosmic.app.platform_file import PlatformFile, PlatformSettings
+from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.daqco.core.settings import (
     ChannelSettings,
     DaqcoSettings,
@@ -62,6 +63,7 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[[daqco.scale]]": ScaleSettings,
     "[[daqco.channel]]": ChannelSettings,
     "[[daqco.limit]]": LimitSettings,
+    "[control]": ControlSettings,
     "[kinds.NAME]": StageKind,
     "[controller]": ControllerSettings,
     "[[devices]]": DeviceWiring,
@@ -87,6 +89,7 @@ _UNITS: Final = (
     ("_un_sqrt_s", "µN/√s"),
     ("_un_um", "µN/µm"),
     ("_v_un", "V/µN"),
+    ("_un_s", "µN/s"),
     ("_un", "µN"),
     ("_n", "N"),
     ("_counts_s2", "counts/s²"),

@@ -5,6 +5,7 @@ from typing import Annotated, Final
 
 from pydantic import Field
 
+from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.frame.config import StrictModel, load_model, shipped_config_dir
 from cosmic.frame.errors import ConfigError
@@ -32,6 +33,7 @@ class PlatformFile(StrictModel):
     mico: MicoSettings
     daqco: DaqcoSettings | None = None
     vico: VicoSettings | None = None
+    control: ControlSettings = ControlSettings()
 
 
 def platform_path(config: str | Path | None) -> Path:

@@ -11,6 +11,7 @@ from typing_extensions import override
 
 from cosmic.app.platform import Platform, build_platform
 from cosmic.app.platform_file import KNOWN_APPLICATIONS
+from cosmic.autonomy.control.control import Control
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.errors import ConfigError, NotAvailable, NotConnectedError
 from cosmic.mico.api.mico import Mico
@@ -34,6 +35,15 @@ class Rig:
         self._mico = Mico(platform.mico, source) if platform.mico is not None else None
         self._daqco = Daqco(platform.daqco) if platform.daqco is not None else None
         self._vico = Vico(platform.vico) if platform.vico is not None else None
+        self._control: Control | None = None
+        if self._mico is not None:
+            self._control = Control(
+                self._mico,
+                self._daqco,
+                platform.file.control,
+                platform.policy,
+                rate=platform.clock.rate,
+            )
         self._closed = False
 
     @override
@@ -66,6 +76,13 @@ class Rig:
         if self._vico is None:
             raise NotAvailable("vico is not hosted here; name it in the platform file")
         return self._vico
+
+    @property
+    def control(self) -> Control:
+        """Control loops; raises `NotAvailable` where mico is not hosted."""
+        if self._control is None:
+            raise NotAvailable("mico is not hosted here; a control loop has nothing to move")
+        return self._control
 
     @property
     def stopped(self) -> str | None:
@@ -104,6 +121,8 @@ class Rig:
         if not self._closed:
             self._closed = True
             atexit.unregister(self.close)
+            if self._control is not None:
+                self._control.close()
             self._platform.shut_down()
 
     def __enter__(self) -> Self:

@@ -1,0 +1,181 @@
+"""Where a control loop gets its measurement from: a channel of DAQCo, or a position."""
+
+import math
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+from typing_extensions import override
+
+from cosmic.daqco.api.daqco import Daqco
+from cosmic.daqco.core.chunk import DataChunk
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import ConfigError, CosmicError, LimitError, NotAvailable
+from cosmic.frame.verdict import Reason, refuse
+from cosmic.mico.api.mico import Mico
+
+IDLE_POLLS: Final = 2.5
+"""A position of a standing axis is read less often: so many polls may pass before it is stale."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """The newest value and the wall time at which it came."""
+
+    value: float
+    read_wall_s: float
+
+
+class Source(Protocol):
+    """A measurement that is there at once whenever it is asked for; any thread."""
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """What is measured."""
+
+    @property
+    @abstractmethod
+    def unit(self) -> str:
+        """Its unit."""
+
+    @property
+    @abstractmethod
+    def stale_s(self) -> float:
+        """How old a value may be, wall time."""
+
+    @abstractmethod
+    def begin(self, on_limit: Callable[[CosmicError], None]) -> None:
+        """Begin to listen; `on_limit` is told of a limit crossed the moment it is seen."""
+
+    @abstractmethod
+    def newest(self) -> Sample | None:
+        """Return the newest value; None before the first."""
+
+    @abstractmethod
+    def end(self) -> None:
+        """Stop listening."""
+
+
+class ChannelSource(Source):
+    """The newest sample of a channel, in its unit; every sample is held against the limits.
+
+    Parameters
+    ----------
+    low, high : float
+        Limits: a sample that does not lie between them ends the loop, in the thread that acquires.
+    """
+
+    def __init__(
+        self,
+        daqco: Daqco,
+        channel: str,
+        *,
+        stale_s: float,
+        low: float = -math.inf,
+        high: float = math.inf,
+    ) -> None:
+        if channel not in daqco.channels:
+            raise ConfigError(
+                f"there is no active channel {channel!r}; there are {', '.join(daqco.channels)}"
+            )
+        if not low < high:
+            raise ConfigError(f"{channel}: the low limit must lie below the high one")
+        self._daqco = daqco
+        self._channel = channel
+        self._unit = daqco.units[channel]
+        self._stale_s = stale_s
+        self._low, self._high = low, high
+        self._newest: Sample | None = None
+        self._on_limit: Callable[[CosmicError], None] | None = None
+        self._forget: Callable[[], None] | None = None
+
+    @property
+    @override
+    def name(self) -> str:
+        return self._channel
+
+    @property
+    @override
+    def unit(self) -> str:
+        return self._unit
+
+    @property
+    @override
+    def stale_s(self) -> float:
+        return self._stale_s
+
+    @override
+    def begin(self, on_limit: Callable[[CosmicError], None]) -> None:
+        if not self._daqco.running:
+            why = self._daqco.problem or "start it first"
+            raise NotAvailable(f"{self._channel}: nothing is acquired; {why}")
+        self._on_limit = on_limit
+        self._forget = self._daqco.subscribe(self._on_chunk)
+
+    @override
+    def newest(self) -> Sample | None:
+        return self._newest
+
+    @override
+    def end(self) -> None:
+        if self._forget is not None:
+            self._forget()
+            self._forget = None
+
+    def _on_chunk(self, chunk: DataChunk) -> None:
+        """Take a chunk; acquisition thread."""
+        if self._channel not in chunk.channels:
+            return  # the value gets stale
+        row = chunk.channels.index(self._channel)
+        values = chunk.scales[row].apply(chunk.volts[row])
+        self._newest = Sample(float(values[-1]), WALL.now_s())
+        beyond = np.flatnonzero(~((values > self._low) & (values < self._high)))
+        if beyond.size and self._on_limit is not None:
+            self._on_limit(self._crossed(float(values[beyond[0]])))
+
+    def _crossed(self, value: float) -> LimitError:
+        limit = self._low if value <= self._low else self._high
+        text = f"{self._channel} reached {value:.4g} {self._unit}, the loop's limit is {limit:g}"
+        return LimitError(refuse(Reason.LIMIT, text, value=value, limit=limit, unit=self._unit))
+
+
+class PositionSource(Source):
+    """The position of an axis, in gate coordinates; about 20 values a second while it moves."""
+
+    def __init__(self, mico: Mico, axis: str, *, stale_s: float) -> None:
+        self._axis = mico[axis]
+        settings = mico.application.manager.settings.watch
+        self._stale_s = max(stale_s, IDLE_POLLS * settings.idle_poll_s)
+
+    @property
+    @override
+    def name(self) -> str:
+        return self._axis.name
+
+    @property
+    @override
+    def unit(self) -> str:
+        return self._axis.unit
+
+    @property
+    @override
+    def stale_s(self) -> float:
+        return self._stale_s
+
+    @override
+    def begin(self, on_limit: Callable[[CosmicError], None]) -> None:
+        """Nothing to do: MiCo reads positions anyway, and the gate knows the limits."""
+
+    @override
+    def newest(self) -> Sample | None:
+        state = self._axis.details
+        if state.position is None:
+            return None
+        return Sample(state.position, state.read_wall_s)
+
+    @override
+    def end(self) -> None:
+        """Nothing to do."""
