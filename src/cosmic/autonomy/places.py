@@ -1,7 +1,7 @@
 """Pixels and places on the platform: what is calibrated, and moving a tool to a pixel."""
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -156,8 +156,7 @@ class PlatformPlaces(Places):
     def calibrate_stage(self, tool: str, camera: str) -> Task:
         settings = self._tool(tool)
         procedure = StageProcedure(self._vico, self._manager, self.calibrations, settings, camera)
-        title = f"Calibrating {camera} by {settings.shown}"
-        return self._vico.begin(title, procedure.run)
+        return self._begin(f"Calibrating {camera} by {settings.shown}", procedure.run)
 
     @override
     def find_rotation_centre(self, camera: str) -> Task:
@@ -167,7 +166,16 @@ class PlatformPlaces(Places):
         procedure = RotationProcedure(
             self._vico, self._manager, self.calibrations, self._plate_map, camera, axis
         )
-        return self._vico.begin(f"Rotation centre of {axis}", procedure.run)
+        return self._begin(f"Rotation centre of {axis}", procedure.run)
+
+    def _begin(self, title: str, measure: Callable[[Task], None]) -> Task:
+        def job(task: Task) -> None:
+            try:
+                measure(task)
+            finally:
+                self._vico.status_changed.emit()
+
+        return self._vico.begin(title, job)
 
     @property
     @override

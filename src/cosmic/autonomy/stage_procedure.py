@@ -100,7 +100,9 @@ class StageProcedure:
             raise CalibrationRefused(
                 "calibration: the zoom was moved meanwhile; leave it, and try again"
             )
-        return Plane(zoom, float(begun[2]), fit_map(sightings), datetime.now(UTC).replace(microsecond=0))
+        return Plane(
+            zoom, float(begun[2]), fit_map(sightings), datetime.now(UTC).replace(microsecond=0)
+        )
 
     # Where things are
 

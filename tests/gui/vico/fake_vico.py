@@ -8,6 +8,7 @@ import numpy as np
 
 from cosmic.frame.errors import ConfigError, CosmicError
 from cosmic.frame.task import Task
+from cosmic.vico.api.places import CalibrationShown
 from cosmic.vico.core.picture import Circumstances, Picture
 from cosmic.vico.hw.interface import (
     CameraCounters,
@@ -142,6 +143,7 @@ class FakeCamera:
         self.recording = Recorded()
         self.calibration_problem = "not calibrated at this zoom: run the calibration"
         self.scale_um_px: float | None = 1.25
+        self.calibrated: tuple[CalibrationShown, ...] = ()
         self.targets: tuple[str, ...] = ("left gripper", "right gripper")
         self.refuse = ""
         self.refuse_later = ""
@@ -258,6 +260,12 @@ class FakeCamera:
         if self.calibration_problem:
             return None
         return (place_px[0] * 1.25 - 1000.0, place_px[1] * 1.25 - 750.0)
+
+    def calibrate_stage(self, tool: str) -> Task:
+        return self._began("Calibrating", "calibrate_stage", tool)
+
+    def find_rotation_centre(self) -> Task:
+        return self._began("Rotation centre", "find_rotation_centre")
 
     def click_to_move(self, place_px: tuple[float, float], what: str) -> str:
         self._do("move", place_px, what)

@@ -9,6 +9,7 @@ from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.file_names import space_left
 from cosmic.frame.task import Task
 from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.api.places import CalibrationShown, Places
 from cosmic.vico.core.camera_recordings import PictureRecordingState
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.recording.formats import FORMATS, picture_bytes_per_s, recording_suffix
@@ -317,6 +318,27 @@ class CameraHandle:
         """What can be moved to a place in the picture, such as "left"."""
         places = self._application.places
         return places.targets if places is not None else ()
+
+    @property
+    def calibrated(self) -> Sequence[CalibrationShown]:
+        """The maps from platform to picture that are in force for this camera."""
+        places = self._application.places
+        known = places.calibrated if places is not None else ()
+        return tuple(each for each in known if each.camera == self.name)
+
+    def calibrate_stage(self, tool: str) -> Task:
+        """Begin to measure such a map by moving a tool; see `Vico.calibrate_stage`."""
+        return self._moving.calibrate_stage(tool, self.name)
+
+    def find_rotation_centre(self) -> Task:
+        """Begin to measure about which place the plate turns; see `Vico.find_rotation_centre`."""
+        return self._moving.find_rotation_centre(self.name)
+
+    @property
+    def _moving(self) -> Places:
+        if self._application.places is None:
+            raise NotAvailable("micromanipulation is not hosted here: no tool can be moved")
+        return self._application.places
 
     def click_to_move(self, place_px: Pixel, what: str) -> str:
         """Begin to move `what` to a pixel of the newest picture, and say what was begun.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 
-from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.frame.errors import CosmicError
 from cosmic.frame.listeners import tell
 from cosmic.frame.task import Task
 from cosmic.vico.api.application import VicoApplication
@@ -17,7 +17,7 @@ from cosmic.vico.hw.interface import CameraInfo, Pixels
 
 if TYPE_CHECKING:
     from cosmic.vico.api.fibres import PlacedFibre
-    from cosmic.vico.api.places import CalibrationShown, Places, RotationShown
+    from cosmic.vico.api.places import CalibrationShown, RotationShown
 
 
 class Vico:
@@ -133,7 +133,7 @@ class Vico:
         NotAvailable
             Another long operation is under way, or micromanipulation is not hosted.
         """
-        return self._places.calibrate_stage(tool, camera or self._application.first_camera)
+        return self.camera(camera).calibrate_stage(tool)
 
     def find_rotation_centre(self, camera: str = "") -> Task:
         """Begin to measure about which place the plate turns, by a fibre that lies on it.
@@ -145,20 +145,13 @@ class Vico:
         NotAvailable
             Another long operation is under way, or micromanipulation is not hosted.
         """
-        return self._places.find_rotation_centre(camera or self._application.first_camera)
+        return self.camera(camera).find_rotation_centre()
 
     def rotation_centre(self, camera: str = "") -> "RotationShown | None":
         """Return about which place the plate turns, as a camera saw it last; None before."""
         places = self._application.places
         chosen = camera or self._application.first_camera
         return places.rotation_centre(chosen) if places is not None else None
-
-    @property
-    def _places(self) -> "Places":
-        places = self._application.places
-        if places is None:
-            raise NotAvailable("micromanipulation is not hosted here: no tool can be moved")
-        return places
 
     # Recording
 

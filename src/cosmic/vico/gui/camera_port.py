@@ -10,6 +10,7 @@ from typing import Protocol
 
 from cosmic.frame.task import Task
 from cosmic.vico.core.picture import Picture
+from cosmic.vico.gui.calibrate_menu import MapShown
 from cosmic.vico.gui.seen import Algorithm, Analysis, Pixel
 from cosmic.vico.hw.interface import CameraCounters, CameraInfo, CameraRanges, CameraSettings
 
@@ -262,3 +263,16 @@ class CameraPort(Protocol):
         MoveRefused, NotAvailable
             The gate says no, or the place cannot be told.
         """
+
+    @property
+    @abstractmethod
+    def calibrated(self) -> Sequence[MapShown]:
+        """The maps from platform to picture that are in force."""
+
+    @abstractmethod
+    def calibrate_stage(self, tool: str) -> Task:
+        """Begin to measure such a map by moving a tool; raises `NotAvailable`."""
+
+    @abstractmethod
+    def find_rotation_centre(self) -> Task:
+        """Begin to measure about which place the plate turns; raises `NotAvailable`."""

@@ -14,6 +14,7 @@ from cosmic.frame.gui.build import named
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.overrides import override
 from cosmic.vico.core.picture import Picture
+from cosmic.vico.gui.calibrate_menu import CalibrateButton
 from cosmic.vico.gui.camera_chooser import CameraChooser
 from cosmic.vico.gui.chain_panel import ChainPanel
 from cosmic.vico.gui.contrast_panel import ContrastPanel
@@ -75,6 +76,7 @@ class CameraView(QWidget):
         self.cross, self.scale_bar = Crosshair(), ScaleBar()
         self.seen, self.note = SeenLayer(), Note()
         self.row, self.status = ToolRow(), StatusRow(self._camera)
+        self.calibrate = self.row.add(CalibrateButton(self._camera))
         self.contrast, self.chain = ContrastPanel(), ChainPanel(self._camera)
         self.form = SettingsForm(self._camera, self)
         self.chooser = CameraChooser(port, name)
@@ -157,7 +159,9 @@ class CameraView(QWidget):
         self.contrast.levels_changed.connect(view.set_levels)
         self.contrast.marks_changed.connect(view.set_marks)
         view.pointed.connect(self._on_pointed)
-        self.tools.told.connect(self.say)
+        self.calibrate.begun.connect(self.recorder.tasks.follow)
+        for refusing in (self.calibrate.refused, self.tools.told):
+            refusing.connect(self.say)
         self.tools.region_chosen.connect(self.form.read_part)
 
     @override
@@ -248,6 +252,7 @@ class CameraView(QWidget):
         self.form.refresh()
         self.chain.refresh()
         self.row.show_running(camera.running, camera.problem)
+        self.calibrate.fill()
         self.row.show_targets(tuple(camera.targets), camera.calibration_problem)
         self.tools.refresh()
         self.recorder.refresh()

@@ -1,6 +1,6 @@
 """The buttons above the picture: what part is shown, what lies over it, what a click does."""
 
-from typing import Final
+from typing import Final, TypeVar
 
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction
@@ -9,6 +9,8 @@ from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 from cosmic.frame.gui.build import named, tipped
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.vico.gui.flow_layout import FlowLayout
+
+W = TypeVar("W", bound=QWidget)
 
 TOOLS: Final = {
     "distance": ("Distance", "Measure a distance: press, drag, let go; Del takes the chosen away"),
@@ -51,9 +53,9 @@ class ToolRow(QWidget):
         )
         self.scale.setChecked(True)
         self.found.setChecked(True)
-        flow = FlowLayout(STEP_PX // 2, self)
+        self._flow = FlowLayout(STEP_PX // 2, self)
         for widget in self.buttons:
-            flow.addWidget(widget)
+            self._flow.addWidget(widget)
         for name, button in self.tools.items():
             button.clicked.connect(
                 lambda checked, name=name: self._on_tool(name if checked else "")
@@ -74,6 +76,11 @@ class ToolRow(QWidget):
             *shown,
             self.more,
         )
+
+    def add(self, widget: W) -> W:
+        """Put one more at the end."""
+        self._flow.addWidget(widget)
+        return widget
 
     def choose(self, name: str) -> None:
         """Show which tool is chosen: one of `TOOLS`, "move", or empty."""

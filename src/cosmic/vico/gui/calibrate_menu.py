@@ -1,0 +1,153 @@
+"""The button that begins calibrations of a camera, and says what was calibrated."""
+
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from typing import Protocol
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QMenu, QToolButton, QWidget
+
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.build import named, tipped
+from cosmic.frame.gui.theme import STEP_PX, State, state_look
+from cosmic.frame.task import Task
+from cosmic.vico.gui.texts import duration_text
+
+TIP = "Measure where on the platform the pixels lie: a tool goes to nine places and back"
+
+
+class MapShown(Protocol):
+    """One map from platform to picture that is in force."""
+
+    @property
+    @abstractmethod
+    def tool(self) -> str:
+        """What was moved."""
+
+    @property
+    @abstractmethod
+    def zoom_counts(self) -> float:
+        """Where the zoom stood."""
+
+    @property
+    @abstractmethod
+    def height_um(self) -> float:
+        """Of the tool's tip."""
+
+    @property
+    @abstractmethod
+    def scale_um_px(self) -> float:
+        """Size of a pixel."""
+
+    @property
+    @abstractmethod
+    def residual_px(self) -> float:
+        """What is left over, RMS."""
+
+    @property
+    @abstractmethod
+    def measured(self) -> datetime:
+        """With its time zone."""
+
+
+class Calibrating(Protocol):
+    """A camera that can be calibrated, as the menu sees it."""
+
+    @property
+    @abstractmethod
+    def targets(self) -> Sequence[str]:
+        """What can be moved, such as "left"."""
+
+    @property
+    @abstractmethod
+    def calibrated(self) -> Sequence[MapShown]:
+        """The maps in force."""
+
+    @abstractmethod
+    def calibrate_stage(self, tool: str) -> Task:
+        """Begin to measure a map by moving a tool."""
+
+    @abstractmethod
+    def find_rotation_centre(self) -> Task:
+        """Begin to measure about which place the plate turns."""
+
+
+class CalibrateButton(QToolButton):
+    """Opens a menu: a calibration by each tool, the rotation centre, and what there is.
+
+    Signals
+    -------
+    begun(Task)
+        A calibration is under way.
+    refused(str)
+        Why it could not be begun.
+    """
+
+    begun = Signal(object)
+    refused = Signal(str)
+
+    def __init__(
+        self,
+        camera: Calibrating,
+        parent: QWidget | None = None,
+        *,
+        now: Callable[[], datetime] = lambda: datetime.now(UTC),
+    ) -> None:
+        super().__init__(parent)
+        self._camera, self._now = camera, now
+        self.setText("Calibrate")
+        named(tipped(self, TIP), "calibrate")
+        self.setStyleSheet(
+            f"QToolButton {{ padding: 1px {STEP_PX - 3}px; }}"
+            "QToolButton::menu-indicator { image: none; }"
+        )
+        self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        shown = QMenu(self)
+        shown.setToolTipsVisible(True)
+        shown.aboutToShow.connect(self.fill)
+        self.setMenu(shown)
+        self.fill()
+
+    def fill(self) -> None:
+        """Offer what can be done now; an open menu stays as it is."""
+        menu = self.menu()
+        if menu.isVisible():
+            return
+        menu.clear()
+        tools = tuple(self._camera.targets)
+        self.setEnabled(bool(tools))
+        self.setToolTip(TIP if tools else "Not here: no tool can be moved from this window")
+        for tool in tools:
+            action = menu.addAction(f"Move {tool}")
+            action.setToolTip("Its tip must be on the picture, and sharp")
+            action.triggered.connect(lambda _=False, tool=tool: self._begin_stage(tool))
+        action = menu.addAction("Find the table's rotation centre")
+        action.setToolTip("Turns the table by 24° to both sides; a fibre must lie near the middle")
+        action.triggered.connect(lambda _=False: self._begin_rotation())
+        menu.addSeparator()
+        for text in self.lines() or ["not calibrated yet"]:
+            menu.addAction(text).setEnabled(False)
+
+    def lines(self) -> list[str]:
+        """Return what is calibrated, a line each."""
+        return [
+            f"{each.tool}: {each.scale_um_px:.4g} µm a pixel at zoom {each.zoom_counts:.0f}, "
+            f"height {each.height_um:.0f} µm; {each.residual_px:.2f} px off, "
+            f"{duration_text((self._now() - each.measured).total_seconds())} old"
+            for each in self._camera.calibrated
+        ]
+
+    def _begin_stage(self, tool: str) -> None:
+        self._begin(lambda: self._camera.calibrate_stage(tool))
+
+    def _begin_rotation(self) -> None:
+        self._begin(self._camera.find_rotation_centre)
+
+    def _begin(self, start: Callable[[], Task]) -> None:
+        try:
+            task = start()
+        except CosmicError as exc:
+            self.refused.emit(f"{state_look(State.REFUSED).glyph} {exc}")
+        else:
+            self.begun.emit(task)
