@@ -8,6 +8,7 @@ import cosmic
 from cosmic.frame.clock import WALL
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.orders import Order
+from cosmic.mico.core.steer import HandLostError
 from cosmic.mico.hw.interface import Channel
 from unit.mico.rigs import mico, wait_until
 
@@ -62,7 +63,8 @@ def test_a_hand_that_is_lost_stops_the_axis_within_a_tenth_of_a_second():
         hand = Hand(rig, 500.0)
         hand.hold(500.0, 0.1)
         lost_s = WALL.now_s()
-        hand.order.movement.wait(2)
+        with pytest.raises(HandLostError):
+            hand.order.movement.wait(2)
         assert ("stop", X) in controller.calls
         assert WALL.now_s() - lost_s < 0.5
         assert rig["d0.c0"].position_um < 200.0

@@ -20,6 +20,7 @@ from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.device_manager import DeviceManager, Mode
 from cosmic.mico.core.settings import MicoSettings
+from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 from cosmic.mico.core.way_finder import WayFinder
 from cosmic.mico.hw.interface import Controller
 
@@ -71,6 +72,7 @@ class MicoApplication(TaskApplication):
         self.way_finder = (
             WayFinder(self.manager, self.collision.model) if self.collision is not None else None
         )
+        self.teleoperation = Teleoperation(self.manager, policy)
         self._failure = ""
         self._forget = policy.on_safe_stop(self.manager.stop)
 
@@ -198,6 +200,7 @@ class MicoApplication(TaskApplication):
     def shut_down(self) -> None:
         """Stop every movement, release the hold, end all threads; any state."""
         self.request_end()
+        self.teleoperation.close()
         if self.clearance_watch is not None:
             self.clearance_watch.request_end()
             self.clearance_watch.join()

@@ -23,6 +23,7 @@ from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.device import Device
 from cosmic.mico.core.device_commander import DeviceCommander
 from cosmic.mico.core.orders import Motion, MoveBy, MoveTo
+from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 
 
 class Mico:
@@ -294,6 +295,13 @@ class Mico:
     def _in_gate(self, name: str, value: Number) -> float:
         axis = self[name]
         return as_number(value, axis.unit, name) + axis.details.zero
+
+    # Teleoperation
+
+    @property
+    def teleoperation(self) -> Teleoperation:
+        """Steering by a gamepad, keys or a haptic device; one for the whole program."""
+        return self._application.teleoperation
 
     # Collisions
 

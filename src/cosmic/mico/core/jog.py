@@ -4,6 +4,7 @@ import math
 from typing import Final
 
 from cosmic.frame.clock import WALL
+from cosmic.frame.errors import MoveCancelled
 from cosmic.mico.core.orders import LARGEST_STEPS, Jog, Motion, MoveTo, Step
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.core.settings import MicoSettings
@@ -41,6 +42,11 @@ class JogRun:
     def pause_s(self) -> float:
         """How long may pass before somebody looks whether a packet is due."""
         return 0.2 * self._settings.jog.packet_s
+
+    @property
+    def lost(self) -> MoveCancelled | None:
+        """Why it ended, where that is no good end; letting go of a key is."""
+        return None
 
     def follow_hand(self) -> None:
         """Take over what is wanted now; a plain jog keeps its speed."""

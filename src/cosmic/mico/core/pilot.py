@@ -8,11 +8,12 @@ from typing_extensions import override
 
 from cosmic.frame.errors import DeviceError, MoveCancelled, refusal
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.mico.core.departure import ChannelDeparture
 from cosmic.mico.core.flight import Flight
 from cosmic.mico.core.follower import ChannelFollower
 from cosmic.mico.core.gate import Request
 from cosmic.mico.core.jog import SLOWER, JogRun
-from cosmic.mico.core.messages import MovementBegun
+from cosmic.mico.core.messages import Departed, MovementBegun
 from cosmic.mico.core.orders import (
     FREQUENCY_HZ,
     Grant,
@@ -61,12 +62,47 @@ class ChannelPilot(ChannelFollower):
             self.turn_away(order, _stopped(self.name))
             return
         replaced = self._begin(order, grant)
+        if order.start is not None:
+            self._await_start(order, replaced)
+            return
         try:
-            if replaced is not None and isinstance(replaced.order.motion, Jog):
-                self._quietly(lambda: self._limit_speed(self._frequency_hz))
+            self._set_speed_for(order, replaced)
             self._send(order.motion, grant)
         finally:
             self._tell_begun(order, replaced)
+        self.ask_activity()
+
+    def _set_speed_for(self, order: Order, replaced: Flight | None) -> None:
+        """Give the channel the speed of `order`, or its usual one back."""
+        own_hz = order.frequency_hz
+        if own_hz is not None:
+            self._quietly(lambda: self._limit_speed(own_hz))
+        elif replaced is not None and replaced.has_own_speed:
+            self._quietly(lambda: self._limit_speed(self._frequency_hz))
+
+    def _await_start(self, order: Order, replaced: Flight | None) -> None:
+        """Get everything ready, and leave the call itself to the one that starts the group."""
+        flight, start = self.flight, order.start
+        if flight is None or start is None:
+            return
+        flight.awaiting = True
+        try:
+            self._set_speed_for(order, replaced)
+        finally:
+            self._tell_begun(order, replaced)
+        start.arrive(ChannelDeparture(self._positioner, self._context, flight))
+
+    def depart(self, departed: Departed) -> None:
+        """Follow an order that was sent together with others."""
+        flight = self.flight
+        if flight is None or flight.order is not departed.order:
+            return
+        flight.awaiting = False
+        flight.progress_s = self._context.clock.now_s()
+        if departed.error is not None:
+            self._blame(departed.error)
+        elif flight.error is None and not self._context.gate.still_valid(flight.grant):
+            self.halt(refusal(_stopped(self.name)))
         self.ask_activity()
 
     def _granted(self, order: Order) -> Grant | None:
@@ -109,6 +145,8 @@ class ChannelPilot(ChannelFollower):
         flight = Flight(order, grant, started_s=now_s, progress_s=now_s, jog=jog)
         flight.known_pending = isinstance(order.motion, Reference)
         replaced, self.flight = self.flight, flight
+        if replaced is not None:
+            replaced.replaced = True
         self.next_poll_s = now_s + self._context.poll_s * (self._context.clock.rate or 1.0)
         return replaced
 
@@ -237,7 +275,7 @@ class ChannelPilot(ChannelFollower):
             self._quietly(lambda: self._limit_jog_speed(jog.speed))
         packet = jog.packet(self._positioner.state, now_s)
         if packet is None:
-            self._end_jog(None)
+            self._end_jog(jog.lost)
             return
         grant = self._grant(flight.order, packet)
         if grant is not None:

@@ -8,7 +8,9 @@ from pydantic import Field, model_validator
 
 from cosmic.frame.config import StrictModel
 from cosmic.frame.units import AxisUnit
+from cosmic.mico.core.link_settings import LinkSettings, link_misfits
 from cosmic.mico.core.sequence.settings import InitialisationSettings, misfits
+from cosmic.mico.core.teleoperation.settings import TeleoperationSettings
 from cosmic.mico.core.trajectory.settings import MirrorSettings
 from cosmic.mico.hw.interface import Channel, PositionerKind
 
@@ -33,6 +35,8 @@ class MotionDefaults(StrictModel):
     largest_step_deg: float = Field(default=0.05, gt=0)
     acceleration_um_s2: float = Field(default=100_000.0, gt=0)
     acceleration_deg_s2: float = Field(default=1_000.0, gt=0)
+    approach_um: float = Field(default=20.0, ge=0)
+    approach_deg: float = Field(default=0.2, ge=0)
 
     @property
     def hold(self) -> float:
@@ -165,8 +169,10 @@ class MicoSettings(StrictModel):
     initialisation: InitialisationSettings = InitialisationSettings()
     poses: str = "poses.toml"
     mirror: MirrorSettings = MirrorSettings()
+    teleoperation: TeleoperationSettings = TeleoperationSettings()
     positioner: Annotated[tuple[PositionerSettings, ...], Field(strict=False)]
     group: Annotated[tuple[GroupSettings, ...], Field(strict=False)] = ()
+    link: Annotated[tuple[LinkSettings, ...], Field(strict=False)] = ()
 
     @model_validator(mode="after")
     def _names_fit(self) -> Self:
@@ -176,11 +182,13 @@ class MicoSettings(StrictModel):
             *self._twice("key", self._keys()),
             *self._twice("serial", [str(serial) for serial in self.serials]),
             *self._unknown_names(),
+            *link_misfits(self.link, {each.name: each.kind for each in self.positioner}),
             *misfits(
                 self.initialisation.step,
                 {each.name: each.kind for each in self.positioner},
                 tuple(group.title for group in self.group),
             ),
+            *self.teleoperation.mistakes({each.name: each.kind for each in self.positioner}),
         ]
         if wrong:
             raise ValueError("; ".join(wrong))

@@ -7,6 +7,7 @@ from typing import Final
 from typing_extensions import override
 
 from cosmic.frame.clock import WALL
+from cosmic.frame.errors import MoveCancelled
 from cosmic.mico.core.jog import SHARE, JogRun
 from cosmic.mico.core.orders import Motion, MoveTo, Steer
 from cosmic.mico.core.positioner import PositionerState
@@ -19,6 +20,10 @@ LOCATE_PERIOD_S: Final = 0.02
 _CHANGE: Final = 0.05
 """Part of the speed by which it must change before the axis is told."""
 _OLDEST_S: Final = 0.1
+
+
+class HandLostError(MoveCancelled):
+    """Nobody said for too long how fast a steered axis is to go."""
 
 
 class SteerRun(JogRun):
@@ -97,6 +102,11 @@ class SteerRun(JogRun):
         turned = self._wanted != self._jog.direction * self._jog.speed
         rested = WALL.now_s() - self._packet_wall_s >= PACKET_PERIOD_S
         return super().due(now_s) or (turned and rested)
+
+    @property
+    @override
+    def lost(self) -> MoveCancelled | None:
+        return HandLostError("nothing steers it any more") if self._expired() else None
 
     @override
     def _expired(self) -> bool:

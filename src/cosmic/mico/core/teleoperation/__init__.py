@@ -1,0 +1,1 @@
+"""Teleoperation: an input device steers positioners (M9)."""

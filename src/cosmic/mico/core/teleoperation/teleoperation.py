@@ -1,0 +1,297 @@
+"""`Teleoperation`: one input device steers positioners by one profile (M9, thesis MiCo4)."""
+
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from threading import RLock
+
+from pydantic import ValidationError
+
+from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.frame.failure import FailurePolicy
+from cosmic.mico.core.device_commander import DeviceCommander
+from cosmic.mico.core.device_manager import DeviceManager, Mode
+from cosmic.mico.core.positioner import class_for
+from cosmic.mico.core.stop_latch import StopState
+from cosmic.mico.core.teleoperation.driver import AxisDriver
+from cosmic.mico.core.teleoperation.input_thread import InputThread, Steering
+from cosmic.mico.core.teleoperation.mapping import Converter, ProfileMapping
+from cosmic.mico.core.teleoperation.settings import TeleoperationProfileSettings
+from cosmic.mico.core.teleoperation.state import (
+    RateMeter,
+    TeleoperationPhase,
+    TeleoperationState,
+)
+from cosmic.mico.hw.input_device import InputDevice, InputInfo
+from cosmic.mico.hw.input_sources import InputSources
+
+logger = logging.getLogger(__name__)
+
+SOURCE = "teleoperation"
+
+
+@dataclass(frozen=True)
+class ForceCoupling:
+    """What another subsystem has to say about steering; any thread.
+
+    Attributes
+    ----------
+    make_converter : callable
+        Puts something between the inputs and the movements.
+    begin, end : callable
+        Called when teleoperation begins and ends.
+    slowed : callable
+        Part of the speed that the force leaves now.
+    """
+
+    make_converter: Callable[[ProfileMapping], Converter]
+    begin: Callable[[], None]
+    end: Callable[[], None]
+    slowed: Callable[[], float]
+
+
+class Teleoperation:
+    """Starts and ends the steering by an input device; any thread.
+
+    A stop, a lost device or a failed thread ends it, and it must be started again.
+    """
+
+    def __init__(
+        self,
+        manager: DeviceManager,
+        policy: FailurePolicy,
+        sources: InputSources | None = None,
+    ) -> None:
+        self._manager = manager
+        self._policy = policy
+        self.settings = manager.settings.teleoperation
+        self.sources = sources or InputSources(simulated=manager.controller.simulated)
+        self.coupling: ForceCoupling | None = None
+        self._profiles = {each.name: each for each in self.settings.profile}
+        self._lock = RLock()
+        self._thread: InputThread | None = None
+        self._device: InputDevice | None = None
+        self._commanders: list[DeviceCommander] = []
+        self._stuck: list[InputThread] = []
+        self._focus = True
+        self._closed = False
+        self._over = TeleoperationState(TeleoperationPhase.OFF)
+        manager.latch.subscribe(self._on_latch)
+
+    # What there is
+
+    def devices(self) -> tuple[InputInfo, ...]:
+        """Return what is plugged in now."""
+        return self.sources.devices()
+
+    @property
+    def device(self) -> InputDevice | None:
+        """The device in use."""
+        return self._device
+
+    @property
+    def state(self) -> TeleoperationState:
+        """How it is now."""
+        thread = self._thread
+        return thread.state if thread is not None else self._over
+
+    @property
+    def profiles(self) -> tuple[TeleoperationProfileSettings, ...]:
+        """The profiles as they are now, in their order."""
+        return tuple(self._profiles.values())
+
+    def profile(self, name: str) -> TeleoperationProfileSettings:
+        """Return a profile; raises `NotAvailable` where there is none of that name."""
+        found = self._profiles.get(name)
+        if found is None:
+            known = ", ".join(self._profiles) or "none"
+            raise NotAvailable(f"there is no teleoperation profile {name!r}; there are: {known}")
+        return found
+
+    def set_profile(self, profile: TeleoperationProfileSettings) -> None:
+        """Use `profile` from now on, in place of the one of its name; the file is left as it is.
+
+        Steering goes on with it once the sticks were at rest.
+
+        Raises
+        ------
+        ConfigError
+            It does not fit the positioners there are, or moves others while it steers.
+        """
+        wrong = profile.mistakes(self._kinds())
+        if wrong:
+            raise ConfigError("\n".join(wrong))
+        with self._lock:
+            thread = self._thread
+            running = thread is not None and self.state.profile == profile.name
+            if thread is not None and running and not thread.stopped:
+                mapping = self._mapping(profile)
+                before = self._mapping(self._profiles[profile.name])
+                if set(mapping.positioners) - set(before.positioners):
+                    raise ConfigError(
+                        f"profile {profile.name!r}: stop before it moves other positioners"
+                    )
+                thread.remap(mapping, self._converter(mapping))
+            self._profiles[profile.name] = profile
+
+    def edit_axis(self, name: str, index: int, **changes: object) -> TeleoperationProfileSettings:
+        """Change one row of a profile's mapping and use it; returns the profile.
+
+        Raises
+        ------
+        ConfigError
+            As `set_profile`; or a value is none that the key takes.
+        """
+        before = self.profile(name)
+        rows = [each.model_dump() for each in before.axis]
+        if not 0 <= index < len(rows):
+            raise ConfigError(f"profile {name!r} has no row {index}")
+        rows[index] |= changes
+        whole = before.model_dump() | {"axis": rows}
+        try:
+            after = TeleoperationProfileSettings.model_validate(whole)
+        except ValidationError as exc:
+            first = exc.errors(include_url=False)[0]
+            raise ConfigError(f"profile {name!r}: {first['loc'][-1]}: {first['msg']}") from None
+        self.set_profile(after)
+        return after
+
+    def _kinds(self) -> dict[str, str]:
+        return {each.name: each.kind for each in self._manager.settings.positioner}
+
+    # Running
+
+    def start(self, device: str | InputDevice, profile: str) -> None:
+        """Begin to steer: `device` is a key of `devices`, or an open device.
+
+        Nothing moves before the sticks were at rest. What ran before is ended.
+
+        Raises
+        ------
+        NotAvailable
+            There is no such profile, motion is stopped, or MiCo is not ready.
+        NotConnectedError
+            The device is not there.
+        """
+        chosen = self.profile(profile)
+        self.stop()
+        with self._lock:
+            self._refuse_if_not_ready()
+            opened = self.sources.open(device) if isinstance(device, str) else device
+            try:
+                steering = self._steering(opened, chosen)
+            except BaseException:
+                opened.close()
+                raise
+            self._device = opened
+            if self.coupling is not None:
+                self.coupling.begin()
+            thread = InputThread(steering, self._policy)
+            thread.set_focus(self._focus)
+            self._thread = thread
+            thread.start()
+        logger.info("teleoperation: %s steers %r", opened.info.title, profile)
+
+    def _refuse_if_not_ready(self) -> None:
+        stop = self._manager.latch.state
+        if self._closed or self._manager.mode is not Mode.RUN_TIME:
+            raise NotAvailable("MiCo is not ready; wait, or rescan")
+        if stop.latched:
+            raise NotAvailable(f"motion is stopped ({stop.reason}); reset the stop first")
+
+    def _steering(self, device: InputDevice, profile: TeleoperationProfileSettings) -> Steering:
+        mapping, commands = self._mapping(profile), RateMeter()
+        token = self._manager.lease.holder.token
+        by_device: dict[int, DeviceCommander] = {}
+        drivers: dict[str, AxisDriver] = {}
+        for name in mapping.positioners:
+            address, state = self._manager.address(name), self._manager.state(name)
+            commander = by_device.get(address.device)
+            if commander is None:
+                commander = by_device[address.device] = DeviceCommander(token, SOURCE)
+                self._manager.connect_device_commander(address.device, commander)
+            drivers[name] = AxisDriver(
+                name,
+                address.channel,
+                commander,
+                self.settings,
+                sensor=class_for(state.kind, state.positioner).has_sensor,
+                commands=commands,
+            )
+        self._commanders = list(by_device.values())
+        coupling = self.coupling
+        return Steering(
+            device=device,
+            mapping=mapping,
+            converter=self._converter(mapping),
+            drivers=drivers,
+            settings=self.settings,
+            latch=self._manager.latch,
+            stop=self._manager.stop,
+            commands=commands,
+            slowed=coupling.slowed if coupling is not None else lambda: 1.0,
+        )
+
+    def _mapping(self, profile: TeleoperationProfileSettings) -> ProfileMapping:
+        jog = self._manager.settings.jog
+        usual = {
+            "linear": jog.speed_um_s,
+            "rotary": jog.speed_deg_s,
+            "open-loop": float(jog.frequency_hz),
+        }
+        speeds = {name: usual[kind] for name, kind in self._kinds().items()}
+        return ProfileMapping(profile, speeds, lambda name: self._manager.state(name).position)
+
+    def _converter(self, mapping: ProfileMapping) -> Converter:
+        return mapping if self.coupling is None else self.coupling.make_converter(mapping)
+
+    def stop(self) -> None:
+        """End the steering and give the device back; harmless when nothing runs."""
+        with self._lock:
+            thread, self._thread = self._thread, None
+            if thread is None:
+                return
+            thread.request_end()
+            if not thread.join(1.0):
+                logger.error("the input device hangs; what it moved was stopped without it")
+                self._stuck.append(thread)  # a thread that runs must not be destroyed
+            self._over = replace(
+                thread.state,
+                phase=TeleoperationPhase.OFF,
+                inputs=None,
+                velocities={},
+                refused={},
+            )
+            if thread.stopped:
+                self._over = replace(self._over, phase=TeleoperationPhase.STOPPED)
+            self._device = None
+            if self.coupling is not None:
+                self.coupling.end()
+            for commander in self._commanders:
+                commander.detach()
+            self._commanders = []
+
+    def set_focus(self, focus: bool) -> None:
+        """Say whether the window has the operator's attention; nothing moves while it has not."""
+        self._focus = focus
+        thread = self._thread
+        if thread is not None:
+            thread.set_focus(focus)
+
+    def feel(self, force: Mapping[str, float]) -> None:
+        """Have the hand feel a force by axis of the device, -1 to 1; returns at once."""
+        thread = self._thread
+        if thread is not None:
+            thread.feel(force)
+
+    def _on_latch(self, state: StopState) -> None:
+        """End at once; the thread sees the latch as well, but may just wait for its next look."""
+        thread = self._thread
+        if state.latched and thread is not None:
+            thread.look_now()
+
+    def close(self) -> None:
+        """End the steering for good and give all devices back."""
+        self._closed = True
+        self.stop()
+        self.sources.close()
