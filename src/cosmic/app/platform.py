@@ -175,6 +175,8 @@ def _build_mico(
         clock=site.clock,
         policy=site.policy,
         checker=load_checker(site.file, site.path),
+        platform=site.file.platform.name,
+        folder=site.path.parent,
         gui_factory=gui_factory,
     )
     return application, faults

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import QObject, Signal
@@ -14,6 +15,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.task import Task
 from cosmic.frame.task_application import TaskApplication
 from cosmic.mico.api.initialisation import Confirm, InitialisationRun
+from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.ways import Way, follow, way_from_plan
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT, CollisionChecker
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
@@ -56,6 +58,8 @@ class MicoApplication(TaskApplication):
         clock: Clock,
         policy: FailurePolicy,
         checker: CollisionChecker | None = None,
+        platform: str = "",
+        folder: Path | None = None,
         gui_factory: GuiFactory | None = None,
         parent: QObject | None = None,
     ) -> None:
@@ -73,6 +77,7 @@ class MicoApplication(TaskApplication):
             WayFinder(self.manager, self.collision.model) if self.collision is not None else None
         )
         self.teleoperation = Teleoperation(self.manager, policy)
+        self.trajectories = TrajectorySite(self, policy, platform, folder)
         self._failure = ""
         self._forget = policy.on_safe_stop(self.manager.stop)
 
@@ -201,6 +206,7 @@ class MicoApplication(TaskApplication):
         """Stop every movement, release the hold, end all threads; any state."""
         self.request_end()
         self.teleoperation.close()
+        self.trajectories.close()
         if self.clearance_watch is not None:
             self.clearance_watch.request_end()
             self.clearance_watch.join()

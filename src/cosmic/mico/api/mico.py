@@ -17,6 +17,8 @@ from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.entry import Number, as_number
 from cosmic.mico.api.group import GroupMovement, waited_for
 from cosmic.mico.api.initialisation import Confirm
+from cosmic.mico.api.poses import Poses
+from cosmic.mico.api.trajectories import Trajectories
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
@@ -302,6 +304,18 @@ class Mico:
     def teleoperation(self) -> Teleoperation:
         """Steering by a gamepad, keys or a haptic device; one for the whole program."""
         return self._application.teleoperation
+
+    # Trajectories and poses (SCM)
+
+    @property
+    def trajectories(self) -> Trajectories:
+        """Records, reads, rehearses and runs trajectories."""
+        return Trajectories(self._application.trajectories, self._source)
+
+    @property
+    def poses(self) -> Poses:
+        """Named poses: teach, go, remove."""
+        return Poses(self._application.trajectories, self._source)
 
     # Collisions
 

@@ -105,6 +105,7 @@ class _Reader:
         self._start: dict[str, Place] = {}
         self._once: dict[str, tuple[str, int]] = {}
         self._pose_axes: tuple[str, ...] | None = None
+        self._moved: set[str] = set()
         self._block: list[Move | Steps] | None = None
         self._block_line = 0
         self._block_at_s: float | None = None
@@ -263,11 +264,11 @@ class _Reader:
             self._pose_axes = tuple(words.axis_name(each.strip()) for each in axes.split(","))
 
     def _starts(self, rest: str) -> None:
-        if self._statements:
-            raise QuantityError("'start' belongs before the first movement")
         for each in rest.split(","):
             name, _, where = each.strip().partition(" ")
             axis = words.axis_name(name)
+            if axis in self._moved:
+                raise QuantityError(f"{axis} moves before line {self._line} tells its start")
             if axis in self._start:
                 raise QuantityError(f"the start of {axis} stands in line {self._start[axis].line}")
             value, unit = words.position(where.strip())
@@ -299,6 +300,7 @@ class _Reader:
 
     def _motion(self, said: str, at_s: float | None) -> None:
         part = self._part(said)
+        self._moved.add(part.axis)
         if self._block is None:
             self._statements.append(Leg((part,), self._line, at_s))
             return

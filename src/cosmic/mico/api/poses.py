@@ -1,0 +1,144 @@
+"""Named poses of the scripted API: ``rig.mico.poses``."""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from cosmic.frame.errors import MoveCancelled, NotAvailable, UnknownAxisError
+from cosmic.frame.task import Task
+from cosmic.mico.api.group import move_together
+from cosmic.mico.api.trajectory_site import TrajectorySite
+from cosmic.mico.core.orders import Motion, MoveTo
+from cosmic.mico.core.poses import Pose
+from cosmic.mico.core.positioner import Confidence
+
+WAY_BUDGET_S = 2.0
+
+
+class Poses:
+    """The named poses of the platform; any thread.
+
+    Positions are kept as the gate counts them: a user's zero changes nothing.
+    """
+
+    def __init__(self, site: TrajectorySite, source: str = "script") -> None:
+        self._site = site
+        self._source = source
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all poses."""
+        return list(self._site.poses.poses)
+
+    @property
+    def path(self) -> Path | None:
+        """The file they are kept in; None: they are kept until the program ends."""
+        return self._site.poses.path
+
+    def __getitem__(self, name: str) -> Pose:
+        return self._site.poses[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    def __iter__(self) -> Iterator[Pose]:
+        return iter(self._site.poses.poses.values())
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def teach(self, name: str, axes: str | Iterable[str] | None = None) -> Pose:
+        """Keep where axes stand now under a name; an older pose of that name is replaced.
+
+        Parameters
+        ----------
+        axes : str, iterable of str or None
+            Axes, or the title of a group of the window; None: all with a sensor. Axes without
+            sensor are left out, for nothing can bring them back.
+
+        Raises
+        ------
+        NotAvailable
+            The name is none, or the position of an axis is not known.
+        UnknownAxisError
+            There is no such axis or group.
+        """
+        facts = self._site.facts().axes
+        positions: dict[str, float] = {}
+        for axis in self._axes(axes):
+            if axis not in facts:
+                raise UnknownAxisError(axis, facts)
+            if not facts[axis].has_sensor:
+                continue
+            state = self._site.manager.state(axis)
+            if state.position is None or state.confidence is not Confidence.KNOWN:
+                raise NotAvailable(f"{axis}: its position is not known; initialise it first")
+            positions[axis] = state.position
+        pose = Pose(name, positions)
+        self._site.poses.put(pose)
+        return pose
+
+    def _axes(self, axes: str | Iterable[str] | None) -> tuple[str, ...]:
+        manager = self._site.manager
+        if axes is None:
+            return tuple(manager.names())
+        if not isinstance(axes, str):
+            return tuple(axes)
+        for group in manager.settings.group:
+            if axes == group.title:
+                return group.positioners
+        return (axes,)
+
+    def remove(self, name: str) -> None:
+        """Forget a pose; raises `NotAvailable` where there is none."""
+        self._site.poses.remove(name)
+
+    def go(self, name: str, *, way: bool = False, wait: bool = True) -> Task:
+        """Move to a pose, all its axes together.
+
+        Parameters
+        ----------
+        way : bool
+            Have a way found round what is in between; else the gate decides the straight one.
+        wait : bool
+            False returns at once; the task has `progress`, `cancel` and `wait`.
+
+        Raises
+        ------
+        NotAvailable
+            There is no such pose, or another long operation is under way.
+        MoveRefused
+            The gate refused it; with `way`, none was found.
+        """
+        pose = self._site.poses[name]
+        task = self._site.worker.begin(
+            f"Going to {name}", lambda task: self._go(pose, task, way=way)
+        )
+        if wait:
+            try:
+                task.wait()
+            except KeyboardInterrupt:
+                task.cancel()
+                raise
+        return task
+
+    def _go(self, pose: Pose, task: Task, *, way: bool) -> None:
+        from cosmic.frame.errors import CosmicError
+
+        manager = self._site.manager
+        try:
+            parts = [pose.positions]
+            if way and self._site.worker.collision is not None:
+                task.report(0.0, "looking for a way")
+                parts = list(self._site.worker.find_way(pose.positions, WAY_BUDGET_S).waypoints)
+            for number, targets in enumerate(parts):
+                if task.cancel_requested:
+                    raise MoveCancelled(f"the way to {pose.name} was left before its end")
+                task.report(number / len(parts), ", ".join(targets))
+                motions: dict[str, Motion] = {
+                    axis: MoveTo(target, manager.state(axis).unit)
+                    for axis, target in targets.items()
+                }
+                move_together(manager, motions, task, source=self._source)
+            task.finish()
+        except CosmicError as exc:
+            task.fail(exc)

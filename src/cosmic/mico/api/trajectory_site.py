@@ -1,0 +1,175 @@
+"""What trajectories need of a platform: its facts, its poses, and a stage for rehearsals."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from threading import Lock
+from typing import TYPE_CHECKING, Final, Protocol
+
+from cosmic.frame.config import shipped_config_dir
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.task import Task
+from cosmic.frame.task_application import Job
+from cosmic.mico.api.ways import Way
+from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
+from cosmic.mico.core.collision.collision_manager import CollisionManager
+from cosmic.mico.core.device_manager import DeviceManager
+from cosmic.mico.core.poses import PoseBook
+from cosmic.mico.core.positioner import Confidence, PositionerState, class_for
+from cosmic.mico.core.rules import Limits
+from cosmic.mico.core.trajectory.binding import AxisFacts, Bound, PlatformFacts
+from cosmic.mico.core.trajectory.clearance import ClearanceSearch
+from cosmic.mico.core.trajectory.pure_gate import PureAnswers, pure_copy
+from cosmic.mico.core.trajectory.rehearsal import Rehearsal, Stage, Told, rehearse
+
+if TYPE_CHECKING:
+    from cosmic.mico.api.trajectory_player import TrajectoryPlayer
+    from cosmic.mico.core.trajectory_recorder import TrajectoryRecorder
+
+POSES_IN_MEMORY: Final = ""
+
+
+class Worker(Protocol):
+    """What carries out long operations and finds ways: the application."""
+
+    @property
+    def manager(self) -> DeviceManager:
+        """Where the axes are."""
+
+    @property
+    def collision(self) -> CollisionManager | None:
+        """The collision model, where there is one."""
+
+    def begin(self, title: str, job: Job) -> Task:
+        """See `TaskApplication.begin`."""
+
+    def find_way(self, targets: Mapping[str, float], budget_s: float) -> Way:
+        """See `MicoApplication.find_way`."""
+
+
+class TrajectorySite:
+    """The platform as trajectories see it; any thread.
+
+    Parameters
+    ----------
+    platform : str
+        Name of the platform; empty where there is none.
+    folder : Path or None
+        Folder of the platform file, where the named poses are kept.
+    """
+
+    def __init__(
+        self,
+        worker: Worker,
+        policy: FailurePolicy,
+        platform: str = "",
+        folder: Path | None = None,
+    ) -> None:
+        self.worker = worker
+        self.policy = policy
+        self.player: TrajectoryPlayer | None = None
+        self.recorder: TrajectoryRecorder | None = None
+        self.manager = worker.manager
+        self.platform = platform
+        self.poses = PoseBook(_poses_path(self.manager.settings.poses, folder))
+        self._answers: PureAnswers | None = None
+        self._rehearsing = Lock()
+
+    def close(self) -> None:
+        """End a recording that is under way."""
+        if self.recorder is not None:
+            self.recorder.stop()
+
+    def states(self) -> dict[str, PositionerState]:
+        """Return the state of every axis."""
+        return {name: self.manager.state(name) for name in self.manager.names()}
+
+    def facts(self) -> PlatformFacts:
+        """Return what a trajectory is checked against."""
+        axes = {
+            name: AxisFacts(
+                unit=state.unit,
+                has_sensor=class_for(state.kind, state.positioner).has_sensor,
+                limits=state.limits,
+            )
+            for name, state in self.states().items()
+        }
+        return PlatformFacts(
+            name=self.platform,
+            axes=axes,
+            defaults=self.manager.settings.defaults,
+            poses=self.poses.poses,
+        )
+
+    def positions(self) -> dict[str, float]:
+        """Return where the axes with a sensor stand, as far as it is known."""
+        return {
+            name: state.position
+            for name, state in self.states().items()
+            if state.position is not None and state.confidence is Confidence.KNOWN
+        }
+
+    def frequency_hz(self, axis: str) -> int:
+        """Return the closed-loop frequency limit of an axis."""
+        channel = self.manager.address(axis).channel
+        positioner = self.manager.device(axis).container.positioner(channel)
+        own = positioner.frequency_hz if positioner is not None else None
+        return own or self.manager.settings.defaults.closed_loop_frequency_hz
+
+    def step_um(self, axis: str) -> float:
+        """Return how far a step of an axis without sensor is taken to go."""
+        for each in self.manager.settings.positioner:
+            if each.name == axis and each.step_um is not None:
+                return each.step_um
+        return self.manager.settings.defaults.nominal_step_um
+
+    def rehearse(
+        self,
+        bound: Bound,
+        *,
+        speed: float = 1.0,
+        timed: bool = True,
+        progress: Told | None = None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> Rehearsal:
+        """Run a trajectory through the pure gate; one at a time, in the calling thread."""
+        states = self.states()
+        defaults = self.manager.settings.defaults
+        with self._rehearsing:
+            checker, search = self._pure_gate(bound)
+            stage = Stage(
+                states=states,
+                facts=self.facts(),
+                frequencies_hz={name: float(self.frequency_hz(name)) for name in states},
+                step_um={name: self.step_um(name) for name in states},
+                checker=checker,
+                rules=Limits(
+                    largest_step={
+                        "um": defaults.largest_step_um,
+                        "deg": defaults.largest_step_deg,
+                    },
+                    stale_s=self.manager.settings.watch.stale_s,
+                ),
+                clearance=search,
+                speed=speed,
+                timed=timed,
+                progress=progress or (lambda _part, _text: None),
+                cancelled=cancelled or (lambda: False),
+            )
+            return rehearse(bound, stage)
+
+    def _pure_gate(self, bound: Bound) -> tuple[CollisionChecker, ClearanceSearch | None]:
+        live = self.worker.collision
+        if live is None:
+            return NoCollisionModel(), None
+        if self._answers is None:
+            self._answers = PureAnswers(live.model)
+        checker = pure_copy(live, self._answers, self.manager.names())
+        axes = bound.trajectory.axes
+        return checker, ClearanceSearch(self._answers.sweep, axes, live.ignored_pairs)
+
+
+def _poses_path(name: str, folder: Path | None) -> Path | None:
+    """Return where named poses are kept; the shipped configuration is nobody's to change."""
+    if folder is None or name == POSES_IN_MEMORY or folder.resolve() == shipped_config_dir():
+        return None
+    return folder / name
