@@ -9,10 +9,10 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, tipped
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.task import Task
-from cosmic.vico.gui.texts import duration_text
 
 TIP = "Measure where on the platform the pixels lie: a tool goes to nine places and back"
 
