@@ -14,12 +14,13 @@ from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.api.entry import Number, as_number, as_whole
 from cosmic.mico.api.group import waited_for
 from cosmic.mico.api.jogging import Jogging
+from cosmic.mico.api.linked import linked_movement
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.device_commander import DeviceCommander
 from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import FREQUENCY_HZ, MoveTo
+from cosmic.mico.core.orders import FREQUENCY_HZ, Motion, MoveBy, MoveTo
 from cosmic.mico.core.positioner import Confidence, PositionerState, Status, class_for
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
 
@@ -48,11 +49,6 @@ class Axis:
         return f"<Axis {self._name}: {where}, {state.status}, position {state.confidence}>"
 
     # What it is
-
-    @property
-    def name(self) -> str:
-        """Name of the axis, such as "left.x"."""
-        return self._name
 
     @property
     def details(self) -> PositionerState:
@@ -113,6 +109,11 @@ class Axis:
             raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the platform file")
         change = model.take_in if on else model.take_out
         change(self._name, source=self.commander.source)
+
+    @property
+    def linked_to(self) -> dict[str, float]:
+        """How far each axis linked to it goes when it goes 1; empty where it is linked to none."""
+        return dict(self._manager.links.companions(self._name))
 
     @property
     def position_um(self) -> float | None:
@@ -195,7 +196,7 @@ class Axis:
             It was cancelled or replaced.
         """
         target = self._number(position) + self.details.zero
-        movement = self.commander.move_absolute(self._channel, target, self.unit, consent=consent)
+        movement = self._send(MoveTo(target, self.unit), consent=consent)
         return self._result(movement, wait=wait)
 
     def continue_to(self, position: Number, after: Movement, *, consent: bool = False) -> Movement:
@@ -205,8 +206,19 @@ class Axis:
         movement fails with `MoveCancelled`.
         """
         target = self._number(position) + self.details.zero
-        motion = MoveTo(target, self.unit)
-        return self.commander.send(self._channel, motion, consent=consent, follows=after)
+        return self._send(MoveTo(target, self.unit), consent=consent, follows=after)
+
+    def _send(self, motion: Motion, *, consent: bool, follows: Movement | None = None) -> Movement:
+        if self.linked_to:
+            return linked_movement(
+                self._manager,
+                self._name,
+                motion,
+                source=self.commander.source,
+                consent=consent,
+                follows=follows,
+            )
+        return self.commander.send(self._channel, motion, consent=consent, follows=follows)
 
     @overload
     def move_by(
@@ -222,10 +234,8 @@ class Axis:
         self, distance: Number, *, wait: bool = True, consent: bool = False
     ) -> float | Movement | None:
         """Move by `distance` from where it stands or is going; otherwise as `move_to`."""
-        movement = self.commander.move_relative(
-            self._channel, self._number(distance), self.unit, consent=consent
-        )
-        return self._result(movement, wait=wait)
+        motion = MoveBy(self._number(distance), self.unit)
+        return self._result(self._send(motion, consent=consent), wait=wait)
 
     @overload
     def steps(

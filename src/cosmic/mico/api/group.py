@@ -1,14 +1,17 @@
 """Several axes that move together."""
 
-from collections.abc import Mapping
-from typing import Protocol, TypeVar
+from collections.abc import Callable, Mapping
+from threading import Lock
+from typing import Protocol, Self, TypeVar
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, MoveCancelled
+from cosmic.frame.listeners import tell
 from cosmic.frame.task import Task
 from cosmic.mico.core.device_manager import DeviceManager
+from cosmic.mico.core.group_start import GroupStart
 from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import Motion
+from cosmic.mico.core.orders import Motion, Order
 
 T = TypeVar("T", covariant=True)
 
@@ -19,14 +22,52 @@ class GroupMovement:
     Any thread. `movements` has the movement of each axis by name.
     """
 
-    def __init__(self, movements: Mapping[str, Movement]) -> None:
+    def __init__(self, movements: Mapping[str, Movement], start: GroupStart | None = None) -> None:
         self.movements = dict(movements)
+        self._start = start
+        self._lock = Lock()
+        self._left = len(self.movements)
+        self._callbacks: list[Callable[[GroupMovement], None]] = []
         for movement in self.movements.values():
             movement.add_callback(self._on_end)
+
+    @classmethod
+    def of(cls, orders: Mapping[str, Order]) -> Self:
+        """Return the future of what `DeviceManager.order_together` ordered."""
+        start = next((order.start for order in orders.values()), None)
+        return cls({name: order.movement for name, order in orders.items()}, start)
+
+    @property
+    def start_skew_ms(self) -> float | None:
+        """From the start of the first axis to that of the last, in milliseconds of wall time.
+
+        Measured at the calls of the library; None before they were made, 0 where one goes alone.
+        """
+        if self._start is None:
+            return 0.0
+        return self._start.skew_ms
 
     def _on_end(self, ended: Movement) -> None:
         if not ended.success:
             self.cancel()
+        with self._lock:
+            self._left -= 1
+            over = self._left == 0
+            callbacks = self._callbacks if over else []
+            if over:
+                self._callbacks = []
+        tell(callbacks, self)
+
+    def add_callback(self, callback: "Callable[[GroupMovement], None]") -> None:
+        """Call `callback(movement)` when all have ended, in the thread that ends the last, or now.
+
+        It must return at once.
+        """
+        with self._lock:
+            if self._left > 0:
+                self._callbacks.append(callback)
+                return
+        tell([callback], self)
 
     @property
     def done(self) -> bool:
@@ -53,15 +94,13 @@ class GroupMovement:
             What ended one of them early; as `Movement.wait`.
         """
         failures: list[CosmicError] = []
-        deadline_s = None if timeout_s is None else WALL.now_s() + timeout_s
+        deadline_s = None if timeout is None else WALL.now_s() + timeout
         for movement in self.movements.values():
             left_s = None if deadline_s is None else max(0.0, deadline_s - WALL.now_s())
             error = movement.exception(left_s)
             if isinstance(error, CosmicError):
                 failures.append(error)
-        if failures:
-            raise min(failures, key=_importance)
-        return {name: movement.wait() for name, movement in self.movements.items()}
+        return min(failures, key=_importance) if failures else None
 
 
 def move_together(
@@ -71,16 +110,19 @@ def move_together(
     *,
     source: str,
     consent: bool = False,
+    linked: bool = True,
 ) -> None:
     """Start `motions` at once and wait for all; whoever cancels `task` stops them.
+
+    Axes that are linked to them move as well, unless not `linked`.
 
     Raises
     ------
     CosmicError
         What ended one of them early, or the refusal: then nothing has moved.
     """
-    orders = manager.order_together(motions, source=source, consent=consent)
-    together = GroupMovement({name: order.movement for name, order in orders.items()})
+    orders = manager.order_together(motions, source=source, consent=consent, linked=linked)
+    together = GroupMovement.of(orders)
     task.on_cancel(together.cancel)
     together.wait()
 

@@ -123,7 +123,9 @@ class InitialisationRun:
                 self._zero(step)
             case _:
                 manager = self._manager
-                move_together(manager, step.motions, task, source=SOURCE, consent=True)
+                move_together(
+                    manager, step.motions, task, source=SOURCE, consent=True, linked=False
+                )
 
     def _look(self, task: Task) -> None:
         """Go no further when it was cancelled or stopped."""

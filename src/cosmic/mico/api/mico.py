@@ -24,7 +24,9 @@ from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.device import Device
 from cosmic.mico.core.device_commander import DeviceCommander
+from cosmic.mico.core.links import Link
 from cosmic.mico.core.orders import Motion, MoveBy, MoveTo
+from cosmic.mico.hw.interface import PositionerKind
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 
 
@@ -164,20 +166,32 @@ class Mico:
         *,
         wait: Literal[True] = True,
         consent: bool = False,
+        match_arrival: bool = False,
     ) -> dict[str, float | None]: ...
 
     @overload
     def move(
-        self, targets: Mapping[str, Number], *, wait: Literal[False], consent: bool = False
+        self,
+        targets: Mapping[str, Number],
+        *,
+        wait: Literal[False],
+        consent: bool = False,
+        match_arrival: bool = False,
     ) -> GroupMovement: ...
 
     def move(
-        self, targets: Mapping[str, Number], *, wait: bool = True, consent: bool = False
+        self,
+        targets: Mapping[str, Number],
+        *,
+        wait: bool = True,
+        consent: bool = False,
+        match_arrival: bool = False,
     ) -> dict[str, float | None] | GroupMovement:
         """Move several axes to positions together; returns the positions reached.
 
         They are decided together and started back to back; each goes at its own speed, so the
-        path is not a straight line. The failure of one stops the others.
+        path is not a straight line. The failure of one stops the others. Axes that are linked to
+        them, and not named, move with them.
 
         Parameters
         ----------
@@ -185,6 +199,9 @@ class Mico:
             Positions by axis name, in the unit of each axis, from the user's zero.
         wait : bool
             False returns the `GroupMovement` at once.
+        match_arrival : bool
+            Slow the axes down to the one that takes longest, so that all arrive together; their
+            own speeds come back afterwards.
 
         Raises
         ------
@@ -195,7 +212,8 @@ class Mico:
         DeviceError, MoveCancelled
             One of them failed or was stopped.
         """
-        return self._together(self._targets(targets), wait=wait, consent=consent)
+        motions = self._targets(targets)
+        return self._together(motions, wait=wait, consent=consent, match_arrival=match_arrival)
 
     @overload
     def move_by(
@@ -204,22 +222,33 @@ class Mico:
         *,
         wait: Literal[True] = True,
         consent: bool = False,
+        match_arrival: bool = False,
     ) -> dict[str, float | None]: ...
 
     @overload
     def move_by(
-        self, distances: Mapping[str, Number], *, wait: Literal[False], consent: bool = False
+        self,
+        distances: Mapping[str, Number],
+        *,
+        wait: Literal[False],
+        consent: bool = False,
+        match_arrival: bool = False,
     ) -> GroupMovement: ...
 
     def move_by(
-        self, distances: Mapping[str, Number], *, wait: bool = True, consent: bool = False
+        self,
+        distances: Mapping[str, Number],
+        *,
+        wait: bool = True,
+        consent: bool = False,
+        match_arrival: bool = False,
     ) -> dict[str, float | None] | GroupMovement:
         """Move several axes by distances together; otherwise as `move`."""
         motions: dict[str, Motion] = {}
         for name, value in distances.items():
             unit = self[name].unit
             motions[name] = MoveBy(as_number(value, unit, name), unit)
-        return self._together(motions, wait=wait, consent=consent)
+        return self._together(motions, wait=wait, consent=consent, match_arrival=match_arrival)
 
     def _targets(self, targets: Mapping[str, Number]) -> dict[str, Motion]:
         motions: dict[str, Motion] = {}
@@ -228,10 +257,12 @@ class Mico:
         return motions
 
     def _together(
-        self, motions: Mapping[str, Motion], *, wait: bool, consent: bool
+        self, motions: Mapping[str, Motion], *, wait: bool, consent: bool, match_arrival: bool
     ) -> dict[str, float | None] | GroupMovement:
-        orders = self._manager.order_together(motions, source=self._source, consent=consent)
-        group = GroupMovement({name: order.movement for name, order in orders.items()})
+        orders = self._manager.order_together(
+            motions, source=self._source, consent=consent, match_arrival=match_arrival
+        )
+        group = GroupMovement.of(orders)
         return waited_for(group) if wait else group
 
     def check(self, targets: Mapping[str, Number]) -> MoveVerdict:
@@ -316,6 +347,47 @@ class Mico:
     def poses(self) -> Poses:
         """Named poses: teach, go, remove."""
         return Poses(self._application.trajectories, self._source)
+
+    # Links
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """The links in force, each with `first`, `second` and `ratio`."""
+        return self._manager.links.links
+
+    def link(self, first: str, second: str, ratio: float = 1.0) -> Link:
+        """Link two axes: a movement of one to or by a position moves the other as well.
+
+        They are decided together, started together and arrive together. Neither can be moved
+        otherwise while they are linked: steps, jogs and reference runs are refused.
+
+        Parameters
+        ----------
+        ratio : float
+            How far `second` goes when `first` goes 1; below 0 the other way.
+
+        Raises
+        ------
+        UnknownAxisError
+            One of them does not exist.
+        NotAvailable
+            They are linked already, have no sensor, or are not of one kind.
+        """
+        kinds = {self[name].kind for name in (first, second)}
+        if len(kinds) > 1 or PositionerKind.OPEN_LOOP in kinds:
+            text = f"{first} and {second} cannot be linked: both must be linear, or both rotary"
+            raise NotAvailable(text)
+        return self._manager.links.add(first, second, float(ratio))
+
+    def unlink(self, axis: str) -> bool:
+        """Take away every link of an axis; False when it had none.
+
+        Raises
+        ------
+        UnknownAxisError
+            There is no such axis.
+        """
+        return self._manager.links.remove(self[axis].name)
 
     # Collisions
 

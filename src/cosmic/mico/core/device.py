@@ -28,6 +28,7 @@ from cosmic.mico.core.flight import PilotContext
 from cosmic.mico.core.gate import Gate
 from cosmic.mico.core.introduction import Introduction
 from cosmic.mico.core.messages import (
+    Departed,
     DeviceLost,
     Halt,
     Lost,
@@ -50,7 +51,7 @@ MOST_AT_ONCE: Final = 100
 """How many messages are taken before positions are polled again."""
 
 
-_Message = Order | Event | Halt | StopAll | Lost | SetFrequency | Tell | Wake
+_Message = Departed | Order | Event | Halt | StopAll | Lost | SetFrequency | Tell | Wake
 
 
 class Device(WorkerThread):
@@ -107,6 +108,7 @@ class Device(WorkerThread):
             on_failed=self._emit_failed,
             on_state=self._emit_state,
             on_begun=self.movement_begun.emit,
+            on_departed=self._inbox.put,
         )
         self._introduction = Introduction(self._context)
         container.observe(lambda event, _state: self._inbox.put(event))
@@ -273,6 +275,8 @@ class Device(WorkerThread):
         match message:
             case Order():
                 self._on_order(message)
+            case Departed():
+                self._on_departed(message)
             case StopAll():
                 for pilot in self._pilots.values():
                     pilot.halt(message.error)
@@ -315,6 +319,11 @@ class Device(WorkerThread):
         except BaseException as exc:
             order.movement.fail(DeviceError(f"{pilot.name}: {exc}"))
             raise
+
+    def _on_departed(self, departed: Departed) -> None:
+        pilot = self._pilots.get(departed.order.channel)
+        if pilot is not None:
+            pilot.depart(departed)
 
     def _turn_away(self, order: Order, state: PositionerState | None) -> None:
         state = state or self.container.state(order.channel)

@@ -25,15 +25,19 @@ from cosmic.mico.core.device import Device
 from cosmic.mico.core.device_commander import CommanderType, DeviceCommander, join
 from cosmic.mico.core.device_listener import DeviceListener
 from cosmic.mico.core.gate import Gate, Request
+from cosmic.mico.core.group_start import GroupStart
 from cosmic.mico.core.introduction import CHANNELS
 from cosmic.mico.core.lease import Lease
+from cosmic.mico.core.links import LinkTable
 from cosmic.mico.core.messages import DeviceLost
+from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.numbering import library_indices, serials_to_open
 from cosmic.mico.core.orders import Interval, Motion, Order
 from cosmic.mico.core.positioner import Confidence, PositionerState
 from cosmic.mico.core.rules import Limits
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.stop_latch import StopLatch
+from cosmic.mico.core.together import frequencies, give_up_together, with_linked
 from cosmic.mico.hw.interface import Channel, Controller
 
 logger = logging.getLogger(__name__)
@@ -64,11 +68,17 @@ class DeviceManager(QObject):
         A device cannot be reached any more.
     group_refused(MoveVerdict)
         Movements that were to begin together were refused; in the thread of who asked.
+    group_started(GroupStarted)
+        Several axes were started back to back; in the thread of a device.
+    links_changed()
+        Axes were linked, or are linked no more.
     """
 
     changed = Signal()
     device_lost = Signal(object)
     group_refused = Signal(object)
+    group_started = Signal(object)
+    links_changed = Signal()
 
     def __init__(
         self,
@@ -86,6 +96,10 @@ class DeviceManager(QObject):
         self.clock = clock
         self.latch = StopLatch()
         self.lease = Lease()
+        self.links = LinkTable()
+        for link in settings.link:
+            self.links.add(link.first, link.second, link.ratio)
+        self.links.subscribe(self.links_changed.emit)
         self._policy = policy
         self._busy = RLock()
         self._devices: dict[int, Device] = {}
@@ -107,6 +121,7 @@ class DeviceManager(QObject):
                 for each in settings.positioner
                 if each.start_region is not None
             },
+            links=self.links.partners,
         )
         self._arrange({})
 
@@ -371,12 +386,30 @@ class DeviceManager(QObject):
 
     def check(self, motions: Mapping[str, Motion], *, consent: bool = False) -> MoveVerdict:
         """Return what the gate says to all of `motions` together, without moving anything."""
-        return self.gate.check(self._requests(motions, consent=consent))
+        self._addressed(motions)
+        together = with_linked(motions, self.links, self)
+        return self.gate.check(self._requests(together, consent=consent))
 
     def order_together(
-        self, motions: Mapping[str, Motion], *, source: str, consent: bool = False
+        self,
+        motions: Mapping[str, Motion],
+        *,
+        source: str,
+        consent: bool = False,
+        linked: bool = True,
+        match_arrival: bool = False,
+        follows: Mapping[str, Movement] | None = None,
     ) -> dict[str, Order]:
         """Decide `motions` together and start them back to back, or none of them.
+
+        Parameters
+        ----------
+        linked : bool
+            Axes linked to those named move with them; False moves those named only.
+        match_arrival : bool
+            Slow the axes down to the one that takes longest, so that all arrive together.
+        follows : mapping of Movement
+            By axis, what must be the newest movement there; otherwise this one is void.
 
         Raises
         ------
@@ -385,7 +418,12 @@ class DeviceManager(QObject):
         UnknownAxisError
             One axis does not exist; nothing moved.
         """
-        requests = self._requests(motions, consent=consent)
+        self._addressed(motions)
+        if linked:
+            named = len(motions)
+            motions = with_linked(motions, self.links, self)
+            match_arrival = match_arrival or len(motions) > named
+        requests = self._requests(motions, consent=consent, alone=not linked)
         if self._mode is not Mode.RUN_TIME:
             raise refusal(
                 refuse(Reason.DEVICE, f"MiCo is not ready ({self._mode}); wait, or rescan")
@@ -395,22 +433,51 @@ class DeviceManager(QObject):
             logger.warning("refused (%s): %s", source, verdict)
             self.group_refused.emit(verdict)
             raise refusal(verdict)
+        self.links.sent(
+            {name: each.target for name, each in grants.items() if each.target is not None}
+        )
+        speeds: Mapping[str, int] = {}
+        if match_arrival:
+            speeds = frequencies(grants, self.states(), self.settings.defaults, self._usual_hz)
+        start = GroupStart(len(motions), self.group_started.emit) if len(motions) > 1 else None
         token = self.lease.holder.token
         orders = {
             name: Order(
-                self.address(name).channel, motion, token, source, consent, grant=grants[name]
+                self.address(name).channel,
+                motion,
+                token,
+                source,
+                consent,
+                grant=grants[name],
+                follows=None if follows is None else follows.get(name),
+                start=start,
+                frequency_hz=speeds.get(name),
             )
             for name, motion in motions.items()
         }
+        give_up_together(orders)
         for name, order in orders.items():
             self.device(name).submit(order)
         return orders
 
-    def _requests(self, motions: Mapping[str, Motion], *, consent: bool) -> list[Request]:
+    def _usual_hz(self, name: str) -> int:
+        """Return the closed-loop frequency limit that is set on an axis."""
+        found = self.device(name).container.positioner(self.address(name).channel)
+        own_hz = None if found is None else found.frequency_hz
+        return own_hz or self.settings.defaults.closed_loop_frequency_hz
+
+    def _addressed(self, motions: Mapping[str, Motion]) -> None:
+        """Raise `UnknownAxisError` where one of the axes does not exist."""
         for name in motions:
             self.address(name)
+
+    def _requests(
+        self, motions: Mapping[str, Motion], *, consent: bool, alone: bool = False
+    ) -> list[Request]:
         token = self.lease.holder.token
-        return [Request(name, motion, token, consent) for name, motion in motions.items()]
+        return [
+            Request(name, motion, token, consent, alone=alone) for name, motion in motions.items()
+        ]
 
     # Stopping
 

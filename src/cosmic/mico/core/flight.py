@@ -13,7 +13,7 @@ from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.core.data_container import DeviceDataContainer
 from cosmic.mico.core.gate import Gate
 from cosmic.mico.core.jog import JogRun
-from cosmic.mico.core.messages import MovementBegun
+from cosmic.mico.core.messages import Departed, MovementBegun
 from cosmic.mico.core.orders import Grant, Jog, Order, Step
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.core.settings import MicoSettings
@@ -38,6 +38,10 @@ class Flight:
         The controller still has to say whether the reference was found.
     error : CosmicError or None
         Why the movement will fail once it stands.
+    awaiting : bool
+        It waits for others to start together with, and was not sent yet.
+    replaced : bool
+        A newer order took its place.
     told : bool
         Its movement has been failed already; it is only followed until it stands.
     progress_s : float
@@ -56,6 +60,18 @@ class Flight:
     error: CosmicError | None = None
     jog: JogRun | None = None
     told: bool = False
+    awaiting: bool = False
+    replaced: bool = False
+
+    @property
+    def has_own_speed(self) -> bool:
+        """True when the channel has another closed-loop speed than the usual one meanwhile."""
+        return isinstance(self.order.motion, Jog) or self.order.frequency_hz is not None
+
+    @property
+    def withdrawn(self) -> bool:
+        """True when it must not be sent any more."""
+        return self.replaced or self.error is not None
 
     @property
     def at_rest(self) -> bool:
@@ -79,7 +95,7 @@ class Flight:
         return patience_s
 
 
-def _nobody(_begun: MovementBegun) -> None:
+def _nobody(_what: object) -> None:
     """Hear of a movement where nobody listens."""
 
 
@@ -97,6 +113,7 @@ class PilotContext:
     on_failed: Callable[[str, CosmicError], None]
     on_state: Callable[[int], None]
     on_begun: Callable[[MovementBegun], None] = _nobody
+    on_departed: Callable[[Departed], None] = _nobody
     poll_s: float = 0.05
 
 

@@ -81,6 +81,7 @@ class ChannelFollower:
             self._context.gate.abandon(self.flight.grant)
             self.flight.error = self.flight.error or error
             self.flight.jog = None
+            self.flight.awaiting = False
         self._quietly(lambda: self._context.controller.stop(self._address))
         if self.flight is not None:
             self.flight.progress_s = self._context.clock.now_s()
@@ -90,6 +91,7 @@ class ChannelFollower:
         """Give up the movement of a channel that cannot be reached; its interval stays held."""
         flight, self.flight = self.flight, None
         if flight is not None:
+            flight.error = flight.error or error
             self._context.gate.abandon(flight.grant)
             self._count(flight)
             flight.order.movement.fail(error)
@@ -146,11 +148,17 @@ class ChannelFollower:
         flight.order.movement.fail(error)
         self._context.on_failed(self.name, error)
 
+    @property
+    def _number(self) -> int:
+        """Under which number to ask: 0 while no order is under way, or it was not sent yet."""
+        flight = self.flight
+        return 0 if flight is None or flight.awaiting else flight.order.number
+
     def ask_activity(self) -> None:
         """Ask what the channel is doing."""
         if not self._activity.may_ask():
             return
-        self._activity.asked(self.flight.order.number if self.flight else 0)
+        self._activity.asked(self._number)
         if not self._quietly(lambda: self._context.controller.ask_activity(self._address)):
             self._activity.withdrawn()
 
@@ -158,7 +166,7 @@ class ChannelFollower:
         """Ask for the position, where there is a sensor."""
         if not self._positioner.has_sensor or not self._position.may_ask():
             return
-        number = self.flight.order.number if self.flight else 0
+        number = self._number
         final = self.flight is not None and self.flight.rests_seen > 0
         self._position.asked(-number if final else number)
         unit = self._positioner.state.unit
@@ -317,7 +325,7 @@ class ChannelFollower:
         flight, self.flight = self.flight, None
         if flight is None:
             return
-        if isinstance(flight.order.motion, Jog):
+        if flight.has_own_speed:
             self._quietly(lambda: self._limit_speed(self._frequency_hz))
         in_motion = not flight.at_rest
         state = self._context.container.update(self._address.channel, in_motion=in_motion)

@@ -1,7 +1,7 @@
 """The one gate in front of the vendor library: every movement from anywhere is decided here."""
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
 from itertools import count
@@ -29,6 +29,8 @@ class Request:
     motion: Motion
     token: str
     consent: bool = False
+    alone: bool = False
+    """Move it without the axes that it is linked to."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +45,8 @@ class Picture:
         Where axes in flight stood before; None where that was not known.
     regions : mapping of Interval
         Where axes may be whose position is unknown.
+    links : mapping of frozenset of str
+        By axis, those that must move with it.
     """
 
     stop_reason: str | None
@@ -54,6 +58,7 @@ class Picture:
     rules: Limits
     begun_at: Mapping[str, float | None] = field(default_factory=dict)
     regions: Mapping[str, Interval] = field(default_factory=dict)
+    links: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
     def place(self, state: PositionerState) -> Interval:
         """Return where an axis may be, if nobody moves it."""
@@ -86,8 +91,9 @@ def judge(
     """Decide several movements together; pure: state in, answer out, nothing else touched."""
     intervals: dict[str, Interval] = {}
     targets: dict[str, float] = {}
+    asked = {request.axis for request in requests}
     for request in requests:
-        verdict = _first_refusal(request, picture)
+        verdict = _first_refusal(request, picture) or _torn_apart(request, asked, picture)
         if verdict is not None:
             return Decision(verdict, {}, {})
         state = picture.states[request.axis]
@@ -125,6 +131,19 @@ def _first_refusal(request: Request, picture: Picture) -> MoveVerdict | None:
         held=picture.held.get(axis),
         age_s=picture.now_wall_s - state.read_wall_s,
         rules=picture.rules,
+    )
+
+
+def _torn_apart(request: Request, asked: Collection[str], picture: Picture) -> MoveVerdict | None:
+    """Return why an axis must not move without those that it is linked to, or None."""
+    missing = picture.links.get(request.axis, frozenset()).difference(asked)
+    if request.alone or not missing:
+        return None
+    return refuse(
+        Reason.WRONG_KIND,
+        f"{request.axis}: it is linked to {', '.join(sorted(missing))} and does not move alone; "
+        "move it to or by a position, or unlink it first",
+        axis=request.axis,
     )
 
 
@@ -187,6 +206,8 @@ class Gate:
         Returns the state of every positioner by name.
     regions : mapping of Interval
         Where each axis may stand at power-up; anywhere, where it has none.
+    links : callable
+        Returns, by axis, those that must move with it.
     """
 
     def __init__(
@@ -198,6 +219,7 @@ class Gate:
         rules: Limits,
         states: Callable[[], Mapping[str, PositionerState]],
         regions: Mapping[str, Interval] | None = None,
+        links: Callable[[], Mapping[str, frozenset[str]]] = dict,
     ) -> None:
         self._latch = latch
         self._lease = lease
@@ -205,6 +227,7 @@ class Gate:
         self._rules = rules
         self._states = states
         self._lock = Lock()
+        self._links = links
         self._numbers = count(1)
         self._holds: dict[str, dict[int, _Hold]] = {}
         self._power_up = dict(regions or {})
@@ -282,6 +305,11 @@ class Gate:
         with self._lock:
             return self._held()
 
+    def targets(self) -> dict[str, float]:
+        """Return where the axes in flight go, by axis."""
+        with self._lock:
+            return self._targets()
+
     def _held(self) -> dict[str, Interval]:
         return {
             axis: reduce(Interval.hull, (hold.interval for hold in holds.values()))
@@ -314,6 +342,7 @@ class Gate:
             held=self._held(),
             begun_at=self._begun_at(),
             regions=self._regions_now(states),
+            links=self._links(),
             targets=self._targets(),
             now_wall_s=WALL.now_s(),
             rules=self._rules,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from cosmic.frame.errors import CosmicError, DeviceError
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import Motion
+from cosmic.mico.core.orders import Motion, Order
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,3 +107,11 @@ class Tell:
     """Tell the state of one channel, which somebody else changed."""
 
     channel: int
+
+
+@dataclass(frozen=True, slots=True)
+class Departed:
+    """An order that waited for others was sent with them, or could not be."""
+
+    order: Order
+    error: DeviceError | None

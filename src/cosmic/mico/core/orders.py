@@ -5,6 +5,7 @@ from itertools import count
 from typing import Final
 
 from cosmic.frame.units import AxisUnit
+from cosmic.mico.core.group_start import GroupStart
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.hw.interface import Direction
 
@@ -139,6 +140,10 @@ class Order:
         Number of stops so far when it was submitted; a stop since then makes it void.
     follows : Movement or None
         The order is void unless this was the newest on its channel, and nothing was halted since.
+    start : GroupStart or None
+        Others that it starts together with.
+    frequency_hz : int or None
+        Limit of the closed-loop speed for this movement only.
     """
 
     channel: int
@@ -150,4 +155,6 @@ class Order:
     grant: Grant | None = None
     follows: Movement | None = None
     epoch: int | None = None
+    start: GroupStart | None = None
+    frequency_hz: int | None = None
     number: int = field(default_factory=lambda: next(_numbers))
