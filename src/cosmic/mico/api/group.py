@@ -93,6 +93,21 @@ class GroupMovement:
         CosmicError
             What ended one of them early; as `Movement.wait`.
         """
+        error = self.exception(timeout_s)
+        if error is not None:
+            raise error
+        return {name: movement.wait() for name, movement in self.movements.items()}
+
+    def exception(self, timeout: float | None = 0.0) -> CosmicError | None:
+        """Return what ended one of them early, first of all what went wrong; None for success.
+
+        Waits up to `timeout` seconds of wall time (None: for ever); bluesky names it so.
+
+        Raises
+        ------
+        DeviceTimeout
+            They had not all ended by then.
+        """
         failures: list[CosmicError] = []
         deadline_s = None if timeout is None else WALL.now_s() + timeout
         for movement in self.movements.values():
