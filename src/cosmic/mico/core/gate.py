@@ -93,7 +93,9 @@ def judge(
     targets: dict[str, float] = {}
     asked = {request.axis for request in requests}
     for request in requests:
-        verdict = _first_refusal(request, picture) or _torn_apart(request, asked, picture)
+        verdict = _first_refusal(request, picture)
+        if verdict is None:
+            verdict = _torn_apart(request, asked, picture)
         if verdict is not None:
             return Decision(verdict, {}, {})
         state = picture.states[request.axis]
