@@ -32,6 +32,9 @@ from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.positioner import Confidence, PositionerState, Status
+from cosmic.mico.core.teleoperation.state import TeleoperationPhase, TeleoperationState
+from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
+from cosmic.mico.hw.input_device import Feedback, InputInfo, InputKind, InputState
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
 
 CLASSES: Final[dict[str, type]] = {
@@ -45,6 +48,10 @@ CLASSES: Final[dict[str, type]] = {
     "GroupMovement": GroupMovement,
     "Jogging": Jogging,
     "StepwiseMove": StepwiseMove,
+    "Teleoperation": Teleoperation,
+    "TeleoperationState": TeleoperationState,
+    "InputInfo": InputInfo,
+    "InputState": InputState,
     "Task": Task,
     "Progress": Progress,
     "PositionerState": PositionerState,
@@ -77,6 +84,9 @@ ENUMS: Final[dict[str, type[Enum]]] = {
     "PositionerKind": PositionerKind,
     "Direction": Direction,
     "DeviceFault": DeviceFault,
+    "TeleoperationPhase": TeleoperationPhase,
+    "InputKind": InputKind,
+    "Feedback": Feedback,
     "ControlState": ControlState,
     "ControlEnding": ControlEnding,
 }

@@ -23,6 +23,11 @@ from cosmic.mico.core.settings import (
     PositionerSettings,
     WatchSettings,
 )
+from cosmic.mico.core.teleoperation.settings import (
+    TeleoperationAxisSettings,
+    TeleoperationProfileSettings,
+    TeleoperationSettings,
+)
 from cosmic.mico.core.trajectory.settings import MirrorSettings
 from cosmic.twin.force_settings import (
     ContactSettings,
@@ -57,6 +62,9 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[mico.initialisation]": InitialisationSettings,
     "[[mico.initialisation.step]]": StepSettings,
     "[mico.mirror]": MirrorSettings,
+    "[mico.teleoperation]": TeleoperationSettings,
+    "[[mico.teleoperation.profile]]": TeleoperationProfileSettings,
+    "[[mico.teleoperation.profile.axis]]": TeleoperationAxisSettings,
     "[[mico.group]]": GroupSettings,
     "[[mico.positioner]]": PositionerSettings,
     "[daqco]": DaqcoSettings,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import cosmic
 from cosmic.app.platform_file import KNOWN_APPLICATIONS, PlatformFile, load_platform, load_twin
 from cosmic.app.scene_fit import load_checker
+from cosmic.autonomy.couplings import join_teleoperation
 from cosmic.autonomy.interlocks import (
     join_force_limits,
     join_positions,
@@ -130,6 +131,7 @@ def build_platform(
         vico = _build_vico(site, file.vico, vico_gui)
     if daqco is not None and mico is not None:
         join_force_limits(daqco, mico)
+        join_teleoperation(mico, daqco)
         join_positions(daqco.recorder, mico, clock)
     if vico is not None and mico is not None:
         join_stage_positions(vico, mico)

@@ -11,13 +11,14 @@ from cosmic.frame.errors import NotConnectedError
 from cosmic.mico.hw.input_device import InputDevice, InputInfo, InputKind, InputSource, InputState
 
 KEYS: Final[dict[str, tuple[str, str]]] = {
-    "x": ("4", "6"),
-    "y": ("2", "8"),
-    "z": ("3", "9"),
-    "turn": ("1", "7"),
+    "left_x": ("4", "6"),
+    "left_y": ("2", "8"),
+    "right_x": ("1", "7"),
+    "right_y": ("3", "9"),
 }
-"""The key backwards and the key forwards of each axis; figures, as they lie on a number pad."""
+"""The key backwards and the key forwards of each axis; named as a gamepad's, for its profiles."""
 FINE_KEY: Final = "5"
+FINE_BUTTON: Final = "right_shoulder"
 KEY: Final = "keyboard:window"
 QUIET_S: Final = 0.09
 
@@ -35,7 +36,7 @@ class KeyboardInput(InputDevice):
             title="Number keys",
             kind=InputKind.KEYBOARD,
             axes=tuple(KEYS),
-            buttons=("fine",),
+            buttons=(FINE_BUTTON,),
             quiet_s=QUIET_S,
         )
 
@@ -72,7 +73,9 @@ class KeyboardInput(InputDevice):
             axis: float(forward in held) - float(backward in held)
             for axis, (backward, forward) in KEYS.items()
         }
-        return InputState(axes, {"fine": FINE_KEY in held}, connected=self._plugged, time_s=time_s)
+        return InputState(
+            axes, {FINE_BUTTON: FINE_KEY in held}, connected=self._plugged, time_s=time_s
+        )
 
     @override
     def feel(self, force: Mapping[str, float]) -> None:

@@ -101,7 +101,8 @@ class TeleoperationSettings(StrictModel):
     dead_man_s: float = Field(default=0.06, ge=0.03, le=0.08)
     quiet_s: float = Field(default=3.0, ge=0.1, le=60)
     force_channel: str = ""
-    force_axis: str = ""
+    force_axis: Text = "y"
+    force_direction: Literal[-1, 1] = 1
     feedback_un: float = Field(default=100.0, gt=0)
     soft_force_un: float = Field(default=60.0, gt=0)
     hard_force_un: float = Field(default=140.0, gt=0)
