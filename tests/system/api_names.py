@@ -24,6 +24,8 @@ from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.errors import DeviceFault, ExportCancelled, RecordingExistsError
 from cosmic.frame.task import Progress, Task
 from cosmic.mico.api.axis import Axis, Jogging
+from cosmic.mico.api.axis_group import AxisGroup, GroupStatus
+from cosmic.mico.api.axis_shape import AxisMovable
 from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.mico import Mico
@@ -44,6 +46,9 @@ CLASSES: Final[dict[str, type]] = {
     "Approach": Approach,
     "Way": Way,
     "Axis": Axis,
+    "AxisMovable": AxisMovable,
+    "AxisGroup": AxisGroup,
+    "GroupStatus": GroupStatus,
     "Movement": Movement,
     "GroupMovement": GroupMovement,
     "Jogging": Jogging,
@@ -99,6 +104,7 @@ MADE_LATER: Final = {
     "Approach": ("bodies", "distance_um", "places_um", "pose"),
     "Way": ("start", "waypoints", "method", "length", "straight_length", "duration_s"),
     "GroupMovement": ("movements",),
+    "GroupStatus": ("movement",),
     "DataChunk": ("first_sample", "time_s", "rate_hz", "channels", "volts", "scales"),
     "StepwiseMove": ("planned", "movement"),
 }

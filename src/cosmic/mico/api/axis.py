@@ -1,16 +1,16 @@
 """One axis of the scripted API: ``rig.mico["left.x"]``."""
 
 from collections.abc import Callable
-from typing import Any, Literal, overload
+from typing import Literal, overload
 
 from PySide6.QtCore import QObject, Qt
 from typing_extensions import override
 
-from cosmic.frame.clock import Clock
-from cosmic.frame.errors import MoveRefused, NotAvailable, refusal
+from cosmic.frame.errors import NotAvailable, refusal
 from cosmic.frame.listeners import tell
 from cosmic.frame.units import AxisUnit
-from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.frame.verdict import Reason, refuse
+from cosmic.mico.api.axis_shape import AxisMovable, AxisShape
 from cosmic.mico.api.entry import Number, as_number, as_whole
 from cosmic.mico.api.group import waited_for
 from cosmic.mico.api.jogging import Jogging
@@ -25,21 +25,22 @@ from cosmic.mico.core.positioner import Confidence, PositionerState, Status, cla
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
 
 
-class Axis:
+class Axis(AxisShape):
     """One positioner, as scripts and widgets command it; any thread.
 
     Positions are in `unit` from the user's zero (see `set_zero`). A number may be given as text
     with a unit of its own: ``axis.move_to("0.2 mm")``. It has the shape of a bluesky device
-    (Movable, Readable, Locatable, Stoppable, Checkable) without importing bluesky.
+    without importing bluesky; give plans `movable`, which has a name that bluesky admits.
     """
-
-    parent: None = None
 
     def __init__(self, name: str, manager: DeviceManager, commander: DeviceCommander) -> None:
         self._name = name
         self._manager = manager
         self._channel = manager.address(name).channel
         self.commander = commander
+        self._halt = self.halt
+        self._begin = lambda to: self.move_to(to, wait=False)
+        self._movable = AxisMovable(name, manager, self._halt, self._begin)
 
     @override
     def __repr__(self) -> str:
@@ -161,6 +162,11 @@ class Axis:
             QObject.disconnect(connection)
 
         return unsubscribe
+
+    @property
+    def movable(self) -> AxisMovable:
+        """The axis for plans of bluesky, whose documents forbid the dot in its name."""
+        return self._movable
 
     # Moving
 
@@ -411,43 +417,3 @@ class Axis:
                 refuse(Reason.LIMIT, text, axis=self._name, value=hertz, limit=limit, unit="Hz")
             )
         self.commander.set_frequency(self._channel, hertz)
-
-    # The shape of a bluesky device
-
-    def check(self, position: Number, *, consent: bool = False) -> MoveVerdict:
-        """Return the gate's answer to `move_to(position)`, without moving."""
-        try:
-            target = self._number(position) + self.details.zero
-        except MoveRefused as exc:
-            return exc.verdict
-        return self._manager.check({self._name: MoveTo(target, self.unit)}, consent=consent)
-
-    def check_value(self, value: Number) -> None:
-        """Raise `MoveRefused` where `move_to(value)` would; for bluesky's check_limits."""
-        verdict = self.check(value)
-        if not verdict.allowed:
-            raise refusal(verdict)
-
-    def set(self, value: Number) -> Movement:
-        """Start to move to `value` and return the movement, which is a bluesky status."""
-        return self.move_to(value, wait=False)
-
-    def stop(self, *, success: bool = False) -> None:  # noqa: ARG002 - bluesky's signature
-        """Stop this axis; bluesky's name for `halt`."""
-        self.halt()
-
-    def locate(self) -> dict[str, float | None]:
-        """Return where it is, as bluesky's Location."""
-        here = self.details.shown_position
-        return {"setpoint": here, "readback": here}
-
-    def read(self) -> dict[str, dict[str, Any]]:
-        """Return the position as a bluesky reading; the time is the platform's."""
-        clock: Clock = self._manager.clock
-        return {self._name: {"value": self.details.shown_position, "timestamp": clock.now_s()}}
-
-    def describe(self) -> dict[str, dict[str, Any]]:
-        """Return what `read` returns, in bluesky's terms."""
-        source = f"{self._manager.controller.name}:{self._name}"
-        key = {"source": source, "dtype": "number", "shape": [], "units": self.unit}
-        return {self._name: key}

@@ -13,6 +13,7 @@ from cosmic.frame.threads import forbid_waiting_here
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.application import WAY_BUDGET_S, MicoApplication
 from cosmic.mico.api.axis import Axis
+from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.entry import Number, as_number
 from cosmic.mico.api.group import GroupMovement, waited_for
@@ -264,6 +265,11 @@ class Mico:
         )
         group = GroupMovement.of(orders)
         return waited_for(group) if wait else group
+
+    def group(self, *names: str, name: str = "") -> AxisGroup:
+        """Return axes that a bluesky plan moves as one; raises `UnknownAxisError`."""
+        axes = {each: self[each].movable for each in names}
+        return AxisGroup(axes, lambda to: self.move(to, wait=False), self.check, name)
 
     def check(self, targets: Mapping[str, Number]) -> MoveVerdict:
         """Return the gate's answer to absolute targets together, without moving.

@@ -46,15 +46,17 @@ class Movement:
         """True once `cancel` was called."""
         return self._cancelled
 
-    def exception(self, timeout_s: float | None = 0.0) -> Exception | None:
-        """Return why it failed, or None; waits up to `timeout_s` for its end (None: for ever).
+    def exception(self, timeout: float | None = 0.0) -> Exception | None:
+        """Return why it failed, or None; waits up to `timeout` seconds (None: for ever).
+
+        The parameter has bluesky's name, which gives it by that.
 
         Raises
         ------
         DeviceTimeout
-            It had not ended after `timeout_s` of wall time.
+            It had not ended after `timeout` seconds of wall time.
         """
-        self._wait(timeout_s)
+        self._wait(timeout)
         return self._error
 
     def wait(self, timeout_s: float | None = None) -> float | None:

@@ -1,0 +1,171 @@
+"""The shape that bluesky expects of an axis: what `Axis` and `AxisMovable` share."""
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from typing_extensions import override
+
+from cosmic.frame.errors import CosmicError, MoveRefused, refusal
+from cosmic.frame.plan_shape import (
+    DataKeys,
+    Readings,
+    number_key,
+    plain_name,
+    text_key,
+    unix_now_s,
+    unix_of_wall_s,
+)
+from cosmic.frame.verdict import MoveVerdict
+from cosmic.mico.api.entry import Number, as_number
+from cosmic.mico.core.device_manager import DeviceManager
+from cosmic.mico.core.movement import Movement
+from cosmic.mico.core.orders import MoveTo
+from cosmic.mico.core.positioner import PositionerState
+
+# How far from a target an axis still counts as standing at it: more than the noise of any sensor.
+STANDS_AT: Final = {"um": 1.0, "deg": 0.1}
+
+
+class AxisShape:
+    """Movable, Readable, Configurable, Locatable, Stoppable and Checkable, without bluesky."""
+
+    parent: None = None
+    _name: str
+    _manager: DeviceManager
+    _halt: Callable[[], None]
+    _begin: Callable[[Number], Movement]
+    _asked: tuple[float, Movement] | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the axis, such as "left.x"."""
+        return self._name
+
+    @property
+    def _now(self) -> PositionerState:
+        return self._manager.state(self._name)
+
+    def check(self, position: Number, *, consent: bool = False) -> MoveVerdict:
+        """Return the gate's answer to `move_to(position)`, without moving."""
+        state = self._now
+        try:
+            target = as_number(position, state.unit, self._name) + state.zero
+        except MoveRefused as exc:
+            return exc.verdict
+        return self._manager.check({self._name: MoveTo(target, state.unit)}, consent=consent)
+
+    def check_value(self, value: Number) -> None:
+        """Raise `MoveRefused` where `move_to(value)` would; for bluesky's check_limits."""
+        verdict = self.check(value)
+        if not verdict.allowed:
+            raise refusal(verdict)
+
+    def set(self, value: Number) -> Movement:
+        """Start to move to `value` and return the movement, which is a bluesky status.
+
+        A refusal is what the movement fails with, so that a plan ends as a failure.
+        """
+        state = self._now
+        try:
+            target = as_number(value, state.unit, self._name) + state.zero
+            movement = self._begin(value)
+        except CosmicError as exc:
+            movement = Movement()
+            movement.fail(exc)
+            return movement
+        self._asked = target, movement
+        return movement
+
+    def stop(self, success: bool = False) -> None:  # noqa: ARG002 - bluesky's signature
+        """Stop this axis; bluesky's name for `halt`.
+
+        A movement under way fails with `MoveCancelled`, whatever `success` says.
+        """
+        self._halt()
+
+    def locate(self) -> dict[str, float | None]:
+        """Return where it is and where a plan last sent it, as bluesky's Location.
+
+        The setpoint is where it is, once something else has moved it.
+        """
+        state = self._now
+        here, setpoint = state.shown_position, state.shown_position
+        if self._asked is not None:
+            target, movement = self._asked
+            near = state.position is not None and (
+                abs(state.position - target) <= STANDS_AT[state.unit]
+            )
+            if not movement.done or (movement.success and near):
+                setpoint = target - state.zero
+        return {"setpoint": setpoint, "readback": here}
+
+    def read(self) -> Readings:
+        """Return the position as a bluesky reading; NaN before the first."""
+        state = self._now
+        here = state.shown_position
+        when_s = unix_of_wall_s(state.read_wall_s) if here is not None else unix_now_s()
+        return {
+            self.name: {"value": math.nan if here is None else here, "timestamp": when_s},
+        }
+
+    def describe(self) -> DataKeys:
+        """Return what `read` returns, in bluesky's terms."""
+        return {self.name: number_key(self._source, self._now.unit)}
+
+    def read_configuration(self) -> Readings:
+        """Return the user's zero, the soft limits and how well the position is known."""
+        state, now_s = self._now, unix_now_s()
+        low, high = state.shown_limits or (math.nan, math.nan)
+        values = {
+            "zero": state.zero,
+            "low_limit": low,
+            "high_limit": high,
+            "confidence": str(state.confidence),
+        }
+        return {
+            f"{self.name}_{key}": {"value": value, "timestamp": now_s}
+            for key, value in values.items()
+        }
+
+    def describe_configuration(self) -> DataKeys:
+        """Return what `read_configuration` returns, in bluesky's terms."""
+        unit, source = self._now.unit, self._source
+        keys: DataKeys = {
+            f"{self.name}_{key}": number_key(source, unit)
+            for key in ("zero", "low_limit", "high_limit")
+        }
+        return {**keys, f"{self.name}_confidence": text_key(source)}
+
+    @property
+    def hints(self) -> dict[str, list[str]]:
+        """Which of its readings a plot shows."""
+        return {"fields": [self.name]}
+
+    @property
+    def _source(self) -> str:
+        return f"{self._manager.controller.name}:{self._name}"
+
+
+class AxisMovable(AxisShape):
+    """An axis for bluesky's RunEngine, whose documents forbid the dot in a name: "left_x"."""
+
+    def __init__(
+        self,
+        name: str,
+        manager: DeviceManager,
+        halt: Callable[[], None],
+        begin: Callable[[Number], Movement],
+    ) -> None:
+        self._name, self._manager = name, manager
+        self._halt, self._begin = halt, begin
+
+    @override
+    def __repr__(self) -> str:
+        return f"<AxisMovable {self.name}>"
+
+    @property
+    @override
+    def name(self) -> str:
+        """Name of the axis without the dot, such as "left_x"."""
+        return plain_name(self._name)
