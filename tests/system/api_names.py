@@ -29,13 +29,25 @@ from cosmic.mico.api.axis_shape import AxisMovable
 from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.mico import Mico
+from cosmic.mico.api.poses import Poses
 from cosmic.mico.api.stepwise import StepwiseMove
+from cosmic.mico.api.trajectories import Trajectories
+from cosmic.mico.api.trajectory_player import (
+    AwayFromStartError,
+    PlayProgress,
+    PlayState,
+    TrajectoryPlayer,
+)
+from cosmic.mico.api.trajectory_recording import TrajectoryRecording
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.movement import Movement
+from cosmic.mico.core.poses import Pose
 from cosmic.mico.core.positioner import Confidence, PositionerState, Status
 from cosmic.mico.core.teleoperation.state import TeleoperationPhase, TeleoperationState
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
+from cosmic.mico.core.trajectory.model import Trajectory, TrajectoryError
+from cosmic.mico.core.trajectory.rehearsal import Rehearsal
 from cosmic.mico.hw.input_device import Feedback, InputInfo, InputKind, InputState
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
 
@@ -45,6 +57,14 @@ CLASSES: Final[dict[str, type]] = {
     "Collision": Collision,
     "Approach": Approach,
     "Way": Way,
+    "Trajectories": Trajectories,
+    "TrajectoryRecording": TrajectoryRecording,
+    "Trajectory": Trajectory,
+    "Rehearsal": Rehearsal,
+    "TrajectoryPlayer": TrajectoryPlayer,
+    "PlayProgress": PlayProgress,
+    "Poses": Poses,
+    "Pose": Pose,
     "Axis": Axis,
     "AxisMovable": AxisMovable,
     "AxisGroup": AxisGroup,
@@ -88,6 +108,7 @@ ENUMS: Final[dict[str, type[Enum]]] = {
     "Activity": Activity,
     "PositionerKind": PositionerKind,
     "Direction": Direction,
+    "PlayState": PlayState,
     "DeviceFault": DeviceFault,
     "TeleoperationPhase": TeleoperationPhase,
     "InputKind": InputKind,
@@ -96,7 +117,12 @@ ENUMS: Final[dict[str, type[Enum]]] = {
     "ControlEnding": ControlEnding,
 }
 # Exceptions that a script may want to name and that `cosmic` does not export.
-FURTHER_EXCEPTIONS: Final = (RecordingExistsError, ExportCancelled)
+FURTHER_EXCEPTIONS: Final = (
+    RecordingExistsError,
+    ExportCancelled,
+    TrajectoryError,
+    AwayFromStartError,
+)
 # Attributes that an object gets when it is made, which the class does not show.
 MADE_LATER: Final = {
     "Control": ("settings",),

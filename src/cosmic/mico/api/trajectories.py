@@ -6,6 +6,7 @@ from pathlib import Path
 
 from cosmic.frame.errors import NotAvailable, RecordingError
 from cosmic.mico.api.trajectory_player import PlayProgress, PlayState, StartMode, TrajectoryPlayer
+from cosmic.mico.api.trajectory_recording import TrajectoryRecording
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.core.trajectory import parser
 from cosmic.mico.core.trajectory.binding import Bound, bind
@@ -35,10 +36,12 @@ class Trajectories:
         return self._site.player
 
     @property
-    def recorder(self) -> TrajectoryRecorder | None:
+    def recording(self) -> TrajectoryRecording | None:
         """What is being recorded, whoever began it; None while nothing is."""
         recorder = self._site.recorder
-        return recorder if recorder is not None and recorder.recording else None
+        if recorder is None or not recorder.recording:
+            return None
+        return TrajectoryRecording(recorder)
 
     # Recording
 
@@ -51,7 +54,7 @@ class Trajectories:
         relative_to: str = "",
         sources: Collection[str] | None = None,
         overwrite: bool = False,
-    ) -> TrajectoryRecorder:
+    ) -> TrajectoryRecording:
         """Begin to record every movement into a file, until `stop` or the end of a with block.
 
         Parameters
@@ -73,7 +76,7 @@ class Trajectories:
         NotAvailable
             Something is being recorded already, or there is no such pose.
         """
-        running = self.recorder
+        running = self.recording
         if running is not None:
             raise NotAvailable(f"{running.path} is being recorded; stop that first")
         pose = self._site.poses[relative_to] if relative_to else None
@@ -98,7 +101,7 @@ class Trajectories:
             overwrite=overwrite,
         )
         self._site.recorder = recorder
-        return recorder
+        return TrajectoryRecording(recorder)
 
     # Reading and writing
 
@@ -191,7 +194,7 @@ class Trajectories:
     def _bound(self, trajectory: Trajectory) -> Bound:
         return bind(trajectory, self._site.facts(), self._site.positions())
 
-    def player_for(
+    def prepare(
         self,
         trajectory: Trajectory,
         *,
@@ -260,7 +263,7 @@ class Trajectories:
         """
         if not isinstance(trajectory, Trajectory):
             trajectory = self.load(trajectory)
-        player = self.player_for(trajectory, speed=speed, loops=loops, timed=timed)
+        player = self.prepare(trajectory, speed=speed, loops=loops, timed=timed)
         if progress is not None:
             player.subscribe(progress)
         player.resume(start)
