@@ -129,7 +129,7 @@ class Control:
         settings = self._changed(travel_um=travel_um, ramp_un_s=ramp_un_s)
         low, high = self._limits(channel, setpoint_un, limit_un)
         check_inside(channel, "uN", setpoint_un, (low, high))
-        source = ChannelSource(daqco, channel, stale_s=settings.stale_s, low=low, high=high)
+        source = self._channel(daqco, channel, settings, (low, high))
         if source.unit != "uN":
             raise ConfigError(f"{channel} is measured in {source.unit}; a force must be in uN")
         sink = self._sink(axis, "um", settings, settings.travel_um)
@@ -183,7 +183,7 @@ class Control:
         check_inside(source, "", set_point, limits)
         if not 0.0 < tolerance < math.inf:
             raise ConfigError(f"tolerance must be a number above 0, got {tolerance!r}")
-        origin = self._source(source, settings.stale_s, limits)
+        origin = self._source(source, settings, limits)
         sink = AxisSink(self._mico, axis, speed=speed, travel=travel, interval_s=settings.latency_s)
         law = PidLaw(
             set_point,
@@ -226,12 +226,25 @@ class Control:
         except ValueError as exc:
             raise ConfigError(f"a loop cannot be made: {exc}") from None
 
-    def _source(self, name: str, stale_s: float, limits: tuple[float, float]) -> Source:
+    @staticmethod
+    def _channel(
+        daqco: Daqco, name: str, settings: ControlSettings, limits: tuple[float, float]
+    ) -> ChannelSource:
+        low, high = limits
+        return ChannelSource(
+            daqco,
+            name,
+            stale_s=settings.stale_s,
+            pause_s=settings.latency_s,
+            low=low,
+            high=high,
+        )
+
+    def _source(self, name: str, settings: ControlSettings, limits: tuple[float, float]) -> Source:
         if name in self.channels:
-            low, high = limits
-            return ChannelSource(self._acquisition(), name, stale_s=stale_s, low=low, high=high)
+            return self._channel(self._acquisition(), name, settings, limits)
         if name in self._mico:
-            return PositionSource(self._mico, name, stale_s=stale_s)
+            return PositionSource(self._mico, name, stale_s=settings.stale_s)
         known = [*self.channels, *self._mico.names]
         raise ConfigError(f"there is no channel or axis {name!r}; there are {', '.join(known)}")
 

@@ -10,7 +10,7 @@ from threading import Event, Lock
 from typing_extensions import override
 
 from cosmic.autonomy.control.law import Answer, ControlState, Law
-from cosmic.autonomy.control.pace import Pacer, PaceStatistics, ask_real_time
+from cosmic.autonomy.control.pace import Pacer, PaceStatistics, ask_real_time, quick_switching
 from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.autonomy.control.sink import AxisSink
 from cosmic.autonomy.control.sources import Sample, Source
@@ -200,7 +200,8 @@ class ControlLoop(WorkerThread):
             self._real_time = asked
             if wanted and asked:
                 logger.info("control loop: %s", asked)
-            self._run()
+            with quick_switching():
+                self._run()
         except CosmicError as exc:
             self.finish(exc)
         except BaseException as exc:
@@ -224,14 +225,16 @@ class ControlLoop(WorkerThread):
             self._cycle(passed_s)
 
     def _cycle(self, passed_s: float) -> None:
-        sample = self._fresh()
-        if sample is None:
-            return
         dt_s = passed_s * self._rate
+        sample = self._fresh()
+        if sample is None or WALL.now_s() - sample.read_wall_s > self.source.pause_s:
+            self.sink.rest(dt_s)
+            return
         answer = self.law.step(sample.value, self.sink.target, dt_s)
         if answer.velocity == 0.0:
-            self.sink.hold()
-        self.sink.move(answer.velocity, dt_s)
+            self.sink.rest(dt_s)
+        else:
+            self.sink.move(answer.velocity, dt_s)
         self._note(sample.value, answer)
 
     def _fresh(self) -> Sample | None:

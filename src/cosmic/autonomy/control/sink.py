@@ -132,8 +132,10 @@ class AxisSink:
         if self._before is None or self._before.done:
             self._send(self._wanted)
 
-    def hold(self) -> None:
-        """Forget what was wanted and not sent yet."""
+    def rest(self, dt_s: float) -> None:
+        """Send nothing for `dt_s`, and forget what was not sent yet; raises as `move`."""
+        self._look()
+        self._since_s += dt_s
         self._wanted = self._target
 
     def _look(self) -> None:

@@ -44,7 +44,12 @@ class Source(Protocol):
     @property
     @abstractmethod
     def stale_s(self) -> float:
-        """How old a value may be, wall time."""
+        """How old a value may be, wall time, before the loop ends."""
+
+    @property
+    @abstractmethod
+    def pause_s(self) -> float:
+        """How old a value may be, wall time, before the axis waits for the next."""
 
     @abstractmethod
     def begin(self, on_limit: Callable[[CosmicError], None]) -> None:
@@ -74,6 +79,7 @@ class ChannelSource(Source):
         channel: str,
         *,
         stale_s: float,
+        pause_s: float,
         low: float = -math.inf,
         high: float = math.inf,
     ) -> None:
@@ -86,7 +92,7 @@ class ChannelSource(Source):
         self._daqco = daqco
         self._channel = channel
         self._unit = daqco.units[channel]
-        self._stale_s = stale_s
+        self._stale_s, self._pause_s = stale_s, min(pause_s, stale_s)
         self._low, self._high = low, high
         self._newest: Sample | None = None
         self._on_limit: Callable[[CosmicError], None] | None = None
@@ -106,6 +112,11 @@ class ChannelSource(Source):
     @override
     def stale_s(self) -> float:
         return self._stale_s
+
+    @property
+    @override
+    def pause_s(self) -> float:
+        return self._pause_s
 
     @override
     def begin(self, on_limit: Callable[[CosmicError], None]) -> None:
@@ -163,6 +174,11 @@ class PositionSource(Source):
     @property
     @override
     def stale_s(self) -> float:
+        return self._stale_s
+
+    @property
+    @override
+    def pause_s(self) -> float:
         return self._stale_s
 
     @override
