@@ -51,6 +51,13 @@ from cosmic.twin.settings import (
     StagePlace,
     TwinSettings,
 )
+from cosmic.vico.core.peripheral_settings import (
+    LampSettings,
+    MotorLensSettings,
+    ZoomStepSettings,
+)
+from cosmic.vico.core.settings import CameraPlace, VicoSettings
+from cosmic.vico.core.tool_settings import ToolSettings
 
 # Heading in the page, and the model whose keys its table lists.
 SECTIONS: Final[dict[str, type[BaseModel]]] = {
@@ -71,6 +78,12 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[[daqco.scale]]": ScaleSettings,
     "[[daqco.channel]]": ChannelSettings,
     "[[daqco.limit]]": LimitSettings,
+    "[vico]": VicoSettings,
+    "[[vico.camera]]": CameraPlace,
+    "[[vico.tool]]": ToolSettings,
+    "[vico.lens]": MotorLensSettings,
+    "[[vico.lens.step]]": ZoomStepSettings,
+    "[vico.light]": LampSettings,
     "[control]": ControlSettings,
     "[kinds.NAME]": StageKind,
     "[controller]": ControllerSettings,
@@ -109,6 +122,8 @@ _UNITS: Final = (
     ("_um_s", "µm/s"),
     ("_deg_s", "°/s"),
     ("_deg_c", "°C"),
+    ("_um_px", "µm/px"),
+    ("_db", "dB"),
     ("_um", "µm"),
     ("_deg", "°"),
     ("_hz", "Hz"),
