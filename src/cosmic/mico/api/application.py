@@ -23,6 +23,7 @@ from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.device_manager import DeviceManager, Mode
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
+from cosmic.mico.core.undo import UndoHistory
 from cosmic.mico.core.way_finder import WayFinder
 from cosmic.mico.hw.interface import Controller
 
@@ -76,6 +77,7 @@ class MicoApplication(TaskApplication):
         self.way_finder = (
             WayFinder(self.manager, self.collision.model) if self.collision is not None else None
         )
+        self.undo = UndoHistory(self.manager)
         self.teleoperation = Teleoperation(self.manager, policy)
         self.trajectories = TrajectorySite(self, policy, platform, folder)
         self._failure = ""

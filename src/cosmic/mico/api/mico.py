@@ -27,8 +27,9 @@ from cosmic.mico.core.device import Device
 from cosmic.mico.core.device_commander import DeviceCommander
 from cosmic.mico.core.links import Link
 from cosmic.mico.core.orders import Motion, MoveBy, MoveTo
-from cosmic.mico.hw.interface import PositionerKind
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
+from cosmic.mico.core.undo import UndoEntry
+from cosmic.mico.hw.interface import PositionerKind
 
 
 class Mico:
@@ -394,6 +395,57 @@ class Mico:
             There is no such axis.
         """
         return self._manager.links.remove(self[axis].name)
+
+    # Taking back
+
+    @property
+    def undo_entries(self) -> tuple[UndoEntry, ...]:
+        """What can be taken back, the newest first; ten of each assembly."""
+        return self._application.undo.entries
+
+    @overload
+    def undo(
+        self, group: str | None = None, *, wait: Literal[True] = True
+    ) -> dict[str, float | None]: ...
+
+    @overload
+    def undo(self, group: str | None = None, *, wait: Literal[False]) -> GroupMovement: ...
+
+    def undo(
+        self, group: str | None = None, *, wait: bool = True
+    ) -> dict[str, float | None] | GroupMovement:
+        """Take the last movement of an assembly back, whoever made it, through the gate.
+
+        Parameters
+        ----------
+        group : str
+            Title of the assembly in the platform file; None takes the one that moved last.
+        wait : bool
+            False returns the `GroupMovement` at once.
+
+        Raises
+        ------
+        NotAvailable
+            There is nothing to take back, no such assembly, or it moves.
+        MoveRefused
+            The gate refused the way back; it can be tried again.
+        DeviceError, MoveCancelled
+            It did not get there; it can be tried again.
+        """
+        history = self._application.undo
+        entry = history.newest(group)
+        movement = GroupMovement.of(history.order(entry))
+
+        def forget(ended: GroupMovement) -> None:
+            if ended.success:
+                history.drop(entry)
+
+        movement.add_callback(forget)
+        if not wait:
+            return movement
+        reached = waited_for(movement)
+        history.drop(entry)
+        return reached
 
     # Collisions
 

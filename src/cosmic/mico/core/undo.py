@@ -1,0 +1,219 @@
+"""What each assembly did last, so that it can be taken back."""
+
+import logging
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import count
+from threading import RLock
+from typing import Final
+
+from PySide6.QtCore import QObject, Qt, Signal
+
+from cosmic.frame.errors import NotAvailable, refusal
+from cosmic.frame.units import format_quantity
+from cosmic.frame.verdict import Reason, refuse
+from cosmic.mico.core.device import Device
+from cosmic.mico.core.device_manager import DeviceManager
+from cosmic.mico.core.messages import MovementBegun
+from cosmic.mico.core.orders import LARGEST_STEPS, Motion, MoveTo, Order, Step
+from cosmic.mico.core.positioner import Confidence, PositionerState
+from cosmic.mico.hw.interface import PositionerKind
+
+logger = logging.getLogger(__name__)
+
+UNDO: Final = "undo"
+DEPTH: Final = 10
+"""How many movements of an assembly can be taken back."""
+_BEGINNINGS: Final = ("initialisation",)
+"""Sources after which there is no way back to before."""
+
+
+@dataclass(frozen=True)
+class UndoEntry:
+    """One movement of an assembly, from standstill to standstill.
+
+    Attributes
+    ----------
+    group : str
+        Title of the assembly.
+    before : mapping of float
+        Where its axes stood before, by name, in gate coordinates.
+    number : int
+        Grows with each entry.
+    """
+
+    group: str
+    before: Mapping[str, float]
+    number: int
+
+
+class UndoHistory(QObject):
+    """Hears of every movement of every source and remembers where it began; any thread.
+
+    What an assembly does while any of its axes moves is one entry. Movements from an unknown
+    position leave none, and initialising an axis takes its entries away: there is no way back.
+
+    Signals
+    -------
+    changed()
+        There is more or less to be taken back; in any thread.
+    """
+
+    changed = Signal()
+
+    def __init__(self, manager: DeviceManager, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._manager = manager
+        self._lock = RLock()
+        self._numbers = count(1)
+        self._entries: dict[str, deque[UndoEntry]] = {}
+        self._open: dict[str, dict[str, float]] = {}
+        self._moving: dict[str, set[str]] = {}
+        self._group_of = {
+            name: group.title for group in manager.settings.group for name in group.positioners
+        }
+        self._joined: dict[int, Device] = {}
+        self._join_devices()
+        manager.changed.connect(self._join_devices, Qt.ConnectionType.DirectConnection)
+
+    def _join_devices(self) -> None:
+        direct = Qt.ConnectionType.DirectConnection
+        for index, device in self._manager.devices.items():
+            if self._joined.get(index) is not device:
+                self._joined[index] = device
+                device.movement_begun.connect(self._on_movement_begun, direct)
+                device.state_changed.connect(self._on_state_changed, direct)
+
+    def group_of(self, axis: str) -> str:
+        """Return the assembly that an axis belongs to; an axis of no group is its own."""
+        return self._group_of.get(axis, axis)
+
+    @property
+    def entries(self) -> tuple[UndoEntry, ...]:
+        """What can be taken back, the newest first."""
+        with self._lock:
+            found = [entry for entries in self._entries.values() for entry in entries]
+        return tuple(sorted(found, key=lambda entry: -entry.number))
+
+    # Recording, in the threads of the devices
+
+    def _on_movement_begun(self, event: MovementBegun) -> None:
+        if event.source == UNDO:
+            return
+        unknown = self._manager.state(event.name).confidence is Confidence.UNKNOWN
+        if unknown or event.from_position is None or event.source in _BEGINNINGS:
+            self._forget(event.name)
+            return
+        group = self.group_of(event.name)
+        with self._lock:
+            self._open.setdefault(group, {}).setdefault(event.name, event.from_position)
+            self._moving.setdefault(group, set()).add(event.name)
+
+    def _on_state_changed(self, state: PositionerState) -> None:
+        if state.in_motion:
+            return
+        group = self.group_of(state.name)
+        with self._lock:
+            moving = self._moving.get(group)
+            if moving is None or state.name not in moving:
+                return
+            moving.discard(state.name)
+            if moving:
+                return
+            del self._moving[group]
+            before = self._open.pop(group, {})
+        self._close(group, before)
+
+    def _close(self, group: str, before: Mapping[str, float]) -> None:
+        moved = {name: where for name, where in before.items() if not self._stands_at(name, where)}
+        if not moved:
+            return
+        with self._lock:
+            entries = self._entries.setdefault(group, deque(maxlen=DEPTH))
+            entries.append(UndoEntry(group, moved, next(self._numbers)))
+        self.changed.emit()
+
+    def _stands_at(self, name: str, where: float) -> bool:
+        state = self._manager.state(name)
+        watch = self._manager.settings.watch
+        near = watch.tolerance_deg if state.unit == "deg" else watch.tolerance_um
+        return state.position is not None and abs(state.position - where) <= 0.5 * near
+
+    def _forget(self, axis: str) -> None:
+        group = self.group_of(axis)
+        with self._lock:
+            self._open.get(group, {}).pop(axis, None)
+            self._moving.get(group, set()).discard(axis)
+            entries = self._entries.get(group, deque())
+            kept = [entry for entry in entries if axis not in entry.before]
+            if len(kept) == len(entries):
+                return
+            self._entries[group] = deque(kept, maxlen=DEPTH)
+        self.changed.emit()
+
+    # Taking back
+
+    def newest(self, group: str | None = None) -> UndoEntry:
+        """Return what is to be taken back first, of one assembly or of all.
+
+        What has come about by itself, as of an axis that followed one it is linked to, is passed
+        over and forgotten.
+
+        Raises
+        ------
+        NotAvailable
+            There is nothing, or no such assembly, or it moves.
+        """
+        self._known(group)
+        for entry in self.entries:
+            if group not in (None, entry.group):
+                continue
+            if all(self._stands_at(name, where) for name, where in entry.before.items()):
+                self.drop(entry)
+                continue
+            self._stands(entry)
+            return entry
+        raise NotAvailable(f"there is nothing to undo{f' of {group}' if group else ''}")
+
+    def _known(self, group: str | None) -> None:
+        titles = dict.fromkeys(self.group_of(name) for name in self._manager.names())
+        if group is not None and group not in titles:
+            raise NotAvailable(f"there is no group {group!r}; there are {', '.join(titles)}")
+
+    def _stands(self, entry: UndoEntry) -> None:
+        moving = [
+            state.name
+            for state in self._manager.states().values()
+            if state.in_motion and self.group_of(state.name) == entry.group
+        ]
+        if moving:
+            raise NotAvailable(f"{', '.join(moving)} is moving; undo when it stands")
+
+    def order(self, entry: UndoEntry) -> dict[str, Order]:
+        """Begin to move back; raises `MoveRefused`, and the entry stays."""
+        motions = {name: self._way_back(name, where) for name, where in entry.before.items()}
+        return self._manager.order_together(motions, source=UNDO)
+
+    def _way_back(self, name: str, where: float) -> Motion:
+        state = self._manager.state(name)
+        if state.kind is not PositionerKind.OPEN_LOOP:
+            return MoveTo(where, state.unit)
+        defaults = self._manager.settings.defaults
+        found = next(each for each in self._manager.settings.positioner if each.name == name)
+        step_um = found.step_um or defaults.nominal_step_um
+        way_um = where - (state.position or 0.0)
+        steps = round(way_um / step_um * 100.0 / defaults.amplitude_v)
+        if not abs(steps) <= LARGEST_STEPS:
+            text = f"{name}: {format_quantity(way_um, 'um')} back is more than it can step at once"
+            raise refusal(refuse(Reason.LIMIT, text, axis=name))
+        return Step(steps, defaults.amplitude_v, defaults.frequency_hz)
+
+    def drop(self, entry: UndoEntry) -> None:
+        """Forget an entry that was taken back; harmless the second time."""
+        with self._lock:
+            entries = self._entries.get(entry.group)
+            if entries is None or entry not in entries:
+                return
+            entries.remove(entry)
+        self.changed.emit()
