@@ -54,6 +54,8 @@ def read_events(path: Path) -> tuple[InputEvent, ...]:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as exc:
         raise ConfigError(f"{path}: cannot be read: {exc}") from exc
+    if "\0" in text:
+        raise ConfigError(f"{path}: no text, it holds zero bytes")
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if _tells(line)]
     if len(lines) > _LARGEST:
         raise ConfigError(f"{path}: longer than {_LARGEST} lines")
@@ -63,7 +65,7 @@ def read_events(path: Path) -> tuple[InputEvent, ...]:
     for number, line in lines[1:]:
         try:
             event = _event(_cells(line))
-        except ValueError as exc:
+        except (ValueError, csv.Error) as exc:
             raise ConfigError(f"{path}:{number}: {exc}") from None
         if events and event.time_s < events[-1].time_s:
             raise ConfigError(f"{path}:{number}: time goes back to {event.time_s:g} s")
