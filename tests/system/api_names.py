@@ -32,13 +32,10 @@ from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.poses import Poses
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.api.trajectories import Trajectories
-from cosmic.mico.api.trajectory_player import (
-    AwayFromStartError,
-    PlayProgress,
-    PlayState,
-    TrajectoryPlayer,
-)
+from cosmic.mico.api.trajectory_places import AwayFromStartError
+from cosmic.mico.api.trajectory_player import TrajectoryPlayer
 from cosmic.mico.api.trajectory_recording import TrajectoryRecording
+from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.movement import Movement

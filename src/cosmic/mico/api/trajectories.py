@@ -5,9 +5,10 @@ from datetime import datetime
 from pathlib import Path
 
 from cosmic.frame.errors import NotAvailable, RecordingError
-from cosmic.mico.api.trajectory_player import PlayProgress, PlayState, StartMode, TrajectoryPlayer
+from cosmic.mico.api.trajectory_player import TrajectoryPlayer
 from cosmic.mico.api.trajectory_recording import TrajectoryRecording
 from cosmic.mico.api.trajectory_site import TrajectorySite
+from cosmic.mico.api.trajectory_state import PlayProgress, PlayState, StartMode
 from cosmic.mico.core.trajectory import parser
 from cosmic.mico.core.trajectory.binding import Bound, bind
 from cosmic.mico.core.trajectory.mirror import mirrored

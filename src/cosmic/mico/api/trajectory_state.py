@@ -1,0 +1,61 @@
+"""What a trajectory player is at, as plain data, and what it has been told."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from threading import Condition, RLock
+from typing import Final, Literal
+
+StartMode = Literal["refuse", "straight", "way"]
+START_MODES: Final = ("refuse", "straight", "way")
+
+
+class PlayState(StrEnum):
+    """What a player is at."""
+
+    READY = "ready"
+    RUNNING = "running"
+    PAUSED = "paused"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+    ENDED = "ended"
+
+
+@dataclass(frozen=True, slots=True)
+class PlayProgress:
+    """How far a player is.
+
+    Attributes
+    ----------
+    line : int
+        Line of the file that is being carried out, or comes next; 0 before the first.
+    fraction : float
+        Of this pass, 0 to 1, by time.
+    left_s : float or None
+        How long this pass still takes, without pauses; None before the rehearsal.
+    loop, loops : int, int or None
+        Which pass this is, and of how many; None: until it is paused or cancelled.
+    error : str
+        Why it stopped, empty while nothing went wrong.
+    """
+
+    state: PlayState
+    line: int
+    text: str
+    fraction: float
+    left_s: float | None
+    loop: int
+    loops: int | None
+    error: str
+
+
+class PlayControl:
+    """What the operator wants of a run; written by any thread, read by the one that runs."""
+
+    def __init__(self, *, timed: bool) -> None:
+        self.changed = Condition(RLock())
+        self.timed = timed
+        self.speed = 1.0
+        self.loops: int | None = 1
+        self.pausing = False
+        self.one_line = False
+        self.start: StartMode = "refuse"
