@@ -141,11 +141,18 @@ class ChannelSource(Source):
         if self._channel not in chunk.channels:
             return  # the value gets stale
         row = chunk.channels.index(self._channel)
+        if chunk.scales[row].unit != self._unit:
+            self._tell(ConfigError(f"{self._channel} is no longer measured in {self._unit}"))
+            return
         values = chunk.scales[row].apply(chunk.volts[row])
         self._newest = Sample(float(values[-1]), WALL.now_s())
         beyond = np.flatnonzero(~((values > self._low) & (values < self._high)))
-        if beyond.size and self._on_limit is not None:
-            self._on_limit(self._crossed(float(values[beyond[0]])))
+        if beyond.size:
+            self._tell(self._crossed(float(values[beyond[0]])))
+
+    def _tell(self, error: CosmicError) -> None:
+        if self._on_limit is not None:
+            self._on_limit(error)
 
     def _crossed(self, value: float) -> LimitError:
         limit = self._low if value <= self._low else self._high

@@ -26,7 +26,7 @@ def test_each_part_gives_what_its_definition_says() -> None:
 def test_the_parts_add_up() -> None:
     three = pid(kp=2.0, ki=1.0, kd=0.5)
     three.step(1.0, 0.0, 0.1)
-    # 2 * 0.8 + 1 * (0.1 * 1 + 0.1 * 0.8) - 0.5 * 0.2 / 0.1
+    # proportional, integral of both errors, derivative
     assert three.step(1.0, 0.2, 0.1) == pytest.approx(1.6 + 0.18 - 1.0)
 
 
