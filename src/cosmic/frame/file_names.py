@@ -142,6 +142,28 @@ def check_directory(directory: Path) -> Path:
     return whole
 
 
+def name_problem(base: str, suffix: str = "") -> str:
+    """Return why `base`, without `suffix`, cannot be the name of a file; empty when it can."""
+    try:
+        check_base_name(check_base_name(base).removesuffix(suffix))
+    except RecordingError as exc:
+        return str(exc)
+    return ""
+
+
+def directory_problem(text: str) -> str:
+    """Return why nothing can be stored in the directory typed; empty when it can."""
+    if not text.strip():
+        return "type a directory"
+    try:
+        check_directory(Path(text))
+    except RecordingError as exc:
+        return str(exc)
+    except (OSError, ValueError, RuntimeError) as exc:  # such as a home that nobody has
+        return f"{text}: {exc}"
+    return ""
+
+
 def check_space(directory: Path, bytes_per_s: float) -> Space:
     """Return how much room there is.
 

@@ -7,8 +7,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QMessageBox, QPushButton
 
-from cosmic.daqco.gui.file_naming import name_problem
 from cosmic.daqco.gui.file_widget import UDaqFileWidget
+from cosmic.frame.file_names import name_problem
 from cosmic.frame.gui.theme import State
 from gui.daqco.fake_port import Counted, Recorded
 

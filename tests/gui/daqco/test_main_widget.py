@@ -141,8 +141,10 @@ def test_an_export_shows_its_progress_and_its_end(qtbot, main, port, tmp_path):
     port.export_task.report(0.4, "row 400")
     qtbot.waitUntil(lambda: main.export_bar.bar.value() == 400)
     assert "row 400" in main.export_bar.text.text()
+    port.export_task.report(1.0, "done")
     port.export_task.finish()
-    qtbot.waitUntil(lambda: main.export_bar.text.text().endswith("done"))
+    qtbot.waitUntil(lambda: main.export_bar.cancel.text() == "Close")
+    assert main.export_bar.text.text().endswith("done")
     qtbot.mouseClick(main.export_bar.cancel, Qt.MouseButton.LeftButton)
     assert not main.export_bar.isVisible()
 

@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QMessageBox, QPushButton
 
-from cosmic.vico.gui.file_fields import directory_problem, name_problem
+from cosmic.frame.file_names import directory_problem, name_problem
 from cosmic.vico.gui.time_lapse_dialog import TimeLapseDialog
 from gui.vico.fake_vico import Recorded
 
@@ -63,7 +63,7 @@ def test_a_recording_is_started_counted_and_stopped(qtbot, bar, camera):
         left_s=3700.0,
     )
     qtbot.waitUntil(lambda: bar.told.text().startswith("4711 written, 2 dropped, 5 waiting"))
-    assert "123.4 MB, disk lasts 1.0 h" in bar.told.text()
+    assert "123.4 MB, disk lasts 1 h 01 min" in bar.told.text()
     assert [each.geometry() for each in (bar.snap, bar.record, bar.lapse, bar.more)] == places
     click(qtbot, bar.record)
     assert camera.calls[-1] == ("stop recording",)
@@ -78,7 +78,7 @@ def test_a_recording_that_ended_by_itself_says_why(qtbot, bar, camera):
 
 
 def test_before_a_recording_the_disk_is_said_to_last(bar):
-    assert bar.told.text() == "disk lasts 2.0 h"
+    assert bar.told.text() == "disk lasts 2 h 00 min"
 
 
 def test_a_format_that_cannot_be_used_disables_recording_and_says_why(qtbot, bar, camera):
@@ -118,9 +118,9 @@ def test_a_name_that_is_none_is_refused(name):
 def test_a_wrong_directory_is_refused_with_its_text_kept(qtbot, bar, camera):
     write(qtbot, bar.files.directory, "/nowhere/at/all")
     assert bar.files.directory.text() == "/nowhere/at/all"
-    assert "no directory" in bar.files.directory.accessibleDescription()
+    assert "does not exist" in bar.files.directory.accessibleDescription()
     assert not bar.record.isEnabled()
-    assert "no directory" in bar.record.toolTip()
+    assert "does not exist" in bar.record.toolTip()
     assert directory_problem("") and directory_problem("\0")
     write(qtbot, bar.files.directory, str(camera.directory))
     assert bar.record.isEnabled()

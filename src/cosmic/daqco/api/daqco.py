@@ -9,6 +9,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 
 from cosmic.daqco.api.application import DaqcoApplication
+from cosmic.daqco.api.channel_shape import ChannelHandle
 from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.limits import LOWEST_RATE_HZ, Crossing, Limit
@@ -49,6 +50,7 @@ class Daqco:
         self._application = application
         self._recorder = application.recorder
         self._listeners: tuple[Callable[[], object], ...] = ()
+        self._handles: dict[str, ChannelHandle] = {}
         # At once and by a function that keeps this object: a call that still waits in a queue when
         # a plain object goes would reach what is no more.
         direct = Qt.ConnectionType.DirectConnection
@@ -113,7 +115,29 @@ class Daqco:
         """Return the highest rate for the active ones of `channels`, or of those in force."""
         return highest_rate_hz(channels or self.settings.channel, self._application.infos)
 
+    def __getitem__(self, channel: str) -> ChannelHandle:
+        """Return an active channel, for plans; raises `ConfigError` where none is named so."""
+        if channel not in self.channels:
+            names = ", ".join(self.channels)
+            raise ConfigError(f"there is no active channel {channel!r}; there are {names}")
+        handle = self._handles.get(channel)
+        if handle is None:
+            handle = ChannelHandle(self, channel, self._application.clock)
+            self._handles[channel] = handle
+        return handle
+
+    def __contains__(self, channel: object) -> bool:
+        return channel in self.channels
+
+    def __iter__(self) -> Iterator[ChannelHandle]:
+        return (self[channel] for channel in self.channels)
+
     # Data
+
+    @property
+    def latest_chunk(self) -> DataChunk | None:
+        """The newest chunk; None before the first."""
+        return self._application.buffer.latest_chunk
 
     def latest(self) -> dict[str, float]:
         """Return the newest value of every active channel in its physical unit.
@@ -268,6 +292,7 @@ class Daqco:
 
             try:
                 export_file(source, target.suffix.lstrip("."), target, report)
+                task.report(1.0, "done")
                 task.finish()
             except CosmicError as exc:
                 task.fail(exc)

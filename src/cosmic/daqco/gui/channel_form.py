@@ -18,10 +18,10 @@ from PySide6.QtWidgets import (
 from cosmic.daqco.core.settings import EXTREMES_V, ChannelSettings
 from cosmic.daqco.gui.channel_names import channel_name_problem
 from cosmic.daqco.gui.colours import colour_name, readable, swatch
-from cosmic.daqco.gui.value_field import show_refusal
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.palette import OKABE_ITO
 from cosmic.frame.gui.quantity_field import QuantityField
+from cosmic.frame.gui.refusal import show_refusal
 from cosmic.frame.gui.theme import STEP_PX
 
 _MODES: Final = {

@@ -21,12 +21,12 @@ from cosmic.daqco.gui.channel_tree import ChannelTree
 from cosmic.daqco.gui.dialog import FieldDialog, button_box
 from cosmic.daqco.gui.draft import Draft
 from cosmic.daqco.gui.ports import DaqPort
-from cosmic.daqco.gui.relay import PortRelay
 from cosmic.daqco.gui.scale_editor import ScaleEditor, ScaleView
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.quantity_field import QuantityField
+from cosmic.frame.gui.relay import PortRelay
 from cosmic.frame.gui.theme import STEP_PX
 
 REFRESH_HZ: Final = (1.0, 300.0)

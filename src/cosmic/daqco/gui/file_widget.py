@@ -9,7 +9,6 @@ from PySide6.QtCore import QTimer
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
-    QFileDialog,
     QGridLayout,
     QLabel,
     QLineEdit,
@@ -20,15 +19,16 @@ from PySide6.QtWidgets import (
 from cosmic.daqco.core.recording_format import SUFFIX
 from cosmic.daqco.gui.amounts import recording_text, room_text
 from cosmic.daqco.gui.append_row import append_row
-from cosmic.daqco.gui.file_naming import directory_problem, name_pattern, name_problem
-from cosmic.daqco.gui.overwrite_question import overwrite_question
+from cosmic.daqco.gui.file_naming import name_pattern
 from cosmic.daqco.gui.ports import DaqPort
-from cosmic.daqco.gui.relay import PortRelay
-from cosmic.daqco.gui.value_field import mark_refusal
 from cosmic.frame.errors import CosmicError
-from cosmic.frame.file_names import NameOption, file_name
+from cosmic.frame.file_names import NameOption, directory_problem, file_name, name_problem
+from cosmic.frame.gui.ask_directory import ask_directory
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.overwrite_question import overwrite_question
+from cosmic.frame.gui.refusal import mark_refusal
+from cosmic.frame.gui.relay import PortRelay
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, number_font
 from cosmic.frame.overrides import override
@@ -169,7 +169,7 @@ class UDaqFileWidget(QWidget):
     def refresh(self) -> None:
         """Show what is being recorded, what may be done now and how much room there is."""
         recording = self._port.recording
-        wrong_name = "" if recording.active else name_problem(self.base.text())
+        wrong_name = "" if recording.active else name_problem(self.base.text(), SUFFIX)
         wrong_folder = "" if recording.active else directory_problem(self.directory.text())
         mark_refusal(self.base, wrong_name)
         mark_refusal(self.directory, wrong_folder)
@@ -249,12 +249,8 @@ class UDaqFileWidget(QWidget):
         self.refresh()
 
     def _on_browse(self) -> None:
-        dialog = QFileDialog(self, "Directory for recordings", self.directory.text())
-        dialog.setFileMode(QFileDialog.FileMode.Directory)
-        dialog.setOption(QFileDialog.Option.ShowDirsOnly)
-        dialog.fileSelected.connect(self._on_chosen)
-        dialog.finished.connect(dialog.deleteLater)
-        dialog.open()
+        title = "Directory for recordings"
+        ask_directory(self, title, self.directory.text(), self._on_chosen)
 
     def _on_chosen(self, folder: str) -> None:
         self.directory.setText(folder)
@@ -276,15 +272,13 @@ class UDaqFileWidget(QWidget):
             self._record(path)
 
     def _ask(self, path: Path, size_bytes: int) -> None:
-        box = overwrite_question(self, path, size_bytes, lambda: self._record(path, overwrite=True))
+        box = overwrite_question(self, path, lambda: self._record(path, overwrite=True), size_bytes)
         box.finished.connect(self._on_answered)
         self._asking = box
         box.open()
         self.refresh()
 
     def _on_answered(self) -> None:
-        if self._asking is not None:
-            self._asking.deleteLater()
         self._asking = None
         self.refresh()
 

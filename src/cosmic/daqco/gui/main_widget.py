@@ -19,16 +19,16 @@ from PySide6.QtWidgets import (
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.gui.configure_dialog import UDaqConfigureDialog
-from cosmic.daqco.gui.export_bar import ExportBar
 from cosmic.daqco.gui.file_widget import UDaqFileWidget
 from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.plotter import UDaqPlotter
 from cosmic.daqco.gui.ports import DaqPort
-from cosmic.daqco.gui.relay import PortRelay
 from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.relay import PortRelay
+from cosmic.frame.gui.task_bar import TaskBar
 from cosmic.frame.gui.theme import STEP_PX, number_font
 from cosmic.frame.overrides import override
 
@@ -55,7 +55,9 @@ class UDaqMainWidget(QWidget):
         self._port = port
         self.plotter = UDaqPlotter(port)
         self.files = UDaqFileWidget(port)
-        self.export_bar = ExportBar()
+        tip = "End the export; what is written is deleted"
+        self.export_bar = TaskBar(cancel_tip=tip, closable=True)
+        self.export_bar.setContentsMargins(STEP_PX, 0, STEP_PX, 0)
         self.state = Chip("STOPPED", tip="Whether samples are acquired")
         self.rate_text, self.error = ElidedLabel(), ElidedLabel()
         self.rate_text.setFont(number_font())
@@ -209,7 +211,7 @@ class UDaqMainWidget(QWidget):
         try:
             self.export_bar.follow(self._port.export(source, target))
         except CosmicError as exc:
-            self.export_bar.say(f"◆ {exc}")
+            self.export_bar.say(str(exc), refused=True)
 
 
 def make_daqco_gui(application: CosmicApplicationBase) -> UDaqMainWidget:

@@ -18,11 +18,11 @@ from cosmic.daqco.gui.plot.refresh import shown_rate_hz
 from cosmic.daqco.gui.plot.unit_ranges import UnitRanges
 from cosmic.daqco.gui.plot.units import AxisRange
 from cosmic.daqco.gui.ports import DaqPort
-from cosmic.daqco.gui.relay import PortRelay
 from cosmic.daqco.gui.scaling_bar import ScalingBar
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.relay import PortRelay
 from cosmic.frame.gui.theme import STEP_PX, number_font
 from cosmic.frame.overrides import override
 

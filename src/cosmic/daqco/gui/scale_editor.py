@@ -20,9 +20,10 @@ from cosmic.daqco.core.settings import ScaleSettings
 from cosmic.daqco.gui.dialog import FieldDialog, button_box
 from cosmic.daqco.gui.polynomial import checked, coefficient_problem
 from cosmic.daqco.gui.scale_plot import ScalePlot
-from cosmic.daqco.gui.value_field import ValueField, show_refusal
+from cosmic.daqco.gui.value_field import ValueField
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.gui.build import named, push_button, tipped
+from cosmic.frame.gui.refusal import show_refusal
 from cosmic.frame.gui.theme import STEP_PX
 
 _RAISED: Final = "⁰¹²³⁴⁵⁶⁷⁸⁹"

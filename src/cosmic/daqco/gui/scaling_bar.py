@@ -5,10 +5,10 @@ from typing import Final
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QPushButton, QWidget
 
-from cosmic.daqco.gui.flow_layout import FlowLayout
 from cosmic.daqco.gui.plot.units import AxisRange, display_unit
 from cosmic.daqco.gui.value_field import ValueField
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
+from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.theme import STEP_PX
 
 SPANS_S: Final = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0)

@@ -3,12 +3,12 @@
 import math
 from typing import Final
 
-from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFocusEvent, QKeyEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QLineEdit, QSizePolicy, QWidget
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from cosmic.frame.gui.reason_bubble import ReasonBubble
-from cosmic.frame.gui.theme import STEP_PX, State, current_palette, number_font, state_look
+from cosmic.frame.errors import QuantityError
+from cosmic.frame.gui.number_edit import NumberEdit, read_number
 from cosmic.frame.overrides import override
 from cosmic.vico.gui.texts import number_text, plain_steps
 
@@ -16,21 +16,7 @@ _ENTER: Final = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 _STEPS: Final = {Qt.Key.Key_Up: 1, Qt.Key.Key_Down: -1}
 
 
-def mark_refused(field: QLineEdit, reason: str) -> None:
-    """Turn the border of a field and say below it why; an empty reason takes both away."""
-    if field.accessibleDescription() == reason:
-        return
-    if reason:
-        ReasonBubble.of(field).show_for(field, f"{state_look(State.REFUSED).glyph} {reason}")
-    else:
-        ReasonBubble.of(field).dismiss(field)
-    field.setAccessibleDescription(reason)
-    field.setProperty("refused", bool(reason))
-    field.style().unpolish(field)
-    field.style().polish(field)
-
-
-class AmountField(QLineEdit):
+class AmountField(NumberEdit):
     """Takes a number within a range; its unit stands dimmed behind it.
 
     Enter accepts, Escape goes back, the arrow keys go up and down a step.
@@ -54,26 +40,16 @@ class AmountField(QLineEdit):
         integers: bool = False,
         parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
-        self._name, self._unit, self._integers = name, unit, integers
+        super().__init__(name, unit, parent)
+        self._integers = integers
         self._low, self._high, self._step = low, high, 1.0
         self._good: float | None = None
         self._before: float | None = None
         self._shown = self._why_not = ""
-        self.setFont(number_font())
-        self.setAlignment(Qt.AlignmentFlag.AlignRight)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName(name)
-        room = self.fontMetrics().horizontalAdvance(unit) + STEP_PX // 2 if unit else 0
-        self.setTextMargins(0, 0, room, 0)
         self.set_range(low, high)
         self.set_value(value)
         self.textEdited.connect(self._on_edited)
-
-    @property
-    def reason(self) -> str:
-        """Why the entry is refused; empty when it is not."""
-        return self.accessibleDescription()
 
     @property
     def is_editing(self) -> bool:
@@ -105,12 +81,13 @@ class AmountField(QLineEdit):
         self.setEnabled(not why_not)
         self._tell()
 
+    @override
     def refuse(self, reason: str) -> None:
         """Say why the entry is not taken; a value committed just before was never good."""
         if self._before is not None:
             self._good, self._before = self._before, None
             self._shown = number_text(self._good)
-        mark_refused(self, reason)
+        super().refuse(reason)
         self._tell()
 
     def revert(self) -> None:
@@ -134,12 +111,10 @@ class AmountField(QLineEdit):
         return not self.reason
 
     def _judge(self) -> float | None:
-        text = self.text().strip().removesuffix(self._unit).strip().replace("−", "-")
         try:
-            value = float(text)
-        except ValueError:
-            hint = "; write the decimal sign as a point" if "," in text else ""
-            self.refuse(f"{text!r} is not a number{hint}" if text else "type a number")
+            value = read_number(self.text().strip().removesuffix(self._unit))
+        except QuantityError as exc:
+            self.refuse(str(exc))
             return None
         problem = self._problem(value)
         if problem:
@@ -148,8 +123,6 @@ class AmountField(QLineEdit):
         return value
 
     def _problem(self, value: float) -> str:
-        if not math.isfinite(value):
-            return "give a finite number"
         if self._integers and not value.is_integer():
             return f"{value:g} is not a whole number"
         if not self._low <= value <= self._high:
@@ -210,23 +183,3 @@ class AmountField(QLineEdit):
         )
         if leaving and self.text() != self._shown and not self.reason:
             self.commit()
-
-    @override
-    def sizeHint(self) -> QSize:
-        digits = self.fontMetrics().horizontalAdvance("00000.000")
-        return QSize(digits + self.textMargins().right() + 2 * STEP_PX, super().sizeHint().height())
-
-    @override
-    def minimumSizeHint(self) -> QSize:
-        return self.sizeHint()
-
-    @override
-    def paintEvent(self, event: QPaintEvent) -> None:
-        super().paintEvent(event)
-        if not self._unit:
-            return
-        colours = current_palette()
-        painter = QPainter(self)
-        painter.setPen(QColor(colours.dim if self.isEnabled() else colours.disabled))
-        align = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(self.rect().adjusted(0, 0, -STEP_PX, 0), int(align), self._unit)

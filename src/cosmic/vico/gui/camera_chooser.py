@@ -4,10 +4,10 @@ from PySide6.QtWidgets import QComboBox, QGridLayout, QWidget
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import push_button, tipped
+from cosmic.frame.gui.relay import PortRelay
+from cosmic.frame.gui.task_bar import TaskBar
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.vico.gui.ports import VicoPort
-from cosmic.vico.gui.relay import PortRelay
-from cosmic.vico.gui.task_bar import TaskBar
 from cosmic.vico.hw.interface import CameraInfo
 
 

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QScrollArea, QSizePolicy, 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named
+from cosmic.frame.gui.relay import PortRelay
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.overrides import override
 from cosmic.vico.core.picture import Picture
@@ -25,7 +26,6 @@ from cosmic.vico.gui.picture_view import PictureView
 from cosmic.vico.gui.pointer_text import pointer_text
 from cosmic.vico.gui.ports import VicoPort
 from cosmic.vico.gui.record_bar import RecordBar
-from cosmic.vico.gui.relay import PortRelay
 from cosmic.vico.gui.seen import Pixel
 from cosmic.vico.gui.seen_layer import SeenLayer
 from cosmic.vico.gui.settings_form import SettingsForm

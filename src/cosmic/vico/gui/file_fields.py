@@ -3,45 +3,21 @@
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
-from typing import Final
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QCheckBox,
-    QFileDialog,
     QGridLayout,
     QLabel,
     QLineEdit,
-    QMessageBox,
     QWidget,
 )
 
+from cosmic.frame.file_names import directory_problem, name_problem
+from cosmic.frame.gui.ask_directory import ask_directory
 from cosmic.frame.gui.build import push_button, tipped
+from cosmic.frame.gui.refusal import mark_refusal
 from cosmic.frame.gui.theme import STEP_PX
-from cosmic.vico.gui.amount_field import mark_refused
-
-_FORBIDDEN: Final = '/\\:*?"<>|'
-
-
-def name_problem(base: str) -> str:
-    """Return why `base` cannot be the name of a file; empty when it can."""
-    if not base.strip():
-        return "type a name"
-    bad = sorted({each for each in base if each in _FORBIDDEN or ord(each) < 32})
-    if bad:
-        return f"a file name cannot have {' '.join(bad)}"
-    return "" if base.strip(". ") else "type a name with a letter or a figure in it"
-
-
-def directory_problem(text: str) -> str:
-    """Return why pictures cannot go there; empty when they can."""
-    if not text.strip():
-        return "type a directory"
-    try:
-        there = Path(text).expanduser().is_dir()
-    except (OSError, RuntimeError, ValueError) as exc:
-        return f"{text}: {exc}"
-    return "" if there else f"there is no directory {text}"
 
 
 class FileFields(QWidget):
@@ -107,34 +83,14 @@ class FileFields(QWidget):
         return self.folder / f"{base}{stamp}{suffix}"
 
     def _on_edited(self) -> None:
-        mark_refused(self.base, name_problem(self.base.text()))
-        mark_refused(self.directory, directory_problem(self.directory.text()))
+        mark_refusal(self.base, name_problem(self.base.text()))
+        mark_refusal(self.directory, directory_problem(self.directory.text()))
         self.edited.emit()
 
     def _on_browse(self) -> None:
-        dialog = QFileDialog(self, "Directory for pictures", self.directory.text())
-        dialog.setFileMode(QFileDialog.FileMode.Directory)
-        dialog.setOption(QFileDialog.Option.ShowDirsOnly)
-        dialog.fileSelected.connect(self._on_chosen)
-        dialog.finished.connect(dialog.deleteLater)
-        dialog.open()
+        title = "Directory for pictures"
+        ask_directory(self, title, self.directory.text(), self._on_chosen)
 
     def _on_chosen(self, folder: str) -> None:
         self.directory.setText(folder)
         self._on_edited()
-
-
-def overwrite_question(parent: QWidget, path: Path, overwrite: Callable[[], object]) -> QMessageBox:
-    """Return a dialog that calls `overwrite` when the operator says so; Escape is no."""
-    box = QMessageBox(parent)
-    box.setIcon(QMessageBox.Icon.Warning)
-    box.setWindowTitle("Overwrite it?")
-    box.setText(f"{path.name} exists already.")
-    box.setInformativeText("What is in it will be lost.")
-    agree = box.addButton("Overwrite", QMessageBox.ButtonRole.DestructiveRole)
-    cancel = box.addButton(QMessageBox.StandardButton.Cancel)
-    box.setDefaultButton(cancel)
-    box.setEscapeButton(cancel)
-    agree.clicked.connect(overwrite)
-    box.finished.connect(box.deleteLater)
-    return box

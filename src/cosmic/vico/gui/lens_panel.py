@@ -9,16 +9,16 @@ from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QPushButton, QWidg
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.flow_layout import FlowLayout
+from cosmic.frame.gui.relay import PortRelay
 from cosmic.frame.gui.state_badge import StateBadge
+from cosmic.frame.gui.task_bar import TaskBar
 from cosmic.frame.gui.theme import STEP_PX, State
 from cosmic.frame.overrides import override
 from cosmic.frame.task import Task
 from cosmic.vico.gui.amount_field import AmountField
-from cosmic.vico.gui.flow_layout import FlowLayout
 from cosmic.vico.gui.ports import LensPort, VicoPort
-from cosmic.vico.gui.relay import PortRelay
 from cosmic.vico.gui.slider_field import SliderField
-from cosmic.vico.gui.task_bar import TaskBar
 from cosmic.vico.hw.peripherals import LensAxis, LensState
 
 LOOK_MS: Final = 200

@@ -16,14 +16,15 @@ from PySide6.QtWidgets import (
 )
 
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.amounts import duration_text, size_text
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.overwrite_question import overwrite_question
+from cosmic.frame.gui.task_bar import TaskBar
 from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look
 from cosmic.frame.task import Task
 from cosmic.vico.gui.camera_port import CameraPort, VideoFormat
-from cosmic.vico.gui.file_fields import FileFields, overwrite_question
-from cosmic.vico.gui.task_bar import TaskBar
-from cosmic.vico.gui.texts import duration_text, size_text
+from cosmic.vico.gui.file_fields import FileFields
 from cosmic.vico.gui.time_lapse_dialog import TimeLapseDialog
 
 STILL: Final = ".png"

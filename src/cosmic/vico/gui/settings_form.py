@@ -10,10 +10,10 @@ from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QPushButton, QWidg
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import push_button, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.task_watch import TaskWatch
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.task import Progress
 from cosmic.vico.gui.camera_port import CameraPort
-from cosmic.vico.gui.relay import TaskWatch
 from cosmic.vico.gui.slider_field import SliderField
 from cosmic.vico.hw.interface import (
     CameraRanges,

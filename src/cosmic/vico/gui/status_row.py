@@ -5,10 +5,10 @@ from typing import Final
 from PySide6.QtWidgets import QWidget
 
 from cosmic.frame.clock import WALL
+from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State
 from cosmic.vico.gui.camera_port import CameraPort
-from cosmic.vico.gui.flow_layout import FlowLayout
 from cosmic.vico.gui.levels import Histogram
 from cosmic.vico.gui.readings import FocusBars, Reading
 from cosmic.vico.gui.texts import measure_text

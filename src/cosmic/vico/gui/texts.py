@@ -3,27 +3,6 @@
 import math
 
 
-def duration_text(seconds: float) -> str:
-    """Return a duration, such as "12 s", "3 min 20 s" or "48 h"."""
-    if not math.isfinite(seconds):
-        return "?"
-    whole = max(0, round(seconds))
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02d} s"
-    hours = whole / 3600.0
-    return f"{hours:.1f} h" if hours < 10.0 else f"{hours:.0f} h"
-
-
-def size_text(size_bytes: int) -> str:
-    """Return a file's size, such as "12.3 MB"."""
-    for unit, factor in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
-        if size_bytes >= factor:
-            return f"{size_bytes / factor:.1f} {unit}"
-    return f"{size_bytes} B"
-
-
 def length_text(length_px: float, scale_um_px: float | None) -> str:
     """Return a length in um, or in pixels where the scale is not known."""
     if scale_um_px is None:

@@ -4,10 +4,10 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QIcon, QKeyEvent
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QFormLayout, QLabel, QWidget
 
+from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.overrides import override
 from cosmic.vico.gui.amount_field import AmountField
-from cosmic.vico.gui.texts import duration_text
 
 
 class TimeLapseDialog(QDialog):

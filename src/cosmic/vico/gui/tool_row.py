@@ -7,8 +7,8 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
 from cosmic.frame.gui.build import named, tipped
+from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.theme import STEP_PX
-from cosmic.vico.gui.flow_layout import FlowLayout
 
 W = TypeVar("W", bound=QWidget)
 

@@ -3,16 +3,23 @@
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QWidget
 
+from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import push_button
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.task_watch import TaskWatch
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.task import Progress, Task
-from cosmic.vico.gui.relay import TaskWatch
-from cosmic.vico.gui.texts import duration_text
 
 
 class TaskBar(QWidget):
     """Is there while a task runs; keeps how it ended until the next one.
+
+    Parameters
+    ----------
+    cancel_tip : str
+        What ending the task does.
+    closable : bool
+        Stay away until there is something to say; afterwards the operator can close it.
 
     Signals
     -------
@@ -22,14 +29,21 @@ class TaskBar(QWidget):
 
     ended = Signal(object)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        parent: QWidget | None = None,
+        *,
+        cancel_tip: str = "End it now",
+        closable: bool = False,
+    ) -> None:
         super().__init__(parent)
+        self._closable = closable
         self.text = ElidedLabel()
         self.bar = QProgressBar()
         self.bar.setRange(0, 1000)
         self.bar.setTextVisible(False)
         self.bar.setFixedWidth(10 * STEP_PX)
-        self.cancel = push_button("Cancel", "End it now")
+        self.cancel = push_button("Cancel", cancel_tip)
         self.cancel.clicked.connect(self._on_cancel)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
@@ -44,6 +58,7 @@ class TaskBar(QWidget):
         self.watch = TaskWatch(self)
         self.watch.progressed.connect(self._on_progressed)
         self._show_running(running=False)
+        self.setHidden(closable)
 
     def follow(self, task: Task) -> None:
         """Show how far `task` is."""
@@ -59,7 +74,9 @@ class TaskBar(QWidget):
 
     def _show_running(self, *, running: bool) -> None:
         self.bar.setVisible(running)
-        self.cancel.setVisible(running)
+        self.cancel.setVisible(running or self._closable)
+        if self._closable:
+            self.cancel.setText("Cancel" if running else "Close")
 
     def _on_progressed(self, progress: Progress) -> None:
         self._show_running(running=not progress.done)
@@ -75,5 +92,7 @@ class TaskBar(QWidget):
         self.bar.setValue(round(1000 * progress.fraction))
 
     def _on_cancel(self) -> None:
-        if self.watch.task is not None:
+        if self.watch.task is not None and self.watch.busy:
             self.watch.task.cancel()
+        else:
+            self.hide()

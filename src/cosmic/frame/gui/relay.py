@@ -1,11 +1,21 @@
-"""Brings what the application tells, in any thread, to a widget in the GUI thread."""
+"""Brings what an application tells, in any thread, to a widget in the GUI thread."""
 
+from abc import abstractmethod
 from collections.abc import Callable
+from typing import Protocol
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
-from cosmic.daqco.gui.ports import DaqPort, Unsubscribe
+Unsubscribe = Callable[[], None]
+
+
+class TellsChanges(Protocol):
+    """What an application offers to its widgets, as far as it matters here."""
+
+    @abstractmethod
+    def on_change(self, listener: Callable[[], object]) -> Unsubscribe:
+        """Call `listener()`, in any thread, when something changed."""
 
 
 class PortRelay(QObject):
@@ -14,12 +24,12 @@ class PortRelay(QObject):
     Signals
     -------
     changed()
-        Anything but samples and counters changed; connect a method of the widget.
+        Anything changed that the port tells of; connect a method of the widget.
     """
 
     changed = Signal()
 
-    def __init__(self, port: DaqPort, widget: QWidget) -> None:
+    def __init__(self, port: TellsChanges, widget: QWidget) -> None:
         super().__init__(widget)
         self._ends: list[Unsubscribe] = []
         self.keep(port.on_change(self.changed.emit))

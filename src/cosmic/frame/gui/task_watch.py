@@ -1,43 +1,9 @@
-"""Brings what the application and its tasks tell, in any thread, to widgets in the GUI thread."""
-
-from collections.abc import Callable
+"""Brings how far a task is, told in any thread, to a widget in the GUI thread."""
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QWidget
 from shiboken6 import isValid
 
 from cosmic.frame.task import Progress, Task
-from cosmic.vico.gui.ports import Unsubscribe, VicoPort
-
-
-class PortRelay(QObject):
-    """Belongs to a widget; stops listening when the widget goes.
-
-    Signals
-    -------
-    changed()
-        Anything but pictures and counters changed; connect a method of the widget.
-    """
-
-    changed = Signal()
-
-    def __init__(self, port: VicoPort, widget: QWidget) -> None:
-        super().__init__(widget)
-        self._ends: list[Unsubscribe] = [port.on_change(self.changed.emit)]
-        widget.destroyed.connect(_ender(self._ends))
-
-    def end(self) -> None:
-        """Stop listening now; harmless the second time."""
-        _end_all(self._ends)
-
-
-def _ender(ends: list[Unsubscribe]) -> Callable[[], None]:
-    return lambda: _end_all(ends)  # must not hold the widget, which is gone by then
-
-
-def _end_all(ends: list[Unsubscribe]) -> None:
-    while ends:
-        ends.pop()()
 
 
 class TaskWatch(QObject):
