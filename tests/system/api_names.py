@@ -14,6 +14,7 @@ from cosmic.autonomy.control.loop import ControlEnding, ControlReading, ControlS
 from cosmic.autonomy.control.pace import PaceStatistics
 from cosmic.autonomy.control.pid import PidGains
 from cosmic.autonomy.control.trace import ControlTrace
+from cosmic.daqco.api.channel_shape import ChannelHandle
 from cosmic.daqco.api.daqco import Daqco, DaqCounters, DaqLimit
 from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.core.chunk import DataChunk
@@ -22,6 +23,7 @@ from cosmic.daqco.core.recording_format import AxisPosition, Overrun, RecordedEv
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.errors import DeviceFault, ExportCancelled, RecordingExistsError
+from cosmic.frame.plan_shape import PlanStatus
 from cosmic.frame.task import Progress, Task
 from cosmic.mico.api.axis import Axis, Jogging
 from cosmic.mico.api.axis_group import AxisGroup, GroupStatus
@@ -79,6 +81,8 @@ CLASSES: Final[dict[str, type]] = {
     "PositionerState": PositionerState,
     "MoveVerdict": cosmic.MoveVerdict,
     "Daqco": Daqco,
+    "ChannelHandle": ChannelHandle,
+    "PlanStatus": PlanStatus,
     "RecordingState": RecordingState,
     "DaqCounters": DaqCounters,
     "DaqLimit": DaqLimit,
