@@ -110,7 +110,7 @@ def help_of(*command: str) -> str:
 def test_every_option_of_a_window_is_listed_and_none_besides(tmp_path: Path) -> None:
     listed = section(REFERENCE / "commands.md", "Commands", tmp_path)
     said = {re.findall(r"--\w+", row[0])[0] for row in listed if row[0].startswith("`--")}
-    for command in ((), ("mico",), ("daqco",)):
+    for command in ((), ("mico",), ("daqco",), ("vico",)):
         assert set(re.findall(r"--\w+", help_of(*command))) == said
 
 
