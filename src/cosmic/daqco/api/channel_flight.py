@@ -94,19 +94,18 @@ class ChannelFlight:
         self.ended.fail(error)
 
     def pages(self) -> Iterator[EventPage]:
-        """Yield and forget what has come."""
-        while True:
-            with self._lock:
-                parts = list(self._parts)
-                self._parts.clear()
-                self._kept = 0
-            if not parts:
-                return
-            times_s = np.concatenate([each[0] for each in parts])
-            values = np.concatenate([each[1] for each in parts])
-            for first in range(0, len(values), LARGEST_PAGE):
-                part = slice(first, first + LARGEST_PAGE)
-                yield self._page(times_s[part], values[part])
+        """Yield and forget what has come before the call."""
+        with self._lock:
+            parts = list(self._parts)
+            self._parts.clear()
+            self._kept = 0
+        if not parts:
+            return
+        times_s = np.concatenate([each[0] for each in parts])
+        values = np.concatenate([each[1] for each in parts])
+        for first in range(0, len(values), LARGEST_PAGE):
+            part = slice(first, first + LARGEST_PAGE)
+            yield self._page(times_s[part], values[part])
 
     def _page(self, times_s: Values, values: Values) -> EventPage:
         unix_s = (self._since_unix_s + (times_s - self._since_s) / self._rate).tolist()
