@@ -218,12 +218,6 @@ def test_confidence_is_said_by_word_and_shape(panel: MicoWidget) -> None:
     assert part(panel.cards["left.gripper"], "chip", ConfidenceMark).text() == "≈ estimated"
 
 
-def test_what_cannot_be_used_yet_says_why(panel: MicoWidget) -> None:
-    link = part(panel.cards["left.x"], "MiCoCL_12", QAbstractButton)
-    assert not link.isEnabled()
-    assert "synchronous movement" in link.toolTip()
-
-
 def test_everything_that_can_be_used_has_a_tooltip(panel: MicoWidget) -> None:
     kinds = (QAbstractButton, QuantityField, StateBadge)
     silent = [

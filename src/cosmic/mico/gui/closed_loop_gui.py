@@ -1,12 +1,13 @@
 """`ClosedLoopGUI`: the card of a positioner with sensor (fields MiCoCL.1 to MiCoCL.13)."""
 
-from collections.abc import Callable, Sequence
-from typing import ClassVar, Final
+from collections.abc import Callable, Mapping, Sequence
+from typing import ClassVar
 
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from cosmic.frame.errors import CosmicError, MoveRefused
-from cosmic.frame.gui.build import named, push_button, tipped
+from cosmic.frame.gui.build import named, push_button
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.overrides import override
@@ -14,15 +15,25 @@ from cosmic.frame.units import format_quantity
 from cosmic.mico.core.orders import FREQUENCY_HZ
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.gui.axis_menu import AxisMenu
+from cosmic.mico.gui.link_switch import LinkSwitch
 from cosmic.mico.gui.move_row import MoveFields
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
 from cosmic.mico.hw.interface import Direction
 
-NO_LINK_TIP: Final = "Not available: linking axes comes with synchronous movement"
-
 
 class ClosedLoopGUI(PositionerBaseGUI):
-    """Adds moves to and by a position, in one or in parts, and what belongs to the sensor."""
+    """Adds moves to and by a position, in one or in parts, and what belongs to the sensor.
+
+    Signals
+    -------
+    link_wanted(str, float)
+        The operator wants the axis linked with another one, at that ratio.
+    unlink_wanted()
+        The operator wants it linked with none.
+    """
+
+    link_wanted = Signal(str, float)
+    unlink_wanted = Signal()
 
     state_name: ClassVar[str] = "MiCoCL_1"
     title_name: ClassVar[str] = "MiCoCL_4"
@@ -36,6 +47,7 @@ class ClosedLoopGUI(PositionerBaseGUI):
 
     @override
     def _make_common(self) -> None:
+        self._others: tuple[str, ...] = ()
         super()._make_common()
         self._move = MoveFields(self.axis, self._defaults)
         self._move.go_to.clicked.connect(self._on_go_to)
@@ -44,9 +56,11 @@ class ClosedLoopGUI(PositionerBaseGUI):
         self._make_speed()
 
     def _make_indicators(self) -> None:
-        self._linked = tipped(named(QLabel("○"), "MiCoCL_3"), "Moves on its own, linked to none")
-        self._linked.setAccessibleName("not linked")
-        self._link = _switch("Link off", "MiCoCL_12", NO_LINK_TIP)
+        self._link = named(LinkSwitch(self.settings.name), "MiCoCL_12")
+        self._linked = named(self._link.sign, "MiCoCL_3")
+        self._link.opened.connect(self._on_link_opened)
+        self._link.link_wanted.connect(self.link_wanted)
+        self._link.unlink_wanted.connect(self.unlink_wanted)
 
     def _make_menu(self) -> None:
         name, settings = self.settings.name, self.settings
@@ -116,6 +130,15 @@ class ClosedLoopGUI(PositionerBaseGUI):
             self._note = f"part {series.begun} of {series.planned}"
         super().show_state(state)
 
+    def show_links(self, linked: Mapping[str, float], others: Sequence[str]) -> None:
+        """Show what the axis is linked with, and remember what it could be linked with."""
+        self._others = tuple(others)
+        self._link.show_links(linked)
+
+    def say_refused(self, reason: str) -> None:
+        """Show why something that was wanted cannot be."""
+        self._on_refused(None, reason)
+
     @override
     def _usual_line(self, state: PositionerState) -> str:
         limits = state.shown_limits
@@ -126,6 +149,9 @@ class ClosedLoopGUI(PositionerBaseGUI):
         return f"travel {low.split(' ')[0]} to {high}{zero}"
 
     # Commanding
+
+    def _on_link_opened(self) -> None:
+        self._link.offer(self._others)
 
     @override
     def move_once(self, direction: int) -> None:
@@ -192,13 +218,6 @@ class ClosedLoopGUI(PositionerBaseGUI):
 
     def _on_more(self, shown: bool) -> None:
         self._more.setVisible(shown)
-
-
-def _switch(text: str, name: str, why_not: str) -> QPushButton:
-    button = named(push_button(text, why_not), name)
-    button.setEnabled(False)
-    button.setStyleSheet(f"QPushButton {{ padding: 3px {STEP_PX - 2}px; }}")
-    return button
 
 
 def _gap() -> QWidget:

@@ -2,22 +2,15 @@
 
 from typing import Final
 
-from PySide6.QtCore import QEvent, QObject, QPoint, Qt, Signal
-from PySide6.QtGui import QHideEvent, QKeyEvent
-from PySide6.QtWidgets import (
-    QApplication,
-    QFrame,
-    QHBoxLayout,
-    QLabel,
-    QPushButton,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QHideEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.chip import set_style_property
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.overrides import override
+from cosmic.mico.gui.overlay import Overlay
 
 NO_MODEL_TIP: Final = (
     "No collision model: movements within the limits are made without a check for collisions"
@@ -61,7 +54,7 @@ class CollisionSwitch(QPushButton):
         found = self.window().findChild(
             TakeOutQuestion, options=Qt.FindChildOption.FindDirectChildrenOnly
         )
-        if isinstance(found, TakeOutQuestion) and found.switch is self:
+        if isinstance(found, TakeOutQuestion) and found.anchor is self:
             return found
         return None
 
@@ -95,7 +88,7 @@ class CollisionSwitch(QPushButton):
             return
         question = TakeOutQuestion(self._axis, self)
         question.agreed.connect(self._on_agreed)
-        question.show()
+        question.open_below(question.cancel)
 
     def _on_agreed(self) -> None:
         self.wanted.emit(False)
@@ -107,11 +100,8 @@ class CollisionSwitch(QPushButton):
             self.question.close()
 
 
-class TakeOutQuestion(QFrame):
-    """Asks once more, below the switch; it lies over its window, so nothing jumps.
-
-    No dialog: STOP, keys and everything else act as before. Whatever else takes the focus is
-    taken for a no.
+class TakeOutQuestion(Overlay):
+    """Asks once more, below the switch; whatever else takes the focus is taken for a no.
 
     Signals
     -------
@@ -122,11 +112,8 @@ class TakeOutQuestion(QFrame):
     agreed = Signal()
 
     def __init__(self, axis: str, switch: CollisionSwitch) -> None:
-        self._window = switch.window()
-        super().__init__(self._window)
+        super().__init__(switch)
         self.setObjectName("takeOutQuestion")
-        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.switch = switch
         text = QLabel(
             f"Take {axis} out of collision detection? Nothing will keep it from hitting something."
         )
@@ -148,41 +135,7 @@ class TakeOutQuestion(QFrame):
         column.addLayout(buttons)
         self.cancel.clicked.connect(self.close)
         self.take_out.clicked.connect(self._on_take_out)
-        self._place()
-        self.raise_()
-        self._window.installEventFilter(self)
-        app = QApplication.instance()
-        if isinstance(app, QApplication):
-            app.focusChanged.connect(self._on_focus_changed)
-        self.cancel.setFocus()
-
-    def _place(self) -> None:
-        self.ensurePolished()
-        self.adjustSize()
-        window = self._window
-        below = self.switch.mapTo(window, QPoint(0, self.switch.height() + STEP_PX // 2))
-        x = max(0, min(below.x(), window.width() - self.width()))
-        y = below.y()
-        if y + self.height() > window.height():
-            y -= self.height() + self.switch.height() + STEP_PX
-        self.move(x, max(0, y))
 
     def _on_take_out(self) -> None:
         self.agreed.emit()
         self.close()
-
-    def _on_focus_changed(self, _before: QWidget | None, now: QWidget | None) -> None:
-        if now is not None and now is not self.switch and not self.isAncestorOf(now):
-            self.close()
-
-    @override
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        super().keyPressEvent(event)
-        if event.key() == Qt.Key.Key_Escape:  # which stops everything, too
-            self.close()
-
-    @override
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.Resize:
-            self.close()
-        return super().eventFilter(watched, event)

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import (
     QProgressBar,
     QSizePolicy,
     QStackedWidget,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
@@ -30,12 +31,16 @@ class MicoHeader(QWidget):
 
     Signals
     -------
-    initialise_requested(), rescan_requested()
+    initialise_requested(), rescan_requested(), undo_requested()
         The operator wants it.
+    steps_toggled(bool)
+        The steps of the initialisation shall be shown, or not.
     """
 
     initialise_requested = Signal()
     rescan_requested = Signal()
+    undo_requested = Signal()
+    steps_toggled = Signal(bool)
 
     def __init__(self, jog: JogSettings, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -62,6 +67,14 @@ class MicoHeader(QWidget):
         self._rescan = named(
             push_button("Rescan", "Look again for the devices; nothing may be moving"), "rescan"
         )
+        self._steps = named(QToolButton(), "showSteps")
+        self._steps.setText("▾")
+        self._steps.setCheckable(True)
+        tipped(self._steps, "Show the steps of the initialisation")
+        self._steps.toggled.connect(self.steps_toggled)
+        self._undo = named(push_button("Undo", ""), "undo")
+        self._undo.clicked.connect(self.undo_requested)
+        self.set_undo("")
         self._tips = {each: each.toolTip() for each in (self._initialise, self._rescan)}
         self._initialise.clicked.connect(self.initialise_requested)
         self._rescan.clicked.connect(self.rescan_requested)
@@ -91,7 +104,9 @@ class MicoHeader(QWidget):
         line = QHBoxLayout()
         line.setSpacing(STEP_PX)
         line.addWidget(self._initialise)
+        line.addWidget(self._steps)
         line.addWidget(self._rescan)
+        line.addWidget(self._undo)
         line.addWidget(self._pages, 1)
         caption = tipped(QLabel("jog per second"), "How far a held key moves in one second")
         caption.setProperty("role", "dim")
@@ -118,6 +133,16 @@ class MicoHeader(QWidget):
     def set_message(self, text: str, state: State = State.OK) -> None:
         """Show one line, such as how the last operation ended."""
         self._message.set_text(f"{state_look(state).glyph} {text}" if text else "")
+
+    def set_undo(self, what: str) -> None:
+        """Say what Undo takes back; empty when there is nothing."""
+        self._undo.setEnabled(bool(what))
+        why_not = "Not available: nothing has moved that could go back"
+        self._undo.setToolTip(f"Ctrl+Z: {what}" if what else why_not)
+
+    def set_steps_shown(self, shown: bool) -> None:
+        """Show whether the steps are to be seen."""
+        self._steps.setChecked(shown)
 
     # A long operation
 

@@ -11,18 +11,23 @@ from cosmic.frame.gui.theme import State
 from cosmic.frame.task import Task
 from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.api.mico import Mico
+from cosmic.mico.core.group_start import GroupStarted
 from cosmic.mico.core.settings import GroupSettings, PositionerSettings
 from cosmic.mico.gui.axis_commands import ConsentRequest
+from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI
 from cosmic.mico.gui.collision_status import CollisionStatus
 from cosmic.mico.gui.columns import GroupColumns
 from cosmic.mico.gui.consent_dialog import ConsentDialog
 from cosmic.mico.gui.device_gui import DeviceGUI
+from cosmic.mico.gui.initialisation_panel import make_initialisation_panel
 from cosmic.mico.gui.jog_keys import JogKey, JogKeys
 from cosmic.mico.gui.key_names import key_text
+from cosmic.mico.gui.linking import join_links, show_links
 from cosmic.mico.gui.mico_header import MicoHeader
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
 from cosmic.mico.gui.registry import gui_class
 from cosmic.mico.gui.state_feed import StateFeed
+from cosmic.mico.gui.undo_gui import UNDO_KEY, UndoGui
 
 logger = logging.getLogger(__name__)
 
@@ -65,6 +70,9 @@ class MicoWidget(QWidget):
         self._seeks_ways = False
         self._collision = CollisionStatus(self._application.collision)
         self._header = MicoHeader(self._settings.jog)
+        self._steps = make_initialisation_panel(mico)
+        self._steps.hide()
+        self._undoing = UndoGui(mico, self)
         self._columns = GroupColumns()
         self._feed = StateFeed(mico, self)
         self._keys = JogKeys(_application(), self._header.speed, self)
@@ -72,6 +80,7 @@ class MicoWidget(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         column.addWidget(self._header)
+        column.addWidget(self._steps)
         column.addWidget(self._columns, 1)
         self._connect()
         self.refresh()
@@ -79,12 +88,20 @@ class MicoWidget(QWidget):
     def _connect(self) -> None:
         self._header.initialise_requested.connect(self.initialise)
         self._header.rescan_requested.connect(self.rescan)
+        self._header.undo_requested.connect(self._undoing.undo)
+        self._header.steps_toggled.connect(self._on_steps_toggled)
+        self._steps.refused.connect(self._on_refused)
+        self._undoing.said.connect(self._header.set_message)
+        self._undoing.available.connect(self._header.set_undo)
+        self._undoing.show_available()
         self._collision.changed.connect(self._on_collision_changed)
         application = self._application
         application.task_started.connect(self._on_task_started)
         application.status_changed.connect(self._on_status_changed)
         application.rescanned.connect(self._on_status_changed)
         self._manager.device_lost.connect(self._on_status_changed)
+        self._manager.links_changed.connect(self._on_links_changed)
+        self._manager.group_started.connect(self._on_group_started)
 
     @property
     def mico(self) -> Mico:
@@ -112,8 +129,8 @@ class MicoWidget(QWidget):
         return self._dialog
 
     def keys(self) -> list[tuple[str, str]]:
-        """Return the keys that jog, and what each moves."""
-        return [
+        """Return the keys that jog, and what each moves, and that of Undo."""
+        jogs = [
             (key, f"{each.name}: {text} while held")
             for each in self._settings.positioner
             for key, text in (
@@ -122,6 +139,7 @@ class MicoWidget(QWidget):
             )
             if key
         ]
+        return [*jogs, (UNDO_KEY, "take the last movement back, through the gate")]
 
     def release_keys(self) -> None:
         """Let go of every key that jogs."""
@@ -154,6 +172,8 @@ class MicoWidget(QWidget):
                 self._feed.add(name, card)
                 self._feed.add(name, group)
         self._header.set_missing(self._mico.missing)
+        self._steps.preview()
+        self._on_links_changed()
         self.failure_changed.emit(self._application.failure)
         self.refreshed.emit()
 
@@ -191,6 +211,8 @@ class MicoWidget(QWidget):
             card.commands.verdict_given.connect(self.verdict_given)
             card.commands.way_wanted.connect(self.way_wanted)
             card.commands.seeks_ways = self._seeks_ways
+            if isinstance(card, ClosedLoopGUI):
+                join_links(card, self._mico)
             self._cards[name] = card
             group.add(card)
         return group
@@ -224,14 +246,29 @@ class MicoWidget(QWidget):
         for name, card in self._cards.items():
             card.show_detection(model=model, watched=name not in unwatched)
 
+    def _on_links_changed(self) -> None:
+        for card in self._cards.values():
+            if isinstance(card, ClosedLoopGUI):
+                show_links(card, self._mico)
+
+    def _on_group_started(self, started: GroupStarted) -> None:
+        count, skew_ms = len(started.names), started.skew_ms
+        self._header.set_message(f"{count} axes started within {skew_ms:.1f} ms")
+
+    def _on_refused(self, why: str) -> None:
+        self._header.set_message(why, State.REFUSED)
+
     # Long operations
 
     def initialise(self) -> None:
-        """Begin to find all references, as the button does."""
-        try:
-            self._mico.initialise(wait=False)
-        except NotAvailable as exc:
-            self._header.set_message(str(exc), State.REFUSED)
+        """Begin the initialisation sequence and show its steps, as the button does."""
+        self._header.set_steps_shown(True)
+        self._steps.start()
+
+    def _on_steps_toggled(self, shown: bool) -> None:
+        self._steps.setVisible(shown)
+        if shown:
+            self._steps.preview()
 
     def rescan(self) -> None:
         """Begin to look for the devices again, as the button does."""
