@@ -209,7 +209,7 @@ class FakeCamera:
         self._do("stop")
         self.change(running=False)
 
-    def trigger(self) -> None:
+    def software_trigger(self) -> None:
         self._do("trigger")
 
     def set_background(self) -> None:

@@ -9,6 +9,7 @@ from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.file_names import space_left
 from cosmic.frame.task import Task
 from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.api.camera_shape import CameraShape
 from cosmic.vico.api.places import CalibrationShown, Places
 from cosmic.vico.core.camera_recordings import PictureRecordingState
 from cosmic.vico.core.picture import Picture
@@ -71,8 +72,11 @@ class Seen:
     tips: tuple[TipSeen, ...]
 
 
-class CameraHandle:
-    """One camera: its pictures, settings, recordings and what machine vision finds; any thread."""
+class CameraHandle(CameraShape):
+    """One camera: its pictures, settings, recordings and what machine vision finds; any thread.
+
+    It has the shape of a bluesky detector without importing bluesky.
+    """
 
     def __init__(self, application: VicoApplication, name: str) -> None:
         self._application = application
@@ -167,12 +171,12 @@ class CameraHandle:
         """Begin to take pictures."""
         return self._thread.start_pictures()
 
-    def stop(self) -> Task:
+    def stop(self, success: bool = True) -> Task:  # noqa: ARG002 - bluesky's signature
         """End taking pictures; a recording is closed."""
         self._unit.recordings.request_stop()
         return self._thread.stop_pictures()
 
-    def trigger(self) -> None:
+    def software_trigger(self) -> None:
         """Take one picture, with the software trigger; raises `NotAvailable` without it."""
         self._thread.trigger()
 

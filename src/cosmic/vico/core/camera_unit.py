@@ -10,6 +10,7 @@ from cosmic.vico.core.background import Background
 from cosmic.vico.core.camera_libraries import CameraLibraries
 from cosmic.vico.core.camera_recordings import CameraRecordings
 from cosmic.vico.core.camera_thread import CameraThread
+from cosmic.vico.core.job_thread import JobThread
 from cosmic.vico.core.picture import Circumstances, Picture
 from cosmic.vico.core.settings import CameraPlace
 from cosmic.vico.core.vision.algorithms import make_chain
@@ -31,6 +32,8 @@ class CameraUnit:
     recordings : CameraRecordings
     vision : VisionThread
         Runs `chain` on the newest picture, background corrected.
+    jobs : JobThread
+        Takes the pictures that plans ask for.
     """
 
     def __init__(
@@ -54,6 +57,7 @@ class CameraUnit:
             policy,
         )
         self.recordings = CameraRecordings(self.thread, policy)
+        self.jobs = JobThread(f"pictures of {place.name}", policy)
         self.vision: VisionThread[Analysis] = VisionThread(place.name, self._analyse, policy)
         self.thread.subscribe(self._collect)
         self.thread.subscribe(self.vision.put)
@@ -81,6 +85,7 @@ class CameraUnit:
     def request_end(self) -> None:
         """Ask everything to end; returns at once."""
         self.recordings.request_stop()
+        self.jobs.request_end()
         self.thread.request_end()
         self.vision.request_end()
 
@@ -88,6 +93,7 @@ class CameraUnit:
         """Wait until everything has ended."""
         self.recordings.stop()
         self.thread.join()
+        self.jobs.join()
         self.vision.join()
 
     def _collect(self, picture: Picture) -> None:

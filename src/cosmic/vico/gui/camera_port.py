@@ -168,7 +168,7 @@ class CameraPort(Protocol):
         """End taking pictures; a recording is closed."""
 
     @abstractmethod
-    def trigger(self) -> None:
+    def software_trigger(self) -> None:
         """Take one picture, with the software trigger."""
 
     # Machine vision

@@ -184,7 +184,7 @@ class SettingsForm(QObject):
 
     def _on_shoot(self) -> None:
         try:
-            self._port.trigger()
+            self._port.software_trigger()
         except CosmicError as exc:
             self._refuse(str(exc))
 

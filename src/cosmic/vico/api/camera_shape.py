@@ -1,0 +1,208 @@
+"""The shape that plans of bluesky expect of a camera: a part of `CameraHandle`."""
+
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from cosmic.frame.errors import ConfigError, NotAvailable, RecordingExistsError
+from cosmic.frame.file_names import check_directory
+from cosmic.frame.plan_shape import (
+    DataKeys,
+    PlanStatus,
+    Readings,
+    number_key,
+    text_key,
+    unix_now_s,
+    unix_of_platform_s,
+    whole_key,
+)
+from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.core.camera_unit import CameraUnit
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.recording.snap import save_picture
+from cosmic.vico.hw.interface import Trigger
+
+if TYPE_CHECKING:
+    from cosmic.vico.api.fibres import PlacedFibre
+
+SUFFIXES: Final = (".tif", ".tiff", ".png")
+WAIT_S: Final = 5.0
+# Of the longest fibre, as `PlacedFibre` names them, with their units.
+MEASURES: Final[Mapping[str, str]] = {"length_um": "um", "width_um": "um", "curl": ""}
+
+
+class CameraShape:
+    """Readable, Configurable and Triggerable, without bluesky; any thread."""
+
+    parent: None = None
+    name: str
+    _application: VicoApplication
+    _unit: CameraUnit
+    _folder: Path | None = None
+    _suffix = ".tif"
+    _fibres = False
+    _number = 0
+    _last: tuple[Readings, float] | None = None
+
+    def plan_pictures(
+        self, folder: str | Path | None = None, *, suffix: str = ".tif", fibres: bool = False
+    ) -> None:
+        """Say what a trigger does with its picture, and so what `read` returns.
+
+        Parameters
+        ----------
+        folder : path or None
+            Where each picture goes, into a file of its own; None keeps none.
+        suffix : str
+            ".tif" or ".png".
+        fibres : bool
+            Find the fibres on each and measure the longest.
+
+        Raises
+        ------
+        ConfigError
+            There is no such suffix.
+        RecordingError
+            There is no such folder, or nothing can be written to it.
+        """
+        if suffix not in SUFFIXES:
+            raise ConfigError(f"{suffix!r}: a picture is one of {', '.join(SUFFIXES)}")
+        chosen = None if folder is None else check_directory(Path(folder).absolute())
+        self._folder, self._suffix, self._fibres, self._last = chosen, suffix, fibres, None
+        self._number = 0 if chosen is None else _last_number(chosen, self.name)
+
+    def trigger(self) -> PlanStatus:
+        """Begin to take a picture exposed after this call; the status ends when all is done.
+
+        With the software trigger chosen, it is given. The status fails with `NotAvailable` where no
+        picture comes in time, and with `RecordingError` where it cannot be kept.
+        """
+        status = PlanStatus(f"picture of {self.name}")
+        since_s = self._application.clock.now_s()
+        self._unit.jobs.put(lambda: self._take(since_s), status)
+        return status
+
+    def _take(self, since_s: float) -> None:
+        thread = self._unit.thread
+        settings = thread.settings
+        if settings is not None and settings.trigger is Trigger.SOFTWARE:
+            thread.trigger()
+        exposure_s = settings.exposure_s if settings is not None else 0.0
+        picture = thread.next_picture(since_s, WAIT_S + 2.0 * exposure_s)
+        when_s = unix_of_platform_s(self._application.clock, picture.frame.exposed_s)
+        self._last = self._readings(picture, when_s), when_s
+
+    def _readings(self, picture: Picture, when_s: float) -> Readings:
+        scale = picture.circumstances.scale_um_px
+        values: dict[str, object] = {
+            "frame": picture.frame.frame_id,
+            "mean": float(picture.data.mean()),
+            "scale_um_px": math.nan if scale is None else scale,
+        }
+        if self._folder is not None:
+            values["file"] = str(self._save(picture, self._folder))
+        if self._fibres:
+            values |= self._measured(picture)
+        return {
+            f"{self.name}_{key}": {"value": value, "timestamp": when_s}
+            for key, value in values.items()
+        }
+
+    def _save(self, picture: Picture, folder: Path) -> Path:
+        axes = self._unit.recordings.axes
+        while True:
+            self._number += 1
+            path = folder / f"{self.name}_{self._number:05d}{self._suffix}"
+            try:
+                return save_picture(picture, path, axes=axes)
+            except RecordingExistsError:
+                continue  # somebody else put it there meanwhile: never replaced
+
+    def _measured(self, picture: Picture) -> dict[str, object]:
+        # Imported here: it loads scikit-image and scipy.
+        from cosmic.vico.api.fibres import place_fibres
+
+        found = place_fibres(picture, self._application.places)
+        longest = max(found, key=lambda each: each.length_px, default=None)
+        return {
+            "fibres": len(found),
+            **{f"fibre_{key}": _number(longest, key) for key in MEASURES},
+            "fibre_certain": int(longest is not None and longest.certain),
+        }
+
+    def read(self) -> Readings:
+        """Return what the last trigger gave.
+
+        Raises
+        ------
+        NotAvailable
+            Nothing has triggered it since `plan_pictures`.
+        """
+        if self._last is None:
+            raise NotAvailable(f"{self.name}: there is no picture to read; trigger it first")
+        return dict(self._last[0])
+
+    def describe(self) -> DataKeys:
+        """Return what `read` returns, in bluesky's terms; it follows `plan_pictures`."""
+        source = self._source
+        keys = {
+            "frame": whole_key(source),
+            "mean": number_key(source),
+            "scale_um_px": number_key(source, "um/px"),
+        }
+        if self._folder is not None:
+            keys["file"] = text_key(source)
+        if self._fibres:
+            keys["fibres"] = whole_key(source)
+            for key, unit in MEASURES.items():
+                keys[f"fibre_{key}"] = number_key(source, unit)
+            keys["fibre_certain"] = whole_key(source)
+        return {f"{self.name}_{key}": value for key, value in keys.items()}
+
+    def read_configuration(self) -> Readings:
+        """Return exposure, gain, binning and trigger; NaN, 0 and empty without a camera."""
+        settings, now_s = self._unit.thread.settings, unix_now_s()
+        values: dict[str, object] = {
+            "exposure_s": settings.exposure_s if settings is not None else math.nan,
+            "gain_db": settings.gain_db if settings is not None else math.nan,
+            "binning": settings.binning if settings is not None else 0,
+            "trigger": str(settings.trigger) if settings is not None else "",
+        }
+        return {
+            f"{self.name}_{key}": {"value": value, "timestamp": now_s}
+            for key, value in values.items()
+        }
+
+    def describe_configuration(self) -> DataKeys:
+        """Return what `read_configuration` returns, in bluesky's terms."""
+        source = self._source
+        return {
+            f"{self.name}_exposure_s": number_key(source, "s"),
+            f"{self.name}_gain_db": number_key(source, "dB"),
+            f"{self.name}_binning": whole_key(source),
+            f"{self.name}_trigger": text_key(source),
+        }
+
+    @property
+    def hints(self) -> dict[str, list[str]]:
+        """Which of its readings a plot shows: the length of the fibre, or the mean grey value."""
+        return {"fields": [f"{self.name}_{'fibre_length_um' if self._fibres else 'mean'}"]}
+
+    @property
+    def _source(self) -> str:
+        info = self._unit.thread.info
+        return f"camera:{info.key if info is not None else self.name}"
+
+
+def _number(fibre: "PlacedFibre | None", key: str) -> float:
+    value = getattr(fibre, key, None)
+    return math.nan if value is None else float(value)
+
+
+def _last_number(folder: Path, camera: str) -> int:
+    """Return the highest number of a picture of `camera` in a folder; 0 without any."""
+    pattern = re.compile(rf"{re.escape(camera)}_(\d+)\.\w+")
+    found = (pattern.fullmatch(path.name) for path in folder.iterdir())
+    return max((int(match[1]) for match in found if match is not None), default=0)
