@@ -91,3 +91,14 @@ def test_a_force_is_measured_and_a_limit_stops_the_push(said: str) -> None:
     assert "stopped: stopped: force reached 14" in said
     assert "crossed: True" in said
     assert float(numbers["crossed"][-1]) < 500.0
+
+
+@example("look_at_a_fibre.py")
+def test_a_fibre_is_looked_at_measured_and_recorded(said: str) -> None:
+    numbers = {line.split(":")[0]: re.findall(r"-?[\d.]+", line) for line in said.splitlines()}
+    assert float(numbers["length"][0]) == pytest.approx(1200.0, rel=0.005)
+    assert "certain True" in said
+    assert float(numbers["right"][0]) == pytest.approx(2.2, rel=0.003)
+    ends = sorted(float(each) for each in numbers["ends"])
+    assert ends == pytest.approx([-371.2, -227.2, 19.8, 790.9], abs=5.0)
+    assert "recorded: True, 1600 x 1200 px" in said
