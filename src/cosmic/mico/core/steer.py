@@ -45,6 +45,7 @@ class SteerRun(JogRun):
         self._target: float | None = None
         self._target_s = 0.0
         self._velocity = 0.0
+        self._lost: HandLostError | None = None
 
     # Any thread
 
@@ -106,7 +107,7 @@ class SteerRun(JogRun):
     @property
     @override
     def lost(self) -> MoveCancelled | None:
-        return HandLostError("nothing steers it any more") if self._expired() else None
+        return self._lost
 
     @override
     def _expired(self) -> bool:
@@ -115,6 +116,10 @@ class SteerRun(JogRun):
     @override
     def packet(self, state: PositionerState, now_s: float) -> Motion | None:
         self._packet_wall_s = WALL.now_s()
+        if self._expired():
+            # Remembered, for a renewal may come between this and the end that it leads to.
+            self._lost = HandLostError("nothing steers it any more")
+            return None
         return super().packet(state, now_s)
 
     @override

@@ -181,13 +181,16 @@ class InputThread(WorkerThread):
             return "unplugged"
         if not all(-1.0 <= each <= 1.0 for each in inputs.axes.values()):
             return "the device reports nonsense"
-        quiet_s = self._steering.device.info.quiet_s or self._steering.settings.quiet_s
-        silent_s = WALL.now_s() - inputs.time_s
+        quiet_s = self._steering.device.info.quiet_s
+        if quiet_s is not None and self._silent(inputs, quiet_s):
+            return f"frozen, no report for {quiet_s:g} s"
+        return ""
+
+    def _silent(self, inputs: InputState, quiet_s: float) -> bool:
+        """Return True where something is deflected and nothing was reported for too long."""
         moving = any(driver.moving for driver in self._steering.drivers.values())
         deflected = moving or self._steering.mapping.deflected(inputs)
-        if deflected and not silent_s <= quiet_s:
-            return f"frozen, no report for {silent_s:.2g} s"
-        return ""
+        return deflected and not WALL.now_s() - inputs.time_s <= quiet_s
 
     def _on_buttons(self, newly: frozenset[str]) -> None:
         profile = self._steering.mapping.profile
@@ -226,11 +229,16 @@ class InputThread(WorkerThread):
             return False
         if self._phase is TeleoperationPhase.PAUSED:
             self._phase, self._reason = TeleoperationPhase.CENTRE, ""
+        quiet_s = self._steering.settings.quiet_s
+        if self._phase is not TeleoperationPhase.CENTRE and self._silent(inputs, quiet_s):
+            # A hand held still, or a device that hangs: only letting go tells them apart.
+            self._phase = TeleoperationPhase.CENTRE
+            self._reason = f"no change for {quiet_s:g} s"
         if self._phase is TeleoperationPhase.CENTRE:
             if mapping.deflected(inputs):
                 return False
             mapping.recentre()
-            self._phase = TeleoperationPhase.ARMED
+            self._phase, self._reason = TeleoperationPhase.ARMED, ""
         held = mapping.profile.hold_button
         if held and not inputs.buttons.get(held, False):
             mapping.recentre()
