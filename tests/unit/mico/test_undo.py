@@ -1,0 +1,134 @@
+"""Taking movements back, per assembly, through the gate."""
+
+import pytest
+
+import cosmic
+from cosmic.frame.errors import DeviceFault
+from cosmic.mico.hw.interface import Channel
+from unit.mico.rigs import mico, wait_until
+
+GROUPS = {
+    "group": [
+        {"title": "Left", "positioners": ["d0.c0", "d0.c1", "d0.c2"]},
+        {"title": "Right", "positioners": ["d1.c0"]},
+    ]
+}
+TWO = ("LLN", "LL")
+
+
+def where(rig, *names):
+    return [rig[name].details.position for name in names]
+
+
+def test_a_movement_of_any_kind_is_taken_back_by_assembly():
+    with mico(TWO, **GROUPS) as (rig, _):
+        rig["d0.c0"].move_to(100.0)
+        rig.move({"d0.c0": 200.0, "d0.c1": 50.0})
+        rig["d1.c0"].move_to(7.0)
+        wait_until(lambda: len(rig.undo_entries) == 3)
+        assert [entry.group for entry in rig.undo_entries] == ["Right", "Left", "Left"]
+        assert rig.undo("Left") == {"d0.c0": 100.0, "d0.c1": 0.0}
+        assert rig.undo() == {"d1.c0": 0.0}
+        assert rig.undo() == {"d0.c0": 0.0}
+        with pytest.raises(cosmic.NotAvailable, match="nothing to undo"):
+            rig.undo()
+        with pytest.raises(cosmic.NotAvailable, match="nothing to undo of Left"):
+            rig.undo("Left")
+        with pytest.raises(
+            cosmic.NotAvailable, match=r"no group 'Middle'; there are Left, Right, d1"
+        ):
+            rig.undo("Middle")
+
+
+def test_ten_movements_of_an_assembly_are_kept():
+    with mico(TWO, **GROUPS) as (rig, _):
+        for number in range(1, 13):
+            rig["d0.c0"].move_to(10.0 * number)
+            wait_until(lambda n=number: len(rig.undo_entries) == min(n, 10))
+        for _ in range(10):
+            rig.undo()
+        assert where(rig, "d0.c0") == [20.0]
+        with pytest.raises(cosmic.NotAvailable):
+            rig.undo()
+
+
+def test_a_movement_that_was_stopped_on_its_way_is_taken_back_too():
+    with mico(TWO, instant=False, **GROUPS) as (rig, controller):
+        movement = rig["d0.c0"].move_to(100.0, wait=False)
+        wait_until(lambda: controller.of("move_to"))
+        controller.position[Channel(0, 0)] = 40.0
+        rig["d0.c0"].halt()
+        movement.exception(3)
+        wait_until(lambda: len(rig.undo_entries) == 1)
+        back = rig.undo(wait=False)
+        wait_until(lambda: len(controller.of("move_to")) == 2)
+        controller.end(Channel(0, 0), 0.0)
+        assert back.wait(3) == {"d0.c0": 0.0}
+        wait_until(lambda: not rig.undo_entries)
+
+
+def test_a_refused_undo_says_why_and_keeps_its_entry():
+    with mico(TWO, **GROUPS) as (rig, _):
+        rig["d0.c0"].move_to(100.0)
+        wait_until(lambda: len(rig.undo_entries) == 1)
+        rig.application.manager.stop("test")
+        with pytest.raises(cosmic.StoppedError, match="reset the stop first"):
+            rig.undo()
+        rig.application.manager.reset_stop()
+        assert rig.undo() == {"d0.c0": 0.0}
+
+
+def test_an_undo_that_fails_on_its_way_can_be_tried_again():
+    with mico(TWO, instant=False, **GROUPS) as (rig, controller):
+        movement = rig["d0.c0"].move_to(100.0, wait=False)
+        wait_until(lambda: controller.of("move_to"))
+        controller.end(Channel(0, 0), 100.0)
+        movement.wait(3)
+        wait_until(lambda: len(rig.undo_entries) == 1)
+        back = rig.undo(wait=False)
+        wait_until(lambda: len(controller.of("move_to")) == 2)
+        with pytest.raises(cosmic.NotAvailable, match=r"d0\.c0 is moving"):
+            rig.undo()
+        controller.fail(Channel(0, 0), DeviceFault.OVERHEATED)
+        with pytest.raises(cosmic.DeviceError):
+            back.wait(3)
+        assert len(rig.undo_entries) == 1
+
+
+def test_there_is_no_way_back_to_before_an_axis_was_initialised():
+    with mico(TWO, **GROUPS) as (rig, _):
+        rig["d0.c0"].move_to(100.0)
+        wait_until(lambda: len(rig.undo_entries) == 1)
+        rig.initialise()
+        assert not rig.undo_entries
+
+
+def test_a_movement_from_an_unknown_position_leaves_nothing_to_undo():
+    def power_up(controller):
+        controller.known = False
+
+    with mico(TWO, prepare=power_up, **GROUPS) as (rig, _):
+        rig["d0.c0"].move_to(100.0, consent=True)
+        assert not rig.undo_entries
+
+
+def test_a_linked_axis_comes_back_with_the_one_that_moved_it():
+    with mico(TWO, **GROUPS) as (rig, _):
+        rig.link("d0.c0", "d1.c0", -1.0)
+        rig["d0.c0"].move_to(30.0)
+        wait_until(lambda: len(rig.undo_entries) == 2)
+        rig.undo("Left")
+        assert where(rig, "d0.c0", "d1.c0") == [0.0, 0.0]
+        with pytest.raises(cosmic.NotAvailable):
+            rig.undo()
+
+
+def test_what_moved_is_still_known_after_a_rescan():
+    with mico(TWO, **GROUPS) as (rig, _):
+        rig["d0.c0"].move_to(100.0)
+        wait_until(lambda: len(rig.undo_entries) == 1)
+        rig.rescan()
+        rig["d0.c0"].move_to(150.0)
+        wait_until(lambda: len(rig.undo_entries) == 2)
+        rig.undo()
+        assert rig.undo() == {"d0.c0": 0.0}
