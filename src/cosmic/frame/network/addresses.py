@@ -1,0 +1,33 @@
+"""Under which keys stations and clients find each other."""
+
+from cosmic.frame.network.transport import Rule
+
+
+def asks(station: str, client: str = "**") -> str:
+    """Where a client (its name, a slash and its number) asks."""
+    return f"cosmic/{station}/ask/{client}"
+
+
+def client_signs(station: str, client: str = "**") -> str:
+    """Sign of life of a client."""
+    return f"cosmic/{station}/client/{client}"
+
+
+def station_sign(station: str) -> str:
+    """Sign of life of the station."""
+    return f"cosmic/{station}/here"
+
+
+def session_events(station: str, client: str) -> str:
+    """Where a client hears what concerns only itself."""
+    return f"cosmic/{station}/to/{client}"
+
+
+def topic_key(station: str, topic: str, rule: Rule) -> str:
+    """Where a topic is published."""
+    return f"cosmic/{station}/topic/{rule.value}/{topic}"
+
+
+def client_of(key: str) -> str:
+    """Return the client's name, a slash and its number, out of one of its keys."""
+    return "/".join(key.split("/")[3:5])

@@ -1,0 +1,83 @@
+"""Who calls, as the code that is called may ask."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+from cosmic.frame.network.dead_man import DeadMan
+
+JOG_LIMIT_S: Final = 0.3
+"""Silence after which motion without an end of its own stops."""
+MOVE_LIMIT_S: Final = 1.0
+"""Silence after which any other motion stops, and the lease lapses."""
+
+
+class Access(IntEnum):
+    """What a client may do; each includes those before it."""
+
+    VIEW = 1
+    """Subscribe, and call what only reads."""
+    CALL = 2
+    """Call everything that moves nothing."""
+    MOVE = 3
+    """Take the lease and move."""
+
+
+@dataclass(frozen=True, slots=True)
+class Caller:
+    """Who called.
+
+    Attributes
+    ----------
+    name : str
+        What log and windows show.
+    token : str
+        Proof of its session; never shown.
+    access : Access
+        What it may do.
+    local : bool
+        It runs in this process.
+    """
+
+    name: str
+    token: str
+    access: Access = Access.MOVE
+    local: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A call being carried out.
+
+    Attributes
+    ----------
+    caller : Caller
+        Who called.
+    dead_man : DeadMan or None
+        To be polled by the thread that moves: it expires when the caller dies, freezes, is cut
+        off or loses the lease. None when the function moves nothing.
+    """
+
+    caller: Caller
+    dead_man: DeadMan | None = None
+
+
+_current: Final[ContextVar[Call | None]] = ContextVar("cosmic_call", default=None)
+
+
+def current_call() -> Call | None:
+    """Return the call that this thread carries out; None when no station carries it out."""
+    return _current.get()
+
+
+@contextmanager
+def carrying_out(call: Call) -> Iterator[None]:
+    """Say what this thread carries out, while it does."""
+    token = _current.set(call)
+    try:
+        yield
+    finally:
+        _current.reset(token)

@@ -1,0 +1,153 @@
+"""A client's questions to a station: numbered, dated, and answered."""
+
+import secrets
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from threading import Lock
+from typing import Any, Final
+
+from cosmic.frame.clock import Clock
+from cosmic.frame.errors import ProtocolError
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.addresses import asks, client_signs, session_events
+from cosmic.frame.network.delivery import InboxReader
+from cosmic.frame.network.errors import StationTimeout
+from cosmic.frame.network.freshness import StationTime
+from cosmic.frame.network.messages import Order, Request, read_answer
+from cosmic.frame.network.station import checked_name
+from cosmic.frame.network.transport import Rule
+from cosmic.frame.network.wire import Sign, Wire
+
+GREETING_LIMIT_S: Final = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class What:
+    """What is asked.
+
+    Attributes
+    ----------
+    valid_s : float
+        How long it may take until it is begun there.
+    """
+
+    order: Order
+    application: str
+    function: str
+    arguments: Mapping[str, object]
+    valid_s: float
+
+
+class ClientSession:
+    """From one greeting to the next; any thread.
+
+    Parameters
+    ----------
+    name : str
+        How the station knows the client.
+    on_event : callable
+        Receives what the station tells this client alone.
+    """
+
+    def __init__(
+        self,
+        station: str,
+        name: str,
+        policy: FailurePolicy,
+        clock: Clock,
+        on_event: Callable[[bytes], None],
+    ) -> None:
+        self._station = checked_name(station)
+        self._name = checked_name(name)
+        self._policy = policy
+        self._clock = clock
+        self._on_event = on_event
+        self._time = StationTime(clock)
+        self._lock = Lock()
+        self._key = ""
+        self._number = 0
+        self._token = ""
+        self._answered_s = float("-inf")
+        self._sign: Sign | None = None
+        self._events: InboxReader[bytes] | None = None
+
+    @property
+    def unanswered_s(self) -> float:
+        """How long no answer has come."""
+        return self._clock.now_s() - self._answered_s
+
+    def begin(self, wire: Wire) -> Any:
+        """Greet the station as somebody new and return what it hosts.
+
+        Raises
+        ------
+        StationAway, StationTimeout
+            There was no answer.
+        CallRefused
+            It does not let this client in.
+        """
+        self.end()
+        client = f"{self._name}/{secrets.token_hex(8)}"
+        with self._lock:
+            self._time.forget()
+            self._key, self._number, self._token = asks(self._station, client), 0, ""
+        self._sign = wire.sign(client_signs(self._station, client))
+        inbox = wire.inlet(session_events(self._station, client), Rule.ALL)
+        name = f"{self._station} tells"
+        self._events = InboxReader(name, self._policy, inbox, self._on_event)
+        self._events.start()
+        hello = What(Order.HELLO, "", "", {}, valid_s=GREETING_LIMIT_S)
+        said = self.ask(wire, hello, GREETING_LIMIT_S)
+        if not isinstance(said, dict) or not isinstance(said.get("token"), str):
+            raise ProtocolError("the station greets in a way that this program does not know")
+        self._token = said["token"]
+        return said.get("hosted")
+
+    def end(self) -> None:
+        """Take back what shows the station that this client is here; it notices at once."""
+        sign, self._sign = self._sign, None
+        if sign is not None:
+            sign.close()
+        events, self._events = self._events, None
+        if events is not None:
+            events.request_end()
+            events.join()
+
+    def ask(self, wire: Wire, what: What, timeout_s: float) -> object:
+        """Ask the station and return its answer; raises the exception that it answers with.
+
+        Raises
+        ------
+        StationAway, StationTimeout
+            There was no answer.
+        ProtocolError
+            Something cannot travel.
+        """
+        message = self._request(what).encoded()
+        try:
+            answer = wire.ask(self._key, message, timeout_s=timeout_s)
+        except StationTimeout as exc:
+            where = f"{what.application}.{what.function}".strip(".") or what.order.value
+            raise StationTimeout(f"{self._station}, {where}: {exc}") from exc
+        stamp_s, result, error = read_answer(answer)
+        self._time.note(stamp_s)
+        self._answered_s = self._clock.now_s()
+        if error is not None:
+            raise error
+        return result
+
+    def _request(self, what: What) -> Request:
+        with self._lock:
+            self._number += 1
+            number, token = self._number, self._token
+        sent_s = self._time.now_s()
+        return Request(
+            what.order,
+            token,
+            number,
+            sent_s,
+            sent_s + what.valid_s,
+            what.application,
+            what.function,
+            what.arguments,
+        )

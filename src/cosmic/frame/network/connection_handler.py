@@ -1,0 +1,216 @@
+"""One client of a station: its session, its commands, what it has set in motion."""
+
+import logging
+import secrets
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from typing_extensions import override
+
+from cosmic.frame.errors import CosmicError, ProtocolError
+from cosmic.frame.network.caller import Access, Caller
+from cosmic.frame.network.delivery import Backlog, InboxClosed
+from cosmic.frame.network.errors import CallRefused
+from cosmic.frame.network.freshness import SequenceGuard, check_age
+from cosmic.frame.network.messages import Order, Request, answer, read_request, refusal_of
+from cosmic.frame.network.ongoing import Tickets
+from cosmic.frame.network.outbox import Outbox
+from cosmic.frame.network.station import Station
+from cosmic.frame.network.transport import Rule
+from cosmic.frame.network.wire import Outlet, Question
+from cosmic.frame.threads import WorkerThread
+
+logger = logging.getLogger(__name__)
+
+WAITING_LIMIT: Final = 256
+"""The most calls that a client may have waiting."""
+Route = Callable[[str, Callable[[], None]], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Client:
+    """Who connects.
+
+    Attributes
+    ----------
+    key : str
+        Its name, a slash and its number: its address.
+    name : str
+        What log and windows show; with certificates it is the one of its certificate.
+    access : Access
+        What it may do.
+    """
+
+    key: str
+    name: str
+    access: Access
+
+
+class ConnectionHandler(WorkerThread):
+    """Serves one client in a thread of its own (thesis Fig. 5.6, 5.7).
+
+    It checks what comes, carries out what must not wait (a stop, signs of life), and hands every
+    other call to the thread of the application concerned.
+
+    Parameters
+    ----------
+    route : callable
+        `route(application, job)` has the job carried out in the application's thread.
+    outlet : Outlet
+        Where this client alone hears how its tasks go on.
+    """
+
+    def __init__(
+        self, client: Client, station: Station, route: Route, outbox: Outbox, outlet: Outlet
+    ) -> None:
+        super().__init__(f"{station.name} serves {client.name}", station.policy)
+        self._client = client
+        self._station = station
+        self._route = route
+        self._outlet = outlet
+        self._caller = Caller(client.name, secrets.token_hex(16), client.access)
+        self._questions: Backlog[Question] = Backlog(Rule.ALL, max_items=WAITING_LIMIT)
+        self._tickets = Tickets(lambda event: outbox.send(outlet, event))
+        self._guard = SequenceGuard()
+        self._heard_s = station.clock.now_s()
+
+    @property
+    def client(self) -> Client:
+        """Whom it serves."""
+        return self._client
+
+    @property
+    def token(self) -> str:
+        """Token of the session."""
+        return self._caller.token
+
+    @property
+    def silent_s(self) -> float:
+        """How long nothing has come from the client."""
+        return self._station.clock.now_s() - self._heard_s
+
+    def put(self, question: Question) -> None:
+        """Take a question; returns at once."""
+        if not self._questions.put(question):
+            self._refuse(question, CallRefused("too many calls wait already"))
+
+    def lose_motion(self, why: str) -> None:
+        """End what the client moves and take the lease from it; any thread."""
+        self._station.lease.release(self._caller.token, why)
+        self._tickets.cancel_motion()
+
+    def check_motion(self) -> None:
+        """End what the client moves, if the lease is not its own any more; any thread."""
+        if not self._station.lease.holds(self._caller.token):
+            self._tickets.cancel_motion()
+
+    @override
+    def run_body(self) -> None:
+        while not self.end_requested:
+            try:
+                question = self._questions.take()
+            except InboxClosed:
+                return
+            try:
+                self._serve(question)
+            except CosmicError as exc:
+                logger.warning("%s refused %s: %s", self._station.name, self._client.name, exc)
+                self._refuse(question, exc)
+
+    @override
+    def request_end(self) -> None:
+        super().request_end()
+        self._questions.close()
+
+    def close(self, why: str) -> None:
+        """End the session; what the client moves stops first."""
+        self.lose_motion(why)
+        self.request_end()
+        self.join()
+        self._outlet.close()
+        logger.info("%s: %s is gone (%s)", self._station.name, self._client.key, why)
+
+    def greet(self, question: Question) -> None:
+        """Answer the first message of the session."""
+        hosted = {
+            name: {
+                each.name: [each.mark.moves, list(each.parameters)]
+                for each in invoker.offered.values()
+            }
+            for name, invoker in self._station.invokers.items()
+        }
+        self._answer(question, {"token": self._caller.token, "hosted": hosted})
+        logger.info("%s: %s is here", self._station.name, self._client.key)
+
+    def _serve(self, question: Question) -> None:
+        request = read_request(question.message)
+        if not secrets.compare_digest(request.token.encode(), self._caller.token.encode()):
+            raise CallRefused("the session is unknown: connect again")
+        self._guard.check(request.number)
+        self._note_life(request)
+        if request.order is Order.CALL:
+            self._call(question, request)
+        else:
+            self._answer(question, self._other(request))
+
+    def _note_life(self, request: Request) -> None:
+        now_s = self._station.clock.now_s()
+        if request.sent_s <= now_s:
+            self._heard_s = max(self._heard_s, request.sent_s)
+            self._station.lease.beat(self._caller.token, request.sent_s)
+
+    def _other(self, request: Request) -> object:
+        name, lease = self._client.name, self._station.lease
+        if request.order is Order.BEAT:
+            return lease.holds(self._caller.token)
+        if request.order is Order.CANCEL:
+            self._tickets.cancel(request.function)
+        elif request.order is Order.RELEASE:
+            self._tickets.cancel_motion()
+            lease.release(self._caller.token)
+        elif request.order is Order.TAKE:
+            check_age(self._station.clock, request.until_s, "taking the lease")
+            if self._client.access < Access.MOVE:
+                raise CallRefused(f"{name} may not move anything")
+            lease.take(name, self._caller.token)
+            lease.beat(self._caller.token, request.sent_s)
+        elif request.order is Order.PUBLISH:
+            if self._client.access < Access.CALL:
+                raise CallRefused(f"{name} may not publish")
+            self._station.publish_shared(name, request.function, request.arguments["payload"])
+        return None
+
+    def _call(self, question: Question, request: Request) -> None:
+        invoker = self._station.invoker(request.application)
+        found = invoker.find(self._caller, request.function)
+        what = f"{request.application}.{request.function} from {self._client.name}"
+
+        def still_wanted() -> None:
+            check_age(self._station.clock, request.until_s, what)
+
+        def carry_out() -> None:
+            try:
+                result = invoker.invoke(
+                    self._caller, request.function, request.arguments, still_wanted
+                )
+                self._answer(question, self._tickets.wrap(result, moves=found.mark.moves))
+            except CosmicError as exc:
+                logger.warning("%s: %s ended: %s", self._station.name, what, exc)
+                self._refuse(question, exc)
+
+        if found.mark.at_once:
+            carry_out()
+            return
+        still_wanted()
+        self._route(request.application, carry_out)
+
+    def _answer(self, question: Question, value: object) -> None:
+        try:
+            message = answer(self._station.clock.now_s(), value)
+        except ProtocolError as exc:
+            raise ProtocolError(f"the result cannot travel: {exc}") from exc
+        question.answer(message)
+
+    def _refuse(self, question: Question, error: CosmicError) -> None:
+        question.answer(refusal_of(self._station.clock.now_s(), error))

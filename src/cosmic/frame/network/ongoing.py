@@ -1,0 +1,139 @@
+"""What goes on after a call has returned (a task, a movement), followed from elsewhere."""
+
+import logging
+import secrets
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from threading import Lock
+from typing import Final, Protocol, runtime_checkable
+
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.network.errors import CallRefused, RemoteDefect
+from cosmic.frame.network.transfer import transferable
+from cosmic.frame.network.travelling_errors import to_plain
+from cosmic.frame.task import Progress
+
+logger = logging.getLogger(__name__)
+
+transferable(Progress)
+
+_MOST_TICKETS: Final = 256
+
+
+@runtime_checkable
+class Ongoing(Protocol):
+    """The shape of a `Task` and a `Movement`."""
+
+    @property
+    @abstractmethod
+    def done(self) -> bool:
+        """True when it has ended."""
+
+    @abstractmethod
+    def cancel(self) -> None:
+        """End it early."""
+
+    @abstractmethod
+    def wait(self, timeout_s: float | None = None) -> object:
+        """Wait for the end; raises what it failed with."""
+
+
+@transferable
+@dataclass(frozen=True, slots=True)
+class Ticket:
+    """Stands for something that goes on at the station."""
+
+    number: str
+    title: str
+
+
+Tell = Callable[[list[object]], None]
+
+
+class Tickets:
+    """What goes on at a station for one session; any thread.
+
+    Parameters
+    ----------
+    tell : callable
+        Sends ``[ticket, progress or None, done, result, exception or None]`` to the session;
+        returns at once.
+    """
+
+    def __init__(self, tell: Tell) -> None:
+        self._tell = tell
+        self._lock = Lock()
+        self._running: dict[str, tuple[Ongoing, bool]] = {}
+
+    def wrap(self, result: object, *, moves: bool) -> object:
+        """Return a `Ticket` in place of something that goes on, anything else as it is.
+
+        Raises
+        ------
+        CallRefused
+            Too much goes on for this session; what came last was cancelled.
+        """
+        if not isinstance(result, Ongoing):
+            return result
+        number = secrets.token_hex(8)
+        with self._lock:
+            full = len(self._running) >= _MOST_TICKETS
+            if not full:
+                self._running[number] = (result, moves)
+        if full:
+            result.cancel()
+            raise CallRefused(f"{_MOST_TICKETS} things go on for this client already")
+        self._follow(number, result)
+        return Ticket(number, str(getattr(result, "title", "")))
+
+    def cancel(self, number: object) -> None:
+        """End one early.
+
+        Raises
+        ------
+        CallRefused
+            There is none of that number, or it has ended.
+        """
+        with self._lock:
+            found = self._running.get(number) if isinstance(number, str) else None
+        if found is not None:
+            found[0].cancel()
+
+    def cancel_motion(self) -> None:
+        """End early everything that moves, because nobody watches it any more."""
+        with self._lock:
+            moving = [ongoing for ongoing, moves in self._running.values() if moves]
+        for each in moving:
+            if not each.done:
+                each.cancel()
+
+    def _follow(self, number: str, ongoing: Ongoing) -> None:
+        subscribe = getattr(ongoing, "subscribe", None)
+        add_callback = getattr(ongoing, "add_callback", None)
+
+        def on_progress(progress: Progress) -> None:
+            if progress.done:
+                self._finish(number, ongoing)
+            else:
+                self._tell([number, progress, False, None, None])
+
+        if subscribe is not None:
+            subscribe(on_progress)
+        elif add_callback is not None:
+            add_callback(lambda *_: self._finish(number, ongoing))
+        else:
+            logger.warning("the end of %r cannot be told: it has no add_callback", ongoing)
+
+    def _finish(self, number: str, ongoing: Ongoing) -> None:
+        with self._lock:
+            if self._running.pop(number, None) is None:
+                return
+        try:
+            result = ongoing.wait(0.0)
+        except CosmicError as exc:
+            self._tell([number, None, True, None, to_plain(exc)])
+        except Exception as exc:  # noqa: BLE001 - whoever carried it out has reported it
+            self._tell([number, None, True, None, to_plain(RemoteDefect(repr(exc)))])
+        else:
+            self._tell([number, None, True, result, None])

@@ -1,0 +1,230 @@
+"""Lets clients in and notices when they are gone (thesis 5.2.1, Fig. 5.6)."""
+
+import logging
+import secrets
+from collections.abc import Callable, Mapping
+from threading import Event, Lock
+from typing import Final
+
+from typing_extensions import override
+
+from cosmic.frame.errors import CosmicError, ProtocolError
+from cosmic.frame.network.addresses import (
+    asks,
+    client_of,
+    client_signs,
+    session_events,
+    station_sign,
+)
+from cosmic.frame.network.caller import Access
+from cosmic.frame.network.connection_handler import Client, ConnectionHandler
+from cosmic.frame.network.delivery import Backlog, InboxReader
+from cosmic.frame.network.errors import CallRefused
+from cosmic.frame.network.messages import Order, read_request, refusal_of
+from cosmic.frame.network.outbox import Outbox
+from cosmic.frame.network.station import Station
+from cosmic.frame.network.transport import Presence, Rule
+from cosmic.frame.network.wire import Question, Wire
+from cosmic.frame.threads import WorkerThread
+
+logger = logging.getLogger(__name__)
+
+LOOK_EVERY_S: Final = 0.05
+SILENCE_LIMIT_S: Final = 5.0
+"""A session of which nothing was heard for so long has ended, whatever its sign of life says."""
+CLIENTS_LIMIT: Final = 32
+_JOBS_LIMIT: Final = 1024
+
+
+class ServerListener(WorkerThread):
+    """Makes a `ConnectionHandler` for each client of a station.
+
+    Start it, and call `shut_down` in a ``finally``: a wire that stays open goes on answering.
+
+    Parameters
+    ----------
+    wire : Wire
+        Becomes the listener's own; closed with it.
+    access : mapping or callable
+        What a client of a name may do; a name that is missing may do nothing. With certificates
+        the name is proven.
+    """
+
+    def __init__(
+        self,
+        station: Station,
+        wire: Wire,
+        access: Callable[[str], Access | None] | Mapping[str, Access] = lambda _: Access.MOVE,
+    ) -> None:
+        super().__init__(f"{station.name} listens", station.policy)
+        self._station = station
+        self._wire = wire
+        self._access = access.get if isinstance(access, Mapping) else access
+        self._outbox = Outbox(station.name, secrets.token_hex(8), wire, station.policy)
+        self._lock = Lock()
+        self._handlers: dict[str, ConnectionHandler] = {}
+        self._gone: Backlog[str] = Backlog(Rule.ALL)
+        self._lanes: dict[str, _Lane] = {}
+        self._woken = Event()
+        self._remove: list[Callable[[], None]] = []
+        self._readers: list[WorkerThread] = []
+        self._shut = False
+
+    @property
+    def clients(self) -> list[str]:
+        """The clients that are here: name, slash, number."""
+        with self._lock:
+            return list(self._handlers)
+
+    @override
+    def run_body(self) -> None:
+        name, policy = self._station.name, self._station.policy
+        questions = InboxReader(
+            f"{name} hears", policy, self._wire.questions(asks(name)), self._sort
+        )
+        signs = InboxReader(
+            f"{name} watches", policy, self._wire.signs(client_signs(name)), self._on_sign
+        )
+        self._readers = [questions, signs]
+        self._remove = [
+            self._station.bus.tap(self._outbox.publish),
+            self._station.lease.subscribe(lambda _: self._end_motion_without_lease()),
+        ]
+        for reader in self._readers:
+            reader.start()
+        here = self._wire.sign(station_sign(name))
+        try:
+            while not self.end_requested:
+                self._woken.wait(LOOK_EVERY_S)
+                self._woken.clear()
+                self._look()
+        finally:
+            here.close()
+            self._end_all()
+
+    @override
+    def request_end(self) -> None:
+        super().request_end()
+        self._woken.set()
+
+    def shut_down(self) -> None:
+        """Tell every client that the station is gone, end every thread and close the wire."""
+        self.request_end()
+        self.join()
+        with self._lock:
+            shut, self._shut = self._shut, True
+        if not shut:
+            self._end_all()
+            self._outbox.close()
+            self._wire.close()
+
+    def _end_all(self) -> None:
+        for remove in self._remove:
+            remove()
+        for reader in self._readers:
+            reader.request_end()
+        for reader in self._readers:
+            reader.join()
+        for key in self.clients:
+            self._end(key, "the station closes")
+        with self._lock:
+            lanes, self._lanes = list(self._lanes.values()), {}
+        for lane in lanes:
+            lane.thread.request_end()
+        for lane in lanes:
+            lane.thread.join()
+        self._remove, self._readers = [], []
+
+    # Questions, in the thread "hears"
+
+    def _sort(self, question: Question) -> None:
+        key = client_of(question.key)
+        handler = self._handlers.get(key)
+        if handler is not None:
+            handler.put(question)
+            return
+        try:
+            self._let_in(key, question)
+        except CosmicError as exc:
+            logger.warning("%s refused %s: %s", self._station.name, key, exc)
+            question.answer(refusal_of(self._station.clock.now_s(), exc))
+
+    def _let_in(self, key: str, question: Question) -> None:
+        if read_request(question.message).order is not Order.HELLO:
+            raise CallRefused("the session is unknown: connect again")
+        name, _, number = key.partition("/")
+        access = self._access(name)
+        if access is None:
+            raise CallRefused(f"{name} is not on the list of those who may connect")
+        if not (name and number) or "/" in number:
+            raise ProtocolError("a client without a name")
+        outlet = self._wire.outlet(session_events(self._station.name, key), Rule.ALL)
+        client = Client(key, name, access)
+        handler = ConnectionHandler(client, self._station, self._run_in, self._outbox, outlet)
+        with self._lock:
+            if len(self._handlers) >= CLIENTS_LIMIT or self.end_requested:
+                outlet.close()
+                raise CallRefused(f"{CLIENTS_LIMIT} clients are here already")
+            self._handlers[key] = handler
+        handler.start()
+        self._station.note_client(key, Presence(name, here=True))
+        handler.greet(question)
+
+    def _run_in(self, application: str, job: Callable[[], None]) -> None:
+        with self._lock:
+            if self.end_requested:
+                raise CallRefused("the station closes")
+            if application not in self._lanes:
+                self._lanes[application] = _Lane(application, self._station)
+            lane = self._lanes[application]
+        if not lane.jobs.put(job):
+            raise CallRefused(f"too many calls wait for {application} already")
+
+    # Signs of life, in the thread "watches"
+
+    def _on_sign(self, sign: tuple[str, bool]) -> None:
+        key, here = sign
+        if here:
+            return
+        client = client_of(key)
+        handler = self._handlers.get(client)
+        if handler is not None:
+            handler.lose_motion(f"{handler.client.name} is gone")  # at once, in this thread
+            self._gone.put(client)
+            self._woken.set()
+
+    # Housekeeping, in the listener's own thread
+
+    def _look(self) -> None:
+        self._station.lease.poll()
+        while len(self._gone):
+            self._end(self._gone.take(), "its sign of life is gone")
+        with self._lock:
+            silent = [
+                key for key, each in self._handlers.items() if each.silent_s > SILENCE_LIMIT_S
+            ]
+        for key in silent:
+            self._end(key, f"silent for {SILENCE_LIMIT_S:g} s")
+
+    def _end(self, key: str, why: str) -> None:
+        with self._lock:
+            handler = self._handlers.pop(key, None)
+        if handler is not None:
+            handler.close(why)
+            self._station.note_client(key, Presence(handler.client.name, here=False, why=why))
+
+    def _end_motion_without_lease(self) -> None:
+        with self._lock:
+            handlers = list(self._handlers.values())
+        for each in handlers:
+            each.check_motion()
+
+
+class _Lane:
+    """Carries out the calls to one application in a thread, one after the other."""
+
+    def __init__(self, application: str, station: Station) -> None:
+        self.jobs: Backlog[Callable[[], None]] = Backlog(Rule.ALL, max_items=_JOBS_LIMIT)
+        name = f"{station.name} calls {application}"
+        self.thread = InboxReader(name, station.policy, self.jobs, lambda job: job())
+        self.thread.start()

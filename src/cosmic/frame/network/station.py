@@ -1,0 +1,161 @@
+"""A station: applications under one name, with their topics, their lease and who uses them."""
+
+from collections.abc import Callable, Mapping
+from threading import Lock
+
+from cosmic.frame.clock import WALL, Clock
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.listeners import tell
+from cosmic.frame.network.bus import Bus
+from cosmic.frame.network.errors import CallRefused
+from cosmic.frame.network.invoker import ApplicationInvoker
+from cosmic.frame.network.lease import StationLease
+from cosmic.frame.network.transport import SHARED_PREFIX, Presence, PresenceListener
+
+LEASE_TOPIC = "station/lease"
+
+
+class Station:
+    """What is hosted here; in this process it is used through an `InProcessTransport`.
+
+    Parameters
+    ----------
+    name : str
+        How others call it: letters, digits, `-` and `_`.
+    policy : FailurePolicy
+        Told of mistakes in the applications.
+    lease : StationLease or None
+        Who may move; a new one, offered to everybody, by default.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        policy: FailurePolicy,
+        lease: StationLease | None = None,
+        clock: Clock = WALL,
+    ) -> None:
+        self._name = checked_name(name)
+        self._policy = policy
+        self._clock = clock
+        self._lease = lease or StationLease(f"the operator at {name}", clock=clock)
+        self._bus = Bus(policy)
+        self._lock = Lock()
+        self._invokers: dict[str, ApplicationInvoker] = {}
+        self._clients: dict[str, Presence] = {}
+        self._listeners: tuple[PresenceListener, ...] = ()
+        self._lease.subscribe(lambda state: self._bus.publish(LEASE_TOPIC, state))
+
+    @property
+    def name(self) -> str:
+        """How others call it."""
+        return self._name
+
+    @property
+    def policy(self) -> FailurePolicy:
+        """Told of mistakes in the applications."""
+        return self._policy
+
+    @property
+    def clock(self) -> Clock:
+        """The clock by which it judges how old a command is."""
+        return self._clock
+
+    @property
+    def lease(self) -> StationLease:
+        """Who may move."""
+        return self._lease
+
+    @property
+    def bus(self) -> Bus:
+        """Its topics."""
+        return self._bus
+
+    @property
+    def invokers(self) -> Mapping[str, ApplicationInvoker]:
+        """The applications it hosts."""
+        return dict(self._invokers)
+
+    def host(self, name: str, application: object) -> ApplicationInvoker:
+        """Offer what is marked with `remote` in `application` under `name`.
+
+        Raises
+        ------
+        TypeError
+            A marked function has a signature that cannot be checked.
+        ValueError
+            There is one of that name, or the name is none.
+        """
+        invoker = ApplicationInvoker(checked_name(name), application, self._lease, self._policy)
+        with self._lock:
+            if name in self._invokers:
+                raise ValueError(f"{self._name} hosts an application {name!r} already")
+            self._invokers[name] = invoker
+        return invoker
+
+    def invoker(self, name: object) -> ApplicationInvoker:
+        """Return the way into an application.
+
+        Raises
+        ------
+        CallRefused
+            There is none of that name.
+        """
+        found = self._invokers.get(name) if isinstance(name, str) else None
+        if found is None:
+            hosted = ", ".join(self._invokers) or "none"
+            raise CallRefused(f"{self._name} hosts no {str(name)[:60]!r}; it hosts: {hosted}")
+        return found
+
+    def publish(self, topic: str, payload: object) -> None:
+        """Publish to a topic of the station; returns at once. `payload` must not change later."""
+        self._bus.publish(topic, payload)
+
+    def publish_shared(self, who: str, topic: object, payload: object) -> None:
+        """Publish for a client, if the topic is open to clients.
+
+        Raises
+        ------
+        CallRefused
+            It is not.
+        """
+        if not (isinstance(topic, str) and topic.startswith(SHARED_PREFIX)):
+            raise CallRefused(f"{who} may publish to topics that begin with {SHARED_PREFIX!r} only")
+        self._bus.publish(topic, payload)
+
+    def presence(self, listener: PresenceListener) -> Callable[[], None]:
+        """Call `listener` with each client that is here, and at each change."""
+        with self._lock:
+            self._listeners = (*self._listeners, listener)
+            here = list(self._clients.values())
+        for each in here:
+            tell([listener], each)
+
+        def remove() -> None:
+            with self._lock:
+                self._listeners = tuple(each for each in self._listeners if each is not listener)
+
+        return remove
+
+    def note_client(self, key: str, presence: Presence) -> None:
+        """Remember that a client came or went, and tell; for whoever lets clients in."""
+        with self._lock:
+            if presence.here:
+                self._clients[key] = presence
+            elif self._clients.pop(key, None) is None:
+                return
+            listeners = self._listeners
+        tell(listeners, presence)
+
+
+def checked_name(name: str) -> str:
+    """Return `name` if it can stand in an address.
+
+    Raises
+    ------
+    ValueError
+        It cannot.
+    """
+    if not name or not all((each.isalnum() and each.isascii()) or each in "-_" for each in name):
+        raise ValueError(f"a name has letters, digits, - and _, got {name!r}")
+    return name
