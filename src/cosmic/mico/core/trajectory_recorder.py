@@ -10,7 +10,7 @@ from typing import BinaryIO, Final
 from PySide6.QtCore import Qt, Signal
 from typing_extensions import override
 
-from cosmic.frame.errors import MoveCancelled, RecordingError, RecordingExistsError
+from cosmic.frame.errors import RecordingError, RecordingExistsError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.file_names import check_base_name, check_directory
 from cosmic.frame.threads import WorkerThread
@@ -32,6 +32,7 @@ OpenFile = Callable[[Path, str], BinaryIO]
 class _Begun:
     event: MovementBegun
     positions: Mapping[str, float]
+    resting: frozenset[str]
     sensed: bool
     frequency_hz: int | None
 
@@ -42,7 +43,6 @@ class _Ended:
     positions: Mapping[str, float]
     time_s: float
     well: bool
-    replaced: bool
 
 
 def _open(path: Path, mode: str) -> BinaryIO:
@@ -192,20 +192,25 @@ class TrajectoryRecorder(WorkerThread):
         state = self._manager.state(event.name)
         sensed = class_for(state.kind, state.positioner).has_sensor
         self._under_way.add(event.name)
-        self._queue.put(_Begun(event, self._positions(), sensed, hertz))
+        self._queue.put(_Begun(event, self._positions(), self._resting(), sensed, hertz))
 
     def _on_movement_ended(self, event: MovementEnded) -> None:
         if not self.recording or event.name not in self._under_way:
             return
         positions = self._positions()
-        replaced = isinstance(event.error, MoveCancelled)
         now_s = self._manager.clock.now_s()
         well = event.error is None
-        self._queue.put(_Ended(event.name, positions, now_s, well=well, replaced=replaced))
+        self._queue.put(_Ended(event.name, positions, now_s, well=well))
 
     def _positions(self) -> dict[str, float]:
         states = self._manager.states().values()
         return {each.name: each.position for each in states if each.position is not None}
+
+    def _resting(self) -> frozenset[str]:
+        """Return the axes at rest: their state knows before their end is told."""
+        return frozenset(
+            name for name, each in self._manager.states().items() if not each.in_motion
+        )
 
     # Its own thread
 
@@ -214,7 +219,7 @@ class TrajectoryRecorder(WorkerThread):
         try:
             self._record()
             now_s = self._manager.clock.now_s()
-            self._builder.close(self._positions(), now_s)
+            self._builder.close(self._positions(), now_s, self._resting())
             self._write([END_OF_RECORDING])
         finally:
             self._close()
@@ -235,6 +240,7 @@ class TrajectoryRecorder(WorkerThread):
                         item.positions,
                         sensed=item.sensed,
                         frequency_hz=item.frequency_hz,
+                        resting=item.resting,
                     )
                 case _Ended():
                     self._builder.ended(item.name, item.positions, item.time_s, well=item.well)

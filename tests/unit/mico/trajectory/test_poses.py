@@ -41,7 +41,15 @@ def test_what_the_user_wrote_into_the_file_stays(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["[a]\n", "a = 1\n", "[a]\nx = 'far'\n", "[a]\nx = nan\n", "[a]\nx = true\n", "[a", '["#"]\nx=1\n'],
+    [
+        "[a]\n",
+        "a = 1\n",
+        "[a]\nx = 'far'\n",
+        "[a]\nx = nan\n",
+        "[a]\nx = true\n",
+        "[a",
+        '["#"]\nx=1\n',
+    ],
 )
 def test_a_file_that_is_wrong_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "poses.toml").write_text(text, encoding="utf-8")

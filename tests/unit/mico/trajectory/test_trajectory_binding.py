@@ -118,14 +118,14 @@ def test_relative_positions_count_from_the_pose() -> None:
 
 
 def test_an_axis_that_the_pose_does_not_hold_is_refused_and_not_taken_for_absolute() -> None:
-    with pytest.raises(TrajectoryError, match="line 3: .*right.x"):
+    with pytest.raises(TrajectoryError, match=r"line 3: .*right\.x"):
         bound("relative to pose fibre\nright.x to 10 um\n")
     found = bound("relative to pose fibre: left.x\nright.x to 10 um\nleft.x to 10 um\n")
     assert motions(found) == [MoveTo(10.0, "um"), MoveTo(1010.0, "um")]
 
 
 def test_a_relative_position_out_of_the_limits_is_refused() -> None:
-    with pytest.raises(TrajectoryError, match="line 4: left.x: 5600"):
+    with pytest.raises(TrajectoryError, match=r"line 4: left\.x: 5600"):
         bound("relative to pose fibre\nleft.x to 4600 um\n")
 
 
@@ -152,7 +152,7 @@ def test_a_trajectory_is_mirrored_to_the_other_assembly() -> None:
 
 
 def test_an_axis_without_counterpart_is_not_mirrored() -> None:
-    with pytest.raises(TrajectoryError, match="line 3: left.z has no counterpart"):
+    with pytest.raises(TrajectoryError, match=r"line 3: left\.z has no counterpart"):
         mirrored(parse(HEAD + "left.z to 1 um\n"), MIRROR)
 
 

@@ -12,6 +12,7 @@ class Recording:
 
     def __init__(self, *, timed: bool = False, zero: dict[str, float] | None = None) -> None:
         self.lines: list[str] = []
+        self.resting: tuple[str, ...] = ()
         self.at = {"x": 0.0, "y": 0.0, "gripper": 30.0}
         self._builder = SegmentBuilder(
             self._take,
@@ -31,7 +32,11 @@ class Recording:
         target = motion.target if isinstance(motion, MoveTo) else None
         event = MovementBegun(name, motion, self.at[name], target, "um", time_s, "script")
         self._builder.begun(
-            event, dict(self.at), sensed=name != "gripper", frequency_hz=hertz
+            event,
+            dict(self.at),
+            sensed=name != "gripper",
+            frequency_hz=hertz,
+            resting=self.resting,
         )
 
     def go(self, name: str, target: float, time_s: float) -> None:
@@ -175,3 +180,14 @@ def test_what_still_moves_at_the_end_is_written_as_far_as_it_got() -> None:
     record.go("x", 1000.0, 11.0)
     record.at["x"] = 640.0
     assert record.close(12.0) == ["start x 0", "x to 640 um"]
+
+
+def test_an_end_that_is_told_late_cuts_nothing() -> None:
+    record = Recording()
+    record.go("x", 100.0, 11.0)
+    record.at["x"] = 99.9
+    record.resting = ("x",)
+    record.go("y", 50.0, 12.0)
+    record.end("x", 99.9, 12.001)
+    record.end("y", 50.0, 13.0)
+    assert record.close(14.0) == ["start x 0", "x to 100 um", "start y 0", "y to 50 um"]

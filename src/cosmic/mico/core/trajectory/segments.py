@@ -1,6 +1,6 @@
 """Turning movements as they happen into the lines of a trajectory; pure."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,6 +11,8 @@ from cosmic.mico.core.trajectory.model import Leg, Move, Place, Speed, Statement
 
 STILL: Final[dict[str, float]] = {"um": 0.5, "deg": 0.0005}
 """What a position may differ by without the axis having moved."""
+NEAR: Final = 4.0
+"""How many times that an axis may stand away from a target that it has reached."""
 SPACING_S: Final = 0.25
 """Movements that are redirected all the time are cut into parts at least as long as this."""
 REPLACED_S: Final = 0.1
@@ -95,6 +97,7 @@ class SegmentBuilder:
         *,
         sensed: bool,
         frequency_hz: int | None,
+        resting: Collection[str] = (),
     ) -> None:
         """Take the beginning of a movement.
 
@@ -104,8 +107,11 @@ class SegmentBuilder:
             Where all axes are just then.
         frequency_hz : int or None
             The closed-loop frequency that was set for the axis; None: the usual one.
+        resting : collection of str
+            Axes that have come to rest, even if that was not told yet.
         """
         now_s = event.time_s
+        self._settle(positions, now_s, resting)
         known = self._parts.get(event.name)
         if known is not None and self._goes_on(known, event, positions):
             known.begun = event
@@ -144,9 +150,22 @@ class SegmentBuilder:
         if now_s - max(each.ended_s for each in parts) > REPLACED_S:
             self._cut({}, now_s, but="")
 
-    def close(self, positions: Positions, now_s: float) -> None:
+    def close(self, positions: Positions, now_s: float, resting: Collection[str] = ()) -> None:
         """Write the rest; what still moves is written as far as it got."""
+        self._settle(positions, now_s, resting)
         self._cut(positions, now_s, but="")
+
+    def _settle(self, positions: Positions, now_s: float, resting: Collection[str]) -> None:
+        """Take the ends of movements that nobody has told yet."""
+        for name, part in self._parts.items():
+            if part.under_way and name in resting:
+                target, here = part.begun.target, positions.get(name)
+                missed = (
+                    target is not None
+                    and here is not None
+                    and (abs(here - target) > NEAR * STILL[part.unit])
+                )
+                self.ended(name, positions, now_s, well=not missed)
 
     def _tell_start(self, event: MovementBegun, start: float, *, sensed: bool) -> None:
         if sensed and event.name not in self._told:
