@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
-from typing import Protocol
+from typing import Final, Protocol
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QMenu, QToolButton, QWidget
@@ -11,10 +11,12 @@ from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, tipped
+from cosmic.frame.gui.task_watch import TaskWatch
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
-from cosmic.frame.task import Task
+from cosmic.frame.task import Progress, Task
 
-TIP = "Measure where on the platform the pixels lie: a tool goes to nine places and back"
+REFUSED: Final = state_look(State.REFUSED).glyph
+TIP: Final = "Measure where on the platform the pixels lie: a tool goes to nine places and back"
 
 
 class MapShown(Protocol):
@@ -78,14 +80,11 @@ class CalibrateButton(QToolButton):
 
     Signals
     -------
-    begun(Task)
-        A calibration is under way.
-    refused(str)
-        Why it could not be begun.
+    told(str)
+        How far a calibration is, how it ended, or why it could not be begun.
     """
 
-    begun = Signal(object)
-    refused = Signal(str)
+    told = Signal(str)
 
     def __init__(
         self,
@@ -96,6 +95,8 @@ class CalibrateButton(QToolButton):
     ) -> None:
         super().__init__(parent)
         self._camera, self._now = camera, now
+        self._watch = TaskWatch(self)
+        self._watch.progressed.connect(self._on_progressed)
         self.setText("Calibrate")
         named(tipped(self, TIP), "calibrate")
         self.setStyleSheet(
@@ -116,6 +117,9 @@ class CalibrateButton(QToolButton):
             return
         menu.clear()
         tools = tuple(self._camera.targets)
+        if self._watch.busy:
+            menu.addAction("Cancel").triggered.connect(self._on_cancel)
+            return
         self.setEnabled(bool(tools))
         self.setToolTip(TIP if tools else "Not here: no tool can be moved from this window")
         for tool in tools:
@@ -146,8 +150,18 @@ class CalibrateButton(QToolButton):
 
     def _begin(self, start: Callable[[], Task]) -> None:
         try:
-            task = start()
+            self._watch.follow(start())
         except CosmicError as exc:
-            self.refused.emit(f"{state_look(State.REFUSED).glyph} {exc}")
+            self.told.emit(f"{REFUSED} {exc}")
+
+    def _on_cancel(self) -> None:
+        if self._watch.task is not None:
+            self._watch.task.cancel()
+
+    def _on_progressed(self, progress: Progress) -> None:
+        if progress.error:
+            self.told.emit(f"{REFUSED} {progress.title}: {progress.error}")
         else:
-            self.begun.emit(task)
+            self.told.emit(f"{progress.title}: {progress.text}")
+        if progress.done:
+            self.fill()

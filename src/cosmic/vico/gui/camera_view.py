@@ -159,9 +159,8 @@ class CameraView(QWidget):
         self.contrast.levels_changed.connect(view.set_levels)
         self.contrast.marks_changed.connect(view.set_marks)
         view.pointed.connect(self._on_pointed)
-        self.calibrate.begun.connect(self.recorder.tasks.follow)
-        for refusing in (self.calibrate.refused, self.tools.told):
-            refusing.connect(self.say)
+        for telling in (self.calibrate.told, self.tools.told):
+            telling.connect(self.say)
         self.tools.region_chosen.connect(self.form.read_part)
 
     @override
