@@ -49,6 +49,15 @@ from cosmic.mico.core.trajectory.model import Trajectory, TrajectoryError
 from cosmic.mico.core.trajectory.rehearsal import Rehearsal
 from cosmic.mico.hw.input_device import Feedback, InputInfo, InputKind, InputState
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
+from cosmic.vico.api.camera import CameraHandle, Seen
+from cosmic.vico.api.fibres import PlacedFibre
+from cosmic.vico.api.lens import LensHandle, LightHandle
+from cosmic.vico.api.places import CalibrationShown, RotationShown
+from cosmic.vico.api.vico import Vico
+from cosmic.vico.core.camera_recordings import PictureRecordingState
+from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.core.vision.tool_tips import TipSeen
+from cosmic.vico.hw.interface import CameraCounters, CameraRanges, CameraSettings, Frame
 
 CLASSES: Final[dict[str, type]] = {
     "Rig": cosmic.Rig,
@@ -94,6 +103,22 @@ CLASSES: Final[dict[str, type]] = {
     "RecordedEvent": RecordedEvent,
     "Overrun": Overrun,
     "AxisPosition": AxisPosition,
+    "Vico": Vico,
+    "CameraHandle": CameraHandle,
+    "LensHandle": LensHandle,
+    "LightHandle": LightHandle,
+    "PlacedFibre": PlacedFibre,
+    "Picture": Picture,
+    "Circumstances": Circumstances,
+    "Frame": Frame,
+    "CameraSettings": CameraSettings,
+    "CameraRanges": CameraRanges,
+    "CameraCounters": CameraCounters,
+    "Seen": Seen,
+    "TipSeen": TipSeen,
+    "CalibrationShown": CalibrationShown,
+    "RotationShown": RotationShown,
+    "PictureRecordingState": PictureRecordingState,
     "Control": Control,
     "ControlHandle": ControlHandle,
     "ControlReading": ControlReading,
@@ -126,6 +151,8 @@ FURTHER_EXCEPTIONS: Final = (
 )
 # Attributes that an object gets when it is made, which the class does not show.
 MADE_LATER: Final = {
+    "Vico": ("lens", "light"),
+    "CameraHandle": ("name",),
     "Control": ("settings",),
     "Axis": ("commander",),
     "Approach": ("bodies", "distance_um", "places_um", "pose"),
