@@ -152,6 +152,12 @@ class UndoHistory(QObject):
             self._entries[group] = deque(kept, maxlen=DEPTH)
         self.changed.emit()
 
+    def forget_all(self) -> None:
+        """Forget everything that could be taken back."""
+        with self._lock:
+            self._entries.clear()
+        self.changed.emit()
+
     # Taking back
 
     def newest(self, group: str | None = None) -> UndoEntry:
