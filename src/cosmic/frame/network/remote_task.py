@@ -57,9 +57,9 @@ class RemoteTask:
         """How far it is, where it tells."""
         return self._progress
 
-    def exception(self, timeout_s: float | None = 0.0) -> CosmicError | None:
-        """Return why it failed, or None; waits up to `timeout_s` for its end."""
-        self._wait(timeout_s)
+    def exception(self, timeout: float | None = 0.0) -> CosmicError | None:
+        """Return why it failed, or None; waits up to `timeout` s for its end."""
+        self._wait(timeout)
         return self._error
 
     def wait(self, timeout_s: float | None = None) -> object:
