@@ -1,0 +1,129 @@
+"""Named poses in the window: teach, go, remove."""
+
+from typing import Final
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QComboBox, QLineEdit, QVBoxLayout, QWidget
+
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.build import named, push_button, tight_row, tipped
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.theme import STEP_PX
+from cosmic.frame.task import Progress, Task
+from cosmic.mico.api.mico import Mico
+from cosmic.mico.core.settings import GroupSettings
+
+ALL: Final = "all axes"
+
+
+class _Relay(QObject):
+    """Brings the progress of tasks to the window's thread; outlives the box."""
+
+    progressed = Signal(object)
+
+    def follow(self, task: Task) -> None:
+        task.subscribe(self.progressed.emit)
+
+
+class PosesBox(QWidget):
+    """The named poses of the platform, and what can be done with them.
+
+    Signals
+    -------
+    poses_changed()
+        One was taught or removed here.
+    """
+
+    poses_changed = Signal()
+
+    def __init__(self, mico: Mico, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._mico = mico
+        self._relay = _Relay()
+        self._relay.progressed.connect(self._on_progressed)
+        self.poses = named(tipped(QComboBox(), "Named poses"), "poses")
+        self.go = named(push_button("Go", "Move all axes of the pose there, together"), "goPose")
+        self.way = named(
+            push_button("Go round", "Go there by a way round what is in between"), "goPoseWay"
+        )
+        self.remove = named(push_button("Remove", "Forget this pose"), "removePose")
+        self.name = named(tipped(QLineEdit(), "Name of the pose to teach"), "poseName")
+        self.name.setPlaceholderText("name")
+        self.group = tipped(QComboBox(), "Which axes the pose holds")
+        self.group.addItems([ALL, *(each.title for each in self._settings_groups())])
+        self.teach = named(push_button("Teach", "Keep where the axes stand now"), "teachPose")
+        self.told = ElidedLabel()
+        self._arrange()
+        self.go.clicked.connect(lambda: self._go(way=False))
+        self.way.clicked.connect(lambda: self._go(way=True))
+        self.remove.clicked.connect(self._on_remove)
+        self.teach.clicked.connect(self._on_teach)
+        self.name.returnPressed.connect(self._on_teach)
+        self.refresh()
+
+    def _settings_groups(self) -> tuple[GroupSettings, ...]:
+        return self._mico.application.manager.settings.group
+
+    def _arrange(self) -> None:
+        first, second = tight_row(STEP_PX), tight_row(STEP_PX)
+        first[1].addWidget(self.poses, 1)
+        for button in (self.go, self.way, self.remove):
+            first[1].addWidget(button)
+        second[1].addWidget(self.name, 1)
+        second[1].addWidget(self.group)
+        second[1].addWidget(self.teach)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(STEP_PX // 2)
+        for row, _ in (first, second):
+            column.addWidget(row)
+        column.addWidget(self.told)
+
+    def refresh(self) -> None:
+        """Show the poses there are now."""
+        names, chosen = self._mico.poses.names, self.poses.currentText()
+        self.poses.clear()
+        self.poses.addItems(names)
+        if chosen in names:
+            self.poses.setCurrentText(chosen)
+        has_model = self._mico.application.collision is not None
+        for button in (self.go, self.remove):
+            button.setEnabled(bool(names))
+        self.way.setEnabled(bool(names) and has_model)
+
+    def _on_teach(self) -> None:
+        name, group = self.name.text().strip(), self.group.currentText()
+        try:
+            pose = self._mico.poses.teach(name, None if group == ALL else group)
+        except CosmicError as exc:
+            self.told.set_text(str(exc))
+            return
+        where = self._mico.poses.path
+        kept = f"kept in {where.name}" if where is not None else "kept until the program ends"
+        self.told.set_text(f"{name}: {len(pose.positions)} axes, {kept}")
+        self.name.clear()
+        self.refresh()
+        self.poses.setCurrentText(name)
+        self.poses_changed.emit()
+
+    def _on_remove(self) -> None:
+        try:
+            self._mico.poses.remove(self.poses.currentText())
+        except CosmicError as exc:
+            self.told.set_text(str(exc))
+        self.refresh()
+        self.poses_changed.emit()
+
+    def _go(self, *, way: bool) -> None:
+        """Begin to go; how it ends is shown by the window's task bar."""
+        try:
+            task = self._mico.poses.go(self.poses.currentText(), way=way, wait=False)
+        except CosmicError as exc:
+            self.told.set_text(str(exc))
+            return
+        self.told.set_text("")
+        self._relay.follow(task)
+
+    def _on_progressed(self, progress: Progress) -> None:
+        if progress.done:
+            self.told.set_text(progress.error or "there")

@@ -1,0 +1,423 @@
+"""The panel of SCM: trajectories are opened, recorded, rehearsed and run; poses are taught."""
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QFileDialog, QLabel, QVBoxLayout, QWidget
+
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.build import named, push_button, tight_row
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.state_badge import StateBadge
+from cosmic.frame.gui.theme import STEP_PX, State, ui_font
+from cosmic.frame.task import Task
+from cosmic.mico.api.mico import Mico
+from cosmic.mico.api.trajectory_places import AwayFromStartError
+from cosmic.mico.api.trajectory_player import TrajectoryPlayer
+from cosmic.mico.api.trajectory_recording import TrajectoryRecording
+from cosmic.mico.api.trajectory_state import PlayProgress, PlayState, StartMode
+from cosmic.mico.core.trajectory.model import SUFFIX, Problem, Trajectory, TrajectoryError
+from cosmic.mico.core.trajectory.parser import LARGEST_BYTES
+from cosmic.mico.core.trajectory.rehearsal import Rehearsal
+from cosmic.mico.gui.poses_box import PosesBox
+from cosmic.mico.gui.trajectory_bars import RecordBar, RunBar, StartQuestion
+from cosmic.mico.gui.trajectory_lines import TrajectoryLines
+
+logger = logging.getLogger(__name__)
+
+FILTER: Final = f"Trajectories (*{SUFFIX});;All files (*)"
+_STATES: Final = {
+    PlayState.READY: State.OK,
+    PlayState.RUNNING: State.BUSY,
+    PlayState.PAUSED: State.UNKNOWN,
+    PlayState.FAILED: State.ERROR,
+    PlayState.CANCELLED: State.REFUSED,
+    PlayState.ENDED: State.OK,
+}
+
+
+class _Relay(QObject):
+    """Brings what happens in other threads to the window's; outlives the panel."""
+
+    loaded = Signal(object, object)
+    rehearsed = Signal(object)
+    failed = Signal(str)
+    progressed = Signal(object, object)
+    recorded = Signal()
+
+
+class TrajectoryPanel(QWidget):
+    """Everything about one trajectory; GUI thread. Nothing here waits.
+
+    Signals
+    -------
+    preview_changed(object)
+        Poses of all axes along the trajectory after a rehearsal, for the scene; None: none.
+    refused(MoveVerdict)
+        The rehearsal met a line that the gate refuses.
+    """
+
+    preview_changed = Signal(object)
+    refused = Signal(object)
+
+    def __init__(self, mico: Mico, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("trajectoryPanel")
+        self._mico = mico
+        self._application = mico.application
+        self._api = mico.trajectories
+        self._trajectory: Trajectory | None = None
+        self._player: TrajectoryPlayer | None = None
+        self._recording: TrajectoryRecording | None = None
+        self._asked: Callable[[StartMode], None] | None = None
+        self._make_widgets()
+        self._arrange()
+        self._connect()
+        self._show_player()
+
+    def _make_widgets(self) -> None:
+        self.open_button = named(push_button("Open…", "Read a trajectory and check it"), "open")
+        self.mirror_button = named(
+            push_button("Mirror", "The same for the opposite assembly"), "mirror"
+        )
+        self.rehearse_button = named(
+            push_button("Rehearse", "Run it through the gate without moving"), "rehearse"
+        )
+        self.badge = StateBadge(State.UNKNOWN)
+        self.title = named(ElidedLabel("no trajectory"), "trajectoryTitle")
+        self.title.setFont(ui_font(bold=True))
+        self.report = named(QLabel(), "trajectoryReport")
+        self.report.setWordWrap(True)
+        self.lines = TrajectoryLines()
+        self.record_bar = RecordBar()
+        self.run_bar = RunBar()
+        self.question = StartQuestion()
+        self.poses_box = PosesBox(self._mico)
+        self.record_bar.set_poses(self._mico.poses.names)
+
+    def _arrange(self) -> None:
+        head, beside = tight_row(STEP_PX)
+        beside.addWidget(self.badge)
+        beside.addWidget(self.title, 1)
+        for button in (self.open_button, self.mirror_button, self.rehearse_button):
+            beside.addWidget(button)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
+        column.setSpacing(STEP_PX)
+        column.addWidget(self.record_bar)
+        column.addWidget(head)
+        column.addWidget(self.lines, 1)
+        for widget in (self.report, self.question, self.run_bar, self.poses_box):
+            column.addWidget(widget)
+
+    def _connect(self) -> None:
+        self._relay = _Relay()
+        self._relay.loaded.connect(self._on_loaded)
+        self._relay.rehearsed.connect(self._on_rehearsed)
+        self._relay.failed.connect(self._on_failed)
+        self._relay.progressed.connect(self._on_progressed)
+        self._relay.recorded.connect(self._on_recorded)
+        self.open_button.clicked.connect(self._on_open)
+        self.mirror_button.clicked.connect(self.mirror)
+        self.rehearse_button.clicked.connect(self.rehearse)
+        self.record_bar.record_requested.connect(self._on_record)
+        self.record_bar.stop_requested.connect(self.stop_recording)
+        self.run_bar.run_requested.connect(self.run)
+        self.run_bar.step_requested.connect(self.step)
+        self.run_bar.pause_requested.connect(self._on_pause)
+        self.run_bar.cancel_requested.connect(self._on_cancel)
+        self.run_bar.speed_changed.connect(self._on_speed)
+        self.question.chosen.connect(self._on_start_chosen)
+        self.poses_box.poses_changed.connect(self._on_poses_changed)
+
+    @property
+    def trajectory(self) -> Trajectory | None:
+        """The trajectory shown, if it can be run."""
+        return self._trajectory
+
+    @property
+    def player(self) -> TrajectoryPlayer | None:
+        """Its player; None before it was run."""
+        return self._player
+
+    # Opening
+
+    def _on_open(self) -> None:
+        name, _ = QFileDialog.getOpenFileName(self, "Open a trajectory", "", FILTER)
+        if name:
+            self.open(Path(name))
+
+    def open(self, path: Path) -> None:
+        """Read a file in the application's thread; what is wrong with it is shown."""
+
+        def read(task: Task) -> None:
+            try:
+                found = self._api.load(path, lambda part: task.report(part, "reading"))
+            except CosmicError as exc:
+                self._relay.loaded.emit(path, exc)
+            else:
+                self._relay.loaded.emit(path, found)
+            task.finish()
+
+        self._begin(f"Reading {path.name}", read)
+
+    def _begin(self, title: str, job: Callable[[Task], None]) -> None:
+        try:
+            self._application.begin(title, job)
+        except CosmicError as exc:
+            self._say(str(exc), State.REFUSED)
+
+    def _on_loaded(self, path: Path, found: object) -> None:
+        self._forget()
+        if isinstance(found, Trajectory):
+            self._show_trajectory(found)
+            return
+        self.title.set_text(path.name)
+        self.lines.lines.set_lines(_text_of(path))
+        if isinstance(found, TrajectoryError):
+            self.lines.lines.set_problems(found.problems)
+            self.lines.look_at(found.problems[0].line)
+            count = len(found.problems)
+            more = "" if count == 1 else f", and {count - 1} more"
+            self._say(f"{found.problems[0]}{more}", State.REFUSED)
+        else:
+            self._say(str(found), State.REFUSED)
+        self._show_player()
+
+    def _show_trajectory(self, trajectory: Trajectory) -> None:
+        self._trajectory = trajectory
+        self.title.set_text(trajectory.name)
+        self.lines.lines.set_lines(trajectory.lines)
+        count = len(trajectory.lines)
+        self._say(f"{count} lines, nothing wrong. Rehearse it to see what it does.", State.OK)
+        self._show_player()
+
+    def _forget(self) -> None:
+        """Let go of the trajectory shown; one that is paused is given up."""
+        if self._player is not None and not self._player.done:
+            self._player.cancel()
+        self._trajectory = self._player = None
+        self.question.hide()
+        self.preview_changed.emit(None)
+
+    def mirror(self) -> None:
+        """Show the trajectory for the opposite assembly."""
+        if self._trajectory is None:
+            return
+        try:
+            found = self._api.mirror(self._trajectory)
+        except CosmicError as exc:
+            self._say(str(exc), State.REFUSED)
+            return
+        self._forget()
+        self._show_trajectory(found)
+
+    # Recording
+
+    def _on_record(self) -> None:
+        name, _ = QFileDialog.getSaveFileName(self, "Record movements to", "", FILTER)
+        if name:
+            path = Path(name)
+            self.record(path if path.suffix else path.with_suffix(SUFFIX))
+
+    def record(self, path: Path) -> None:
+        """Begin to record as the bar says; the dialogue has asked about a file that is there."""
+        bar = self.record_bar
+        try:
+            self._recording = self._api.record(
+                path,
+                title=path.stem,
+                timed=bar.timed.isChecked(),
+                relative_to=bar.relative_to,
+                sources=bar.sources,
+                overwrite=True,
+            )
+        except CosmicError as exc:
+            bar.show_recording(str(exc), recording=False)
+            return
+        self._recording.subscribe(self._relay.recorded.emit)
+        self._on_recorded()
+
+    def stop_recording(self) -> None:
+        """End the recording and show it."""
+        recording, self._recording = self._recording, None
+        if recording is None:
+            return
+        recording.stop()
+        self.record_bar.show_recording(_recorded(recording), recording=False)
+        if recording.error is None:
+            self.open(recording.path)
+
+    def _on_recorded(self) -> None:
+        if self._recording is not None:
+            error = self._recording.error
+            self.record_bar.show_recording(_recorded(self._recording), recording=error is None)
+
+    # Rehearsing
+
+    def rehearse(self) -> None:
+        """Run it through the gate in the application's thread, without moving anything."""
+        trajectory, speed = self._trajectory, self.run_bar.speed.value()
+        if trajectory is None:
+            return
+
+        def play(task: Task) -> None:
+            try:
+                found = self._api.rehearse(
+                    trajectory, task.report, speed=speed, cancelled=lambda: task.cancel_requested
+                )
+            except CosmicError as exc:
+                self._relay.failed.emit(str(exc))
+                task.fail(exc)
+            else:
+                self._relay.rehearsed.emit(found)
+                task.finish()
+
+        self._say("rehearsing", State.BUSY)
+        self._begin(f"Rehearsing {trajectory.name}", play)
+
+    def _on_rehearsed(self, found: Rehearsal) -> None:
+        self._show_rehearsal(found)
+        self.preview_changed.emit(found.poses)
+
+    def _show_rehearsal(self, found: Rehearsal) -> None:
+        if found.allowed:
+            self._say(rehearsal_text(found), State.OK)
+            return
+        self.lines.lines.set_problems([Problem(found.line, str(found.verdict))])
+        self.lines.look_at(found.line)
+        self._say(f"line {found.line}: {found.verdict}", State.REFUSED)
+        self.refused.emit(found.verdict)
+
+    def _on_failed(self, text: str) -> None:
+        self._say(text, State.REFUSED)
+
+    # Running
+
+    def run(self) -> None:
+        """Run it, or go on where it was paused or has failed."""
+        self._start(lambda player, start: player.resume(start))
+
+    def step(self) -> None:
+        """Make one line."""
+        self._start(lambda player, start: player.step(start))
+
+    def _start(self, begin: Callable[[TrajectoryPlayer, StartMode], None]) -> None:
+        player = self._usable_player()
+        if player is None:
+            return
+        player.loops = self.run_bar.wanted_loops
+        player.speed = self.run_bar.speed.value()
+        self._asked = lambda start: begin(player, start)
+        self._try_start("refuse")
+
+    def _try_start(self, start: StartMode) -> None:
+        if self._asked is None:
+            return
+        self.question.hide()
+        try:
+            self._asked(start)
+        except AwayFromStartError as exc:
+            self.question.ask(str(exc), has_model=self._application.collision is not None)
+        except CosmicError as exc:
+            self._say(str(exc), State.REFUSED)
+
+    def _on_start_chosen(self, mode: str) -> None:
+        self._try_start("way" if mode == "way" else "straight")
+
+    def _usable_player(self) -> TrajectoryPlayer | None:
+        """Return a player that can go on, or a new one."""
+        done = (PlayState.ENDED, PlayState.CANCELLED)
+        if self._player is not None and self._player.state not in done:
+            return self._player
+        if self._trajectory is None:
+            return None
+        try:
+            player = self._player = self._api.prepare(self._trajectory)
+        except CosmicError as exc:
+            self._say(str(exc), State.REFUSED)
+            return None
+        player.subscribe(lambda progress: self._relay.progressed.emit(player, progress))
+        return player
+
+    def _on_pause(self) -> None:
+        if self._player is not None:
+            self._player.pause()
+
+    def _on_cancel(self) -> None:
+        if self._player is not None:
+            self._player.cancel()
+
+    def _on_speed(self, factor: float) -> None:
+        if self._player is not None:
+            self._player.speed = factor
+
+    def _on_progressed(self, player: TrajectoryPlayer, progress: PlayProgress) -> None:
+        if player is not self._player:
+            return
+        self.run_bar.show_state(progress, ready=True)
+        self.lines.show_line(0 if progress.state is PlayState.ENDED else progress.line)
+        if progress.error:
+            self.lines.lines.set_problems([Problem(progress.line, progress.error)])
+        words = progress.error or progress.text
+        if progress.state is PlayState.ENDED and player.rehearsal is not None:
+            words = f"done. {rehearsal_text(player.rehearsal)}"
+        self._say(words, _STATES[progress.state])
+        self._enable(running=progress.state is PlayState.RUNNING)
+
+    # Showing
+
+    def _on_poses_changed(self) -> None:
+        self.record_bar.set_poses(self._mico.poses.names)
+
+    def _show_player(self) -> None:
+        progress = self._player.progress if self._player is not None else None
+        self.run_bar.show_state(progress, ready=self._trajectory is not None)
+        self._enable(running=False)
+
+    def _enable(self, *, running: bool) -> None:
+        there = self._trajectory is not None
+        self.open_button.setEnabled(not running)
+        self.mirror_button.setEnabled(there and not running)
+        self.rehearse_button.setEnabled(there and not running)
+
+    def _say(self, text: str, state: State) -> None:
+        self.report.setText(text)
+        self.badge.set_state(state)
+
+
+def rehearsal_text(found: Rehearsal) -> str:
+    """Return what a rehearsal found, for the operator."""
+    parts = [f"{found.lines} lines in about {found.duration_s:.1f} s"]
+    if found.clearance_um is not None:
+        where = f"line {found.clearance_line}" if found.clearance_line else "the start"
+        bodies = " and ".join(found.clearance_bodies)
+        parts.append(f"smallest clearance {found.clearance_um:.0f} µm at {where} ({bodies})")
+    ends = [f"{axis} {value:.1f}" for axis, value in found.end.items()]
+    if ends:
+        parts.append(f"ends at {', '.join(ends)}")
+    return "; ".join(parts)
+
+
+def _recorded(recording: TrajectoryRecording) -> str:
+    if recording.error is not None:
+        return str(recording.error)
+    return f"{recording.path.name}: {recording.lines} lines"
+
+
+def _text_of(path: Path) -> list[str]:
+    """Return what can be shown of a file that is no trajectory."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(LARGEST_BYTES)
+    except OSError:
+        return []
+    return data.decode("utf-8", errors="replace").splitlines()
+
+
+def make_trajectory_panel(mico: Mico) -> TrajectoryPanel:
+    """Return the panel of SCM for a window."""
+    return TrajectoryPanel(mico)
