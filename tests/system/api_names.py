@@ -26,11 +26,12 @@ from cosmic.frame.errors import DeviceFault, ExportCancelled, RecordingExistsErr
 from cosmic.frame.plan_shape import PlanStatus
 from cosmic.frame.task import Progress, Task
 from cosmic.mico.api.axis import Axis, Jogging
-from cosmic.mico.api.axis_group import AxisGroup, GroupStatus
+from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.axis_shape import AxisMovable
 from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.mico import Mico
+from cosmic.mico.api.move_status import MoveStatus
 from cosmic.mico.api.poses import Poses
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.api.trajectories import Trajectories
@@ -76,7 +77,7 @@ CLASSES: Final[dict[str, type]] = {
     "Axis": Axis,
     "AxisMovable": AxisMovable,
     "AxisGroup": AxisGroup,
-    "GroupStatus": GroupStatus,
+    "MoveStatus": MoveStatus,
     "Movement": Movement,
     "GroupMovement": GroupMovement,
     "Jogging": Jogging,
@@ -158,7 +159,7 @@ MADE_LATER: Final = {
     "Approach": ("bodies", "distance_um", "places_um", "pose"),
     "Way": ("start", "waypoints", "method", "length", "straight_length", "duration_s"),
     "GroupMovement": ("movements",),
-    "GroupStatus": ("movement",),
+    "MoveStatus": ("movement",),
     "DataChunk": ("first_sample", "time_s", "rate_hz", "channels", "volts", "scales"),
     "StepwiseMove": ("planned", "movement"),
 }

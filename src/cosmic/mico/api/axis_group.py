@@ -5,42 +5,15 @@ from collections.abc import Callable, Mapping, Sequence
 from typing_extensions import override
 
 from cosmic.frame.errors import ConfigError, CosmicError, refusal
-from cosmic.frame.plan_shape import DataKeys, PlanStatus, Readings, plain_name
+from cosmic.frame.plan_shape import DataKeys, Readings, plain_name
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.axis_shape import AxisMovable
 from cosmic.mico.api.entry import Number
 from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.move_status import MoveStatus, refused
 
 Place = Mapping[str, Number] | Sequence[Number]
 """Targets by axis name, with or without the dot, or in the order of the group's axes."""
-
-
-class GroupStatus(PlanStatus):
-    """A synchronous movement as a plan sees it.
-
-    Attributes
-    ----------
-    movement : GroupMovement or None
-        None where it was refused.
-    """
-
-    def __init__(self, what: str, movement: GroupMovement | None = None) -> None:
-        super().__init__(what)
-        self.movement = movement
-        if movement is not None:
-            movement.add_callback(self._on_end)
-
-    def _on_end(self, movement: GroupMovement) -> None:
-        error = movement.exception()
-        if error is None:
-            self.finish()
-        else:
-            self.fail(error)
-
-    def cancel(self) -> None:
-        """Stop every axis that still moves."""
-        if self.movement is not None:
-            self.movement.cancel()
 
 
 class AxisGroup:
@@ -65,6 +38,7 @@ class AxisGroup:
         self._axes = tuple(axes.values())
         self._name = plain_name(name) or "_and_".join(axis.name for axis in self._axes)
         self._move, self._check = move, check
+        self._asked: MoveStatus | None = None
 
     @override
     def __repr__(self) -> str:
@@ -92,18 +66,19 @@ class AxisGroup:
         if not verdict.allowed:
             raise refusal(verdict)
 
-    def set(self, value: Place) -> GroupStatus:
+    def set(self, value: Place) -> MoveStatus:
         """Start to move to `value` and return a bluesky status; a refusal is how it fails."""
+        what = f"{self._name} to {value}"
         try:
-            movement = self._move(self._targets(value))
+            self._asked = MoveStatus(what, self._move(self._targets(value)))
         except CosmicError as exc:
-            refused = GroupStatus(f"{self._name} to {value}")
-            refused.fail(exc)
-            return refused
-        return GroupStatus(f"{self._name} to {value}", movement)
+            return refused(what, exc)
+        return self._asked
 
     def stop(self, success: bool = False) -> None:
-        """Stop every axis of the group; a movement under way fails, whatever `success` says."""
+        """Stop every axis of the group; otherwise as `Axis.stop`."""
+        if success and self._asked is not None:
+            self._asked.finish()
         for axis in self._axes:
             axis.stop(success=success)
 

@@ -18,6 +18,7 @@ from cosmic.frame.plan_shape import (
 )
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.entry import Number, as_number
+from cosmic.mico.api.move_status import MoveStatus, refused
 from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.orders import MoveTo
@@ -35,7 +36,7 @@ class AxisShape:
     _manager: DeviceManager
     _halt: Callable[[], None]
     _begin: Callable[[Number], Movement]
-    _asked: tuple[float, Movement] | None = None
+    _asked: tuple[float, MoveStatus] | None = None
 
     @property
     def name(self) -> str:
@@ -61,27 +62,25 @@ class AxisShape:
         if not verdict.allowed:
             raise refusal(verdict)
 
-    def set(self, value: Number) -> Movement:
-        """Start to move to `value` and return the movement, which is a bluesky status.
-
-        A refusal is what the movement fails with, so that a plan ends as a failure.
-        """
-        state = self._now
+    def set(self, value: Number) -> MoveStatus:
+        """Start to move to `value` and return a bluesky status; a refusal is how it fails."""
+        state, what = self._now, f"{self._name} to {value}"
         try:
             target = as_number(value, state.unit, self._name) + state.zero
-            movement = self._begin(value)
+            status = MoveStatus(what, self._begin(value))
         except CosmicError as exc:
-            movement = Movement()
-            movement.fail(exc)
-            return movement
-        self._asked = target, movement
-        return movement
+            return refused(what, exc)
+        self._asked = target, status
+        return status
 
-    def stop(self, success: bool = False) -> None:  # noqa: ARG002 - bluesky's signature
-        """Stop this axis; bluesky's name for `halt`.
+    def stop(self, success: bool = False) -> None:
+        """Stop this axis, as `halt` does.
 
-        A movement under way fails with `MoveCancelled`, whatever `success` says.
+        What `set` began fails with `MoveCancelled`. With `success`, which bluesky says of a stop
+        that belongs to the plan, such as a pause, it ends well.
         """
+        if success and self._asked is not None:
+            self._asked[1].finish()
         self._halt()
 
     def locate(self) -> dict[str, float | None]:
@@ -92,11 +91,11 @@ class AxisShape:
         state = self._now
         here, setpoint = state.shown_position, state.shown_position
         if self._asked is not None:
-            target, movement = self._asked
+            target, status = self._asked
             near = state.position is not None and (
                 abs(state.position - target) <= STANDS_AT[state.unit]
             )
-            if not movement.done or (movement.success and near):
+            if not status.done or (status.success and near):
                 setpoint = target - state.zero
         return {"setpoint": setpoint, "readback": here}
 
