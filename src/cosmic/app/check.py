@@ -29,6 +29,7 @@ def find_mistakes(config: str | Path) -> list[str]:
             lines += str(exc).splitlines()
     if file is not None:
         lines += key_mistakes(file, path)
+        lines += _tool_mistakes(file, path)
     if file is not None and twin is not None:
         lines += _twin_mistakes(file, path, twin, twin_path)
     if file is not None and file.platform.scene:
@@ -79,6 +80,16 @@ def key_mistakes(file: PlatformFile, path: Path) -> list[str]:
     if not file.platform.stop_key:
         lines.append(f"{path}: platform.stop_key: a platform needs a stop key")
     return lines
+
+
+def _tool_mistakes(file: PlatformFile, path: Path) -> list[str]:
+    if file.vico is None:
+        return []
+    # Imported here: it loads OpenCV.
+    from cosmic.autonomy.places import tool_mistakes
+
+    axes = {each.name for each in file.mico.positioner}
+    return [f"{path}: {each}" for each in tool_mistakes(file.vico.tool, axes)]
 
 
 def _twin_mistakes(

@@ -1,7 +1,7 @@
 """Pixels and places on the platform: what is calibrated, and moving a tool to a pixel."""
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -47,7 +47,9 @@ class PlatformPlaces(Places):
         self._vico = vico
         self._manager = mico.manager
         self._tools = {each.name: each for each in vico.settings.tool}
-        _check_axes(vico.settings.tool, [each.name for each in mico.manager.settings.positioner])
+        axes = [each.name for each in mico.manager.settings.positioner]
+        if mistakes := tool_mistakes(vico.settings.tool, axes):
+            raise ConfigError("\n".join(mistakes))
         self.calibrations = Calibrations(vico.units, self._tools, folder)
 
     # Pixels to places
@@ -214,11 +216,14 @@ def _inside(place_px: Pixel, width: int, height: int) -> bool:
     return 0.0 <= place_px[0] <= width - 1.0 and 0.0 <= place_px[1] <= height - 1.0
 
 
-def _check_axes(tools: Sequence[ToolSettings], axes: Sequence[str]) -> None:
-    for index, tool in enumerate(tools):
-        for axis in tool.axes:
-            if axis not in axes:
-                raise ConfigError(f"vico.tool[{index}]: there is no positioner {axis!r}")
+def tool_mistakes(tools: Sequence[ToolSettings], axes: Collection[str]) -> list[str]:
+    """Return a line for every axis that a tool names and that is not there."""
+    return [
+        f"vico.tool[{index}]: {tool.name}: there is no positioner {axis!r}"
+        for index, tool in enumerate(tools)
+        for axis in tool.axes
+        if axis not in axes
+    ]
 
 
 def join_places(vico: VicoApplication, mico: MicoApplication, folder: Path | None) -> None:
