@@ -102,3 +102,14 @@ def test_a_fibre_is_looked_at_measured_and_recorded(said: str) -> None:
     ends = sorted(float(each) for each in numbers["ends"])
     assert ends == pytest.approx([-371.2, -227.2, 19.8, 790.9], abs=5.0)
     assert "recorded: True, 1600 x 1200 px" in said
+
+
+@example("hold_a_force.py")
+def test_a_force_is_held_changed_and_let_go(said: str) -> None:
+    held, stiffness, lower, period, ended, limit = said.splitlines()
+    assert float(held.split()[1]) == pytest.approx(50.0, abs=2.5)
+    assert 1.0 < float(stiffness.split()[1]) < 4.0
+    assert float(lower.split()[1]) == pytest.approx(25.0, abs=2.0)
+    assert period.startswith("period: ")
+    assert ended == "ended: asked to"
+    assert "travel" in limit

@@ -16,6 +16,7 @@ SPAN_S: Final = 10.0
 _AXIS_PX: Final = 56
 _GAP_PX: Final = 3
 _WIDTH: Final = 2
+_MOST_POINTS: Final = 1000
 _VALUE: Final = OKABE_ITO["orange"]
 _OUTPUT: Final = OKABE_ITO["sky blue"]
 
@@ -64,10 +65,11 @@ class ControlPlot(QWidget):
         if not trace.wall_s.size:
             self.clear()
             return
-        before_s = trace.wall_s - trace.wall_s[-1]
-        self.value.setData(before_s, trace.measured)
-        self.set_point.setData(before_s, trace.set_point)
-        self.output.setData(before_s, trace.output)
+        every = slice(None, None, 1 + trace.wall_s.size // _MOST_POINTS)
+        before_s = (trace.wall_s - trace.wall_s[-1])[every]
+        self.value.setData(before_s, trace.measured[every])
+        self.set_point.setData(before_s, trace.set_point[every])
+        self.output.setData(before_s, trace.output[every])
 
     def clear(self) -> None:
         """Draw nothing."""

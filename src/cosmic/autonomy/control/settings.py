@@ -11,7 +11,7 @@ class ControlSettings(StrictModel):
     rate_hz: float = Field(default=200.0, ge=10.0, le=1000.0)
     real_time: bool = True
     priority: int = Field(default=10, ge=1, le=99)
-    stale_s: float = Field(default=0.25, gt=0.0, le=30.0)
+    stale_s: float = Field(default=0.5, gt=0.0, le=30.0)
     latency_s: float = Field(default=0.05, ge=0.02, le=0.5)
     response_s: float = Field(default=0.2, ge=0.1, le=60.0)
     travel_um: float = Field(default=500.0, gt=0.0)
