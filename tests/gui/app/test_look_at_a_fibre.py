@@ -102,7 +102,7 @@ def test_a_fibre_is_measured_and_a_gripper_calibrated_and_sent_to_a_pixel(
     actions["Move right"].trigger()
     qtbot.waitUntil(view.row.go.isEnabled, timeout=20_000)
     assert "µm a pixel" in view.calibrate.lines()[0]
-    assert "residual" in view.recorder.tasks.text.text()
+    qtbot.waitUntil(lambda: "residual" in view.message.text)
     qtbot.waitUntil(lambda: vico.running_task is not None and vico.running_task.done)
     height_um = mico.manager.state("right.z").position
     actions = {action.text(): action for action in view.row.menu.actions()}
