@@ -147,12 +147,23 @@ class Teleoperation:
         if not 0 <= index < len(rows):
             raise ConfigError(f"profile {name!r} has no row {index}")
         rows[index] |= changes
-        whole = before.model_dump() | {"axis": rows}
+        return self.edit_profile(name, axis=rows)
+
+    def edit_profile(self, name: str, **changes: object) -> TeleoperationProfileSettings:
+        """Change keys of a profile and use it; returns the profile.
+
+        Raises
+        ------
+        ConfigError
+            As `set_profile`; or a value is none that the key takes.
+        """
+        whole = self.profile(name).model_dump() | changes
         try:
             after = TeleoperationProfileSettings.model_validate(whole)
         except ValidationError as exc:
             first = exc.errors(include_url=False)[0]
-            raise ConfigError(f"profile {name!r}: {first['loc'][-1]}: {first['msg']}") from None
+            where = ".".join(str(part) for part in first["loc"])
+            raise ConfigError(f"profile {name!r}: {where}: {first['msg']}") from None
         self.set_profile(after)
         return after
 

@@ -1,0 +1,308 @@
+"""The panel that steers by an input device: what is chosen, what it says and what it does."""
+
+from collections.abc import Callable
+from typing import Final
+
+from PySide6.QtCore import QCoreApplication, QSignalBlocker, Qt, QTimer, Signal
+from PySide6.QtGui import QHideEvent, QShowEvent
+from PySide6.QtWidgets import (
+    QApplication,
+    QComboBox,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QVBoxLayout,
+    QWidget,
+)
+
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.build import named, push_button
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.theme import STEP_PX, State, state_look
+from cosmic.frame.overrides import override
+from cosmic.mico.api.mico import Mico
+from cosmic.mico.core.teleoperation.settings import TeleoperationProfileSettings
+from cosmic.mico.core.teleoperation.state import TeleoperationPhase, TeleoperationState
+from cosmic.mico.gui.input_bars import ForceBar, InputBars
+from cosmic.mico.gui.mapping_table import MappingTable
+from cosmic.mico.gui.phase_sign import PhaseSign
+from cosmic.mico.gui.steering_keys import SteeringKeys
+from cosmic.mico.hw.input_device import InputKind
+
+REFRESH_MS: Final = 40
+LOOK_MS: Final = 1000
+_RUNNING: Final = (
+    TeleoperationPhase.CENTRE,
+    TeleoperationPhase.ARMED,
+    TeleoperationPhase.STEERING,
+    TeleoperationPhase.PAUSED,
+)
+
+
+class TeleoperationPanel(QWidget):
+    """Chooses, starts, shows and edits; `Teleoperation` decides. GUI thread.
+
+    It tells `Teleoperation` when the program's windows lose the operator's attention.
+
+    Signals
+    -------
+    phase_changed(str)
+        What it is at, in words, such as "stopped: unplugged".
+    """
+
+    phase_changed = Signal(str)
+
+    def __init__(self, mico: Mico, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("TeleoperationPanel")
+        self._teleoperation = mico.teleoperation
+        self._app = _application()
+        settings = mico.application.manager.settings
+        self.devices = named(QComboBox(), "teleoperationDevice")
+        self.profiles = named(QComboBox(), "teleoperationProfile")
+        self.start = named(push_button("Start", ""), "teleoperationStart")
+        self.sign = PhaseSign()
+        self.rates = ElidedLabel()
+        self.bars = InputBars()
+        self.force = ForceBar()
+        self.table = MappingTable({each.name: each.kind for each in settings.positioner})
+        self.fine_share = named(QLineEdit(), "fineShare")
+        self.fine_button = named(QLineEdit(), "fineButton")
+        self.pace = QLabel("coarse")
+        self.message = ElidedLabel()
+        self.keys = SteeringKeys(self._app, self._teleoperation.sources.keys.keyboard, self)
+        self._words = ""
+        self._arrange()
+        self._connect()
+        self._show_profiles()
+        self.look_for_devices()
+        self.refresh()
+
+    # Putting it together
+
+    def _arrange(self) -> None:
+        self.devices.setAccessibleName("input device")
+        self.profiles.setAccessibleName("profile")
+        self.rates.setProperty("role", "dim")
+        for box in (self.devices, self.profiles):
+            box.setSizeAdjustPolicy(
+                QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+            )
+            box.setMinimumContentsLength(8)
+        choice = QHBoxLayout()
+        choice.setSpacing(STEP_PX)
+        choice.addWidget(self.devices, 3)
+        choice.addWidget(self.profiles, 2)
+        choice.addWidget(self.start)
+        told = QHBoxLayout()
+        told.setSpacing(STEP_PX)
+        told.addWidget(self.sign, 3)
+        told.addWidget(self.force, 2)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
+        column.setSpacing(STEP_PX)
+        column.addLayout(choice)
+        column.addLayout(told)
+        column.addLayout(self._fine_row())
+        column.addWidget(self.message)
+        column.addWidget(self.bars)
+        column.addWidget(self.table, 1)
+        self.message.hide()
+
+    def _fine_row(self) -> QHBoxLayout:
+        tips = (
+            (self.fine_share, "fine share", "Part of the speed that fine leaves, 0 to 1"),
+            (self.fine_button, "fine button", "Button that changes between fine and coarse"),
+        )
+        for edit, name, tip in tips:
+            edit.setAccessibleName(name)
+            edit.setToolTip(tip)
+        self.fine_share.setFixedWidth(7 * STEP_PX)
+        self.fine_button.setFixedWidth(17 * STEP_PX)
+        self.pace.setFixedWidth(self.pace.fontMetrics().horizontalAdvance("coarse") + STEP_PX)
+        row = QHBoxLayout()
+        row.setSpacing(STEP_PX // 2)
+        for widget in (self.pace, QLabel("fine:"), self.fine_share, QLabel("by"), self.fine_button):
+            row.addWidget(widget)
+        row.addWidget(self.rates, 1)
+        return row
+
+    def _connect(self) -> None:
+        self.start.clicked.connect(self._on_start)
+        self.profiles.currentIndexChanged.connect(self._on_profile_chosen)
+        self.table.changed.connect(self._on_table_changed)
+        self.table.refused.connect(self._say)
+        self.fine_share.editingFinished.connect(self._on_fine_edited)
+        self.fine_button.editingFinished.connect(self._on_fine_edited)
+        self._app.applicationStateChanged.connect(self._on_attention)
+        self._refresh_timer = QTimer(self, interval=REFRESH_MS)
+        self._refresh_timer.timeout.connect(self.refresh)
+        self._look_timer = QTimer(self, interval=LOOK_MS)
+        self._look_timer.timeout.connect(self.look_for_devices)
+
+    # Choosing
+
+    def look_for_devices(self) -> None:
+        """Show what is plugged in now; what was chosen stays chosen while it is there."""
+        if self._running(self._teleoperation.state):
+            return
+        found = self._teleoperation.devices()
+        entries = [(f"{info.title} ({info.kind})", info.key) for info in found]
+        shown = [
+            (self.devices.itemText(number), self.devices.itemData(number))
+            for number in range(self.devices.count())
+        ]
+        if entries != shown:
+            chosen = self.devices.currentData()
+            with QSignalBlocker(self.devices):
+                self.devices.clear()
+                for text, key in entries:
+                    self.devices.addItem(text, key)
+                self.devices.setCurrentIndex(max(0, self.devices.findData(chosen)))
+        self._allow()
+
+    def _show_profiles(self) -> None:
+        with QSignalBlocker(self.profiles):
+            for profile in self._teleoperation.profiles:
+                self.profiles.addItem(profile.name)
+        self._on_profile_chosen()
+
+    def _profile(self) -> TeleoperationProfileSettings | None:
+        name = self.profiles.currentText()
+        return self._teleoperation.profile(name) if name else None
+
+    def _on_profile_chosen(self) -> None:
+        profile = self._profile()
+        self.table.show_profile(profile)
+        if profile is not None:
+            self.fine_share.setText(f"{profile.fine_share:g}")
+            self.fine_button.setText(profile.fine_button)
+        self._allow()
+
+    def _allow(self) -> None:
+        running = self._running(self._teleoperation.state)
+        self.start.setText("Stop" if running else "Start")
+        self.devices.setEnabled(not running)
+        self.profiles.setEnabled(not running)
+        ready = bool(self.devices.count() and self.profiles.count())
+        self.start.setEnabled(running or ready)
+        if running:
+            tip = "End the steering: everything it moves stops"
+        elif ready:
+            tip = "Begin to steer; nothing moves before the sticks were at rest"
+        elif not self.profiles.count():
+            tip = "Not available: the platform file has no teleoperation profile"
+        else:
+            tip = "Not available: no input device is plugged in"
+        self.start.setToolTip(tip)
+
+    @staticmethod
+    def _running(state: TeleoperationState) -> bool:
+        return state.phase in _RUNNING
+
+    # Running
+
+    def _on_start(self) -> None:
+        self.message.hide()
+        if self._running(self._teleoperation.state):
+            self._teleoperation.stop()
+        else:
+            try:
+                self._on_attention()
+                self._teleoperation.start(self.devices.currentData(), self.profiles.currentText())
+            except CosmicError as exc:
+                self._say(str(exc))
+        self.refresh()
+
+    def _on_attention(self) -> None:
+        active = self._app.applicationState() == Qt.ApplicationState.ApplicationActive
+        self._teleoperation.set_focus(active)
+
+    def refresh(self) -> None:
+        """Show how it is now."""
+        self._on_attention()
+        state = self._teleoperation.state
+        self.sign.show_phase(state.phase, state.words)
+        self.bars.show_inputs(state.inputs)
+        self.force.show_force(state.force, state.slowed)
+        self.pace.setText("fine" if state.fine else "coarse")
+        self.table.show_state(state)
+        running = self._running(state)
+        rates = f"read {state.poll_hz:.0f} Hz, sent {state.command_hz:.0f} Hz"
+        self.rates.set_text(rates if running else "")
+        device = state.device
+        by_keys = device is not None and device.kind is InputKind.KEYBOARD
+        self.keys.set_enabled(running and by_keys)
+        if state.words != self._words:
+            self._words = state.words
+            self._allow()
+            self.phase_changed.emit(state.words)
+
+    # Editing
+
+    def _on_table_changed(self, row: int, key: str, value: object) -> None:
+        self._edit(lambda name: self._teleoperation.edit_axis(name, row, **{key: value}))
+
+    def _on_fine_edited(self) -> None:
+        profile = self._profile()
+        if profile is None:
+            return
+        share, button = self.fine_share.text().strip(), self.fine_button.text().strip()
+        if (share, button) != (f"{profile.fine_share:g}", profile.fine_button):
+            self._edit(
+                lambda name: self._teleoperation.edit_profile(
+                    name, fine_share=_number(share), fine_button=button
+                )
+            )
+
+    def _edit(self, action: Callable[[str], object]) -> None:
+        self.message.hide()
+        try:
+            action(self.profiles.currentText())
+        except CosmicError as exc:
+            self._say(str(exc))
+        self._on_profile_chosen()
+
+    def _say(self, text: str) -> None:
+        self.message.set_text(f"{state_look(State.REFUSED).glyph} {text}")
+        self.message.show()
+
+    # Coming and going
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self.look_for_devices()
+        self._refresh_timer.start()
+        self._look_timer.start()
+
+    @override
+    def hideEvent(self, event: QHideEvent) -> None:
+        super().hideEvent(event)
+        self._look_timer.stop()  # the other goes on: what is steered has to be paused when asked
+
+    def shut_down(self) -> None:
+        """End the steering and listen to no key any more; before the window goes."""
+        self._refresh_timer.stop()
+        self._look_timer.stop()
+        self._teleoperation.stop()
+        self.keys.unplug()
+
+
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def make_teleoperation_panel(mico: Mico) -> TeleoperationPanel:
+    """Return the panel that steers by an input device."""
+    return TeleoperationPanel(mico)
+
+
+def _application() -> QApplication:
+    app = QCoreApplication.instance()
+    if not isinstance(app, QApplication):
+        raise TypeError("widgets need a QApplication")
+    return app
