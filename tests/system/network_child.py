@@ -1,0 +1,59 @@
+"""What the tests of stations run in processes of their own; the first argument says which."""
+
+import sys
+
+from contract.station_rig import Application, connected, wait_until
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.line_settings import Line
+from cosmic.frame.network.server_listener import ServerListener
+from cosmic.frame.network.station import Station
+from cosmic.frame.network.transport import Rule
+from cosmic.frame.network.zenoh_wire import ZenohWire
+
+
+def say(text: str) -> None:
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
+
+
+def hold(endpoint: str) -> None:
+    """Take the lease, command a motion, and go on commanding as long as the process runs."""
+    with connected(endpoint, "holder") as client:
+        client.take_lease()
+        client.call("stage", "move", {"target_um": 0.0})
+        say("moving")
+        target_um = 0.0
+        while True:
+            target_um += 1.0
+            try:
+                client.call("stage", "move", {"target_um": target_um}, timeout_s=0.5)
+            except CosmicError as exc:
+                say(f"{type(exc).__name__}: {exc}")
+            wait_until(lambda: False, 0.02)
+
+
+def serve(endpoint: str) -> None:
+    """Serve a station until a line comes; then the main thread dies of an exception."""
+    station = Station("fibres", FailurePolicy())
+    station.host("stage", Application())
+    # Without a `with`, on purpose: whoever forgets it must not leave a process that answers.
+    line = Line(endpoint, listens=True, station="fibres")
+    listener = ServerListener(station, ZenohWire(line))
+    listener.start()
+    say("serving")
+    sys.stdin.readline()
+    raise RuntimeError("the main thread dies")
+
+
+def watch(endpoint: str) -> None:
+    """Subscribe, and take so long for each that the line fills."""
+    with connected(endpoint, "watcher") as client:
+        client.subscribe("frames", Rule.ALL, lambda _: wait_until(lambda: False, 5.0))
+        client.subscribe("frames", Rule.LATEST, lambda _: wait_until(lambda: False, 5.0))
+        say("watching")
+        sys.stdin.readline()
+
+
+if __name__ == "__main__":
+    {"hold": hold, "serve": serve, "watch": watch}[sys.argv[1]](*sys.argv[2:])
