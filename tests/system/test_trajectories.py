@@ -1,6 +1,7 @@
 """Trajectories on the twin: recorded, rehearsed, run, paused, broken and gone on with."""
 
 import io
+import runpy
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -471,3 +472,15 @@ def test_poses_are_taught_and_gone_to(rig: Rig) -> None:
     assert mico.poses.path is None  # the shipped configuration is nobody's to change
     mico.poses.remove("here")
     assert "here" not in mico.poses
+
+
+def test_the_example_records_repeats_and_tells_mistakes(
+    capsys: pytest.CaptureFixture[str], repository: Path
+) -> None:
+    runpy.run_path(str(repository / "examples" / "record_and_repeat.py"), run_name="__main__")
+    said = capsys.readouterr().out
+    assert "relative to pose fibre: left.x, left.y, left.z" in said
+    assert "rehearsed: allowed True, 4 statements" in said
+    assert "repeated: left.x is at -300 um" in said
+    assert "at the next fibre: left.x is at -800 um" in said
+    assert "line 4: left.gripper has no sensor" in said

@@ -3,7 +3,7 @@
 from typing import Final
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QComboBox, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
@@ -66,6 +66,7 @@ class PosesBox(QWidget):
 
     def _arrange(self) -> None:
         first, second = tight_row(STEP_PX), tight_row(STEP_PX)
+        first[1].addWidget(QLabel("Poses"))
         first[1].addWidget(self.poses, 1)
         for button in (self.go, self.way, self.remove):
             first[1].addWidget(button)

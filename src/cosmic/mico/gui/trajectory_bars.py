@@ -60,7 +60,7 @@ class RecordBar(QWidget):
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(STEP_PX)
-        for widget in (self.button, self.source, self.timed, QLabel("from"), self.pose):
+        for widget in (self.button, self.source, self.timed, QLabel("counted from"), self.pose):
             row.addWidget(widget)
         row.addWidget(self.told, 1)
         self.button.clicked.connect(self._on_clicked)

@@ -87,9 +87,8 @@ class TrajectoryLinesModel(QAbstractListModel):
 
     def _text(self, line: int, problem: str | None) -> str:
         width = len(str(len(self._lines)))
-        mark = state_look(State.BUSY).glyph if line == self._current else " "
-        if problem is not None:
-            mark = state_look(State.REFUSED).glyph
+        # Plain signs: others come from fonts of another width, and the text would jump.
+        mark = "!" if problem is not None else ">" if line == self._current else " "
         said = f"{mark} {line:>{width}}  {self._lines[line - 1].rstrip()}"
         return said if problem is None else f"{said}    {problem}"
 

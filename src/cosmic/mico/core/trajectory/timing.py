@@ -8,8 +8,8 @@ from cosmic.mico.core.orders import FREQUENCY_HZ, Motion, Step
 from cosmic.mico.core.settings import MotionDefaults
 from cosmic.mico.core.trajectory.binding import AxisFacts, nominal_step
 
-LANDING_S: Final = 0.06
-"""From standstill until it is known: an axis is asked some 20 times a second (measured)."""
+LANDING_S: Final = 0.025
+"""From standstill until it is known and the next line begins; measured on the twin."""
 
 
 def leg_times_s(
