@@ -1,7 +1,6 @@
 """Mode ECM: a move that something stands in the way of is led round it, on the word Go."""
 
 import logging
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from shutil import copytree
 
@@ -11,54 +10,17 @@ from PySide6.QtWidgets import QCheckBox, QPushButton, QToolButton
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.operator_window import OperatorWindow
-from cosmic.app.platform import build_platform
 from cosmic.app.platform_file import load_platform
 from cosmic.app.way_bar import Stage, WayBar, way_text
 from cosmic.app.way_guide import poses_along
 from cosmic.frame.config import shipped_config_dir
-from cosmic.frame.log import RingBufferHandler
 from cosmic.mico.api.ways import Way
-from cosmic.mico.gui.mico_widget import MicoWidget, make_mico_gui
-from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
-from cosmic.mico.gui.scene.scene_widget import SceneWidget
-from gui.mico.panels import click, enter, field, part, position, show, wait_for_position
+from gui.app.windows import Make, card, mico, scene
+from gui.mico.panels import click, enter, field, part, position, wait_for_position
 
-Make = Callable[..., OperatorWindow]
 LEFT = Qt.MouseButton.LeftButton
 BLOCKED_FROM = {"left.x": 4000.0, "left.y": -2000.0, "right.x": -4500.0}
 """Where the right gripper stands between left.y -2000 and 2000."""
-
-
-@pytest.fixture
-def stored(tmp_path: Path) -> QSettings:
-    return QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
-
-
-@pytest.fixture
-def make(qtbot: QtBot, stored: QSettings) -> Iterator[Make]:
-    made: list[OperatorWindow] = []
-
-    def make_window(*, rate: float = 20.0, config: Path | None = None) -> OperatorWindow:
-        platform = build_platform(config, applications=("mico",), rate=rate, mico_gui=make_mico_gui)
-        window = OperatorWindow(platform, stored, RingBufferHandler(), console=False)
-        made.append(window)
-        qtbot.addWidget(window)
-        show(qtbot, window)
-        window.open_hardware()
-        return window
-
-    yield make_window
-    for window in made:
-        window.close()
-
-
-@pytest.fixture
-def window(make: Make, qtbot: QtBot) -> OperatorWindow:
-    """A window whose axes are ready."""
-    window = make()
-    qtbot.waitUntil(lambda: "µm" in window.top_bar.clearance_text, timeout=8000)
-    scene(window, qtbot)
-    return window
 
 
 @pytest.fixture
@@ -69,25 +31,8 @@ def blocked(window: OperatorWindow, qtbot: QtBot) -> OperatorWindow:
     return window
 
 
-def mico(window: OperatorWindow) -> MicoWidget:
-    assert window.mico_gui is not None
-    return window.mico_gui
-
-
-def scene(window: OperatorWindow, qtbot: QtBot) -> SceneWidget:
-    panel = window.scene_panel
-    assert panel is not None
-    qtbot.waitUntil(lambda: panel.scene is not None)
-    assert panel.scene is not None
-    return panel.scene
-
-
 def bar(window: OperatorWindow) -> WayBar:
     return part(window, "wayBar", WayBar)
-
-
-def card(window: OperatorWindow, axis: str = "left.y") -> PositionerBaseGUI:
-    return mico(window).cards[axis]
 
 
 def place(window: OperatorWindow, qtbot: QtBot) -> None:
@@ -152,7 +97,7 @@ def test_in_mcm_a_blocked_move_is_refused_with_a_hint(window: OperatorWindow, qt
     assert "right_" in reason(window)
     assert "In mode ECM a way round can be looked for" in reason(window)
     assert bar(window).stage is Stage.NONE
-    assert position(card(window)) == pytest.approx(-2000.0, abs=1.0)
+    assert position(card(window, "left.y")) == pytest.approx(-2000.0, abs=1.0)
 
 
 def test_a_refusal_that_no_way_would_help_has_no_hint(window: OperatorWindow, qtbot: QtBot) -> None:
@@ -176,7 +121,7 @@ def test_in_ecm_a_way_is_offered_and_gone_on_the_word_go(
 
     click(qtbot, shown, "wayGo")
     assert shown.stage is Stage.GOING
-    wait_for_position(qtbot, card(blocked), 2000.0)
+    wait_for_position(qtbot, card(blocked, "left.y"), 2000.0)
     qtbot.waitUntil(lambda: shown.stage is Stage.NONE, timeout=8000)
     assert not shown.isVisible()
     assert scene(blocked, qtbot).content.planned == ()
@@ -187,29 +132,29 @@ def test_in_ecm_a_way_is_offered_and_gone_on_the_word_go(
 
 def test_a_free_move_in_ecm_is_made_at_once(blocked: OperatorWindow, qtbot: QtBot) -> None:
     go_to(blocked, qtbot, "-1900")
-    wait_for_position(qtbot, card(blocked), -1900.0)
+    wait_for_position(qtbot, card(blocked, "left.y"), -1900.0)
     assert bar(blocked).stage is Stage.NONE
 
 
 def test_a_blocked_move_by_a_distance_leads_from_where_the_axis_stands(
     blocked: OperatorWindow, qtbot: QtBot
 ) -> None:
-    card(blocked).axis.set_zero()
-    qtbot.waitUntil(lambda: abs(position(card(blocked))) < 1.0)
-    enter(qtbot, field(card(blocked), "MiCoCL_8"), "4000")
-    click(qtbot, card(blocked), "MiCoCL_6")
+    card(blocked, "left.y").axis.set_zero()
+    qtbot.waitUntil(lambda: abs(position(card(blocked, "left.y"))) < 1.0)
+    enter(qtbot, field(card(blocked, "left.y"), "MiCoCL_8"), "4000")
+    click(qtbot, card(blocked, "left.y"), "MiCoCL_6")
     shown = bar(blocked)
     qtbot.waitUntil(lambda: shown.stage is Stage.FOUND, timeout=8000)
     click(qtbot, shown, "wayGo")
-    wait_for_position(qtbot, card(blocked), 4000.0)
-    assert card(blocked).axis.details.position == pytest.approx(2000.0, abs=2.0)
+    wait_for_position(qtbot, card(blocked, "left.y"), 4000.0)
+    assert card(blocked, "left.y").axis.details.position == pytest.approx(2000.0, abs=2.0)
     qtbot.waitUntil(lambda: shown.stage is Stage.NONE, timeout=8000)
 
 
 def test_a_blocked_move_in_parts_is_led_round_as_well(
     blocked: OperatorWindow, qtbot: QtBot
 ) -> None:
-    part(card(blocked), "MiCoCL_10", QCheckBox).setChecked(True)
+    part(card(blocked, "left.y"), "MiCoCL_10", QCheckBox).setChecked(True)
     find(blocked, qtbot)
 
 
@@ -277,12 +222,12 @@ def test_stop_on_the_way_ends_it(make: Make, stored: QSettings, qtbot: QtBot) ->
     qtbot.mousePress(part(window.top_bar, "stopButton", QPushButton), LEFT)
     qtbot.waitUntil(lambda: window.top_bar.latched and not moving(window))
     qtbot.waitUntil(lambda: shown.stage is Stage.NONE, timeout=8000)
-    stood = position(card(window))
+    stood = position(card(window, "left.y"))
     assert stood < 1990.0
     click(qtbot, window.top_bar, "resetButton")
     qtbot.waitUntil(lambda: not window.top_bar.latched)
     qtbot.wait(150)
-    assert position(card(window)) == pytest.approx(stood, abs=1.0)
+    assert position(card(window, "left.y")) == pytest.approx(stood, abs=1.0)
 
 
 def test_stop_takes_an_offer_away(blocked: OperatorWindow, qtbot: QtBot) -> None:
@@ -302,7 +247,7 @@ def test_cancel_on_the_way_stops_there(make: Make, qtbot: QtBot) -> None:
     qtbot.waitUntil(lambda: moving(window))
     click(qtbot, shown, "wayCancel")
     qtbot.waitUntil(lambda: shown.stage is Stage.NONE and not moving(window), timeout=8000)
-    assert position(card(window)) < 1990.0
+    assert position(card(window, "left.y")) < 1990.0
     assert not window.top_bar.latched
 
 
@@ -310,13 +255,13 @@ def test_go_looks_again_when_an_axis_moved_since(blocked: OperatorWindow, qtbot:
     shown = find(blocked, qtbot)
     go_to(blocked, qtbot, "500", "left.z")
     wait_for_position(qtbot, card(blocked, "left.z"), 500.0)
-    stood = position(card(blocked))
+    stood = position(card(blocked, "left.y"))
     click(qtbot, shown, "wayGo")
     assert shown.stage is Stage.SEARCHING
     qtbot.waitUntil(lambda: shown.stage is Stage.FOUND, timeout=8000)
-    assert position(card(blocked)) == pytest.approx(stood, abs=1.0)
+    assert position(card(blocked, "left.y")) == pytest.approx(stood, abs=1.0)
     click(qtbot, shown, "wayGo")
-    wait_for_position(qtbot, card(blocked), 2000.0)
+    wait_for_position(qtbot, card(blocked, "left.y"), 2000.0)
     assert position(card(blocked, "left.z")) == pytest.approx(500.0, abs=1.0)
     qtbot.waitUntil(lambda: shown.stage is Stage.NONE, timeout=8000)
 
@@ -331,7 +276,7 @@ def test_a_way_that_is_blocked_meanwhile_is_left_with_the_reason(
     qtbot.waitUntil(lambda: shown.stage is Stage.ENDED, timeout=8000)
     assert "was left" in shown.text
     assert "right_" in shown.text
-    assert position(card(blocked)) < 0.0
+    assert position(card(blocked, "left.y")) < 0.0
     assert scene(blocked, qtbot).content.planned == ()
 
 

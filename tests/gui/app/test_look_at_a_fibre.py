@@ -1,57 +1,26 @@
 """The tutorial "look at a fibre and measure it", done in the window."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, QSettings, Qt
+from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtWidgets import QCheckBox
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.operator_window import OperatorWindow
-from cosmic.app.platform import build_platform
-from cosmic.frame.log import RingBufferHandler
-from cosmic.mico.gui.mico_widget import make_mico_gui
-from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
 from cosmic.vico.api.vico import Vico
 from cosmic.vico.gui.camera_view import CameraView
 from cosmic.vico.gui.lens_panel import LensPanel
-from cosmic.vico.gui.vico_gui import make_vico_gui
-from gui.mico.panels import click, enter, field, show, wait_for_position
+from gui.app.windows import Make, drive, wait_until_ready
 
 LEFT = Qt.MouseButton.LeftButton
 PIXEL = (1250.0, 640.0)
 
 
 @pytest.fixture
-def window(qtbot: QtBot, tmp_path: Path) -> Iterator[OperatorWindow]:
-    platform = build_platform(
-        None,
-        applications=("mico", "vico"),
-        rate=6.0,
-        mico_gui=make_mico_gui,
-        vico_gui=make_vico_gui,
-    )
-    stored = QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
-    window = OperatorWindow(platform, stored, RingBufferHandler(), console=False)
-    qtbot.addWidget(window)
-    show(qtbot, window, 1600, 1000)
-    window.open_hardware()
-    qtbot.waitUntil(lambda: "µm" in window.top_bar.clearance_text, timeout=15_000)
-    yield window
-    window.close()
-
-
-def card(window: OperatorWindow, axis: str) -> PositionerBaseGUI:
-    assert window.mico_gui is not None
-    return window.mico_gui.cards[axis]
-
-
-def drive(window: OperatorWindow, qtbot: QtBot, axis: str, target_um: float) -> None:
-    enter(qtbot, field(card(window, axis), "MiCoCL_8"), str(target_um))
-    click(qtbot, card(window, axis), "MiCoCL_9")
-    wait_for_position(qtbot, card(window, axis), target_um)
+def window(make: Make, qtbot: QtBot) -> OperatorWindow:
+    window = make(applications=("mico", "vico"), rate=6.0, size=(1600, 1000))
+    wait_until_ready(window, qtbot)
+    return window
 
 
 def zoom(api: Vico) -> float | None:

@@ -1,41 +1,25 @@
 """The tutorial "measure a force", done in the window."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QSettings, Qt
+from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 import cosmic
 from cosmic.app.instrument_panels import DAQCO
 from cosmic.app.operator_window import OperatorWindow
-from cosmic.app.platform import build_platform
-from cosmic.daqco.gui.main_widget import UDaqMainWidget, make_daqco_gui
-from cosmic.frame.log import RingBufferHandler
-from cosmic.mico.gui.mico_widget import make_mico_gui
-from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
-from gui.mico.panels import click, enter, field, show, wait_for_position
+from cosmic.daqco.gui.main_widget import UDaqMainWidget
+from gui.app.windows import Make, card, drive, go_to, wait_until_ready
 
 LEFT = Qt.MouseButton.LeftButton
 
 
 @pytest.fixture
-def window(qtbot: QtBot, tmp_path: Path) -> Iterator[OperatorWindow]:
-    platform = build_platform(
-        applications=("mico", "daqco"),
-        rate=4.0,
-        mico_gui=make_mico_gui,
-        daqco_gui=make_daqco_gui,
-    )
-    stored = QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
-    window = OperatorWindow(platform, stored, RingBufferHandler(), console=False)
-    qtbot.addWidget(window)
-    show(qtbot, window)
-    window.open_hardware()
-    qtbot.waitUntil(lambda: "µm" in window.top_bar.clearance_text, timeout=8000)
-    yield window
-    window.close()
+def window(make: Make, qtbot: QtBot) -> OperatorWindow:
+    window = make(applications=("mico", "daqco"), rate=4.0)
+    wait_until_ready(window, qtbot)
+    return window
 
 
 def daqco(window: OperatorWindow) -> UDaqMainWidget:
@@ -43,21 +27,6 @@ def daqco(window: OperatorWindow) -> UDaqMainWidget:
     assert found is not None
     window.dock(DAQCO).raise_()
     return found
-
-
-def card(window: OperatorWindow, axis: str) -> PositionerBaseGUI:
-    assert window.mico_gui is not None
-    return window.mico_gui.cards[axis]
-
-
-def go_to(window: OperatorWindow, qtbot: QtBot, axis: str, target_um: float) -> None:
-    enter(qtbot, field(card(window, axis), "MiCoCL_8"), str(target_um))
-    click(qtbot, card(window, axis), "MiCoCL_9")
-
-
-def drive(window: OperatorWindow, qtbot: QtBot, axis: str, target_um: float) -> None:
-    go_to(window, qtbot, axis, target_um)
-    wait_for_position(qtbot, card(window, axis), target_um)
 
 
 def test_the_probe_is_pushed_recorded_and_stopped_by_its_limit(

@@ -1,26 +1,24 @@
 """Whichever way a command comes in, the same gate says the same words."""
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 
 import pytest
-from PySide6.QtCore import QSettings, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.operator_window import OperatorWindow
-from cosmic.app.platform import build_platform
 from cosmic.app.rig import Rig
 from cosmic.frame.errors import MoveRefused
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.log import RingBufferHandler
 from cosmic.frame.overrides import override
 from cosmic.frame.threads import WorkerThread
 from cosmic.frame.verdict import MoveVerdict, Reason
 from cosmic.mico.core.collision.answer import Approach
-from cosmic.mico.gui.mico_widget import MicoWidget, make_mico_gui
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
-from gui.mico.panels import click, enter, field, part, position, show, wait_for_position
+from gui.app.windows import Make
+from gui.app.windows import mico as panel
+from gui.mico.panels import click, enter, field, part, position, wait_for_position
 
 AXIS = "left.z"
 NEAR_UM = 30.0
@@ -30,22 +28,11 @@ BEYOND_UM = 60.0
 
 
 @pytest.fixture
-def window(qtbot: QtBot, tmp_path: Path) -> Iterator[OperatorWindow]:
-    platform = build_platform(applications=("mico",), rate=10.0, mico_gui=make_mico_gui)
-    settings = QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
-    window = OperatorWindow(platform, settings, RingBufferHandler())
-    qtbot.addWidget(window)
-    show(qtbot, window)
-    window.open_hardware()
+def window(make: Make, qtbot: QtBot) -> OperatorWindow:
+    window = make(rate=10.0, console=True)
     forward = part(panel(window).cards[AXIS], "MiCoCL_6", QPushButton)
     qtbot.waitUntil(forward.isEnabled, timeout=8000)
-    yield window
-    window.close()
-
-
-def panel(window: OperatorWindow) -> MicoWidget:
-    assert window.mico_gui is not None
-    return window.mico_gui
+    return window
 
 
 class Script(WorkerThread):

@@ -1,6 +1,3 @@
-from collections.abc import Callable, Iterator
-from pathlib import Path
-
 import pytest
 from PySide6.QtCore import QSettings, Qt
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPushButton, QWidget
@@ -8,52 +5,18 @@ from pytestqt.qtbot import QtBot
 
 from cosmic.app.hint_bar import HintBar
 from cosmic.app.operator_window import OperatorWindow
-from cosmic.app.platform import Platform, build_platform
+from cosmic.app.platform import Platform
 from cosmic.app.platform_file import load_platform
 from cosmic.frame.clock import WALL, RatedClock
 from cosmic.frame.errors import DeviceError, DeviceFault, MoveCancelled, StoppedError
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.log import RingBufferHandler
 from cosmic.frame.threads import running_threads
 from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.gui.mico_widget import MicoWidget, make_mico_gui
-from gui.mico.panels import click, enter, field, part, position, show, wait_for_position
+from gui.app.windows import Make, mico
+from gui.mico.panels import click, enter, field, part, position, wait_for_position
 from unit.mico.rigs import settings as small_settings
 from unit.mico.scripted_controller import ScriptedController
-
-Make = Callable[..., OperatorWindow]
-
-
-@pytest.fixture
-def stored(tmp_path: Path) -> QSettings:
-    return QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
-
-
-@pytest.fixture
-def make(qtbot: QtBot, stored: QSettings) -> Iterator[Make]:
-    made: list[OperatorWindow] = []
-
-    def make_window(
-        platform: Platform | None = None, *, rate: float = 20.0, console: bool = False
-    ) -> OperatorWindow:
-        platform = platform or build_platform(
-            applications=("mico",), rate=rate, mico_gui=make_mico_gui
-        )
-        window = OperatorWindow(platform, stored, RingBufferHandler(), console=console)
-        made.append(window)
-        qtbot.addWidget(window)
-        show(qtbot, window)
-        return window
-
-    yield make_window
-    for window in made:
-        window.close()
-
-
-def mico(window: OperatorWindow) -> MicoWidget:
-    panel = window.mico_gui
-    assert panel is not None
-    return panel
 
 
 def ready(window: OperatorWindow, qtbot: QtBot) -> MicoWidget:
@@ -73,14 +36,14 @@ def moving(panel: MicoWidget, qtbot: QtBot) -> None:
 
 
 def test_the_window_stands_before_the_hardware_is_there(make: Make, qtbot: QtBot) -> None:
-    window = make()
+    window = make(hardware=False)
     forward = part(mico(window).cards["left.x"], "MiCoCL_6", QPushButton)
     assert not forward.isEnabled()
     ready(window, qtbot)
 
 
 def test_the_bar_says_what_is_in_force(make: Make) -> None:
-    window = make(rate=20.0)
+    window = make(rate=20.0, hardware=False)
     texts = [label.text() for label in window.top_bar.findChildren(QLabel) if label.isVisible()]
     said = " | ".join(texts)
     for wanted in ("SIMULATED", "controls: this window", "×20"):
@@ -89,7 +52,7 @@ def test_the_bar_says_what_is_in_force(make: Make) -> None:
 
 
 def test_stop_latches_with_its_reason_and_reset_lets_go(make: Make, qtbot: QtBot) -> None:
-    window = make(rate=4.0)
+    window = make(rate=4.0, hardware=False)
     panel = ready(window, qtbot)
     moving(panel, qtbot)
     card = panel.cards["left.x"]
@@ -111,7 +74,7 @@ def test_stop_latches_with_its_reason_and_reset_lets_go(make: Make, qtbot: QtBot
 def test_f12_stops_from_a_text_field_and_escape_only_takes_the_entry_back(
     make: Make, qtbot: QtBot
 ) -> None:
-    window = make(rate=4.0)
+    window = make(rate=4.0, hardware=False)
     panel = ready(window, qtbot)
     moving(panel, qtbot)
     entry = field(panel.cards["right.x"], "MiCoCL_8")
@@ -127,7 +90,7 @@ def test_f12_stops_from_a_text_field_and_escape_only_takes_the_entry_back(
 
 
 def test_a_failure_anywhere_stands_in_the_bar(make: Make, qtbot: QtBot) -> None:
-    window = make()
+    window = make(hardware=False)
     window.platform.policy.report(DeviceError("the cable is out"), "device 7")
     qtbot.waitUntil(lambda: "the cable is out" in window.top_bar.message)
     assert not window.top_bar.latched
@@ -135,7 +98,7 @@ def test_a_failure_anywhere_stands_in_the_bar(make: Make, qtbot: QtBot) -> None:
 
 @pytest.mark.defects
 def test_a_defect_stops_everything(make: Make, qtbot: QtBot) -> None:
-    window = make(rate=4.0)
+    window = make(rate=4.0, hardware=False)
     panel = ready(window, qtbot)
     moving(panel, qtbot)
     window.platform.policy.report(ValueError("a mistake"), "somewhere")
@@ -146,7 +109,7 @@ def test_a_defect_stops_everything(make: Make, qtbot: QtBot) -> None:
 def test_closing_while_something_moves_ends_everything_in_time(
     make: Make, qtbot: QtBot, stored: QSettings
 ) -> None:
-    window = make(rate=1.0, console=True)
+    window = make(rate=1.0, console=True, hardware=False)
     panel = ready(window, qtbot)
     moving(panel, qtbot)
     movement = panel.cards["left.x"].axis.set(5000.0)
@@ -159,7 +122,7 @@ def test_closing_while_something_moves_ends_everything_in_time(
 
 
 def test_closing_while_initialising_ends_in_time(make: Make, qtbot: QtBot) -> None:
-    window = make(rate=1.0)
+    window = make(rate=1.0, hardware=False)
     panel = ready(window, qtbot)
     panel.initialise()
     qtbot.waitUntil(lambda: any(axis.details.in_motion for axis in panel.mico))
@@ -170,7 +133,7 @@ def test_closing_while_initialising_ends_in_time(make: Make, qtbot: QtBot) -> No
 
 
 def test_the_console_moves_the_same_platform(make: Make, qtbot: QtBot) -> None:
-    window = make(console=True)
+    window = make(console=True, hardware=False)
     panel = ready(window, qtbot)
     console = window.console
     assert console is not None
@@ -182,7 +145,7 @@ def test_the_console_moves_the_same_platform(make: Make, qtbot: QtBot) -> None:
 
 
 def test_interrupting_the_console_halts_what_moves(make: Make, qtbot: QtBot) -> None:
-    window = make(rate=2.0, console=True)
+    window = make(rate=2.0, console=True, hardware=False)
     panel = ready(window, qtbot)
     console = window.console
     assert console is not None
@@ -196,7 +159,7 @@ def test_interrupting_the_console_halts_what_moves(make: Make, qtbot: QtBot) -> 
 
 
 def test_keys_typed_into_the_console_move_nothing(make: Make, qtbot: QtBot) -> None:
-    window = make(console=True)
+    window = make(console=True, hardware=False)
     panel = ready(window, qtbot)
     console = window.console
     assert console is not None
@@ -213,20 +176,20 @@ def takes_keys(widget: QWidget) -> bool:
 def test_the_hint_is_dismissed_once_and_for_all(
     make: Make, qtbot: QtBot, stored: QSettings
 ) -> None:
-    first = make()
+    first = make(hardware=False)
     hint = first.findChild(HintBar)
     assert hint is not None
     assert hint.isVisible()
     click(qtbot, hint, "gotIt")
     assert not hint.isVisible()
     first.close()
-    again = make().findChild(HintBar)
+    again = make(hardware=False).findChild(HintBar)
     assert again is not None
     assert not again.isVisible()
 
 
 def test_every_key_is_listed(make: Make, qtbot: QtBot) -> None:
-    window = make()
+    window = make(hardware=False)
     window.show_keys()
     dialog = next(w for w in QApplication.topLevelWidgets() if w.windowTitle() == "Keys")
     assert dialog.isVisible()
@@ -258,7 +221,7 @@ def scripted_platform(controller: ScriptedController) -> Platform:
 
 def test_closing_stops_the_hardware_before_it_lets_go(make: Make, qtbot: QtBot) -> None:
     controller = ScriptedController(("LLN",), instant=False)
-    window = make(scripted_platform(controller))
+    window = make(scripted_platform(controller), hardware=False)
     window.open_hardware()
     card = mico(window).cards["d0.c0"]
     qtbot.waitUntil(part(card, "MiCoCL_6", QPushButton).isEnabled)
@@ -274,7 +237,7 @@ def test_a_controller_that_is_not_there_greys_the_panel_until_a_rescan(
     make: Make, qtbot: QtBot
 ) -> None:
     controller = Deaf(("LLN",))
-    window = make(scripted_platform(controller))
+    window = make(scripted_platform(controller), hardware=False)
     dock = window.dock("MiCo")
     window.open_hardware()
     qtbot.waitUntil(lambda: "no device answers" in dock.failure)

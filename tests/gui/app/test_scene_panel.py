@@ -1,8 +1,5 @@
 """The panel "Scene" in the operator's window."""
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
-
 import pytest
 from PySide6.QtCore import QSettings, Qt
 from PySide6.QtWidgets import QLabel, QPushButton
@@ -11,66 +8,13 @@ from pytestqt.qtbot import QtBot
 from cosmic.app.operator_window import SCENE, OperatorWindow
 from cosmic.app.platform import build_platform
 from cosmic.app.scene_facts import bodies_moved_by
-from cosmic.app.scene_panel import ScenePanel
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.log import RingBufferHandler
 from cosmic.mico.core.collision.collision_manager import CollisionManager
-from cosmic.mico.gui.mico_widget import MicoWidget, make_mico_gui
+from cosmic.mico.gui.mico_widget import make_mico_gui
 from cosmic.mico.gui.scene.scene_widget import SceneWidget
+from gui.app.windows import Make, mico, scene, scene_panel
 from gui.mico.panels import click, enter, field, part, position, show, wait_for_position
-
-Make = Callable[..., OperatorWindow]
-
-
-@pytest.fixture
-def stored(tmp_path: Path) -> QSettings:
-    return QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
-
-
-@pytest.fixture
-def make(qtbot: QtBot, stored: QSettings) -> Iterator[Make]:
-    made: list[OperatorWindow] = []
-
-    def make_window(*, rate: float = 20.0, cold: bool = False) -> OperatorWindow:
-        platform = build_platform(
-            applications=("mico",), rate=rate, cold=cold, mico_gui=make_mico_gui
-        )
-        window = OperatorWindow(platform, stored, RingBufferHandler(), console=False)
-        made.append(window)
-        qtbot.addWidget(window)
-        show(qtbot, window)
-        window.open_hardware()
-        return window
-
-    yield make_window
-    for window in made:
-        window.close()
-
-
-@pytest.fixture
-def window(make: Make, qtbot: QtBot) -> OperatorWindow:
-    """A window whose scene is there, and whose axes are ready."""
-    window = make()
-    scene(window, qtbot)
-    qtbot.waitUntil(lambda: "µm" in window.top_bar.clearance_text, timeout=8000)
-    return window
-
-
-def mico(window: OperatorWindow) -> MicoWidget:
-    assert window.mico_gui is not None
-    return window.mico_gui
-
-
-def scene_panel(window: OperatorWindow) -> ScenePanel:
-    assert window.scene_panel is not None
-    return window.scene_panel
-
-
-def scene(window: OperatorWindow, qtbot: QtBot) -> SceneWidget:
-    qtbot.waitUntil(lambda: scene_panel(window).scene is not None)
-    found = scene_panel(window).scene
-    assert found is not None
-    return found
 
 
 def model(window: OperatorWindow) -> CollisionManager:
