@@ -41,6 +41,7 @@ from cosmic.mico.api.trajectory_recording import TrajectoryRecording
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
+from cosmic.mico.core.links import Link
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.poses import Pose
 from cosmic.mico.core.positioner import Confidence, PositionerState, Status
@@ -48,6 +49,7 @@ from cosmic.mico.core.teleoperation.state import TeleoperationPhase, Teleoperati
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 from cosmic.mico.core.trajectory.model import Trajectory, TrajectoryError
 from cosmic.mico.core.trajectory.rehearsal import Rehearsal
+from cosmic.mico.core.undo import UndoEntry
 from cosmic.mico.hw.input_device import Feedback, InputInfo, InputKind, InputState
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
 from cosmic.vico.api.camera import CameraHandle, Seen
@@ -66,6 +68,8 @@ CLASSES: Final[dict[str, type]] = {
     "Collision": Collision,
     "Approach": Approach,
     "Way": Way,
+    "Link": Link,
+    "UndoEntry": UndoEntry,
     "Trajectories": Trajectories,
     "TrajectoryRecording": TrajectoryRecording,
     "Trajectory": Trajectory,
@@ -157,6 +161,8 @@ MADE_LATER: Final = {
     "Control": ("settings",),
     "Axis": ("commander",),
     "Approach": ("bodies", "distance_um", "places_um", "pose"),
+    "Link": ("first", "second", "ratio"),
+    "UndoEntry": ("group", "before", "number"),
     "Way": ("start", "waypoints", "method", "length", "straight_length", "duration_s"),
     "GroupMovement": ("movements",),
     "MoveStatus": ("movement",),

@@ -14,6 +14,7 @@ from cosmic.daqco.core.settings import (
     LimitSettings,
     ScaleSettings,
 )
+from cosmic.mico.core.link_settings import LinkSettings
 from cosmic.mico.core.sequence.settings import InitialisationSettings, StepSettings
 from cosmic.mico.core.settings import (
     GroupSettings,
@@ -73,6 +74,7 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[[mico.teleoperation.profile]]": TeleoperationProfileSettings,
     "[[mico.teleoperation.profile.axis]]": TeleoperationAxisSettings,
     "[[mico.group]]": GroupSettings,
+    "[[mico.link]]": LinkSettings,
     "[[mico.positioner]]": PositionerSettings,
     "[daqco]": DaqcoSettings,
     "[[daqco.scale]]": ScaleSettings,

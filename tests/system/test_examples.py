@@ -113,3 +113,26 @@ def test_a_force_is_held_changed_and_let_go(said: str) -> None:
     assert period.startswith("period: ")
     assert ended == "ended: asked to"
     assert "travel" in limit
+
+
+@example("initialise.py")
+def test_a_cold_platform_is_initialised_step_by_step(said: str) -> None:
+    lines = said.splitlines()
+    assert lines[0] == "at power-up 0 of 9 positions are known"
+    assert lines[1].startswith("refused: left.x: its position is unknown")
+    assert "after initialising 9 of 9 positions are known" in lines
+    again = lines[lines.index("once more, skipping what is known:") :]
+    assert not any("referencing" in line for line in again[:-1])
+    assert lines[-1].endswith("To do: reset the stop, then initialise again")
+
+
+@example("scan_with_force.py")
+def test_a_plan_scans_the_force_keeps_pictures_and_is_refused_a_collision(said: str) -> None:
+    lines = said.splitlines()
+    assert lines[:2] == ["push: allowed", "into the probe: COLLISION, left_jaw_a and probe_tip"]
+    forces_un = [float(line.split()[1]) for line in lines[3:12]]
+    assert forces_un == sorted(forces_un) or max(forces_un[:3]) < 3.0
+    assert 80.0 < forces_un[-1] < 178.0
+    assert 1.0 < float(lines[12].split()[1]) < 4.0
+    assert "pictures: 9" in lines
+    assert lines[-1].startswith("the plan failed: left.x: left_jaw_a would come within")
