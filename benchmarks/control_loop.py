@@ -49,7 +49,7 @@ def bare(cycles: int) -> PaceStatistics:
 def errors_un(loop: ControlHandle, hold_s: float) -> tuple[float, float]:
     """Return how far the mean over 0.1 s was off, and the greatest such, while a force is held."""
     WALL.sleep(hold_s)
-    trace = loop.trace(hold_s)
+    trace = loop.trace(0.95 * hold_s)
     width = max(1, round(0.1 / PERIOD_S))
     off = trace.measured - trace.set_point
     means = np.convolve(off, np.ones(width) / width, mode="valid")
