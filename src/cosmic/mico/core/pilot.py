@@ -203,9 +203,11 @@ class ChannelPilot(ChannelFollower):
             return float(FREQUENCY_HZ[1])
         return self._frequency_hz * self._nominal_step()
 
-    def _limit_jog_speed(self, speed: float) -> None:
+    def _limit_jog_speed(self, jog: JogRun) -> None:
         """Have the axis glide from packet to packet, not leap and wait."""
-        wanted_hz = math.ceil(GLIDE * speed / self._nominal_step())
+        step = self._nominal_step()
+        glide = jog.glide(step) if isinstance(jog, SteerRun) else GLIDE
+        wanted_hz = math.ceil(glide * jog.speed / step)
         self._limit_speed(max(FREQUENCY_HZ[0], min(wanted_hz, self._frequency_hz)))
 
     def renew(self, order_number: int) -> None:
@@ -242,7 +244,7 @@ class ChannelPilot(ChannelFollower):
         if grant is not None:
             replaced = self._begin(order, grant, jog=jog)
             try:
-                self._limit_jog_speed(jog.speed)
+                self._limit_jog_speed(jog)
                 self._send(packet, grant)
             finally:
                 self._tell_begun(order, replaced)
@@ -272,7 +274,7 @@ class ChannelPilot(ChannelFollower):
             return
         jog.follow_hand()
         if jog.must_look() and jog.slow_down(self._free_share(flight.order, jog)):
-            self._quietly(lambda: self._limit_jog_speed(jog.speed))
+            self._quietly(lambda: self._limit_jog_speed(jog))
         packet = jog.packet(self._positioner.state, now_s)
         if packet is None:
             self._end_jog(jog.lost)

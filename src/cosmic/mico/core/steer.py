@@ -17,6 +17,10 @@ PACKET_PERIOD_S: Final = 0.007
 """Least time between two packets, on the wall clock: a hand is followed more than 100 times/s."""
 LOOK_PERIOD_S: Final = 0.04
 LOCATE_PERIOD_S: Final = 0.02
+NEAR_STEPS: Final = 10.0
+"""Closer than so many steps to its target an axis is slow, so that it is let go faster there."""
+GLIDE: Final = 1.5
+CREEPING_GLIDE: Final = 7.5
 _CHANGE: Final = 0.05
 """Part of the speed by which it must change before the axis is told."""
 _OLDEST_S: Final = 0.1
@@ -81,6 +85,11 @@ class SteerRun(JogRun):
             return False
         self._looked_wall_s = now_s
         return True
+
+    def glide(self, step: float) -> float:
+        """Return how much faster than asked the axis may go, `step` being its nominal step."""
+        reach = SHARE * self.speed * self._settings.jog.packet_s
+        return GLIDE if reach > NEAR_STEPS * step else CREEPING_GLIDE
 
     def must_locate(self) -> bool:
         """Return True when the position should be asked for again."""
