@@ -22,6 +22,9 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.api.mico import Mico
 
 MARGIN: Final = 0.5
+CYCLES: Final = 3.0
+"""From a move until its force is seen it takes so many cycles at least."""
+RESPONSE: Final = 4.0
 LEAST_MARGIN_UN: Final = 20.0
 """Where nobody gives a limit: so far beyond the set point, as a part of it and at least."""
 
@@ -179,7 +182,7 @@ class Control:
         ConfigError, UnknownAxisError, LimitError, NotAvailable, StoppedError
             As `hold_force`.
         """
-        settings = self.settings
+        settings = self._changed()
         check_inside(source, "", set_point, limits)
         if not 0.0 < tolerance < math.inf:
             raise ConfigError(f"tolerance must be a number above 0, got {tolerance!r}")
@@ -222,20 +225,23 @@ class Control:
     def _changed(self, **changes: float | None) -> ControlSettings:
         fields = {name: value for name, value in changes.items() if value is not None}
         try:
-            return ControlSettings.model_validate(self.settings.model_dump() | fields)
+            settings = ControlSettings.model_validate(self.settings.model_dump() | fields)
         except ValueError as exc:
             raise ConfigError(f"a loop cannot be made: {exc}") from None
+        # On a fast clock the same cycles are longer: the force comes later, and all goes slower.
+        latency_s = max(settings.latency_s, CYCLES * self._rate / settings.rate_hz)
+        response_s = max(settings.response_s, RESPONSE * latency_s)
+        return settings.model_copy(update={"latency_s": latency_s, "response_s": response_s})
 
-    @staticmethod
     def _channel(
-        daqco: Daqco, name: str, settings: ControlSettings, limits: tuple[float, float]
+        self, daqco: Daqco, name: str, settings: ControlSettings, limits: tuple[float, float]
     ) -> ChannelSource:
         low, high = limits
         return ChannelSource(
             daqco,
             name,
             stale_s=settings.stale_s,
-            pause_s=settings.latency_s,
+            pause_s=self.settings.latency_s,
             low=low,
             high=high,
         )
