@@ -3,7 +3,6 @@
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
     QCheckBox,
     QHBoxLayout,
@@ -29,8 +28,9 @@ _GLYPHS: Final = {
     StepState.SKIPPED: "–",
     StepState.FAILED: state_look(State.ERROR).glyph,
 }
-_LOOKS: Final = {StepState.RUNNING: State.BUSY, StepState.FAILED: State.ERROR}
+_LOUD: Final = (StepState.RUNNING, StepState.FAILED)
 _ROWS: Final = 6
+_START_TIP: Final = "Make these steps, one after the other"
 
 
 class InitialisationPanel(QWidget):
@@ -75,7 +75,7 @@ class InitialisationPanel(QWidget):
         self._skip = named(QCheckBox("skip what is known"), "skipKnown")
         tipped(self._skip, "Look for no position that is known already")
         self._skip.toggled.connect(self.preview)
-        self._start = named(push_button("Start", "Make these steps, one after the other"), "start")
+        self._start = named(push_button("Start", _START_TIP), "start")
         self._start.clicked.connect(self.start)
         self._close = named(push_button("Hide", "Hide the steps; what runs goes on"), "hideSteps")
         self._close.clicked.connect(self.hide)
@@ -172,6 +172,7 @@ class InitialisationPanel(QWidget):
         asked = self._asker is not None and bool(report.question)
         self._text.setText(report.question)
         self._question.setVisible(asked)
+        self._show_usable(running=any(each.state is StepState.RUNNING for each in report.steps))
         while self._list.count() > len(report.steps):
             self._list.takeItem(self._list.count() - 1)
         for number, step in enumerate(report.steps):
@@ -182,6 +183,11 @@ class InitialisationPanel(QWidget):
         height = max(self._list.sizeHintForRow(0), 2 * STEP_PX)
         self._list.setFixedHeight(rows * height + 2 * self._list.frameWidth() + 2)
 
+    def _show_usable(self, *, running: bool) -> None:
+        self._start.setEnabled(not running)
+        self._start.setToolTip("Not available: they are being made" if running else _START_TIP)
+        self._skip.setEnabled(not running)
+
     def _show_step(self, number: int, step: StepReport) -> None:
         item = self._list.item(number)
         note = f": {step.note}" if step.note else ""
@@ -190,12 +196,9 @@ class InitialisationPanel(QWidget):
             return
         item.setText(text)
         item.setToolTip(f"{step.state}: {step.title}{note}")
-        look = _LOOKS.get(step.state)
-        item.setData(
-            Qt.ItemDataRole.ForegroundRole,
-            QColor(state_look(look).colour) if look is not None else None,
-        )
-        if step.state in _LOOKS:
+        loud = step.state in _LOUD
+        item.setFont(ui_font(bold=loud))
+        if loud:
             self._list.scrollToItem(item)
 
 
