@@ -2,6 +2,7 @@
 
 import io
 import runpy
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,12 @@ import pytest
 from PySide6.QtCore import Qt
 from typing_extensions import override
 
+from cosmic.app.platform import build_platform
 from cosmic.app.rig import Rig, connect
 from cosmic.frame.clock import WALL
+from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.errors import (
+    ConfigError,
     DeviceError,
     MoveCancelled,
     MoveRefused,
@@ -401,6 +405,26 @@ def test_one_trajectory_runs_at_a_time(mico: Mico) -> None:
     with pytest.raises(MoveCancelled):
         player.wait(2.0)
     assert mico.trajectories.player is player
+
+
+def test_an_axis_that_draws_another_one_along_is_refused(mico: Mico) -> None:
+    mico.link("left.x", "right.x")
+    with pytest.raises(NotAvailable, match="unlink them first"):
+        mico.trajectories.run(written("left.x to 50 um\n"))
+    mico.trajectories.run(written("together\nleft.x to 50 um\nright.x to 50 um\nend\n"))
+    assert where(mico, "left.x", "right.x") == pytest.approx([50.0, 50.0], abs=1.0)
+
+
+def test_poses_are_kept_beside_the_platform_file(tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    shutil.copytree(shipped_config_dir(), folder)
+    platform = build_platform(folder, applications=("mico",))
+    assert platform.mico is not None
+    assert platform.mico.trajectories.poses.path == folder / "poses.toml"
+    platform.shut_down()
+    (folder / "poses.toml").write_text("[home]\nx = 'far'\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"poses\.toml: home\.x"):
+        build_platform(folder, applications=("mico",))
 
 
 # With the collision model

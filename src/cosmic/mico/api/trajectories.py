@@ -183,6 +183,8 @@ class Trajectories:
         ------
         TrajectoryError
             It does not fit the platform.
+        NotAvailable
+            One of its axes is linked to one that it does not move.
         """
         return self._site.rehearse(
             self._bound(trajectory),
@@ -193,6 +195,12 @@ class Trajectories:
         )
 
     def _bound(self, trajectory: Trajectory) -> Bound:
+        axes = trajectory.axes
+        for link in self._site.manager.links.links:
+            # The rehearsal would know nothing of the axis that is drawn along.
+            if (link.first in axes) != (link.second in axes):
+                text = f"{link.first} and {link.second} are linked, and it moves only one of them"
+                raise NotAvailable(f"{trajectory.name}: {text}; unlink them first")
         return bind(trajectory, self._site.facts(), self._site.positions())
 
     def prepare(
@@ -210,7 +218,8 @@ class Trajectories:
         TrajectoryError
             The trajectory does not fit the platform.
         NotAvailable
-            Another trajectory is running.
+            Another trajectory is running, or one of its axes is linked to one that it does not
+            move.
         """
         running = self._site.player
         if running is not None and running.state is PlayState.RUNNING:

@@ -223,6 +223,7 @@ class TrajectoryPlayer:
                 raise NotAvailable(f"{self.trajectory.name}: it is {self._state}")
             if start == "refuse":
                 self._run.refuse_away()
+            self._run.heed_stops()
             task = self._site.worker.begin(self.trajectory.name, self._play)
             control = self._control
             control.pausing, control.one_line, control.start = False, one_line, start

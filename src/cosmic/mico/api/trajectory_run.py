@@ -74,6 +74,10 @@ class TrajectoryRun:
         wanted = self.places.wanted(self.following, begun=self.begun)
         self.places.refuse_away(wanted, begun=self.begun)
 
+    def heed_stops(self) -> None:
+        """Have every stop from now on end what is played next."""
+        self._epoch = self._site.manager.latch.state.epoch
+
     def change_speed(self, factor: float) -> None:
         """Go on at another speed; any thread, under the control's lock."""
         self._mark = (self._clock.now_s(), self._time_s())
@@ -90,7 +94,6 @@ class TrajectoryRun:
             What ended it.
         """
         self.at_line = False
-        self._epoch = self._site.manager.latch.state.epoch
         self._mark = (self._clock.now_s(), self._mark[1] if self.begun else 0.0)
         try:
             self._prepare(task, say)
@@ -132,6 +135,7 @@ class TrajectoryRun:
             self.places.refuse_away(wanted, begun=self.begun)
         say("going to where it begins")
         for waypoint in self.places.waypoints(wanted, self._control.start):
+            self._look_for_stop(task)
             self.mover.go_to(waypoint, task)
 
     def _begin_again(self, task: Task, say: Callable[[str], None]) -> None:

@@ -24,9 +24,9 @@ from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
 
 SOURCES: Final[dict[str, tuple[str, ...] | None]] = {
     "everything": None,
-    "window and keys": ("window", "key"),
-    "gamepad": ("gamepad", "teleoperation", "joystick", "haptic"),
-    "scripts": ("script",),
+    "window and keys": ("window", "key", "click"),
+    "gamepad": ("teleoperation",),
+    "console and scripts": ("console", "script"),
 }
 NO_POSE: Final = "no pose"
 _MOST_LOOPS: Final = 9999

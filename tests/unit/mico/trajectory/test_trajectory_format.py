@@ -193,8 +193,8 @@ def test_reading_tells_how_far_it_is() -> None:
 
 words = st.sampled_from(
     ["left.x", "to", "by", "12.5 um", "-1e308 mm", "nan", "together", "end", "wait", "0.5 s",
-     "t=1 s", "steps", "speed", "relative to pose", "start", ",", "#", "platform", "µm", "100 V", "1 kHz",
-     "\x00", "\u2028", "end of recording", "²", "\ufeff", "9" * 400]
+     "t=1 s", "steps", "speed", "relative to pose", "start", ",", "#", "platform", "µm", "100 V",
+     "1 kHz", "\x00", "\u2028", "end of recording", "²", "\ufeff", "9" * 400]
 )  # fmt: skip
 lines = st.lists(st.lists(words | st.text(max_size=8), max_size=6).map(" ".join), max_size=8)
 
