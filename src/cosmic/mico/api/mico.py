@@ -343,7 +343,7 @@ class Mico:
         """Steering by a gamepad, keys or a haptic device; one for the whole program."""
         return self._application.teleoperation
 
-    # Trajectories and poses (SCM)
+    # Trajectories and named poses
 
     @property
     def trajectories(self) -> Trajectories:
