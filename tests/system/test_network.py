@@ -22,7 +22,7 @@ from contract.station_rig import (
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import Failure, FailurePolicy
-from cosmic.frame.network.addresses import asks
+from cosmic.frame.network.addresses import asks, greetings
 from cosmic.frame.network.certificates import make_certificates
 from cosmic.frame.network.codec import encode
 from cosmic.frame.network.errors import StationAway
@@ -203,15 +203,20 @@ def test_what_breaks_the_rules_is_refused_and_logged_and_nobody_else_notices(
         honest = stack.enter_context(connected(served.endpoint, "honest"))
         wire = ZenohWire(Line(served.endpoint, False, "fibres"))
         stack.callback(wire.close)
-        key = asks("fibres", "rude/1")
+        door, key = greetings("fibres", "rude/1"), asks("fibres", "rude/1")
 
-        def ask(message: bytes) -> tuple[float, object, CosmicError | None]:
+        def ask(message: bytes, key: str = key) -> tuple[float, object, CosmicError | None]:
             return read_answer(wire.ask(key, message, timeout_s=2.0))
 
-        assert wait_until(lambda: _answers(wire, key, b"hm"))
-        assert isinstance(ask(b"hm")[2], CosmicError), "not let in yet"
-        _, welcome, _ = ask(request("", "", "", {}, order="hello"))
+        assert wait_until(lambda: _answers(wire, door, b"hm"))
+        with pytest.raises(StationAway):
+            ask(b"hm")
+        for message in bad_messages(""):
+            assert isinstance(ask(message, door)[2], CosmicError), "it has to greet first"
+        _, welcome, _ = ask(request("", "", "", {}, order="hello"), door)
         assert isinstance(welcome, dict)
+        assert isinstance(ask(request("", "", "", {}, order="hello"), door)[2], CosmicError)
+        assert wait_until(lambda: _answers(wire, key, b"hm"))
         token = welcome["token"]
         for number, message in enumerate(bad_messages(token)):
             error = ask(message)[2]
@@ -238,7 +243,7 @@ def test_a_huge_message_is_dropped_and_nobody_else_notices(served: Served) -> No
         line = Line(served.endpoint, False, "fibres", shared_memory=False)
         wire = ZenohWire(line)
         stack.callback(wire.close)
-        key = asks("fibres", "rude/1")
+        key = greetings("fibres", "rude/1")
         assert wait_until(lambda: _answers(wire, key, b"hm"))
         with pytest.raises(CosmicError):
             wire.ask(key, b"\0" * 20_000_000, timeout_s=0.3)
@@ -286,7 +291,8 @@ def test_connections_leave_no_thread_no_file_and_no_memory(served: Served, count
             assert client.call("stage", "add", {"a": 1.0}) == 2.0
 
     def files() -> int:
-        return len(list(Path("/proc/self/fd").iterdir()))
+        # The engine gathers up its pages of shared memory now and then, not at once.
+        return sum(".zenoh" not in each for each in _open_files())
 
     def threads() -> int:
         return len(list(Path("/proc/self/task").iterdir()))
@@ -310,21 +316,18 @@ def test_connections_leave_no_thread_no_file_and_no_memory(served: Served, count
     assert grown_kb < 40_000
 
 
-def _sockets_of_this_process() -> set[str]:
-    found = set()
+def _open_files() -> list[str]:
+    found = []
     for each in Path("/proc/self/fd").iterdir():
-        target = ""
         with suppress(OSError):
-            target = str(each.readlink())
-        if target.startswith("socket:["):
-            found.add(target[8:-1])
+            found.append(str(each.readlink()))
     return found
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks into /proc")
 def test_nothing_listens_beyond_this_computer(served: Served) -> None:
     with connected(served.endpoint):
-        own = _sockets_of_this_process()
+        own = {each[8:-1] for each in _open_files() if each.startswith("socket:[")}
         listening_at = set()
         for table, state in (("tcp", "0A"), ("tcp6", "0A"), ("udp", "07"), ("udp6", "07")):
             for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:

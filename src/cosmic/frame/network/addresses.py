@@ -3,8 +3,13 @@
 from cosmic.frame.network.transport import Rule
 
 
-def asks(station: str, client: str = "**") -> str:
-    """Where a client (its name, a slash and its number) asks."""
+def greetings(station: str, client: str = "**") -> str:
+    """Where a client (its name, a slash and its number) asks to be let in."""
+    return f"cosmic/{station}/hello/{client}"
+
+
+def asks(station: str, client: str) -> str:
+    """Where a client that was let in asks."""
     return f"cosmic/{station}/ask/{client}"
 
 

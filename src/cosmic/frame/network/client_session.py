@@ -9,9 +9,9 @@ from typing import Any, Final
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import ProtocolError
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.network.addresses import asks, client_signs, session_events
+from cosmic.frame.network.addresses import asks, client_signs, greetings, session_events
 from cosmic.frame.network.delivery import InboxReader
-from cosmic.frame.network.errors import StationTimeout
+from cosmic.frame.network.errors import StationAway, StationTimeout
 from cosmic.frame.network.freshness import StationTime
 from cosmic.frame.network.messages import Order, Request, read_answer
 from cosmic.frame.network.station import checked_name
@@ -90,7 +90,7 @@ class ClientSession:
         client = f"{self._name}/{secrets.token_hex(8)}"
         with self._lock:
             self._time.forget()
-            self._key, self._number, self._token = asks(self._station, client), 0, ""
+            self._key, self._number, self._token = greetings(self._station, client), 0, ""
         self._sign = wire.sign(client_signs(self._station, client))
         inbox = wire.inlet(session_events(self._station, client), Rule.ALL)
         name = f"{self._station} tells"
@@ -100,8 +100,23 @@ class ClientSession:
         said = self.ask(wire, hello, GREETING_LIMIT_S)
         if not isinstance(said, dict) or not isinstance(said.get("token"), str):
             raise ProtocolError("the station greets in a way that this program does not know")
-        self._token = said["token"]
+        self._token, self._key = said["token"], asks(self._station, client)
+        self._find_handler(wire)
         return said.get("hosted")
+
+    def _find_handler(self, wire: Wire) -> None:
+        """Wait until what we ask reaches the handler, which has only just been made."""
+        until_s = self._clock.now_s() + GREETING_LIMIT_S
+        beat = What(Order.BEAT, "", "", {}, valid_s=GREETING_LIMIT_S)
+        while True:
+            try:
+                self.ask(wire, beat, GREETING_LIMIT_S)
+            except StationAway:
+                if self._clock.now_s() > until_s:
+                    raise
+                self._clock.sleep(0.005)
+            else:
+                return
 
     def end(self) -> None:
         """Take back what shows the station that this client is here; it notices at once."""

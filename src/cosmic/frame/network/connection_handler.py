@@ -3,28 +3,26 @@
 import logging
 import secrets
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Final
 
 from typing_extensions import override
 
 from cosmic.frame.errors import CosmicError, ProtocolError
 from cosmic.frame.network.caller import Access, Caller
-from cosmic.frame.network.delivery import Backlog, InboxClosed
+from cosmic.frame.network.delivery import Inbox, InboxClosed
 from cosmic.frame.network.errors import CallRefused
 from cosmic.frame.network.freshness import SequenceGuard, check_age
+from cosmic.frame.network.invoker import Busy
 from cosmic.frame.network.messages import Order, Request, answer, read_request, refusal_of
 from cosmic.frame.network.ongoing import Tickets
 from cosmic.frame.network.outbox import Outbox
 from cosmic.frame.network.station import Station
-from cosmic.frame.network.transport import Rule
 from cosmic.frame.network.wire import Outlet, Question
 from cosmic.frame.threads import WorkerThread
 
 logger = logging.getLogger(__name__)
 
-WAITING_LIMIT: Final = 256
-"""The most calls that a client may have waiting."""
 Route = Callable[[str, Callable[[], None]], None]
 
 
@@ -55,14 +53,22 @@ class ConnectionHandler(WorkerThread):
 
     Parameters
     ----------
-    route : callable
-        `route(application, job)` has the job carried out in the application's thread.
+    questions : Inbox
+        What this client asks.
     outlet : Outlet
         Where this client alone hears how its tasks go on.
+    route : callable
+        `route(application, job)` has the job carried out in the application's thread.
     """
 
     def __init__(
-        self, client: Client, station: Station, route: Route, outbox: Outbox, outlet: Outlet
+        self,
+        client: Client,
+        station: Station,
+        questions: Inbox[Question],
+        outbox: Outbox,
+        outlet: Outlet,
+        route: Route,
     ) -> None:
         super().__init__(f"{station.name} serves {client.name}", station.policy)
         self._client = client
@@ -70,7 +76,7 @@ class ConnectionHandler(WorkerThread):
         self._route = route
         self._outlet = outlet
         self._caller = Caller(client.name, secrets.token_hex(16), client.access)
-        self._questions: Backlog[Question] = Backlog(Rule.ALL, max_items=WAITING_LIMIT)
+        self._questions = questions
         self._tickets = Tickets(lambda event: outbox.send(outlet, event))
         self._guard = SequenceGuard()
         self._heard_s = station.clock.now_s()
@@ -89,11 +95,6 @@ class ConnectionHandler(WorkerThread):
     def silent_s(self) -> float:
         """How long nothing has come from the client."""
         return self._station.clock.now_s() - self._heard_s
-
-    def put(self, question: Question) -> None:
-        """Take a question; returns at once."""
-        if not self._questions.put(question):
-            self._refuse(question, CallRefused("too many calls wait already"))
 
     def lose_motion(self, why: str) -> None:
         """End what the client moves and take the lease from it; any thread."""
@@ -189,10 +190,10 @@ class ConnectionHandler(WorkerThread):
         def still_wanted() -> None:
             check_age(self._station.clock, request.until_s, what)
 
-        def carry_out() -> None:
+        def carry_out(*, wait: bool = True) -> None:
             try:
                 result = invoker.invoke(
-                    self._caller, request.function, request.arguments, still_wanted
+                    self._caller, request.function, request.arguments, still_wanted, wait=wait
                 )
                 self._answer(question, self._tickets.wrap(result, moves=found.mark.moves))
             except CosmicError as exc:
@@ -203,6 +204,10 @@ class ConnectionHandler(WorkerThread):
             carry_out()
             return
         still_wanted()
+        if found.mark.reads:
+            with suppress(Busy):
+                carry_out(wait=False)
+                return
         self._route(request.application, carry_out)
 
     def _answer(self, question: Question, value: object) -> None:

@@ -14,6 +14,10 @@ from cosmic.frame.network.remote import Offered, offered_by
 logger = logging.getLogger(__name__)
 
 
+class Busy(Exception):  # noqa: N818 - never leaves the station
+    """Another call to the application is being carried out."""
+
+
 class ApplicationInvoker:
     """Checks and carries out the calls to one application, one after the other.
 
@@ -74,6 +78,8 @@ class ApplicationInvoker:
         function: object,
         arguments: Mapping[str, object],
         still_wanted: Callable[[], None] | None = None,
+        *,
+        wait: bool = True,
     ) -> object:
         """Carry out one call and return its result.
 
@@ -81,6 +87,8 @@ class ApplicationInvoker:
         ----------
         still_wanted : callable or None
             Called last before the function; raises when it is too late.
+        wait : bool
+            False raises `Busy` where another call is being carried out.
 
         Raises
         ------
@@ -92,8 +100,12 @@ class ApplicationInvoker:
         checked = found.checked(arguments)
         if found.mark.at_once:
             return self._run(caller, found, checked, still_wanted)
-        with self._turn:
+        if not self._turn.acquire(blocking=wait):
+            raise Busy
+        try:
             return self._run(caller, found, checked, still_wanted)
+        finally:
+            self._turn.release()
 
     def _run(
         self,

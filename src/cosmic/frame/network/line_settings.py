@@ -5,7 +5,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from cosmic.frame.errors import ConfigError
-from cosmic.frame.network.addresses import asks, client_signs, session_events, station_sign
+from cosmic.frame.network.addresses import (
+    asks,
+    client_signs,
+    greetings,
+    session_events,
+    station_sign,
+)
 from cosmic.frame.network.codec import MESSAGE_LIMIT_BYTES
 from cosmic.frame.network.messages import PUBLISH_LIMIT_BYTES
 
@@ -145,10 +151,17 @@ def _access_control(station: str, clients: tuple[str, ...]) -> dict[str, Any]:
     rules = []
     for name in clients:
         its_own = f"{name}/*"
+        ways = (greetings(station, its_own), asks(station, its_own))
         rules += [
-            _rule(f"{name} asks", ["query"], "ingress", asks(station, its_own)),
-            _rule(f"{name} is answered", ["reply"], "egress", asks(station, its_own)),
-            _rule(f"{name} finds where to ask", ["declare_queryable"], "egress", asks(station)),
+            _rule(f"{name} asks", ["query"], "ingress", *ways),
+            _rule(f"{name} is answered", ["reply"], "egress", *ways),
+            _rule(
+                f"{name} finds where to ask",
+                ["declare_queryable"],
+                "egress",
+                greetings(station),
+                asks(station, its_own),
+            ),
             _rule(
                 f"{name} shows itself",
                 ["liveliness_token"],

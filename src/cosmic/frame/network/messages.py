@@ -76,6 +76,7 @@ class Request:
         )
 
 
+_ORDERS = frozenset(order.value for order in Order)
 _KINDS = (str, str, int, float, float, str, str, dict)
 
 
@@ -91,7 +92,7 @@ def read_request(message: bytes) -> Request:
     if not isinstance(parts, list) or [type(each) for each in parts] != list(_KINDS):
         raise ProtocolError("a broken request came")
     order, *rest = parts
-    if order not in set(Order) or not all(isinstance(name, str) for name in rest[-1]):
+    if order not in _ORDERS or not all(isinstance(name, str) for name in rest[-1]):
         raise ProtocolError("a broken request came")
     if order != Order.PUBLISH and len(message) > CALL_LIMIT_BYTES:
         raise ProtocolError(f"a call of {len(message)} bytes came; {CALL_LIMIT_BYTES} are allowed")

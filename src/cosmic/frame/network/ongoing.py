@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from threading import Lock
 from typing import Final, Protocol, runtime_checkable
 
+import numpy as np
+
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.network.errors import CallRefused, RemoteDefect
 from cosmic.frame.network.transfer import transferable
@@ -19,6 +21,7 @@ logger = logging.getLogger(__name__)
 transferable(Progress)
 
 _MOST_TICKETS: Final = 256
+_PLAIN: Final = (float, int, str, bytes, list, tuple, dict, np.ndarray, type(None))
 
 
 @runtime_checkable
@@ -74,7 +77,7 @@ class Tickets:
         CallRefused
             Too much goes on for this session; what came last was cancelled.
         """
-        if not isinstance(result, Ongoing):
+        if isinstance(result, _PLAIN) or not isinstance(result, Ongoing):
             return result
         number = secrets.token_hex(8)
         with self._lock:

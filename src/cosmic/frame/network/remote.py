@@ -47,7 +47,7 @@ def remote(
     moves : bool
         It moves something: only the holder of the lease may call it.
     reads : bool
-        It changes nothing: anybody may call it, and it is not in the log.
+        It changes nothing and returns at once: anybody may call it, and it is not in the log.
     at_once : bool
         It overtakes every other call, as `stop` does; it must return at once.
     limit_s : float

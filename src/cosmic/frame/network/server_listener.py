@@ -13,6 +13,7 @@ from cosmic.frame.network.addresses import (
     asks,
     client_of,
     client_signs,
+    greetings,
     session_events,
     station_sign,
 )
@@ -80,7 +81,7 @@ class ServerListener(WorkerThread):
     def run_body(self) -> None:
         name, policy = self._station.name, self._station.policy
         questions = InboxReader(
-            f"{name} hears", policy, self._wire.questions(asks(name)), self._sort
+            f"{name} hears", policy, self._wire.questions(greetings(name)), self._greet
         )
         signs = InboxReader(
             f"{name} watches", policy, self._wire.signs(client_signs(name)), self._on_sign
@@ -135,14 +136,10 @@ class ServerListener(WorkerThread):
             lane.thread.join()
         self._remove, self._readers = [], []
 
-    # Questions, in the thread "hears"
+    # Greetings, in the thread "hears"
 
-    def _sort(self, question: Question) -> None:
+    def _greet(self, question: Question) -> None:
         key = client_of(question.key)
-        handler = self._handlers.get(key)
-        if handler is not None:
-            handler.put(question)
-            return
         try:
             self._let_in(key, question)
         except CosmicError as exc:
@@ -151,24 +148,33 @@ class ServerListener(WorkerThread):
 
     def _let_in(self, key: str, question: Question) -> None:
         if read_request(question.message).order is not Order.HELLO:
-            raise CallRefused("the session is unknown: connect again")
+            raise ProtocolError("a client has to greet first")
         name, _, number = key.partition("/")
         access = self._access(name)
         if access is None:
             raise CallRefused(f"{name} is not on the list of those who may connect")
         if not (name and number) or "/" in number:
             raise ProtocolError("a client without a name")
-        outlet = self._wire.outlet(session_events(self._station.name, key), Rule.ALL)
-        client = Client(key, name, access)
-        handler = ConnectionHandler(client, self._station, self._run_in, self._outbox, outlet)
         with self._lock:
+            if key in self._handlers:
+                raise CallRefused("this session is here already")
             if len(self._handlers) >= CLIENTS_LIMIT or self.end_requested:
-                outlet.close()
                 raise CallRefused(f"{CLIENTS_LIMIT} clients are here already")
-            self._handlers[key] = handler
+            handler = self._handlers[key] = self._made_handler(Client(key, name, access))
         handler.start()
         self._station.note_client(key, Presence(name, here=True))
         handler.greet(question)
+
+    def _made_handler(self, client: Client) -> ConnectionHandler:
+        name = self._station.name
+        return ConnectionHandler(
+            client,
+            self._station,
+            self._wire.questions(asks(name, client.key)),
+            self._outbox,
+            self._wire.outlet(session_events(name, client.key), Rule.ALL),
+            self._run_in,
+        )
 
     def _run_in(self, application: str, job: Callable[[], None]) -> None:
         with self._lock:
