@@ -1,6 +1,7 @@
-"""The control mode of a window: MCM, or ECM where there is a collision model (thesis 3.4)."""
+"""The control mode of a window: MCM, SCM, or ECM with a collision model (thesis 3.4)."""
 
 import logging
+from collections.abc import Mapping
 from typing import Final
 
 from PySide6.QtCore import QObject, QSettings, Signal
@@ -10,6 +11,7 @@ from cosmic.frame.gui.top_bar import TopBar
 logger = logging.getLogger(__name__)
 
 MCM: Final = "MCM"
+SCM: Final = "SCM"
 ECM: Final = "ECM"
 _KEY: Final = "window/mode"
 
@@ -23,8 +25,8 @@ class ControlMode(QObject):
         Where it is shown and chosen.
     settings : QSettings
         Where it is kept for the next start.
-    why_no_ecm : str
-        Why ECM cannot be chosen; empty when it can.
+    blocked : mapping of str to str
+        Modes that cannot be chosen, and why.
 
     Signals
     -------
@@ -35,14 +37,19 @@ class ControlMode(QObject):
     changed = Signal(str)
 
     def __init__(
-        self, bar: TopBar, settings: QSettings, why_no_ecm: str, parent: QObject | None = None
+        self,
+        bar: TopBar,
+        settings: QSettings,
+        blocked: Mapping[str, str],
+        parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
         self._bar = bar
         self._settings = settings
         self._mode = MCM
-        self._available = (MCM,) if why_no_ecm else (MCM, ECM)
-        bar.set_mode_available(ECM, why_no_ecm)
+        self._available = tuple(mode for mode in (MCM, SCM, ECM) if mode not in blocked)
+        for each in (SCM, ECM):
+            bar.set_mode_available(each, blocked.get(each, ""))
         bar.mode_requested.connect(self.choose)
 
     @property

@@ -10,6 +10,7 @@ from cosmic.vico.gui.vico_gui import VicoGui
 
 DAQCO: Final = "DAQCo"
 LENS: Final = "Lens and light"
+NARROW_SCREEN_PX: Final = 1600
 _SHARES: Final = [1, 1]
 """How scene and force share their column."""
 _ABOVE_LENS: Final = [3, 1]
@@ -45,7 +46,11 @@ def add_instruments(
     if first:
         window.add_panel(first, views[0], Qt.DockWidgetArea.RightDockWidgetArea, scroll=False)
     if first and scene:
-        window.splitDockWidget(window.dock(first), window.dock(scene), Qt.Orientation.Horizontal)
+        picture, other = window.dock(first), window.dock(scene)
+        if window.screen().availableGeometry().width() < NARROW_SCREEN_PX:
+            window.tabifyDockWidget(picture, other)
+        else:
+            window.splitDockWidget(picture, other, Qt.Orientation.Horizontal)
     if force is not None:
         _add_force(window, force, first or scene if low else scene or first, low=low)
     if first and pictures is not None:

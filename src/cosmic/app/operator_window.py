@@ -8,10 +8,11 @@ from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
 import cosmic
 from cosmic.app.collision_bar import CollisionBar
-from cosmic.app.control_mode import ECM, ControlMode
+from cosmic.app.control_mode import ECM, SCM, ControlMode
 from cosmic.app.hint_bar import HintBar, first_steps
 from cosmic.app.instrument_panels import add_instruments
 from cosmic.app.platform import Platform
+from cosmic.app.procedure_panels import TRAJECTORIES, ProcedurePanels
 from cosmic.app.rig import Rig
 from cosmic.app.scene_panel import ScenePanel
 from cosmic.app.way_bar import Stage, WayBar
@@ -37,6 +38,7 @@ LOW_SCREEN_PX: Final = 1000
 CONSOLE: Final = "Console"
 SCENE: Final = "Scene"
 
+NO_MICO: Final = "nothing here moves"
 NO_ECM: Final = f"{NO_COLLISION_MODEL}; name a scene in the platform file"
 
 _WITH_PICTURE: Final = [5, 5, 4]
@@ -87,7 +89,9 @@ class OperatorWindow(CosmicServerGui):
         super().__init__(settings, stop_key=stop_key, theme=theme)
         self.setWindowTitle(f"CoSMic: {platform.file.platform.name}")
         self._platform = platform
+        self._rig = Rig(platform, source="console")
         self._console: ConsolePanel | None = None
+        self._procedures: ProcedurePanels | None = None
         self._mico_gui: MicoWidget | None = None
         self._scene: ScenePanel | None = None
         self._guide: WayGuide | None = None
@@ -95,7 +99,13 @@ class OperatorWindow(CosmicServerGui):
         self._forget_policy = platform.policy.subscribe(self._bridge.tell_failure)
         self._stop_filter = StopKeyFilter(_application(), stop_key, self)
         self._add_mico(settings)
-        self._add_instruments()
+        pictures = self._add_instruments()
+        if self._mico_gui is not None:
+            self._procedures = ProcedurePanels(
+                self, self._mico_gui.mico, self._rig.control, beside=SCENE
+            )
+        if pictures:
+            self.dock(pictures).raise_()
         self._mode = self._make_mode(settings)
         self._add_log(ring, console=console)
         self._connect_all()
@@ -128,14 +138,18 @@ class OperatorWindow(CosmicServerGui):
         self._guide.offered.connect(self._on_way_offered)
 
     def _make_mode(self, settings: QSettings) -> ControlMode:
-        watched = self._mico_gui is not None and self._mico_gui.collision.has_model
-        mode = ControlMode(self.top_bar, settings, "" if watched else NO_ECM, self)
+        blocked = {}
+        if self._mico_gui is None:
+            blocked[SCM] = NO_MICO
+        if self._mico_gui is None or not self._mico_gui.collision.has_model:
+            blocked[ECM] = NO_ECM
+        mode = ControlMode(self.top_bar, settings, blocked, self)
         mode.changed.connect(self._on_mode_changed)
         mode.restore()
         return mode
 
-    def _add_instruments(self) -> None:
-        """Picture and force stand in the middle, what belongs to the scene on the right."""
+    def _add_instruments(self) -> str:
+        """Put picture and lens in the middle, force below the scene; return the picture's title."""
         platform, low = self._platform, self.screen().availableGeometry().height() < LOW_SCREEN_PX
         if platform.mico is None:
             self.top_bar.set_collision_model(present=True)  # nothing moves that could collide
@@ -149,18 +163,20 @@ class OperatorWindow(CosmicServerGui):
             scene,
             low=low,
         )
-        columns = [title for title in (MICO if scene else "", pictures, scene) if title]
+        behind = self.tabifiedDockWidgets(self.dock(pictures)) if pictures else []
+        aside = scene if scene and self.dock(scene) not in behind else ""
+        columns = [title for title in (MICO if scene else "", pictures, aside) if title]
         shares = _WITH_PICTURE if pictures else _SHARES
         self.share_out(columns, shares[: len(columns)], Qt.Orientation.Horizontal)
+        return pictures
 
     def _add_log(self, ring: RingBufferHandler, *, console: bool) -> None:
         below = Qt.DockWidgetArea.BottomDockWidgetArea
         self.add_panel(LOG_TITLE, LogPanel(ring), below, scroll=False)
         if console:
-            rig = Rig(self._platform, source="console")
             self._console = ConsolePanel(
                 self._platform.policy,
-                {"rig": rig, "cosmic": cosmic},
+                {"rig": self._rig, "cosmic": cosmic},
                 on_interrupt=self.halt_all,
                 banner='Python console: try rig.mico["left.x"].move_by("0.2 mm"). '
                 "Ctrl+C or Interrupt breaks what runs.\n",
@@ -212,8 +228,13 @@ class OperatorWindow(CosmicServerGui):
         return self._scene
 
     @property
+    def procedures(self) -> ProcedurePanels | None:
+        """Trajectories, teleoperation and control loops, where MiCo is hosted."""
+        return self._procedures
+
+    @property
     def mode(self) -> str:
-        """The control mode in force: MCM or ECM."""
+        """The control mode in force: MCM, SCM or ECM."""
         return self._mode.mode
 
     @property
@@ -267,6 +288,8 @@ class OperatorWindow(CosmicServerGui):
         if self._mico_gui is None or self._guide is None:
             return
         self._mico_gui.set_seeking_ways(mode == ECM)
+        if mode == SCM:
+            self.raise_panel(TRAJECTORIES)
         if self._guide.stage is not Stage.GOING:
             self._guide.cancel()
 
@@ -298,7 +321,7 @@ class OperatorWindow(CosmicServerGui):
             self._scene.save()
         if self._mico_gui is not None:
             self._mico_gui.release_keys()
-        self._platform.shut_down()
+        self._rig.close()
         if self._console is not None:
             self._console.shut_down()
 

@@ -37,8 +37,8 @@ def test_a_fibre_is_measured_and_a_gripper_calibrated_and_sent_to_a_pixel(
 ) -> None:
     lens = window.findChild(LensPanel)
     views = {each.windowTitle(): each for each in window.findChildren(CameraView)}
-    view = views["Camera microscope"]
-    window.dock("Camera microscope").raise_()
+    view = views["Microscope"]
+    window.dock("Microscope").raise_()
     vico, mico = window.platform.vico, window.platform.mico
     assert lens is not None
     assert vico is not None

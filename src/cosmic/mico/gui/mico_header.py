@@ -4,7 +4,6 @@ from typing import Final
 
 from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import (
-    QHBoxLayout,
     QLabel,
     QProgressBar,
     QSizePolicy,
@@ -16,6 +15,7 @@ from PySide6.QtWidgets import (
 
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look
 from cosmic.frame.task import Progress, Task
@@ -101,22 +101,18 @@ class MicoHeader(QWidget):
         self._pages.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     def _arrange(self) -> None:
-        line = QHBoxLayout()
-        line.setSpacing(STEP_PX)
-        line.addWidget(self._initialise)
-        line.addWidget(self._steps)
-        line.addWidget(self._rescan)
-        line.addWidget(self._undo)
-        line.addWidget(self._pages, 1)
         caption = tipped(QLabel("jog per second"), "How far a held key moves in one second")
         caption.setProperty("role", "dim")
-        line.addWidget(caption)
-        for field in self._speeds.values():
-            line.addWidget(field)
+        # Wraps where the panel is narrow: the picture beside it needs the width.
+        line = FlowLayout(STEP_PX)
+        buttons = (self._initialise, self._steps, self._rescan, self._undo)
+        for widget in (*buttons, caption, *self._speeds.values()):
+            line.addWidget(widget)
         column = QVBoxLayout(self)
         column.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
         column.setSpacing(STEP_PX // 2)
         column.addLayout(line)
+        column.addWidget(self._pages)
         column.addWidget(self._missing)
 
     def speed(self, kind: PositionerKind) -> float:

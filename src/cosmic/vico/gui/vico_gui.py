@@ -32,7 +32,10 @@ def make_vico_gui(application: CosmicApplicationBase) -> VicoGui:
     """Make the GUI component of ViCo; GUI thread."""
     if not isinstance(application, VicoApplication):
         raise TypeError(f"{application.title} is not ViCo")
-    return VicoGui(Vico(application))
+    gui = VicoGui(Vico(application))
+    for place in application.settings.camera:
+        gui.cameras[place.name].setWindowTitle(place.shown)
+    return gui
 
 
 class VicoWidget(QWidget):

@@ -1,0 +1,37 @@
+"""The panels of what MiCo does by itself or under other hands: SCM, teleoperation, loops."""
+
+from typing import Final
+
+from cosmic.app.control_panel import ControlPanel, make_control_panel
+from cosmic.autonomy.control.control import Control
+from cosmic.frame.gui.server_gui import CosmicServerGui
+from cosmic.mico.api.mico import Mico
+from cosmic.mico.gui.teleoperation_panel import TeleoperationPanel, make_teleoperation_panel
+from cosmic.mico.gui.trajectory_panel import TrajectoryPanel, make_trajectory_panel
+
+TRAJECTORIES: Final = "Trajectories"
+TELEOPERATION: Final = "Teleoperation"
+CONTROL: Final = "Control loop"
+
+
+class ProcedurePanels:
+    """Trajectories, teleoperation and control loops, in tabs with another panel; GUI thread.
+
+    Parameters
+    ----------
+    beside : str
+        Title of the panel whose place they share; it stays in front.
+    """
+
+    def __init__(self, window: CosmicServerGui, mico: Mico, control: Control, beside: str) -> None:
+        self.trajectories: TrajectoryPanel = make_trajectory_panel(mico)
+        self.teleoperation: TeleoperationPanel = make_teleoperation_panel(mico)
+        self.control: ControlPanel = make_control_panel(control)
+        panels = {
+            TRAJECTORIES: self.trajectories,
+            TELEOPERATION: self.teleoperation,
+            CONTROL: self.control,
+        }
+        for title, panel in panels.items():
+            window.add_panel(title, panel, beside=beside, tabbed=True)
+        window.dock(beside).raise_()
