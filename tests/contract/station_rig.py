@@ -2,6 +2,7 @@
 
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -43,6 +44,7 @@ class Application:
 
     def __init__(self) -> None:
         self.moved: list[float] = []
+        self.moved_at_s: list[float] = []
         self.stops = 0
         self.entered = threading.Event()
         self.go_on = threading.Event()
@@ -72,6 +74,7 @@ class Application:
         assert call is not None
         self.dead_man = call.dead_man
         self.callers.append(call.caller.name)
+        self.moved_at_s.append(time.monotonic())
         self.moved.append(target_um)
         return target_um
 

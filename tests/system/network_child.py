@@ -1,10 +1,13 @@
 """What the tests of stations run in processes of their own; the first argument says which."""
 
 import sys
+import time
+from pathlib import Path
 
 from contract.station_rig import Application, connected, wait_until
-from cosmic.frame.errors import CosmicError
+from cosmic.frame.errors import CosmicError, MoveRefused
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.certificates import station_certificates
 from cosmic.frame.network.line_settings import Line
 from cosmic.frame.network.server_listener import ServerListener
 from cosmic.frame.network.station import Station
@@ -17,17 +20,17 @@ def say(text: str) -> None:
     sys.stdout.flush()
 
 
-def hold(endpoint: str) -> None:
-    """Take the lease, command a motion, and go on commanding as long as the process runs."""
-    with connected(endpoint, "holder") as client:
+def hold(endpoint: str, folder: str = "") -> None:
+    """Take the lease and command motion on and on, each time to the moment of sending."""
+    files = station_certificates(Path(folder)) if folder else None
+    with connected(endpoint, "holder", certificates=files) as client:
         client.take_lease()
-        client.call("stage", "move", {"target_um": 0.0})
-        say("moving")
-        target_um = 0.0
         while True:
-            target_um += 1.0
             try:
-                client.call("stage", "move", {"target_um": target_um}, timeout_s=0.5)
+                client.call("stage", "move", {"target_um": time.monotonic()}, timeout_s=5.0)
+            except MoveRefused:
+                if folder:  # go on after a cut
+                    client.take_lease()
             except CosmicError as exc:
                 say(f"{type(exc).__name__}: {exc}")
             wait_until(lambda: False, 0.02)
