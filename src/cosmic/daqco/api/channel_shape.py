@@ -253,7 +253,12 @@ class ChannelHandle:
                 fail(NotAvailable(f"{self._channel}: {why}"))
 
         endings = [self._acquisition.subscribe(receive), self._acquisition.on_change(look)]
-        status.add_callback(lambda _status: [end() for end in endings])
+
+        def forget(_status: PlanStatus) -> None:
+            for end in endings:
+                end()
+
+        status.add_callback(forget)
         look()
 
     def _newest(self) -> tuple[float, float, float]:
