@@ -1,75 +1,25 @@
 """One camera of ``rig.vico``; its view uses this as well."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.file_names import space_left
 from cosmic.frame.task import Task
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.camera_shape import CameraShape
+from cosmic.vico.api.camera_shown import FormatShown, LinkShown, Seen, formats_shown, links_shown
 from cosmic.vico.api.places import CalibrationShown, Places
 from cosmic.vico.core.camera_recordings import PictureRecordingState
 from cosmic.vico.core.picture import Picture
-from cosmic.vico.core.recording.formats import FORMATS, picture_bytes_per_s, recording_suffix
+from cosmic.vico.core.recording.formats import FORMATS, picture_bytes_per_s
 from cosmic.vico.core.recording.snap import save_picture
 from cosmic.vico.core.recording.time_lapse import TimeLapsePlan
-from cosmic.vico.core.recording.video_writer import check_codec
-from cosmic.vico.core.vision.chain import Analysis, Unavailable
-from cosmic.vico.core.vision.tool_tips import TipSeen
 from cosmic.vico.hw.interface import CameraCounters, CameraInfo, CameraRanges, CameraSettings
-
-if TYPE_CHECKING:
-    from cosmic.vico.core.vision.fibre import Fibre
 
 Pixel = tuple[float, float]
 
 BACKGROUND_FRAMES = 8
-DESCRIPTIONS = {
-    "focus": "how sharp the picture is",
-    "fibres": "find fibres and measure them",
-    "fibre track": "follow one fibre from picture to picture",
-    "place track": "follow one place from picture to picture",
-    "tools": "measure the ends of grippers and probe",
-    "tips": "find the tips of grippers and probe",
-}
-
-
-@dataclass(frozen=True, slots=True)
-class LinkShown:
-    """One link of the chain of machine vision.
-
-    Attributes
-    ----------
-    problem : str
-        Why it says nothing; empty when all is well.
-    """
-
-    name: str
-    description: str
-    on: bool
-    problem: str
-
-
-@dataclass(frozen=True, slots=True)
-class FormatShown:
-    """A way to record pictures."""
-
-    name: str
-    suffix: str
-    description: str
-    problem: str
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Seen:
-    """What the chain found on one picture."""
-
-    picture: Picture
-    fibres: tuple["Fibre", ...]
-    tips: tuple[TipSeen, ...]
 
 
 class CameraHandle(CameraShape):
@@ -185,16 +135,7 @@ class CameraHandle(CameraShape):
     @property
     def algorithms(self) -> Sequence[LinkShown]:
         """The chain, in its order."""
-        newest = self._unit.vision.newest
-        return tuple(
-            LinkShown(
-                state.name,
-                DESCRIPTIONS.get(state.name, state.name),
-                state.on,
-                state.reason or (_reason(newest, state.name) if state.on else ""),
-            )
-            for state in self._unit.chain.states
-        )
+        return links_shown(self._unit.chain.states, self._unit.vision.newest)
 
     def switch(self, algorithm: str, *, on: bool) -> None:
         """Have an algorithm run on the pictures, or not; raises `ConfigError`."""
@@ -205,16 +146,7 @@ class CameraHandle(CameraShape):
     def analysis(self) -> Seen | None:
         """The newest result; None while nothing is on."""
         newest = self._unit.vision.newest
-        if newest is None:
-            return None
-        fibres, tips = newest.results.get("fibres"), newest.results.get("tips")
-        return Seen(
-            newest.picture,
-            fibres if isinstance(fibres, tuple) else (),
-            tuple(each for each in tips if isinstance(each, TipSeen))
-            if isinstance(tips, tuple)
-            else (),
-        )
+        return Seen.of(newest) if newest is not None else None
 
     # Files
 
@@ -226,22 +158,7 @@ class CameraHandle(CameraShape):
     @property
     def formats(self) -> Sequence[FormatShown]:
         """The ways to record; the first is the usual one."""
-        return tuple(
-            FormatShown(name, recording_suffix(name), found.text, self._format_problem(name))
-            for name, found in FORMATS.items()
-        )
-
-    def _format_problem(self, name: str) -> str:
-        settings = self.settings
-        try:
-            for each in FORMATS:
-                if each == name:
-                    check_codec(each)
-                    if settings is not None and not FORMATS[each].holds(settings.pixel_format):
-                        return f"it cannot keep {settings.pixel_format}"
-        except CosmicError as exc:
-            return str(exc)
-        return ""
+        return formats_shown(self.settings)
 
     @property
     def recording(self) -> PictureRecordingState:
@@ -356,12 +273,3 @@ class CameraHandle(CameraShape):
         if places is None or newest is None:
             raise NotAvailable(self.calibration_problem)
         return places.move_to(newest, place_px, what)
-
-
-def _reason(newest: Analysis | None, name: str) -> str:
-    if newest is None:
-        return ""
-    failure, found = newest.failures.get(name), newest.results.get(name)
-    if failure is not None:
-        return failure.text
-    return found.reason if isinstance(found, Unavailable) else ""

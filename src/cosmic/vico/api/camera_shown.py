@@ -1,0 +1,112 @@
+"""What a camera's view shows of its recordings and of machine vision."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+from cosmic.frame.errors import CosmicError
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.recording.formats import FORMATS, PictureFormat, recording_suffix
+from cosmic.vico.core.recording.video_writer import check_codec
+from cosmic.vico.core.vision.chain import Analysis, LinkState, Unavailable
+from cosmic.vico.core.vision.tool_tips import TipSeen
+from cosmic.vico.hw.interface import CameraSettings
+
+if TYPE_CHECKING:
+    from cosmic.vico.core.vision.fibre import Fibre
+
+DESCRIPTIONS = {
+    "focus": "how sharp the picture is",
+    "fibres": "find fibres and measure them",
+    "fibre track": "follow one fibre from picture to picture",
+    "place track": "follow one place from picture to picture",
+    "tools": "measure the ends of grippers and probe",
+    "tips": "find the tips of grippers and probe",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class LinkShown:
+    """One link of the chain of machine vision.
+
+    Attributes
+    ----------
+    problem : str
+        Why it says nothing; empty when all is well.
+    """
+
+    name: str
+    description: str
+    on: bool
+    problem: str
+
+
+@dataclass(frozen=True, slots=True)
+class FormatShown:
+    """A way to record pictures."""
+
+    name: str
+    suffix: str
+    description: str
+    problem: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """What the chain found on one picture."""
+
+    picture: Picture
+    fibres: tuple["Fibre", ...]
+    tips: tuple[TipSeen, ...]
+
+    @classmethod
+    def of(cls, newest: Analysis) -> Self:
+        """Return what is shown of the newest analysis."""
+        fibres, tips = newest.results.get("fibres"), newest.results.get("tips")
+        return cls(
+            newest.picture,
+            fibres if isinstance(fibres, tuple) else (),
+            tuple(each for each in tips if isinstance(each, TipSeen))
+            if isinstance(tips, tuple)
+            else (),
+        )
+
+
+def links_shown(states: Sequence[LinkState], newest: Analysis | None) -> tuple[LinkShown, ...]:
+    """Return the links of a chain, in its order, as the newest picture left them."""
+    return tuple(
+        LinkShown(
+            state.name,
+            DESCRIPTIONS.get(state.name, state.name),
+            state.on,
+            state.reason or (_reason(newest, state.name) if state.on else ""),
+        )
+        for state in states
+    )
+
+
+def _reason(newest: Analysis | None, name: str) -> str:
+    if newest is None:
+        return ""
+    failure, found = newest.failures.get(name), newest.results.get(name)
+    if failure is not None:
+        return failure.text
+    return found.reason if isinstance(found, Unavailable) else ""
+
+
+def formats_shown(settings: CameraSettings | None) -> tuple[FormatShown, ...]:
+    """Return the ways to record with `settings`; the first is the usual one."""
+    return tuple(
+        FormatShown(name, recording_suffix(name), found.text, _format_problem(name, settings))
+        for name, found in FORMATS.items()
+    )
+
+
+def _format_problem(name: PictureFormat, settings: CameraSettings | None) -> str:
+    try:
+        check_codec(name)
+    except CosmicError as exc:
+        return str(exc)
+    if settings is not None and not FORMATS[name].holds(settings.pixel_format):
+        return f"it cannot keep {settings.pixel_format}"
+    return ""
