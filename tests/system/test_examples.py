@@ -136,3 +136,15 @@ def test_a_plan_scans_the_force_keeps_pictures_and_is_refused_a_collision(said: 
     assert 1.0 < float(lines[12].split()[1]) < 4.0
     assert "pictures: 9" in lines
     assert lines[-1].startswith("the plan failed: left.x: left_jaw_a would come within")
+
+
+@example("steer_with_a_gamepad.py")
+def test_a_recorded_hand_steers_as_a_gamepad_does(said: str) -> None:
+    lines = said.splitlines()
+    words = [line.split("  ")[0] for line in lines[:-4]]
+    assert words[:3] == ["let go of the sticks", "armed", "steering"]
+    assert lines[-4] == "stopped: unplugged"
+    numbers = [float(line.split()[-2]) for line in lines[-3:]]
+    assert numbers[0] == 200.0
+    assert 20.0 < numbers[1] < 260.0
+    assert 10.0 < numbers[2] < 120.0

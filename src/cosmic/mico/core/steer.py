@@ -13,7 +13,7 @@ from cosmic.mico.core.orders import Motion, MoveTo, Steer
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.core.settings import MicoSettings
 
-PACKET_PERIOD_S: Final = 0.007
+PACKET_PERIOD_S: Final = 0.006
 """Least time between two packets, on the wall clock: a hand is followed more than 100 times/s."""
 LOOK_PERIOD_S: Final = 0.04
 LOCATE_PERIOD_S: Final = 0.02

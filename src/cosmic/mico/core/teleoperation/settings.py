@@ -97,7 +97,7 @@ class TeleoperationSettings(StrictModel):
     """How input devices steer; all times count on the wall clock."""
 
     poll_hz: float = Field(default=500.0, ge=300, le=1000)
-    command_hz: float = Field(default=125.0, ge=100, le=300)
+    command_hz: float = Field(default=200.0, ge=100, le=300)
     dead_man_s: float = Field(default=0.06, ge=0.03, le=0.08)
     quiet_s: float = Field(default=3.0, ge=0.1, le=60)
     force_channel: str = ""
