@@ -73,6 +73,15 @@ def far(bench: Bench) -> Iterator[Bench]:
 
 
 @pytest.fixture
+def lazy(far: Bench) -> Iterator[Bench]:
+    """The same, with an axis that is slower than its loop: what is not stopped moves on."""
+    axis = far.rig.mico["probe.y"]
+    axis.set_closed_loop_frequency(10)
+    yield far
+    axis.set_closed_loop_frequency(5000)
+
+
+@pytest.fixture
 def near(bench: Bench) -> Iterator[Bench]:
     """The probe a few micrometres away from the fibre."""
     bench.rig.mico["probe.y"].move_to(-4975.0)
@@ -171,26 +180,26 @@ WAYS: dict[Callable[[Bench, ControlHandle], None], str] = {
 @pytest.mark.defects
 @pytest.mark.parametrize("end", WAYS, ids=lambda each: each.__name__)
 def test_however_it_ends_the_axis_stands(
-    end: Callable[[Bench, ControlHandle], None], far: Bench
+    end: Callable[[Bench, ControlHandle], None], lazy: Bench
 ) -> None:
-    loop = far.hold()
-    start_um = far.truth_um()
-    wait_until(lambda: far.truth_um() < start_um - 2.0, 10.0)
+    loop = lazy.hold()
+    start_um = lazy.truth_um()
+    wait_until(lambda: lazy.truth_um() < start_um - 2.0, 10.0)
     try:
-        end(far, loop)
+        end(lazy, loop)
         WALL.sleep(0.1)
-        then_um = far.truth_um()
+        then_um = lazy.truth_um()
         assert loop.wait(5.0) == WAYS[end]
         WALL.sleep(0.1)
-        assert far.truth_um() == pytest.approx(then_um, abs=0.3)
+        assert lazy.truth_um() == pytest.approx(then_um, abs=0.3)
         assert loop.ending is not None
         assert loop.reason
         if WAYS[end] != "asked to":
             with pytest.raises(cosmic.CosmicError):
                 loop.wait_settled()
-        wait_until(lambda: not far.rig.mico["probe.y"].details.in_motion)
+        wait_until(lambda: not lazy.rig.mico["probe.y"].details.in_motion)
     finally:
-        undo(far)
+        undo(lazy)
 
 
 def test_who_commands_the_axis_meanwhile_has_it(far: Bench) -> None:
@@ -198,6 +207,36 @@ def test_who_commands_the_axis_meanwhile_has_it(far: Bench) -> None:
     wait_until(lambda: loop.statistics.packets > 2)
     assert far.rig.mico["probe.y"].move_to(-4400.0) == pytest.approx(-4400.0, abs=1.0)
     assert loop.wait(1.0) == "interrupted"
+
+
+def test_a_loop_that_rests_ends_when_its_axis_is_moved_or_everything_was_stopped(
+    near: Bench,
+) -> None:
+    loop = near.hold(20.0)
+    loop.wait_settled(timeout_s=20.0)
+    axis = near.rig.mico["probe.y"]
+    axis.move_to(-4900.0)
+    assert loop.wait(5.0) == "interrupted"
+    assert near.truth_um() == pytest.approx(-4900.0, abs=1.0)
+    loop = near.hold(1.5)
+    wait_until(lambda: loop.state == "holding")
+    near.rig.stop("pressed")
+    near.rig.reset_stop()
+    assert loop.wait(5.0) == "stopped"
+    loop = near.hold(1.5)
+    wait_until(lambda: loop.state == "holding")
+    axis.move_by(-100.0)
+    assert loop.wait(5.0) == "interrupted"
+
+
+def test_a_slow_axis_is_never_far_behind_its_last_move(lazy: Bench) -> None:
+    lead_um = []
+    with lazy.hold() as loop:
+        start_um = lazy.truth_um()
+        while lazy.truth_um() > start_um - 8.0:
+            lead_um.append(lazy.truth_um() - loop._loop.sink.target)
+            WALL.sleep(0.01)
+    assert max(lead_um) < 2.2 * 0.1 * lazy.rig.control.settings.speed_um_s
 
 
 def test_it_goes_no_farther_than_it_may(far: Bench) -> None:
@@ -271,15 +310,15 @@ def test_a_stop_that_is_latched_is_told_at_the_begin(far: Bench) -> None:
 
 def test_a_device_that_is_lost_and_a_rig_that_is_closed_end_their_loops() -> None:
     with cosmic.connect(rate=RATE, applications=("mico", "daqco")) as rig:
-        lost = rig.control.hold_force("force", "probe.y", 50.0, direction=-1, travel_um=5000.0)
-        closed = rig.control.hold_force("force", "left.y", 50.0, direction=-1, travel_um=5000.0)
+        rig.control.settings = rig.control.settings.model_copy(update={"stale_s": 5.0})
+        lost = rig.control.hold_force("force", "probe.y", 50.0, direction=-1)
         wait_until(lambda: lost.statistics.packets > 2)
         rig.faults.inject("unplugged", device=2)
         assert lost.wait(5.0) in ("device", "stopped")
+        wait_until(lambda: rig.stopped is not None)  # it was lost while it moved
         rig.reset_stop()
-        if not closed.running:  # the loss of a device that moves stops everything
-            closed = rig.control.hold_force("force", "left.y", 50.0, direction=-1)
-        wait_until(lambda: closed.statistics.packets > 2)
-    assert closed.wait(1.0) == "asked to"
+        closed = rig.control.hold_force("force", "left.y", 50.0, direction=-1)
+        wait_until(lambda: closed.statistics.packets > 2 or not closed.running)
+    assert closed.wait(1.0) in ("asked to", "stopped")
     with pytest.raises(cosmic.NotAvailable, match="closed"):
         rig.control.hold_force("force", "left.y", 50.0, direction=-1)

@@ -228,7 +228,7 @@ class ControlLoop(WorkerThread):
         dt_s = passed_s * self._rate
         sample = self._fresh()
         if sample is None or WALL.now_s() - sample.read_wall_s > self.source.pause_s:
-            self.sink.rest(dt_s)
+            self.sink.brake(dt_s)
             return
         answer = self.law.step(sample.value, self.sink.target, dt_s)
         if answer.velocity == 0.0:

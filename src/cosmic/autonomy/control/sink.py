@@ -61,6 +61,7 @@ class AxisSink:
         self._since_s = math.inf
         self._smallest = 0.02 if state.unit == "um" else 1e-4
         self._home = self._target = self._wanted = 0.0
+        self._braked = False
         self.packets = 0
 
     @property
@@ -123,13 +124,17 @@ class AxisSink:
         self._look()
         self._since_s += dt_s
         most = self._speed * PACKET_S
+        if self._sent is None and self._lags(most):
+            raise self._taken()
         step = min(max(velocity, -self._speed), self._speed) * dt_s
         self._wanted = min(max(self._wanted + step, self._target - most), self._target + most)
         if abs(self._wanted - self._home) > self._travel:
             raise self._used_up()
         if abs(self._wanted - self._target) < self._smallest or self._since_s < self._interval_s:
             return
-        if self._before is None or self._before.done:
+        if self._lags(most):
+            self._wanted = self._target
+        elif self._before is None or self._before.done:
             self._send(self._wanted)
 
     def rest(self, dt_s: float) -> None:
@@ -138,15 +143,37 @@ class AxisSink:
         self._since_s += dt_s
         self._wanted = self._target
 
+    def brake(self, dt_s: float) -> None:
+        """Go no farther than the axis is by now: nobody knows what that does; else as `rest`."""
+        self.rest(dt_s)
+        position = self._axis.details.position
+        under_way = self._sent is not None and not self._sent.done
+        taken = self._before is None or self._before.done
+        if under_way and taken and not self._braked and position is not None:
+            self._send(position)
+            self._wanted = position
+            self._braked = True
+
     def _look(self) -> None:
         stop = self._manager.latch.state
         if stop.latched or stop.epoch != self._epoch:
             text = f"{self.name}: motion was stopped ({stop.reason or 'and reset since'})"
             raise StoppedError(refuse(Reason.STOPPED, text, axis=self.name))
-        if self._sent is not None and self._sent.done:
-            error = self._sent.exception()
-            if error is not None:
-                raise error
+        if self._sent is not None and not self._sent.done:
+            return
+        error = self._sent.exception() if self._sent is not None else None
+        if error is not None:
+            raise error
+        if self._axis.details.in_motion:
+            raise self._taken()
+
+    def _lags(self, most: float) -> bool:
+        """Return True while the axis is so slow that another packet would run ahead of it."""
+        position = self._axis.details.position
+        return position is None or not abs(self._target - position) <= most
+
+    def _taken(self) -> MoveCancelled:
+        return MoveCancelled(f"{self.name}: somebody else moves it")
 
     def _send(self, target: float) -> None:
         with self._lock:
@@ -156,7 +183,7 @@ class AxisSink:
                 self._channel, MoveTo(target, self._axis.unit), follows=self._sent
             )
         self._before, self._sent = self._sent, movement
-        self._target, self._since_s = target, 0.0
+        self._target, self._since_s, self._braked = target, 0.0, False
         self.packets += 1
 
     def _used_up(self) -> LimitError:
