@@ -278,7 +278,7 @@ def test_speeds_hold_for_the_run_and_come_back_after_it(mico: Mico) -> None:
     text = "speed left.x 750 um/s\nleft.x to 3000 um\n"
     clock = mico.application.manager.clock
     took = {}
-    for factor in (1.0, 4.0):
+    for factor in (4.0, 1.0):
         mico["left.x"].move_to(0.0)
         began_s = clock.now_s()
         mico.trajectories.run(written(text), speed=factor)
@@ -308,7 +308,11 @@ def test_times_are_kept_and_scale_with_the_speed(mico: Mico) -> None:
 def test_a_stop_ends_it_and_it_goes_on_at_that_line(mico: Mico) -> None:
     manager = mico.application.manager
     player = mico.trajectories.run(
-        written("left.y to 50 um\nspeed left.x 500 um/s\nleft.x to 5000 um\n"), wait=False
+        written(
+            "together\nleft.x to 0 um\nleft.y to 50 um\nend\n"
+            "speed left.x 500 um/s\nleft.x to 5000 um\n"
+        ),
+        wait=False,
     )
     wait_until(lambda: (mico["left.x"].details.position or 0.0) > 50.0)
     began_s = WALL.now_s()
@@ -318,7 +322,7 @@ def test_a_stop_ends_it_and_it_goes_on_at_that_line(mico: Mico) -> None:
     stood = where(mico, "left.x")
     assert player.state is PlayState.FAILED
     assert isinstance(player.failure, StoppedError)
-    assert str(player.failure).startswith("line 5: ")
+    assert str(player.failure).startswith("line 8: ")
     with pytest.raises(StoppedError):
         player.wait()
     WALL.sleep(0.1)
@@ -333,9 +337,9 @@ def test_a_stop_ends_it_and_it_goes_on_at_that_line(mico: Mico) -> None:
 def test_a_stop_ends_a_wait_even_if_it_is_reset_at_once(mico: Mico, text: str) -> None:
     manager = mico.application.manager
     player = mico.trajectories.run(written(text), wait=False)
-    wait_until(lambda: player.line == 3)
-    manager.stop("test")
-    manager.reset_stop()
+    wait_until(lambda: player.progress.text.startswith("line 3"))
+    manager.latch.set("test")
+    manager.latch.reset()
     with pytest.raises(StoppedError, match="line 3: "):
         player.wait(1.0)
     player.cancel()

@@ -103,6 +103,12 @@ def test_the_duration_comes_from_speeds_accelerations_waits_and_times() -> None:
     assert move_s(5.0, 100.0, 1000.0) == pytest.approx(2 * (5.0 / 1000.0) ** 0.5)
 
 
+def test_it_begins_where_the_trajectory_says() -> None:
+    found = played("start left.x 1000 um\nleft.x by 100 um\n")
+    assert [pose["left.x"] for pose in found.poses] == [1000.0, 1100.0]
+    assert found.clearance_um == pytest.approx(900.0, abs=10.0)
+
+
 def test_what_is_left_is_told_for_each_line() -> None:
     found = played("wait 1 s\nwait 2 s\nwait 3 s\n")
     assert found.left_s == ((3, 6.0), (4, 5.0), (5, 3.0))
