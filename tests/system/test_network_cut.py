@@ -37,6 +37,7 @@ def line() -> Iterator[None]:
             pytest.skip("network name spaces cannot be made here")
         stack.callback(ip, "netns", "del", SPACE)
         stack.callback(ip, "link", "del", BRIDGE)
+        stack.callback(ip, "link", "del", OUTER)  # a dying connection keeps the name space alive
         made = (
             ip("link", "add", "name", BRIDGE, "type", "bridge")
             and ip("link", "add", OUTER, "type", "veth", "peer", "name", INNER)
