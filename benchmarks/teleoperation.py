@@ -35,6 +35,7 @@ class Calls:
 
     def __init__(self, bench: Stand, axis: str) -> None:
         self._address = bench.mico[axis].details.address
+        self._steering = bench.mico.teleoperation
         self._wanted = threading.Condition()
         self.times_s: dict[str, list[float]] = {MOVE: [], STOP: []}
         for name in self.times_s:
@@ -56,8 +57,9 @@ class Calls:
             return next((when for when in self.times_s[name] if when >= since_s), None)
 
         with self._wanted:
-            if not self._wanted.wait_for(lambda: found() is not None, 5.0):
-                raise TimeoutError(f"{name} was not called")
+            if not self._wanted.wait_for(lambda: found() is not None, 1.0):
+                state = self._steering.state
+                raise TimeoutError(f"{name} was not called: {state.words}, {state.refused}")
         return (found() or since_s) - since_s
 
 
@@ -113,7 +115,10 @@ def collect(bench: Stand, count: int) -> dict[str, list[float]]:
             time.sleep(rng.uniform(0.03, 0.06))
             began_s = time.perf_counter()
             pad.push("left_x", 0.0)
-            found.setdefault("stop", []).append(calls.after(STOP, began_s))
+            try:
+                found.setdefault("stop", []).append(calls.after(STOP, began_s))
+            except TimeoutError:  # the dead-man was quicker, for this process got no time
+                found.setdefault("dead man", []).append(1.0)
         found |= rates(bench, pad, calls, 0.3 if count < 10 else 3.0)
         for _ in range(max(1, count // 10)):
             found.setdefault("lost", []).append(lose(bench, pad, calls))
@@ -167,6 +172,7 @@ def measure(quick: bool = False) -> list[Figure]:
         Figure(NAME, "gamepad to first move, p99", 1e3 * percentile(found["move"], 99), "ms", 15),
         Figure(NAME, "gamepad to stop, p99", 1e3 * percentile(found["stop"], 99), "ms", 15),
         Figure(NAME, "focus lost to stop, p99", 1e3 * percentile(found["lost"], 99), "ms", 100),
+        Figure(NAME, "stopped by the dead-man before", len(found.get("dead man", ())), ""),
         # Rates have a least value for a target, which their periods turn into a largest one.
         Figure(NAME, "device read every", 1e3 / found["polled"][0], "ms", 1e3 / 300),
         Figure(NAME, "axis commanded every", 1e3 / max(found["commanded"][0], 0.1), "ms", 10),

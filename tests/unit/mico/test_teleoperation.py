@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from threading import current_thread
 
 import pytest
 
@@ -31,15 +32,17 @@ class TimedController(ScriptedController):
 
     def __init__(self) -> None:
         super().__init__(("LLN",))
-        self.stops: list[tuple[float, Channel]] = []
+        self.stops: list[tuple[float, Channel, str]] = []
 
-    def stop(self, channel: Channel) -> None:
-        self.stops.append((WALL.now_s(), channel))
-        super().stop(channel)
+    def note(self, channel: Channel) -> None:
+        self.stops.append((WALL.now_s(), channel, current_thread().name))
 
     def stopped_after(self, since_s: float, channel: Channel = X) -> float | None:
-        found = [when - since_s for when, what in self.stops if what == channel and when >= since_s]
-        return found[0] if found else None
+        found = self.since(since_s, channel)
+        return found[0][0] - since_s if found else None
+
+    def since(self, since_s: float, channel: Channel = X) -> list[tuple[float, Channel, str]]:
+        return [each for each in self.stops if each[1] == channel and each[0] >= since_s]
 
 
 class Rig:
@@ -84,10 +87,11 @@ def rig(**changes: object) -> Iterator[Rig]:
     with mico(teleoperation={"profile": [profile], **changes}) as (api, controller):
         timed = TimedController()
         controller.stop = lambda channel: (  # type: ignore[method-assign]
-            timed.stops.append((WALL.now_s(), channel)),
+            timed.note(channel),
             ScriptedController.stop(controller, channel),
         )
         controller.stopped_after = timed.stopped_after  # type: ignore[attr-defined]
+        controller.stops_since = timed.since  # type: ignore[attr-defined]
         yield Rig(api, controller)
 
 
@@ -180,6 +184,9 @@ def test_each_kind_of_loss_stops_what_moves_within_a_tenth_of_a_second(lose, pha
         # What is only noticed by its silence takes 50 or 60 ms of the 100 on a quiet machine.
         silent = lose in (freeze, hang)
         assert it.controller.stopped_after(lost_s) < (0.2 if silent else 0.1)
+        by_dead_man = it.controller.stops_since(lost_s)[0][2] == "device 0"
+        late = it.controller.stopped_after(lost_s) > 0.05
+        assert by_dead_man == (lose is hang) or late, "only a hang is left to the dead-man"
         it.stands()
         assert it.phase is phase
         assert it.teleoperation.state.words.startswith(words)
