@@ -17,6 +17,7 @@ from cosmic.frame.errors import (
     MoveRefused,
     NotAvailable,
     UnknownAxisError,
+    WrongThreadError,
 )
 from cosmic.frame.network.errors import (
     CallRefused,
@@ -25,8 +26,10 @@ from cosmic.frame.network.errors import (
     StationAway,
     StationTimeout,
 )
+from cosmic.frame.network.in_process import InProcessTransport
 from cosmic.frame.network.transport import Presence, Rule
 from cosmic.frame.task import Progress
+from cosmic.frame.threads import declare_gui_thread
 from cosmic.frame.verdict import Reason
 
 
@@ -163,9 +166,6 @@ def test_what_waited_too_long_is_not_carried_out(rig: StationRig) -> None:
         assert rig.application.entered.wait(5.0)
         late = pool.submit(rig.client.call, "stage", "move", {"target_um": 1.0}, timeout_s=0.15)
         with pytest.raises((CommandExpired, StationTimeout)):
-            if rig.client.__class__.__name__ == "InProcessTransport":
-                wait_until(lambda: False, 0.2)
-                rig.application.go_on.set()
             late.result(5.0)
         rig.application.go_on.set()
         blocking.result(5.0)
@@ -237,6 +237,18 @@ def test_every_command_is_in_the_log_with_who_sent_it(
     with caplog.at_level(logging.DEBUG, "cosmic.frame.network"):
         rig.client.call("stage", "add", {"a": 2.0})
     assert "vision: stage.add(a=2.0)" in caplog.text
+
+
+def test_nothing_but_a_stop_may_make_the_window_wait(rig: StationRig) -> None:
+    take_back = declare_gui_thread()
+    try:
+        rig.client.call("stage", "stop")
+        if not isinstance(rig.client, InProcessTransport):  # there a call is just a call
+            with pytest.raises(WrongThreadError):
+                rig.client.call("stage", "add", {"a": 1.0})
+    finally:
+        take_back()
+    assert rig.application.stops == 1
 
 
 # --- what takes long --------------------------------------------------------------------------

@@ -18,11 +18,6 @@ def client_signs(station: str, client: str = "**") -> str:
     return f"cosmic/{station}/client/{client}"
 
 
-def station_sign(station: str) -> str:
-    """Sign of life of the station."""
-    return f"cosmic/{station}/here"
-
-
 def session_events(station: str, client: str) -> str:
     """Where a client hears what concerns only itself."""
     return f"cosmic/{station}/to/{client}"

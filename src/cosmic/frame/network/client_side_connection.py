@@ -28,7 +28,7 @@ from cosmic.frame.network.transport import (
     Subscription,
 )
 from cosmic.frame.network.wire import Wire
-from cosmic.frame.threads import WorkerThread
+from cosmic.frame.threads import WorkerThread, forbid_waiting_here
 
 logger = logging.getLogger(__name__)
 
@@ -74,7 +74,7 @@ class ClientSideConnection(WorkerThread):
         self._lock = Lock()
         self._changed = Condition()
         self._wire: Wire | None = None
-        self._moving: dict[tuple[str, str], bool] = {}
+        self._hosted: dict[tuple[str, str], tuple[bool, bool]] = {}
         self._presence = Presence(station, here=False, why="not connected yet")
         self._listeners: tuple[PresenceListener, ...] = ()
         self._tasks = RemoteTasks(self._cancel_task)
@@ -89,6 +89,14 @@ class ClientSideConnection(WorkerThread):
     def state(self) -> Presence:
         """Whether the station is there, and why not."""
         return self._presence
+
+    @property
+    def hosted(self) -> dict[str, list[str]]:
+        """The applications there with their functions, as the station last told."""
+        found: dict[str, list[str]] = {}
+        for application, function in self._hosted:
+            found.setdefault(application, []).append(function)
+        return found
 
     def wait_until_here(self, timeout_s: float) -> bool:
         """Wait for the station; False when it was not there after `timeout_s`."""
@@ -110,7 +118,9 @@ class ClientSideConnection(WorkerThread):
     ) -> object:
         """As `Transport.call`; what goes on there is followed by a `RemoteTask`."""
         wire = self._here()
-        moves = self._moving.get((application, function), True)
+        moves, at_once = self._hosted.get((application, function), (True, False))
+        if not at_once:
+            forbid_waiting_here(f"calling {application}.{function} at {self._station}")
         valid_s = min(timeout_s, MOVE_AGE_LIMIT_S) if moves else timeout_s
         what = What(Order.CALL, application, function, arguments or {}, valid_s)
         result = self._exchange(wire, what, timeout_s)
@@ -202,7 +212,7 @@ class ClientSideConnection(WorkerThread):
     def _connect(self) -> None:
         try:
             wire = self._wire or self._opened()
-            self._moving = _read_hosted(self._session.begin(wire))
+            self._hosted = _read_hosted(self._session.begin(wire))
         except CosmicError as exc:
             self._session.end()
             self._set_away(str(exc))
@@ -276,12 +286,13 @@ class ClientSideConnection(WorkerThread):
             self._incoming = [each for each in self._incoming if each is not incoming]
 
 
-def _read_hosted(said: Any) -> dict[tuple[str, str], bool]:
+def _read_hosted(said: Any) -> dict[tuple[str, str], tuple[bool, bool]]:
+    """Return which functions there are, and of each whether it moves and whether it overtakes."""
     found = {}
     try:
         for application, functions in said.items():
-            for function, (moves, _) in functions.items():
-                found[application, function] = bool(moves)
+            for function, (moves, at_once) in functions.items():
+                found[application, function] = (bool(moves), bool(at_once))
     except (AttributeError, TypeError, ValueError) as exc:
         raise ProtocolError("the station lists its applications in an unknown way") from exc
     return found

@@ -11,9 +11,9 @@ from typing_extensions import override
 from cosmic.frame.errors import CosmicError, ProtocolError
 from cosmic.frame.network.caller import Access, Caller
 from cosmic.frame.network.delivery import Inbox, InboxClosed
-from cosmic.frame.network.errors import CallRefused
+from cosmic.frame.network.errors import Busy, CallRefused
 from cosmic.frame.network.freshness import SequenceGuard, check_age
-from cosmic.frame.network.invoker import Busy
+from cosmic.frame.network.invoker import FOR_EVER
 from cosmic.frame.network.messages import Order, Request, answer, read_request, refusal_of
 from cosmic.frame.network.ongoing import Tickets
 from cosmic.frame.network.outbox import Outbox
@@ -136,8 +136,7 @@ class ConnectionHandler(WorkerThread):
         """Answer the first message of the session."""
         hosted = {
             name: {
-                each.name: [each.mark.moves, list(each.parameters)]
-                for each in invoker.offered.values()
+                each.name: [each.mark.moves, each.mark.at_once] for each in invoker.offered.values()
             }
             for name, invoker in self._station.invokers.items()
         }
@@ -190,12 +189,14 @@ class ConnectionHandler(WorkerThread):
         def still_wanted() -> None:
             check_age(self._station.clock, request.until_s, what)
 
-        def carry_out(*, wait: bool = True) -> None:
+        def carry_out(wait_s: float = FOR_EVER) -> None:
             try:
                 result = invoker.invoke(
-                    self._caller, request.function, request.arguments, still_wanted, wait=wait
+                    self._caller, request.function, request.arguments, still_wanted, wait_s=wait_s
                 )
                 self._answer(question, self._tickets.wrap(result, moves=found.mark.moves))
+            except Busy:
+                raise
             except CosmicError as exc:
                 logger.warning("%s: %s ended: %s", self._station.name, what, exc)
                 self._refuse(question, exc)
@@ -206,7 +207,7 @@ class ConnectionHandler(WorkerThread):
         still_wanted()
         if found.mark.reads:
             with suppress(Busy):
-                carry_out(wait=False)
+                carry_out(0.0)
                 return
         self._route(request.application, carry_out)
 

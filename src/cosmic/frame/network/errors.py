@@ -11,6 +11,10 @@ class StationTimeout(DeviceTimeout):
     """The other station did not answer in time; what was not begun then will not be."""
 
 
+class Busy(StationTimeout):
+    """Other calls to the application took too long; this one was not carried out."""
+
+
 class CommandExpired(CosmicError):  # noqa: N818 - reads as what happened
     """A command came too late, or a second time, and was not executed."""
 

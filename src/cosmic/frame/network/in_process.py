@@ -74,7 +74,9 @@ class InProcessTransport(Transport):
                 )
 
         invoker = self._station.invoker(application)
-        return invoker.invoke(self._caller, function, arguments or {}, still_wanted)
+        return invoker.invoke(
+            self._caller, function, arguments or {}, still_wanted, wait_s=timeout_s
+        )
 
     @override
     def publish(self, topic: str, payload: object) -> None:

@@ -3,19 +3,17 @@
 import logging
 from collections.abc import Callable, Mapping
 from threading import RLock
+from typing import Final
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.caller import Access, Call, Caller, carrying_out
-from cosmic.frame.network.errors import CallRefused, RemoteDefect
+from cosmic.frame.network.errors import Busy, CallRefused, RemoteDefect
 from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.remote import Offered, offered_by
 
+FOR_EVER: Final = -1.0
 logger = logging.getLogger(__name__)
-
-
-class Busy(Exception):  # noqa: N818 - never leaves the station
-    """Another call to the application is being carried out."""
 
 
 class ApplicationInvoker:
@@ -79,7 +77,7 @@ class ApplicationInvoker:
         arguments: Mapping[str, object],
         still_wanted: Callable[[], None] | None = None,
         *,
-        wait: bool = True,
+        wait_s: float = FOR_EVER,
     ) -> object:
         """Carry out one call and return its result.
 
@@ -87,21 +85,22 @@ class ApplicationInvoker:
         ----------
         still_wanted : callable or None
             Called last before the function; raises when it is too late.
-        wait : bool
-            False raises `Busy` where another call is being carried out.
+        wait_s : float
+            How long to wait for other calls to end.
 
         Raises
         ------
         CosmicError
             What the function raised, or why it was not called: `CallRefused`, `CommandExpired`,
-            `MoveRefused` without the lease, `RemoteDefect` for a mistake in the program.
+            `Busy` after `wait_s`, `MoveRefused` without the lease, `RemoteDefect` for a mistake in
+            the program.
         """
         found = self.find(caller, function)
         checked = found.checked(arguments)
         if found.mark.at_once:
             return self._run(caller, found, checked, still_wanted)
-        if not self._turn.acquire(blocking=wait):
-            raise Busy
+        if not self._turn.acquire(timeout=wait_s):
+            raise Busy(f"{self._name} is busy with other calls; this one was not carried out")
         try:
             return self._run(caller, found, checked, still_wanted)
         finally:

@@ -10,7 +10,6 @@ from cosmic.frame.network.addresses import (
     client_signs,
     greetings,
     session_events,
-    station_sign,
 )
 from cosmic.frame.network.codec import MESSAGE_LIMIT_BYTES
 from cosmic.frame.network.messages import PUBLISH_LIMIT_BYTES
@@ -173,15 +172,6 @@ def _access_control(station: str, clients: tuple[str, ...]) -> dict[str, Any]:
                 ["declare_liveliness_subscriber", "liveliness_query"],
                 "egress",
                 client_signs(station),
-            ),
-            _rule(
-                f"{name} looks for the station",
-                ["declare_liveliness_subscriber", "liveliness_query"],
-                "ingress",
-                station_sign(station),
-            ),
-            _rule(
-                f"{name} sees the station", ["liveliness_token"], "egress", station_sign(station)
             ),
             _rule(
                 f"{name} subscribes",

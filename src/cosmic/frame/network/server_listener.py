@@ -15,7 +15,6 @@ from cosmic.frame.network.addresses import (
     client_signs,
     greetings,
     session_events,
-    station_sign,
 )
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.connection_handler import Client, ConnectionHandler
@@ -93,14 +92,12 @@ class ServerListener(WorkerThread):
         ]
         for reader in self._readers:
             reader.start()
-        here = self._wire.sign(station_sign(name))
         try:
             while not self.end_requested:
                 self._woken.wait(LOOK_EVERY_S)
                 self._woken.clear()
                 self._look()
         finally:
-            here.close()
             self._end_all()
 
     @override

@@ -85,6 +85,9 @@ class Transport(Protocol):
             Such a call is not offered or not permitted, or an argument is not of its type.
         MoveRefused
             The gate refused the movement, or the lease is not held (`NO_LEASE`).
+        WrongThreadError
+            The station is elsewhere, and this is the GUI thread; only what overtakes everything
+            (a stop) may be called there.
         CosmicError
             Whatever the function raised.
         """
