@@ -39,6 +39,11 @@ NAMES = (
     "aravis_camera",
     "fibres",
     "vision_tools",
+    "skew",
+    "trajectory",
+    "teleoperation",
+    "control_loop",
+    "network",
 )
 ALL = (*NAMES, "collision_oracles", "soak", "acquisition_soak")
 ROOT = Path(__file__).resolve().parents[1]

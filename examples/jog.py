@@ -25,7 +25,7 @@ def main() -> None:
 
 def standing(axis, jogging) -> float:
     """Wait until the axis stands and return where."""
-    jogging.movement.exception(timeout_s=5.0)
+    jogging.movement.exception(timeout=5.0)
     return axis.position_um
 
 
