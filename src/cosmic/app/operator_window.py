@@ -100,9 +100,9 @@ class OperatorWindow(CosmicServerGui):
         self._stop_filter = StopKeyFilter(_application(), stop_key, self)
         self._add_mico(settings)
         pictures = self._add_instruments()
-        if self._mico_gui is not None:
+        if self._mico_gui is not None and self._scene is not None:
             self._procedures = ProcedurePanels(
-                self, self._mico_gui.mico, self._rig.control, beside=SCENE
+                self, self._mico_gui, self._scene, self._rig.control, beside=SCENE
             )
         if pictures:
             self.dock(pictures).raise_()

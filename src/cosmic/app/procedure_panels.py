@@ -3,9 +3,10 @@
 from typing import Final
 
 from cosmic.app.control_panel import ControlPanel, make_control_panel
+from cosmic.app.scene_panel import ScenePanel
 from cosmic.autonomy.control.control import Control
 from cosmic.frame.gui.server_gui import CosmicServerGui
-from cosmic.mico.api.mico import Mico
+from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.mico.gui.teleoperation_panel import TeleoperationPanel, make_teleoperation_panel
 from cosmic.mico.gui.trajectory_panel import TrajectoryPanel, make_trajectory_panel
 
