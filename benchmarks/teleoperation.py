@@ -2,8 +2,8 @@
 
 A gamepad that exists in SDL only is deflected at random moments; the time runs from there to the
 call that moves the axis, or stops it. Beside it: how often the device is read, an axis is commanded
-while the stick moves on, and the force is set, and how soon the axis is stopped when the window
-loses the focus.
+while the stick moves on, and the force is set, and how soon the axis is stopped when the gamepad is
+unplugged.
 """
 
 import random
@@ -120,10 +120,10 @@ def collect(bench: Stand, count: int) -> dict[str, list[float]]:
             except TimeoutError:  # the dead-man was quicker, for this process got no time
                 found.setdefault("dead man", []).append(1.0)
         found |= rates(bench, pad, calls, 0.3 if count < 10 else 3.0)
-        for _ in range(max(1, count // 10)):
-            found.setdefault("lost", []).append(lose(bench, pad, calls))
-        background.end()
-        steering.stop()
+    for _ in range(max(1, count // 10)):
+        found.setdefault("lost", []).append(lose(bench, calls))
+    background.end()
+    steering.stop()
     return found
 
 
@@ -148,19 +148,18 @@ def rates(
     }
 
 
-def lose(bench: Stand, pad: VirtualGamepad, calls: Calls) -> float:
-    """Return how long after the window lost the focus the axis was stopped."""
+def lose(bench: Stand, calls: Calls) -> float:
+    """Return how long after a gamepad was unplugged its axis was stopped."""
     steering = bench.mico.teleoperation
-    before = len(calls.times_s[MOVE])
-    pad.push("left_x", 0.6)
-    wait_until(lambda: len(calls.times_s[MOVE]) > before + 3)
-    began_s = time.perf_counter()
-    steering.set_focus(False)
-    delay_s = calls.after(STOP, began_s)
-    pad.push("left_x", 0.0)
-    steering.set_focus(True)
-    wait_until(lambda: steering.state.phase is TeleoperationPhase.ARMED)
-    return delay_s
+    with VirtualGamepad() as pad:
+        steering.start(pad.key, "benchmark")
+        wait_until(lambda: steering.state.phase is TeleoperationPhase.ARMED)
+        before = len(calls.times_s[MOVE])
+        pad.push("left_x", 0.6)
+        wait_until(lambda: len(calls.times_s[MOVE]) > before + 3)
+        began_s = time.perf_counter()
+        pad.unplug()
+        return calls.after(STOP, began_s)
 
 
 def measure(quick: bool = False) -> list[Figure]:
@@ -171,7 +170,7 @@ def measure(quick: bool = False) -> list[Figure]:
         Figure(NAME, "gamepad to first move, p50", 1e3 * percentile(found["move"], 50), "ms"),
         Figure(NAME, "gamepad to first move, p99", 1e3 * percentile(found["move"], 99), "ms", 15),
         Figure(NAME, "gamepad to stop, p99", 1e3 * percentile(found["stop"], 99), "ms", 15),
-        Figure(NAME, "focus lost to stop, p99", 1e3 * percentile(found["lost"], 99), "ms", 100),
+        Figure(NAME, "unplugged to stop, p99", 1e3 * percentile(found["lost"], 99), "ms", 100),
         Figure(NAME, "stopped by the dead-man before", len(found.get("dead man", ())), ""),
         # Rates have a least value for a target, which their periods turn into a largest one.
         Figure(NAME, "device read every", 1e3 / found["polled"][0], "ms", 1e3 / 300),

@@ -116,14 +116,14 @@ def test_what_stands_in_the_way_slows_a_hand_down_and_is_shown_not_hit():
             pad.push("right_y", next(deflections))
             return bool(teleoperation.state.refused)
 
-        wait_until(refused, timeout_s=20.0)
+        wait_until(refused, timeout_s=40.0)
         assert "left" in teleoperation.state.refused["left.z"]
         assert WALL.now_s() - began_s > 60.0 / 200.0, "it was slowed down on the way"
         assert len(watched.moves) > before + 10
         assert 0.0 < rig.mico.clearance().distance_um < 30.0
         assert teleoperation.state.phase is Phase.STEERING, "refused is not fatal"
         pad.push("right_y", 1.0)
-        wait_until(lambda: axis.position_um > -1470.0)
+        wait_until(lambda: axis.position_um > -1470.0, timeout_s=20.0)
         assert teleoperation.state.refused == {}
 
 
