@@ -105,10 +105,12 @@ def collect(bench: Stand, count: int) -> dict[str, list[float]]:
     with VirtualGamepad() as pad:
         steering.set_profile(TeleoperationProfileSettings.model_validate(PROFILE))
         steering.start(pad.key, "benchmark")
+        time.sleep(0.5)  # the window finds out that it is active
         wait_until(lambda: steering.state.phase is TeleoperationPhase.ARMED)
         calls, background = Calls(bench, "left.x"), Background(bench)
         for number in range(count):
             time.sleep(rng.uniform(0.03, 0.06))
+            wait_until(lambda: steering.state.phase is TeleoperationPhase.ARMED)
             began_s = time.perf_counter()
             pad.push("left_x", 0.6 if number % 2 else -0.6)
             found.setdefault("move", []).append(calls.after(MOVE, began_s))
@@ -165,6 +167,7 @@ def lose(bench: Stand, calls: Calls) -> float:
 def measure(quick: bool = False) -> list[Figure]:
     """Return the figures of one run."""
     with stand() as bench:
+        bench.window.activateWindow()  # what is steered stands while no window is active
         found = bench.beside(lambda: collect(bench, 4 if quick else 300))
     return [
         Figure(NAME, "gamepad to first move, p50", 1e3 * percentile(found["move"], 50), "ms"),
