@@ -24,9 +24,18 @@ class ProcedurePanels:
         Title of the panel whose place they share; it stays in front.
     """
 
-    def __init__(self, window: CosmicServerGui, mico: Mico, control: Control, beside: str) -> None:
-        self.trajectories: TrajectoryPanel = make_trajectory_panel(mico)
-        self.teleoperation: TeleoperationPanel = make_teleoperation_panel(mico)
+    def __init__(
+        self,
+        window: CosmicServerGui,
+        gui: MicoWidget,
+        scene: ScenePanel,
+        control: Control,
+        beside: str,
+    ) -> None:
+        self.trajectories: TrajectoryPanel = make_trajectory_panel(gui.mico)
+        self.trajectories.preview_changed.connect(scene.set_planned)
+        self.trajectories.refused.connect(gui.verdict_given)
+        self.teleoperation: TeleoperationPanel = make_teleoperation_panel(gui.mico)
         self.control: ControlPanel = make_control_panel(control)
         panels = {
             TRAJECTORIES: self.trajectories,
