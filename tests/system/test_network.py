@@ -187,8 +187,9 @@ def bad_messages(token: str) -> list[bytes]:
         request(token, "stage", "add", {"a": "x" * 70_000}),
         request(token, "stage", "add", {"a": deep}),
         request(token, "stage", "echo", {"value": float("nan")}, number=-(2**62)),
-        request("", "stage", "add", {"a": 1.0}),
-        request("ä" * 32, "stage", "add", {"a": 1.0}),
+        request("", "stage", "add", {"a": 1.0}, number=40),
+        request("ä" * 32, "stage", "add", {"a": 1.0}, number=41),
+        request(token[:-1] + "?", "stage", "add", {"a": 1.0}, number=42),
         *(chance.randbytes(size) for size in (1, 10, 100, 60_000)),
         *(good[:6] + chance.randbytes(size) for size in (10, 100, 1000)),
     ]
