@@ -321,6 +321,8 @@ class OperatorWindow(CosmicServerGui):
             self._scene.save()
         if self._mico_gui is not None:
             self._mico_gui.release_keys()
+        if self._procedures is not None:
+            self._procedures.shut_down()
         self._rig.close()
         if self._console is not None:
             self._console.shut_down()

@@ -45,3 +45,7 @@ class ProcedurePanels:
         for title, panel in panels.items():
             window.add_panel(title, panel, beside=beside, tabbed=True)
         window.dock(beside).raise_()
+
+    def shut_down(self) -> None:
+        """Let go of the input device."""
+        self.teleoperation.shut_down()
