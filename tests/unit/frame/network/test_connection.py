@@ -11,6 +11,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.client_side_connection import ClientSideConnection
 from cosmic.frame.network.codec import decode
+from cosmic.frame.network.delivery import Backlog
 from cosmic.frame.network.errors import CallRefused, CommandExpired, StationAway, StationTimeout
 from cosmic.frame.network.messages import Order
 from cosmic.frame.network.server_listener import ServerListener
@@ -154,12 +155,16 @@ def test_a_gap_in_what_should_be_complete_is_counted(bench: Bench) -> None:
         return bool(received)
 
     assert wait_until(published)
+    bench.station.publish("chunks", "settled")
+    assert wait_until(lambda: received[-1] == "settled")
     inlets = bench.hub.inlets["cosmic/fibres/topic/all/chunks"]
     (kept,) = inlets
-    inlets.clear()
+    nowhere: Backlog[bytes] = Backlog(Rule.ALL)
+    inlets[:] = [nowhere]
     for _ in range(3):
         bench.station.publish("chunks", "lost")
-    inlets.append(kept)
+    assert wait_until(lambda: len(nowhere) == 3)
+    inlets[:] = [kept]
     bench.station.publish("chunks", "last")
     assert wait_until(lambda: received[-1] == "last")
     assert subscription.lost == 3
