@@ -187,6 +187,8 @@ def bad_messages(token: str) -> list[bytes]:
         request(token, "stage", "add", {"a": "x" * 70_000}),
         request(token, "stage", "add", {"a": deep}),
         request(token, "stage", "echo", {"value": float("nan")}, number=-(2**62)),
+        request(token, "", "station/lease", {}, order="publish", number=38),
+        request(token, "\0" * 100, "", {}, number=39),
         request("", "stage", "add", {"a": 1.0}, number=40),
         request("ä" * 32, "stage", "add", {"a": 1.0}, number=41),
         request(token[:-1] + "?", "stage", "add", {"a": 1.0}, number=42),
@@ -222,6 +224,8 @@ def test_what_breaks_the_rules_is_refused_and_logged_and_nobody_else_notices(
             assert isinstance(error, CosmicError), f"message {number} was let through"
             assert honest.call("stage", "add", {"a": 1.0}) == 2.0
         assert ask(request(token, "stage", "add", {"a": 1.0}, number=50))[1] == 2.0
+        assert ask(request(token, "", "shared/x", {}, order="publish", number=51))[2] is None
+        assert ask(request(token, "", "none", {}, order="cancel", number=52))[2] is None
         again = ask(request(token, "stage", "add", {"a": 1.0}, number=50))[2]
         assert "second time" in str(again)
     assert not served.failures

@@ -178,7 +178,7 @@ class ConnectionHandler(WorkerThread):
         elif request.order is Order.PUBLISH:
             if self._client.access < Access.CALL:
                 raise CallRefused(f"{name} may not publish")
-            self._station.publish_shared(name, request.function, request.arguments["payload"])
+            self._station.publish_shared(name, request.function, request.arguments.get("payload"))
         return None
 
     def _call(self, question: Question, request: Request) -> None:
