@@ -1,6 +1,7 @@
 """Scan the probe into a fibre with force and picture as a bluesky plan, save it, read it back."""
 
 import json
+import logging
 import tempfile
 from pathlib import Path
 
@@ -80,6 +81,8 @@ def be_refused(rig: cosmic.Rig, engine: RunEngine) -> None:
 
 def main() -> None:
     """Rehearse, scan, read back, and be refused."""
+    # A plan that fails is told below, in a line; bluesky's log would have its traceback.
+    logging.getLogger("bluesky").setLevel(logging.CRITICAL)
     engine = RunEngine({})
     with tempfile.TemporaryDirectory() as folder, cosmic.connect(rate=5) as rig:
         approach(rig)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.operator_window import OperatorWindow
+from cosmic.app.operator_window import SCENE, OperatorWindow
 from cosmic.app.scene_panel import ScenePanel
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
@@ -35,7 +35,8 @@ def scene_panel(window: OperatorWindow) -> ScenePanel:
 
 
 def scene(window: OperatorWindow, qtbot: QtBot) -> SceneWidget:
-    """Wait for the drawing of the scene."""
+    """Wait for the drawing of the scene, which is made when it is first seen."""
+    window.raise_panel(SCENE)
     qtbot.waitUntil(lambda: scene_panel(window).scene is not None)
     found = scene_panel(window).scene
     assert found is not None

@@ -193,6 +193,7 @@ class CameraThread(WorkerThread):
             else:
                 self._restart(camera, settings, before)
             self._ranges = camera.ranges
+            self._shown = None  # it was taken with other settings
             logger.info("%s: %s", self.name, self._settings)
 
         return self._put(f"Settings of {self.camera_name}", command)
