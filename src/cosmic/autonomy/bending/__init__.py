@@ -1,0 +1,1 @@
+"""Bending stiffness of a fibre from how it pushes back."""

@@ -1,0 +1,41 @@
+"""What a bend test measured, before anything is fitted to it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Span:
+    """One push of the probe against a held fibre, out and back, at one place along it.
+
+    Attributes
+    ----------
+    nominal_um : float
+        From the tip of the jaws to the middle of the probe, as well as it is known.
+    probe_x_um, hold_x_um : float
+        Positions of the axes along the fibre as their encoders read them. Differences between the
+        spans of one grasp are exact; the sum with `nominal_um` holds an offset common to all.
+    way_um : ndarray, shape (n,), float64
+        Position of the probe's axis across the fibre, growing as it pushes.
+    force_un : ndarray, shape (n,), float64
+        Mean force at each, positive when the fibre pushes back, with the baseline still in it.
+    force_std_un : ndarray, shape (n,), float64
+        Standard deviation of that mean.
+    time_s : ndarray, shape (n,), float64
+        On the platform's clock.
+    loading : ndarray, shape (n,), bool
+        True on the way out, False on the way back.
+    """
+
+    nominal_um: float
+    probe_x_um: float
+    hold_x_um: float
+    way_um: Floats
+    force_un: Floats
+    force_std_un: Floats
+    time_s: Floats
+    loading: npt.NDArray[np.bool_]

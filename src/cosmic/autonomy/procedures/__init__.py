@@ -1,0 +1,1 @@
+"""Procedures: unit operations put together, run, paused and aborted."""
