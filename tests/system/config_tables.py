@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from pydantic import BaseModel
 
+from cosmic.app.network_settings import NetworkSettings
 from cosmic.app.platform_file import PlatformFile, PlatformSettings
 from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.daqco.core.settings import (
@@ -87,6 +88,7 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[[vico.lens.step]]": ZoomStepSettings,
     "[vico.light]": LampSettings,
     "[control]": ControlSettings,
+    "[network]": NetworkSettings,
     "[kinds.NAME]": StageKind,
     "[controller]": ControllerSettings,
     "[[devices]]": DeviceWiring,

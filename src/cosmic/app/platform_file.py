@@ -5,6 +5,7 @@ from typing import Annotated, Final
 
 from pydantic import Field
 
+from cosmic.app.network_settings import NetworkSettings
 from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.frame.config import StrictModel, load_model, shipped_config_dir
@@ -34,6 +35,7 @@ class PlatformFile(StrictModel):
     daqco: DaqcoSettings | None = None
     vico: VicoSettings | None = None
     control: ControlSettings = ControlSettings()
+    network: NetworkSettings = NetworkSettings()
 
 
 def platform_path(config: str | Path | None) -> Path:
