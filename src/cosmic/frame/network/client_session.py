@@ -166,3 +166,15 @@ class ClientSession:
             what.function,
             what.arguments,
         )
+
+
+def read_hosted(said: Any) -> dict[tuple[str, str], tuple[bool, bool]]:
+    """Return which functions there are, and of each whether it moves and whether it overtakes."""
+    found = {}
+    try:
+        for application, functions in said.items():
+            for function, (moves, at_once) in functions.items():
+                found[application, function] = (bool(moves), bool(at_once))
+    except (AttributeError, TypeError, ValueError) as exc:
+        raise ProtocolError("the station lists its applications in an unknown way") from exc
+    return found

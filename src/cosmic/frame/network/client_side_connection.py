@@ -3,16 +3,16 @@
 import logging
 from collections.abc import Callable, Mapping
 from threading import Condition, Lock
-from typing import Any, Final
+from typing import Final
 
 from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errors import CosmicError, ProtocolError
+from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.listeners import tell
 from cosmic.frame.network.addresses import topic_key
-from cosmic.frame.network.client_session import ClientSession, What
+from cosmic.frame.network.client_session import ClientSession, What, read_hosted
 from cosmic.frame.network.errors import CallRefused, StationAway, StationTimeout
 from cosmic.frame.network.incoming import Incoming
 from cosmic.frame.network.messages import Order
@@ -45,9 +45,8 @@ _BEAT_LIMIT_S: Final = 0.5
 class ClientSideConnection(WorkerThread):
     """A `Transport` over a line, which connects by itself and says why it is away.
 
-    While the station is there, signs of life go to it ten times a second.
-
-    Start it like any thread; `close` in a ``finally``.
+    While the station is there, signs of life go to it ten times a second. Start it like any
+    thread; `close` in a ``finally``.
 
     Parameters
     ----------
@@ -80,8 +79,9 @@ class ClientSideConnection(WorkerThread):
         self._tasks = RemoteTasks(self._cancel_task)
         self._session = ClientSession(station, name, policy, clock, self._tasks.on_message)
         self._incoming: list[Incoming] = []
-        self._policy_of_receivers = policy
         self._closed = False
+        self._holds_lease = False
+        self._lease_orders = 0
 
     # What everybody uses
 
@@ -97,6 +97,11 @@ class ClientSideConnection(WorkerThread):
         for application, function in self._hosted:
             found.setdefault(application, []).append(function)
         return found
+
+    @property
+    def holds_lease(self) -> bool:
+        """Whether this client may move things there, as the station last told."""
+        return self._holds_lease and self._presence.here
 
     def wait_until_here(self, timeout_s: float) -> bool:
         """Wait for the station; False when it was not there after `timeout_s`."""
@@ -135,7 +140,7 @@ class ClientSideConnection(WorkerThread):
     def subscribe(self, topic: str, rule: Rule, receiver: Receiver) -> Subscription:
         """As `Transport.subscribe`; goes on after a reconnection."""
         key = topic_key(self._station, topic, rule)
-        made = Incoming(topic, key, rule, receiver, self._policy_of_receivers, self._forget)
+        made = Incoming(topic, key, rule, receiver, self._policy, self._forget)
         with self._lock:
             if self._closed:
                 raise StationAway(f"{self._station}: the connection is closed")
@@ -160,9 +165,11 @@ class ClientSideConnection(WorkerThread):
     def take_lease(self) -> None:
         """As `Transport.take_lease`."""
         self._order(Order.TAKE)
+        self._note_lease(holds=True)
 
     def release_lease(self) -> None:
         """As `Transport.release_lease`."""
+        self._note_lease(holds=False)
         self._order(Order.RELEASE)
 
     @override
@@ -212,7 +219,7 @@ class ClientSideConnection(WorkerThread):
     def _connect(self) -> None:
         try:
             wire = self._wire or self._opened()
-            self._hosted = _read_hosted(self._session.begin(wire))
+            self._hosted = read_hosted(self._session.begin(wire))
         except CosmicError as exc:
             self._session.end()
             self._set_away(str(exc))
@@ -229,8 +236,11 @@ class ClientSideConnection(WorkerThread):
         return wire
 
     def _beat(self) -> None:
+        orders = self._lease_orders
         try:
-            self._order(Order.BEAT, timeout_s=_BEAT_LIMIT_S)
+            holds = self._order(Order.BEAT, timeout_s=_BEAT_LIMIT_S)
+            if orders == self._lease_orders:  # else the answer is older than what it tells of
+                self._holds_lease = holds is True
         except StationTimeout as exc:
             if self._session.unanswered_s > SILENCE_LIMIT_S:
                 self._set_away(str(exc))
@@ -265,9 +275,14 @@ class ClientSideConnection(WorkerThread):
     def _cancel_task(self, number: str) -> None:
         self._order(Order.CANCEL, number)
 
+    def _note_lease(self, *, holds: bool) -> None:
+        self._lease_orders += 1
+        self._holds_lease = holds
+
     # State
 
     def _set_away(self, why: str) -> None:
+        self._note_lease(holds=False)
         self._tasks.give_up(f"{self._station} is away: {why}; what it had begun to move stops")
         self._set(Presence(self._station, here=False, why=why))
 
@@ -284,15 +299,3 @@ class ClientSideConnection(WorkerThread):
     def _forget(self, incoming: Incoming) -> None:
         with self._lock:
             self._incoming = [each for each in self._incoming if each is not incoming]
-
-
-def _read_hosted(said: Any) -> dict[tuple[str, str], tuple[bool, bool]]:
-    """Return which functions there are, and of each whether it moves and whether it overtakes."""
-    found = {}
-    try:
-        for application, functions in said.items():
-            for function, (moves, at_once) in functions.items():
-                found[application, function] = (bool(moves), bool(at_once))
-    except (AttributeError, TypeError, ValueError) as exc:
-        raise ProtocolError("the station lists its applications in an unknown way") from exc
-    return found
