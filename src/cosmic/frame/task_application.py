@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from contextvars import copy_context
 from queue import SimpleQueue
 from threading import Lock
 
@@ -65,7 +66,9 @@ class TaskApplication(CosmicApplicationBase):
         with self._taking:
             if self._over:
                 raise NotAvailable(f"{self.title} is closed")
-            self._jobs.put((task, job))
+            # It is carried out as whoever began it, who may be another process.
+            context = copy_context()
+            self._jobs.put((task, lambda task: context.run(job, task)))
         self.task_started.emit(task)
         return task
 

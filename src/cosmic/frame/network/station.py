@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from threading import Lock
+from typing import Protocol, runtime_checkable
 
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.failure import FailurePolicy
@@ -13,6 +14,14 @@ from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.transport import SHARED_PREFIX, Presence, PresenceListener
 
 LEASE_TOPIC = "station/lease"
+
+
+@runtime_checkable
+class Hosted(Protocol):
+    """An application that wants to know where it is hosted, to publish there."""
+
+    def on_hosted(self, station: "Station") -> None:
+        """Take note of the station; called once, by `Station.host`."""
 
 
 class Station:
@@ -79,6 +88,8 @@ class Station:
     def host(self, name: str, application: object) -> ApplicationInvoker:
         """Offer what is marked with `remote` in `application` under `name`.
 
+        An application that is `Hosted` is told of the station.
+
         Raises
         ------
         TypeError
@@ -91,6 +102,8 @@ class Station:
             if name in self._invokers:
                 raise ValueError(f"{self._name} hosts an application {name!r} already")
             self._invokers[name] = invoker
+        if isinstance(application, Hosted):
+            application.on_hosted(self)
         return invoker
 
     def invoker(self, name: object) -> ApplicationInvoker:

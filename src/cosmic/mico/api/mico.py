@@ -57,7 +57,7 @@ class Mico:
 
     def _connect(self) -> None:
         """Join the commanders to the devices there are now."""
-        token = self._manager.lease.holder.token
+        token = self._manager.lease.local_token
         with self._joining:
             for index, device in self._manager.devices.items():
                 commander = self._commanders.get(index)

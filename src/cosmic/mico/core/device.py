@@ -49,6 +49,8 @@ logger = logging.getLogger(__name__)
 
 MOST_AT_ONCE: Final = 100
 """How many messages are taken before positions are polled again."""
+GUARD_LOOK_S: Final = 0.03
+"""How often it is looked whether another process that commanded a motion is still there."""
 
 
 _Message = Departed | Order | Event | Halt | StopAll | Lost | SetFrequency | Tell | Wake
@@ -255,11 +257,13 @@ class Device(WorkerThread):
         moving = any(pilot.flight is not None for pilot in self._pilots.values())
         if not moving:
             return self._settings.watch.idle_poll_s
-        flights = [pilot.flight for pilot in self._pilots.values()]
-        jogs = [flight.jog for flight in flights if flight is not None and flight.jog is not None]
+        flights = [pilot.flight for pilot in self._pilots.values() if pilot.flight is not None]
+        jogs = [flight.jog for flight in flights if flight.jog is not None]
         if jogs:
             rate = self._context.clock.rate or 1.0
             return max(0.002, min(jog.pause_s for jog in jogs) / rate)
+        if any(flight.order.guard is not None for flight in flights):
+            return min(self._context.poll_s, GUARD_LOOK_S)
         return self._context.poll_s
 
     def _guarded(self, action: Callable[[], None]) -> None:

@@ -440,7 +440,7 @@ class DeviceManager(QObject):
         if match_arrival:
             speeds = frequencies(grants, self.states(), self.settings.defaults, self._usual_hz)
         start = GroupStart(len(motions), self.group_started.emit) if len(motions) > 1 else None
-        token = self.lease.holder.token
+        token, guard = self.lease.local_token, self.lease.guard()
         orders = {
             name: Order(
                 self.address(name).channel,
@@ -452,6 +452,7 @@ class DeviceManager(QObject):
                 follows=None if follows is None else follows.get(name),
                 start=start,
                 frequency_hz=speeds.get(name),
+                guard=guard,
             )
             for name, motion in motions.items()
         }
@@ -474,9 +475,10 @@ class DeviceManager(QObject):
     def _requests(
         self, motions: Mapping[str, Motion], *, consent: bool, alone: bool = False
     ) -> list[Request]:
-        token = self.lease.holder.token
+        token, guard = self.lease.local_token, self.lease.guard()
         return [
-            Request(name, motion, token, consent, alone=alone) for name, motion in motions.items()
+            Request(name, motion, token, consent, alone=alone, guard=guard)
+            for name, motion in motions.items()
         ]
 
     # Stopping

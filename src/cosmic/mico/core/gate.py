@@ -11,7 +11,7 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision.answer import AxisSpan
 from cosmic.mico.core.collision.checker import CollisionChecker
-from cosmic.mico.core.lease import Lease
+from cosmic.mico.core.lease import Guard, Lease, LeaseHolder
 from cosmic.mico.core.orders import Grant, Interval, Motion
 from cosmic.mico.core.positioner import Confidence, PositionerState
 from cosmic.mico.core.rules import EVERYWHERE, Limits, check_axis, planned_target, swept_interval
@@ -31,6 +31,8 @@ class Request:
     consent: bool = False
     alone: bool = False
     """Move it without the axes that it is linked to."""
+    guard: Guard | None = None
+    """What watches over a command of another process; None for those of this one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +49,8 @@ class Picture:
         Where axes may be whose position is unknown.
     links : mapping of frozenset of str
         By axis, those that must move with it.
+    token, holder : str
+        Of this process while it may move, otherwise empty; and who may.
     """
 
     stop_reason: str | None
@@ -59,6 +63,7 @@ class Picture:
     begun_at: Mapping[str, float | None] = field(default_factory=dict)
     regions: Mapping[str, Interval] = field(default_factory=dict)
     links: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    holder: str = "somebody else"
 
     def place(self, state: PositionerState) -> Interval:
         """Return where an axis may be, if nobody moves it."""
@@ -118,10 +123,9 @@ def _first_refusal(request: Request, picture: Picture) -> MoveVerdict | None:
             f"{axis}: motion is stopped ({picture.stop_reason}); reset the stop first",
             axis=axis,
         )
-    if request.token != picture.token:
-        return refuse(
-            Reason.NO_LEASE, f"{axis}: somebody else controls the platform now", axis=axis
-        )
+    no_right = _no_right(request, picture)
+    if no_right:
+        return refuse(Reason.NO_LEASE, f"{axis}: {no_right}", axis=axis)
     state = picture.states.get(axis)
     if state is None:
         return refuse(Reason.DEVICE, f"{axis}: there is no such axis", axis=axis)
@@ -133,6 +137,18 @@ def _first_refusal(request: Request, picture: Picture) -> MoveVerdict | None:
         held=picture.held.get(axis),
         age_s=picture.now_wall_s - state.read_wall_s,
         rules=picture.rules,
+    )
+
+
+def _no_right(request: Request, picture: Picture) -> str:
+    """Return why whoever asks may not move anything; empty when they may."""
+    if request.guard is not None:
+        return request.guard.why if request.guard.expired else ""
+    if request.token and request.token == picture.token:
+        return ""
+    return (
+        f"{picture.holder} controls the platform now; take over in the window, "
+        "or wait until it is given back"
     )
 
 
@@ -245,14 +261,16 @@ class Gate:
 
         `advice` is that of `CollisionChecker.check`.
         """
+        holder = self._lease.holder
         with self._lock:
-            return judge(requests, self._picture(), self._checker, advice=advice).verdict
+            return judge(requests, self._picture(holder), self._checker, advice=advice).verdict
 
     def decide(self, requests: Sequence[Request]) -> tuple[MoveVerdict, dict[str, Grant]]:
         """Decide `requests` together; when allowed, hold their intervals and grant each axis."""
+        holder = self._lease.holder  # first, for it may tell listeners that it has lapsed
         with self._lock:
             epoch = self._latch.state.epoch
-            picture = self._picture()
+            picture = self._picture(holder)
             decision = judge(requests, picture, self._checker)
             grants: dict[str, Grant] = {}
             for axis, interval in decision.intervals.items():
@@ -268,8 +286,9 @@ class Gate:
 
     def spans(self) -> dict[str, AxisSpan]:
         """Return where every axis may be as things are now."""
+        holder = self._lease.holder
         with self._lock:
-            picture = self._picture()
+            picture = self._picture(holder)
         return {name: _span(state, None, picture) for name, state in picture.states.items()}
 
     def still_valid(self, grant: Grant) -> bool:
@@ -335,11 +354,12 @@ class Gate:
                 self._regions[name] = self._power_up[name].hull(here)
         return dict(self._regions)
 
-    def _picture(self) -> Picture:
+    def _picture(self, holder: LeaseHolder) -> Picture:
         states = self._states()
         return Picture(
             stop_reason=self._latch.state.reason,
-            token=self._lease.holder.token,
+            token=holder.token,
+            holder=holder.name,
             states=states,
             held=self._held(),
             begun_at=self._begun_at(),

@@ -6,6 +6,7 @@ from typing import Final
 
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.core.group_start import GroupStart
+from cosmic.mico.core.lease import Guard
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.hw.interface import Direction
 
@@ -144,6 +145,8 @@ class Order:
         Others that it starts together with.
     frequency_hz : int or None
         Limit of the closed-loop speed for this movement only.
+    guard : Guard or None
+        Ends the movement when it expires; None for what this process commands.
     """
 
     channel: int
@@ -157,4 +160,5 @@ class Order:
     epoch: int | None = None
     start: GroupStart | None = None
     frequency_hz: int | None = None
+    guard: Guard | None = None
     number: int = field(default_factory=lambda: next(_numbers))

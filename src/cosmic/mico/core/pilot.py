@@ -13,6 +13,7 @@ from cosmic.mico.core.flight import Flight
 from cosmic.mico.core.follower import ChannelFollower
 from cosmic.mico.core.gate import Request
 from cosmic.mico.core.jog import SLOWER, JogRun
+from cosmic.mico.core.lease import Guard
 from cosmic.mico.core.messages import Departed, MovementBegun
 from cosmic.mico.core.orders import (
     FREQUENCY_HZ,
@@ -45,6 +46,10 @@ class ChannelPilot(ChannelFollower):
             self._give_back(order.grant)
             why = "a newer command came first" if order.follows else "cancelled before it started"
             order.movement.fail(MoveCancelled(f"{self.name}: {why}"))
+            return
+        if order.guard is not None and order.guard.expired:
+            self._give_back(order.grant)
+            self.turn_away(order, _unguarded(self.name, order.guard))
             return
         if order.epoch is not None and order.epoch != self._context.gate.stop_state.epoch:
             self._give_back(order.grant)
@@ -119,7 +124,7 @@ class ChannelPilot(ChannelFollower):
         return grant or self._grant(order, order.motion)
 
     def _grant(self, order: Order, motion: Motion) -> Grant | None:
-        request = Request(self.name, motion, order.token, order.consent)
+        request = Request(self.name, motion, order.token, order.consent, guard=order.guard)
         verdict, grants = self._context.gate.decide([request])
         if verdict.allowed:
             return grants[self.name]
@@ -253,7 +258,7 @@ class ChannelPilot(ChannelFollower):
         """Return how much of its speed a jog may keep with what is in its way."""
         for share in SLOWER:
             ahead = jog.look_ahead(self._positioner.state, share)
-            request = Request(self.name, ahead, order.token, order.consent)
+            request = Request(self.name, ahead, order.token, order.consent, guard=order.guard)
             verdict = self._context.gate.check([request], advice=False)
             if verdict.reason is not Reason.COLLISION:
                 return share
@@ -262,6 +267,10 @@ class ChannelPilot(ChannelFollower):
     @override
     def poll(self) -> None:
         flight = self.flight
+        guard = flight.order.guard if flight is not None and flight.error is None else None
+        if guard is not None and guard.expired:
+            logger.warning("%s: stopped, %s", self.name, guard.why)
+            self.halt(MoveCancelled(f"{self.name}: stopped, {guard.why}"))
         jog = flight.jog if flight is not None else None
         if flight is not None and jog is not None and jog.due(self._context.clock.now_s()):
             self._next_packet(flight, jog)
@@ -287,6 +296,10 @@ class ChannelPilot(ChannelFollower):
             flight.progress_s = now_s
             if isinstance(jog, SteerRun) and jog.must_locate():
                 self.ask_position()
+
+
+def _unguarded(name: str, guard: Guard) -> MoveVerdict:
+    return refuse(Reason.NO_LEASE, f"{name}: {guard.why}", axis=name)
 
 
 def _stopped(name: str) -> MoveVerdict:

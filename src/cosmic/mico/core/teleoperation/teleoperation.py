@@ -212,7 +212,7 @@ class Teleoperation:
 
     def _steering(self, device: InputDevice, profile: TeleoperationProfileSettings) -> Steering:
         mapping, commands = self._mapping(profile), RateMeter()
-        token = self._manager.lease.holder.token
+        token = self._manager.lease.local_token
         by_device: dict[int, DeviceCommander] = {}
         drivers: dict[str, AxisDriver] = {}
         for name in mapping.positioners:
