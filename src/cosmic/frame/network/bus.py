@@ -8,6 +8,7 @@ from cosmic.frame.network.delivery import Backlog, Delivery
 from cosmic.frame.network.transport import Receiver, Rule, Subscription
 
 Tap = Callable[[str, int, object], None]
+Wants = Callable[[str], bool]
 
 
 class Bus:
@@ -19,6 +20,7 @@ class Bus:
         self._backlogs: dict[str, tuple[Backlog[object], ...]] = {}
         self._numbers: dict[str, int] = {}
         self._taps: tuple[Tap, ...] = ()
+        self._wants: tuple[Wants, ...] = ()
 
     def publish(self, topic: str, payload: object) -> None:
         """Hand `payload` to everybody who subscribed to `topic`; returns at once.
@@ -48,16 +50,27 @@ class Bus:
             topic, backlog, receiver, self._policy, lost=lambda: backlog.lost, on_close=remove
         )
 
-    def tap(self, tap: Tap) -> Callable[[], None]:
+    def wanted(self, topic: str) -> bool:
+        """Return whether anybody receives what is published to `topic`.
+
+        Over a line it is known only after something has been published to it.
+        """
+        return bool(self._backlogs.get(topic)) or any(wants(topic) for wants in self._wants)
+
+    def tap(self, tap: Tap, wants: Wants | None = None) -> Callable[[], None]:
         """Call `tap(topic, number, payload)` with everything; it must return at once.
 
-        Returns the function that ends it.
+        `wants(topic)` says whether it has anybody to hand a topic on to. Returns the function that
+        ends it.
         """
+        asked = () if wants is None else (wants,)
         with self._lock:
             self._taps = (*self._taps, tap)
+            self._wants = (*self._wants, *asked)
 
         def remove() -> None:
             with self._lock:
                 self._taps = tuple(each for each in self._taps if each is not tap)
+                self._wants = tuple(each for each in self._wants if each not in asked)
 
         return remove

@@ -90,6 +90,11 @@ class Outbox:
         if self._may_be_wanted(topic, Rule.ALL):
             self._queue(parcel)
 
+    def wants(self, topic: str) -> bool:
+        """Return whether anybody receives a topic; False before it was published to."""
+        found = (self._outlets.get((topic, rule)) for rule in Rule)
+        return any(outlet is not None and outlet.wanted for outlet in found)
+
     def send(self, outlet: Outlet, value: object) -> None:
         """Queue a message that must not be lost; returns at once."""
         self._queue(_Parcel(value, outlet=outlet))

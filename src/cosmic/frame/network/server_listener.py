@@ -87,7 +87,7 @@ class ServerListener(WorkerThread):
         )
         self._readers = [questions, signs]
         self._remove = [
-            self._station.bus.tap(self._outbox.publish),
+            self._station.bus.tap(self._outbox.publish, self._outbox.wants),
             self._station.lease.subscribe(lambda _: self._end_motion_without_lease()),
         ]
         for reader in self._readers:

@@ -124,6 +124,10 @@ class Station:
         """Publish to a topic of the station; returns at once. `payload` must not change later."""
         self._bus.publish(topic, payload)
 
+    def wanted(self, topic: str) -> bool:
+        """Return whether anybody receives a topic; see `Bus.wanted`."""
+        return self._bus.wanted(topic)
+
     def publish_shared(self, who: str, topic: object, payload: object) -> None:
         """Publish for a client, if the topic is open to clients.
 
