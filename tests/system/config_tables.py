@@ -46,6 +46,7 @@ from cosmic.twin.optics.settings import (
     SensorSettings,
     ViewSettings,
 )
+from cosmic.twin.sample_settings import SampleSettings
 from cosmic.twin.settings import (
     ControllerSettings,
     DeviceWiring,
@@ -98,6 +99,7 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[geometry.grippers]": GripperGeometry,
     "[contact]": ContactSettings,
     "[[fibres]]": FibreSettings,
+    "[samples.NAME]": SampleSettings,
     "[force_sensors.NAME]": ForceSensorSettings,
     "[lens]": LensSettings,
     "[lens.zoom]": LensMotorSettings,

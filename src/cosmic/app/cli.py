@@ -138,6 +138,7 @@ def _options(chosen: argparse.Namespace) -> "WindowOptions":
         only=chosen.command or "",
         rate=chosen.rate,
         cold=chosen.cold,
+        sample=chosen.sample,
         offscreen_s=chosen.offscreen,
         screenshot=chosen.screenshot,
         size=size,
@@ -167,6 +168,7 @@ def _parser() -> argparse.ArgumentParser:
         config=None,
         rate=1.0,
         cold=False,
+        sample=None,
         offscreen=None,
         screenshot=None,
         size=None,
@@ -204,6 +206,7 @@ def _window_options() -> argparse.ArgumentParser:
     add("--config", type=Path, metavar="PATH", help="a platform.toml or its folder")
     add("--rate", type=float, help="how many times faster than the wall the simulation runs")
     add("--cold", action="store_true", help="start the simulation at power-up, nothing referenced")
+    add("--sample", metavar="NAME", help="what lies on the simulated plate, such as forty-dry")
     add("--offscreen", type=_seconds, metavar="SECONDS", help="show nothing, close after SECONDS")
     add("--screenshot", type=Path, metavar="FILE", help="with --offscreen: save a picture")
     add("--size", type=_size, metavar="WxH", help="size of the window, such as 1600x1000")

@@ -25,6 +25,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.hw.factory import make_controller, make_simulated
 from cosmic.mico.hw.interface import Controller
+from cosmic.twin.sample import put_on
 from cosmic.twin.scene import Scene
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.core.settings import Backend, VicoSettings
@@ -82,6 +83,7 @@ def build_platform(
     rate: float = 1.0,
     cold: bool = False,
     seed: int = 0,
+    sample: str | None = None,
     mico_gui: GuiFactory | None = None,
     daqco_gui: GuiFactory | None = None,
     vico_gui: GuiFactory | None = None,
@@ -94,7 +96,7 @@ def build_platform(
         A platform.toml or its folder; None is the one that ships with CoSMic.
     applications : tuple of str
         Which to make, as far as the platform file names them.
-    rate, cold, seed
+    rate, cold, seed, sample
         Of the simulated platform; see `cosmic.connect`.
     mico_gui, daqco_gui, vico_gui : callable or None
         Make the applications' GUI components, where there is a window.
@@ -108,8 +110,10 @@ def build_platform(
     """
     file, path = load_platform(config)
     simulated = file.mico.backend == "simulated"
-    if not simulated and (rate != 1.0 or cold):
-        raise ConfigError(f"{path}: mico.backend: only the simulated platform has a rate or --cold")
+    if not simulated and (rate != 1.0 or cold or sample is not None):
+        raise ConfigError(
+            f"{path}: mico.backend: only the simulated platform has a rate, --cold or --sample"
+        )
     if rate != 1.0 and file.daqco is not None and file.daqco.backend != "simulated":
         raise ConfigError(f"{path}: daqco.backend: real boards have no rate; leave --rate out")
     try:
@@ -119,6 +123,7 @@ def build_platform(
     scene = None
     if simulated:
         twin = load_twin(file, path)
+        twin = twin if sample is None else put_on(twin, sample, seed)
         scene = Scene.from_settings(twin, clock, seed=seed, cold=cold, folder=path.parent)
     site = _Site(file, path, clock, FailurePolicy(), scene, seed)
     hosted = [name for name in applications if name in file.platform.applications]

@@ -145,6 +145,7 @@ def connect(
     *,
     cold: bool = False,
     seed: int = 0,
+    sample: str | None = None,
 ) -> Rig:
     """Start the platform in this process and return it; no window and no event loop needed.
 
@@ -162,6 +163,9 @@ def connect(
         Start the simulated platform at power-up, with no position known.
     seed : int
         Of everything random in the simulated platform.
+    sample : str or None
+        What lies on the simulated plate, as twin.toml names it, such as "forty-dry"; None: the
+        fibres that twin.toml lists.
 
     Raises
     ------
@@ -183,7 +187,7 @@ def connect(
             f"known are {', '.join(KNOWN_APPLICATIONS)}"
         )
     platform = build_platform(
-        config, applications=tuple(applications), rate=rate, cold=cold, seed=seed
+        config, applications=tuple(applications), rate=rate, cold=cold, seed=seed, sample=sample
     )
     rig = Rig(platform)
     atexit.register(rig.close)

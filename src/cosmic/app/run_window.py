@@ -44,6 +44,8 @@ class WindowOptions:
         Show nothing and close after so many seconds.
     screenshot : Path or None
         Where to save a picture of the window before it closes.
+    sample : str or None
+        What lies on the simulated plate, as twin.toml names it.
     size : tuple of int or None
         Width and height of the window; None leaves it as it was.
     """
@@ -52,6 +54,7 @@ class WindowOptions:
     only: str = ""
     rate: float = 1.0
     cold: bool = False
+    sample: str | None = None
     offscreen_s: float | None = None
     screenshot: Path | None = None
     size: tuple[int, int] | None = None
@@ -131,6 +134,7 @@ def _build(options: WindowOptions) -> Platform:
         applications=only,
         rate=options.rate,
         cold=options.cold,
+        sample=options.sample,
         mico_gui=make_mico_gui,
         daqco_gui=make_daqco_gui,
         vico_gui=make_vico_gui,

@@ -1,10 +1,12 @@
 """Constants of the twin's force side: geometry of the tools, fibres, contact, sensors."""
 
-from typing import Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
 from cosmic.frame.config import StrictModel
+
+Role = Literal["single", "crossing", "stuck", "debris"]
 
 
 class JointDrive(StrictModel):
@@ -99,6 +101,12 @@ class FibreSettings(StrictModel):
     curl_deg, kink_deg : float
         By how much it turns, evenly from end to end and at once in its middle, where it lies. It
         is seen so; what takes and pushes it takes it for straight.
+    role : str
+        What it is to somebody who wants single fibres: told in the truth, without effect.
+    bonded_to : int or None
+        Number of a fibre before it that it lies on or along.
+    bond_un : float
+        Pull at which the two come apart.
     """
 
     length_um: float = Field(gt=0.0)
@@ -113,6 +121,9 @@ class FibreSettings(StrictModel):
     angle_deg: float = 0.0
     curl_deg: float = Field(default=0.0, gt=-180.0, lt=180.0)
     kink_deg: float = Field(default=0.0, gt=-120.0, lt=120.0)
+    role: Role = "single"
+    bonded_to: int | None = Field(default=None, ge=0)
+    bond_un: float = Field(default=0.0, ge=0.0)
 
     @model_validator(mode="after")
     def _partly_inside(self) -> Self:

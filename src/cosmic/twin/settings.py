@@ -15,6 +15,7 @@ from cosmic.twin.force_settings import (
 )
 from cosmic.twin.lens_settings import LensSettings, LightSettings
 from cosmic.twin.optics.settings import OpticsSettings
+from cosmic.twin.sample_settings import SampleSettings
 
 
 class StageKind(StrictModel):
@@ -136,6 +137,7 @@ class TwinSettings(StrictModel):
     geometry: GeometrySettings
     contact: ContactSettings
     fibres: tuple[FibreSettings, ...] = Field(default=(), strict=False)
+    samples: dict[str, SampleSettings] = Field(default_factory=dict)
     force_sensors: dict[str, ForceSensorSettings]
     sensor_wiring: dict[str, str] = Field(default_factory=dict)
     optics: OpticsSettings
@@ -156,6 +158,8 @@ class TwinSettings(StrictModel):
                     f"fibres[{number}] is held by {fibre.held_by!r}, which is no gripper; "
                     f"known: {', '.join(grippers)}"
                 )
+            if fibre.bonded_to is not None and not fibre.bonded_to < number:
+                raise ValueError(f"fibres[{number}].bonded_to must be the number of one before it")
         for place, name in self.sensor_wiring.items():
             if name not in self.force_sensors:
                 raise ValueError(f"sensor_wiring.{place}: there is no force sensor {name!r}")
