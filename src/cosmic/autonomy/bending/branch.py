@@ -1,0 +1,122 @@
+"""A first, rough look at a span: where its baseline lies, and where contact begins."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.autonomy.bending.result import BendingError, Floats
+from cosmic.autonomy.bending.span import Span
+
+Mask = npt.NDArray[np.bool_]
+
+LEAST_POINTS: Final = 6
+CLEAR_SIGMAS: Final = 5.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """The usable points of a span, in the order of time.
+
+    Attributes
+    ----------
+    kept : ndarray of bool
+        Which points of the span these are.
+    """
+
+    way_um: Floats
+    force_un: Floats
+    std_un: Floats
+    time_s: Floats
+    loading: Mask
+    kept: Mask
+
+    def but(self, mask: Mask) -> "Points":
+        """Return these points without those of `mask`."""
+        kept = self.kept.copy()
+        kept[np.flatnonzero(self.kept)[mask]] = False
+        stay = ~mask
+        return Points(
+            self.way_um[stay],
+            self.force_un[stay],
+            self.std_un[stay],
+            self.time_s[stay],
+            self.loading[stay],
+            kept,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Rough:
+    """One branch as baseline and straight line."""
+
+    hinge_um: float
+    k_un_um: float
+
+
+def points_of(span: Span) -> Points:
+    """Return the points of a span that are numbers.
+
+    Raises
+    ------
+    BendingError
+        The arrays differ in length, or too few points are left.
+    """
+    count = len(span.way_um)
+    columns = (span.force_un, span.force_std_un, span.time_s, span.loading)
+    if any(len(each) != count for each in columns):
+        raise BendingError(
+            f"the span at {span.nominal_um:g} um has {count} positions, but "
+            f"{', '.join(str(len(each)) for each in columns)} forces, deviations, times and "
+            "directions: each point needs all of them"
+        )
+    kept = np.isfinite(span.way_um) & np.isfinite(span.force_un) & np.isfinite(span.time_s)
+    kept &= np.isfinite(span.force_std_un) & (span.force_std_un > 0.0)
+    if kept.sum() < LEAST_POINTS:
+        raise BendingError(
+            f"the span at {span.nominal_um:g} um has {kept.sum()} usable points, and a fit needs "
+            f"{LEAST_POINTS}: measure it again with more steps"
+        )
+    return Points(
+        span.way_um[kept],
+        span.force_un[kept],
+        span.force_std_un[kept],
+        span.time_s[kept],
+        span.loading[kept],
+        kept,
+    )
+
+
+def free_force_un(points: Points) -> Floats:
+    """Return the baseline at each time, from where the probe was farthest from the fibre."""
+    ends = []
+    for branch in (points.loading, ~points.loading):
+        if branch.any():
+            ways, forces, times = (
+                values[branch] for values in (points.way_um, points.force_un, points.time_s)
+            )
+            free = np.argsort(ways, kind="stable")[: max(2, len(ways) // 8)]
+            ends.append((float(np.mean(times[free])), float(np.median(forces[free]))))
+    times_s, levels = zip(*sorted(ends), strict=True)
+    return np.asarray(np.interp(points.time_s, times_s, levels), dtype=np.float64)
+
+
+def stuck(points: Points) -> Mask:
+    """Return where the fibre clings to the probe that goes back, and pulls."""
+    below = points.force_un - free_force_un(points)
+    return ~points.loading & (below < -CLEAR_SIGMAS * points.std_un)
+
+
+def rough(points: Points, branch: Mask, baseline_un: Floats) -> Rough:
+    """Return where a branch has its kink, trying each place."""
+    order = np.argsort(points.way_um[branch], kind="stable")
+    way = points.way_um[branch][order]
+    force = (points.force_un - baseline_un)[branch][order]
+    places = np.unique(np.concatenate([way, (way[1:] + way[:-1]) / 2.0]))[:-1]
+    ramp = np.maximum(way - places[:, None], 0.0)
+    # Of the best line through zero at each place, what it leaves unexplained.
+    k = (ramp @ force) / (ramp * ramp).sum(axis=1)
+    left = ((force - k[:, None] * ramp) ** 2).sum(axis=1)
+    best = int(np.argmin(left))
+    return Rough(float(places[best]), float(k[best]))

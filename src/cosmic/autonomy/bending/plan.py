@@ -1,0 +1,134 @@
+"""Where to push a fibre, and how far."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from pydantic import Field
+
+from cosmic.autonomy.bending.fit import fit_bending
+from cosmic.autonomy.bending.result import BendingError
+from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.bending.units import UN_UM2_PER_N_M2
+from cosmic.frame.config import StrictModel
+
+DRY_EI_N_M2: Final = 5e-11
+"""Of a dry fibre, from which to begin when nothing else is known."""
+
+
+class SpanLimits(StrictModel):
+    """What spans a procedure may choose.
+
+    Attributes
+    ----------
+    count : int
+        How many spans.
+    shortest_um, longest_um : float
+        From the tip of the jaws to the middle of the probe.
+    beyond_um : float
+        Length of fibre that must remain beyond the probe.
+    stroke_part : float
+        Longest push as a part of the span.
+    longest_stroke_um : float
+        Longest push.
+    highest_un, wanted_un : float
+        Force that may be reached, and that is enough for a good fit.
+    """
+
+    count: int = Field(3, ge=1, le=10)
+    shortest_um: float = Field(150.0, gt=0.0)
+    longest_um: float = Field(500.0, gt=0.0)
+    beyond_um: float = Field(80.0, ge=0.0)
+    stroke_part: float = Field(0.1, gt=0.0, le=0.2)
+    longest_stroke_um: float = Field(40.0, gt=0.0)
+    highest_un: float = Field(80.0, gt=0.0)
+    wanted_un: float = Field(3.0, gt=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedSpan:
+    """One push to be made.
+
+    Attributes
+    ----------
+    span_um : float
+        From the tip of the jaws to the middle of the probe.
+    stroke_um : float
+        How far to push beyond the first contact.
+    force_un : float
+        What the fibre should push back with at the end.
+    """
+
+    span_um: float
+    stroke_um: float
+    force_un: float
+
+
+def plan_spans(
+    length_free_um: float,
+    ei_guess_n_m2: float = DRY_EI_N_M2,
+    limits: SpanLimits | None = None,
+    *,
+    done: Sequence[Span] = (),
+) -> tuple[PlannedSpan, ...]:
+    """Return the pushes to be made, the longest and therefore gentlest first.
+
+    Softer fibres get shorter spans. After the first span plan again with a better guess
+    (`guess_ei`) and with what is `done`; what is returned is what remains.
+
+    Raises
+    ------
+    BendingError
+        The fibre is too short for the shortest span.
+    """
+    limits = limits or SpanLimits()
+    room_um = min(limits.longest_um, length_free_um - limits.beyond_um)
+    if not room_um >= limits.shortest_um:
+        raise BendingError(
+            f"{length_free_um:.0f} um of free fibre is too short: the shortest span is "
+            f"{limits.shortest_um:g} um, and {limits.beyond_um:g} um must remain beyond the probe"
+        )
+    if not 0.0 < ei_guess_n_m2 < math.inf:
+        raise BendingError(f"{ei_guess_n_m2:g} N m2 is no bending stiffness to plan with")
+    ei = ei_guess_n_m2 * UN_UM2_PER_N_M2
+    # At a push of stroke_part * span the force is 3 EI stroke_part / span^2.
+    enough = math.sqrt(3.0 * ei * limits.stroke_part / limits.wanted_un)
+    longest = min(room_um, max(enough, limits.shortest_um))
+    shortest = max(limits.shortest_um, longest / 2.0)
+    remaining = limits.count - len(done)
+    places = _spread(shortest, longest, limits.count)
+    left = _farthest(places, [span.nominal_um for span in done], remaining)
+    return tuple(_planned(place, ei, limits) for place in sorted(left, reverse=True))
+
+
+def guess_ei(spans: Sequence[Span], *, settings: FitSettings | None = None) -> float | None:
+    """Return the stiffness that the spans measured so far speak for, N m2; None: they do not."""
+    if not spans:
+        return None
+    found = fit_bending(spans, settings=settings).ei_n_m2
+    return found if found > 0.0 else None
+
+
+def _spread(shortest: float, longest: float, count: int) -> list[float]:
+    if count == 1:
+        return [longest]
+    return [longest - (longest - shortest) * n / (count - 1) for n in range(count)]
+
+
+def _farthest(places: list[float], done: list[float], count: int) -> list[float]:
+    """Return those of the places that are farthest from what has been measured."""
+    left = list(places)
+    for place in done:
+        if len(left) > max(count, 0):
+            left.remove(min(left, key=lambda each: abs(each - place)))
+    return left[: max(count, 0)]
+
+
+def _planned(span_um: float, ei_un_um2: float, limits: SpanLimits) -> PlannedSpan:
+    stiffness = 3.0 * ei_un_um2 / span_um**3
+    stroke = min(
+        limits.stroke_part * span_um, limits.longest_stroke_um, limits.highest_un / stiffness
+    )
+    return PlannedSpan(span_um=span_um, stroke_um=stroke, force_un=stiffness * stroke)

@@ -1,0 +1,111 @@
+"""What a bend test says about a fibre, and how far it may be believed."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.frame.errors import CosmicError
+
+Floats = npt.NDArray[np.float64]
+
+
+class BendingError(CosmicError):
+    """What was handed over is not a bend test; the text says what is wrong with it."""
+
+
+class Quality(StrEnum):
+    """What makes a span or a result doubtful."""
+
+    SLIPPED = "slipped"
+    BROKEN = "force lost while pushing"
+    HYSTERESIS = "loading and unloading differ"
+    NO_CONTACT = "no contact"
+    TOO_SOFT = "too soft for the sensor"
+    SATURATED = "sensor saturated"
+    TOO_FEW_SPANS = "too few good spans"
+    POOR_FIT = "the model does not fit"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpanFit:
+    """One span with the model fitted to it.
+
+    Attributes
+    ----------
+    place_um : float
+        From the tip of the jaws to the middle of the probe: exact from span to span, with an
+        offset common to all.
+    k_un_um, k_std_un_um : float
+        Stiffness at the first contact, of the fibre alone; nan where there is none.
+    k_loading_un_um, k_unloading_un_um : float
+        The same of the way out and the way back alone.
+    hinge_um, hinge_back_um : float
+        Position of the probe's axis at the first contact, and at the last on the way back.
+    baseline_un, drift_un_s : float
+        The force without contact: at the begin of the span, and its rate of change.
+    hysteresis_percent : float
+        Mean force that loading has more than unloading, of the highest force.
+    peak_un : float
+        Highest force, above the baseline.
+    chi2, freedom : float, int
+        Sum of squares over the noise foreseen, and degrees of freedom.
+    fitted_un : ndarray, shape (n,), float64
+        The model at each point of the span, baseline included; nan where it was left out.
+    flags : frozenset of Quality
+    """
+
+    place_um: float
+    k_un_um: float
+    k_std_un_um: float
+    k_loading_un_um: float
+    k_unloading_un_um: float
+    hinge_um: float
+    hinge_back_um: float
+    baseline_un: float
+    drift_un_s: float
+    hysteresis_percent: float
+    peak_un: float
+    chi2: float
+    freedom: int
+    fitted_un: Floats
+    flags: frozenset[Quality]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BendingResult:
+    """Bending stiffness with its interval.
+
+    Attributes
+    ----------
+    ei_n_m2, ei_low_n_m2, ei_high_n_m2 : float
+        Best value and 95 % interval; nan where there is none.
+    clamp_offset_um, clamp_offset_std_um : float
+        From the tip of the jaws, as `Span.nominal_um` has it, back to the clamp.
+    spans : tuple of SpanFit
+        As they were handed over.
+    used : tuple of int
+        Which of them the result stands on.
+    chi2, freedom : float, int
+        Of the spans' stiffnesses on one straight line.
+    flags : frozenset of Quality
+        Of the result; those of single spans stand with them.
+    trusted : bool
+        Whether the result may be used without a second look.
+    reasons : tuple of str
+        Why not, or what was left out.
+    """
+
+    ei_n_m2: float
+    ei_low_n_m2: float
+    ei_high_n_m2: float
+    clamp_offset_um: float
+    clamp_offset_std_um: float
+    spans: tuple[SpanFit, ...]
+    used: tuple[int, ...]
+    chi2: float
+    freedom: int
+    flags: frozenset[Quality]
+    trusted: bool
+    reasons: tuple[str, ...]

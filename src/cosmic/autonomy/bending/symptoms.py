@@ -1,0 +1,51 @@
+"""What can be seen on a span without any model: force lost, force cut off, force left behind."""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from cosmic.autonomy.bending.branch import CLEAR_SIGMAS, Points, free_force_un
+from cosmic.autonomy.bending.span import Span
+
+NEAR_RANGE: Final = 0.98
+LOST_PART: Final = 0.4
+"""Of the highest force so far: less than this farther out is a force that was lost."""
+
+COMPARED_FROM: Final = 0.2
+"""Of the highest force: the lowest at which the ways out and back are compared."""
+
+
+def saturated(span: Span, range_un: float) -> bool:
+    """Return whether any force comes near the end of the sensor's range."""
+    forces = span.force_un[np.isfinite(span.force_un)]
+    return bool(np.max(np.abs(forces), initial=0.0) >= NEAR_RANGE * range_un)
+
+
+def lost_while_pushing(points: Points) -> bool:
+    """Return whether the force fell while the probe went on: fibre broken, or passed by."""
+    out = points.loading
+    height = (points.force_un - free_force_un(points))[out]
+    way, std = points.way_um[out], points.std_un[out]
+    if len(way) < 3:
+        return False
+    order = np.argsort(way, kind="stable")
+    highest = np.maximum.accumulate(height[order])
+    clear = highest > 2.0 * CLEAR_SIGMAS * std[order]
+    return bool(np.any(clear & (height[order] < LOST_PART * highest)))
+
+
+def back_and_forth_percent(points: Points) -> float:
+    """Return the mean force that the way out has more than the way back, of the highest."""
+    height = points.force_un - free_force_un(points)
+    out, back = points.loading, ~points.loading
+    if out.sum() < 3 or back.sum() < 3:
+        return math.nan
+    order = np.argsort(points.way_um[back], kind="stable")
+    way, force = points.way_um[back][order], height[back][order]
+    peak = float(np.max(height[out]))
+    high = (height[out] > COMPARED_FROM * peak) & (points.way_um[out] <= way[-1])
+    if not high.any():
+        return math.nan
+    there = np.interp(points.way_um[out][high], way, force)
+    return 100.0 * float(np.mean(height[out][high] - there)) / peak
