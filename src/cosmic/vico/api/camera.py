@@ -1,28 +1,31 @@
 """One camera of ``rig.vico``; its view uses this as well."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from typing_extensions import override
+
+from cosmic.frame.clock import Clock
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.file_names import space_left
 from cosmic.frame.task import Task
 from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.api.camera_places import CameraPlaces
 from cosmic.vico.api.camera_shape import CameraShape
 from cosmic.vico.api.camera_shown import FormatShown, LinkShown, Seen, formats_shown, links_shown
-from cosmic.vico.api.places import CalibrationShown, Places
+from cosmic.vico.api.places import Places
 from cosmic.vico.core.camera_recordings import PictureRecordingState
+from cosmic.vico.core.job_thread import JobThread
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.recording.formats import FORMATS, picture_bytes_per_s
 from cosmic.vico.core.recording.snap import save_picture
 from cosmic.vico.core.recording.time_lapse import TimeLapsePlan
 from cosmic.vico.hw.interface import CameraCounters, CameraInfo, CameraRanges, CameraSettings
 
-Pixel = tuple[float, float]
-
 BACKGROUND_FRAMES = 8
 
 
-class CameraHandle(CameraShape):
+class CameraHandle(CameraPlaces, CameraShape):
     """One camera: its pictures, settings, recordings and what machine vision finds; any thread.
 
     It has the shape of a bluesky detector without importing bluesky.
@@ -42,6 +45,7 @@ class CameraHandle(CameraShape):
         return self._unit.place.shown
 
     @property
+    @override
     def info(self) -> CameraInfo | None:
         """Which camera it is; None while none is connected."""
         return self._thread.info
@@ -52,6 +56,7 @@ class CameraHandle(CameraShape):
         return self._thread.ranges
 
     @property
+    @override
     def settings(self) -> CameraSettings | None:
         """What is in force, as read back; None while it is not connected."""
         return self._thread.settings
@@ -77,6 +82,7 @@ class CameraHandle(CameraShape):
         """Return the newest whole picture, background corrected; None before the first."""
         return self._unit.shown()
 
+    @override
     def next_picture(self, timeout_s: float = 5.0, since_s: float | None = None) -> Picture:
         """Wait for a whole picture exposed from `since_s` of platform time on; None is now.
 
@@ -126,6 +132,7 @@ class CameraHandle(CameraShape):
         self._unit.recordings.request_stop()
         return self._thread.stop_pictures()
 
+    @override
     def software_trigger(self) -> None:
         """Take one picture, with the software trigger; raises `NotAvailable` without it."""
         self._thread.trigger()
@@ -217,59 +224,29 @@ class CameraHandle(CameraShape):
         recordings = self._unit.recordings
         return recordings.time_lapse(path, format_name, plan, now_s, overwrite=overwrite)
 
-    # Places
+    # For its shape, and for the same over a line
 
     @property
-    def calibration_problem(self) -> str:
-        """Why pixels cannot be told as places on the platform; empty when they can."""
-        places, newest = self._application.places, self._thread.newest
-        if places is None:
-            return "micromanipulation is not hosted here"
-        return places.problem(newest) if newest is not None else "no picture yet"
-
-    def platform_um(self, place_px: Pixel) -> tuple[float, float] | None:
-        """Return where on the platform a pixel of the newest picture is; None where unknown."""
-        places, newest = self._application.places, self._thread.newest
-        if places is None or newest is None or places.problem(newest):
-            return None
-        return places.platform_um(newest, place_px)
+    @override
+    def _newest(self) -> Picture | None:
+        return self._thread.newest
 
     @property
-    def targets(self) -> Sequence[str]:
-        """What can be moved to a place in the picture, such as "left"."""
-        places = self._application.places
-        return places.targets if places is not None else ()
-
-    @property
-    def calibrated(self) -> Sequence[CalibrationShown]:
-        """The maps from platform to picture that are in force for this camera."""
-        places = self._application.places
-        known = places.calibrated if places is not None else ()
-        return tuple(each for each in known if each.camera == self.name)
-
-    def calibrate_stage(self, tool: str) -> Task:
-        """Begin to measure such a map by moving a tool; see `Vico.calibrate_stage`."""
-        return self._moving.calibrate_stage(tool, self.name)
-
-    def find_rotation_centre(self) -> Task:
-        """Begin to measure about which place the plate turns; see `Vico.find_rotation_centre`."""
-        return self._moving.find_rotation_centre(self.name)
-
-    @property
-    def _moving(self) -> Places:
-        if self._application.places is None:
-            raise NotAvailable("micromanipulation is not hosted here: no tool can be moved")
+    @override
+    def _places(self) -> Places | None:
         return self._application.places
 
-    def click_to_move(self, place_px: Pixel, what: str) -> str:
-        """Begin to move `what` to a pixel of the newest picture, and say what was begun.
+    @property
+    @override
+    def _clock(self) -> Clock:
+        return self._application.clock
 
-        Raises
-        ------
-        MoveRefused, NotAvailable
-            The gate says no, or the place cannot be told.
-        """
-        places, newest = self._application.places, self._thread.newest
-        if places is None or newest is None:
-            raise NotAvailable(self.calibration_problem)
-        return places.move_to(newest, place_px, what)
+    @property
+    @override
+    def _jobs(self) -> JobThread:
+        return self._unit.jobs
+
+    @property
+    @override
+    def _axes(self) -> Mapping[str, str]:
+        return self._unit.recordings.axes

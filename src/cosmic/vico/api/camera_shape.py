@@ -2,10 +2,12 @@
 
 import math
 import re
+from abc import abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from cosmic.frame.clock import Clock
 from cosmic.frame.errors import ConfigError, NotAvailable, RecordingExistsError
 from cosmic.frame.file_names import check_directory
 from cosmic.frame.plan_shape import (
@@ -18,14 +20,14 @@ from cosmic.frame.plan_shape import (
     unix_of_platform_s,
     whole_key,
 )
-from cosmic.vico.api.application import VicoApplication
-from cosmic.vico.core.camera_unit import CameraUnit
+from cosmic.vico.core.job_thread import JobThread
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.recording.snap import save_picture
-from cosmic.vico.hw.interface import Trigger
+from cosmic.vico.hw.interface import CameraInfo, CameraSettings, Trigger
 
 if TYPE_CHECKING:
     from cosmic.vico.api.fibres import PlacedFibre
+    from cosmic.vico.api.places import Places
 
 SUFFIXES: Final = (".tif", ".tiff", ".png")
 WAIT_S: Final = 5.0
@@ -38,13 +40,53 @@ class CameraShape:
 
     parent: None = None
     name: str
-    _application: VicoApplication
-    _unit: CameraUnit
     _folder: Path | None = None
     _suffix = ".tif"
     _fibres = False
     _number = 0
     _last: tuple[Readings, float] | None = None
+
+    # What it is the shape of
+
+    @property
+    @abstractmethod
+    def info(self) -> CameraInfo | None:
+        """Which camera it is; None while none is connected."""
+
+    @property
+    @abstractmethod
+    def settings(self) -> CameraSettings | None:
+        """What is in force, as read back; None while it is not connected."""
+
+    @abstractmethod
+    def next_picture(self, timeout_s: float = 5.0, since_s: float | None = None) -> Picture:
+        """Wait for a whole picture exposed from `since_s` of platform time on."""
+
+    @abstractmethod
+    def software_trigger(self) -> None:
+        """Take one picture, with the software trigger."""
+
+    @property
+    @abstractmethod
+    def _clock(self) -> Clock:
+        """The platform's."""
+
+    @property
+    @abstractmethod
+    def _jobs(self) -> JobThread:
+        """Takes the pictures."""
+
+    @property
+    @abstractmethod
+    def _axes(self) -> Mapping[str, str]:
+        """Unit of each axis whose position comes with the pictures."""
+
+    @property
+    @abstractmethod
+    def _places(self) -> "Places | None":
+        """What joins pixels and platform."""
+
+    # Plans
 
     def plan_pictures(
         self, folder: str | Path | None = None, *, suffix: str = ".tif", fibres: bool = False
@@ -80,18 +122,17 @@ class CameraShape:
         picture comes in time, and with `RecordingError` where it cannot be kept.
         """
         status = PlanStatus(f"picture of {self.name}")
-        since_s = self._application.clock.now_s()
-        self._unit.jobs.put(lambda: self._take(since_s), status)
+        since_s = self._clock.now_s()
+        self._jobs.put(lambda: self._take(since_s), status)
         return status
 
     def _take(self, since_s: float) -> None:
-        thread = self._unit.thread
-        settings = thread.settings
+        settings = self.settings
         if settings is not None and settings.trigger is Trigger.SOFTWARE:
-            thread.trigger()
+            self.software_trigger()
         exposure_s = settings.exposure_s if settings is not None else 0.0
-        picture = thread.next_picture(since_s, WAIT_S + 2.0 * exposure_s)
-        when_s = unix_of_platform_s(self._application.clock, picture.frame.exposed_s)
+        picture = self.next_picture(WAIT_S + 2.0 * exposure_s, since_s)
+        when_s = unix_of_platform_s(self._clock, picture.frame.exposed_s)
         self._last = self._readings(picture, when_s), when_s
 
     def _readings(self, picture: Picture, when_s: float) -> Readings:
@@ -111,7 +152,7 @@ class CameraShape:
         }
 
     def _save(self, picture: Picture, folder: Path) -> Path:
-        axes = self._unit.recordings.axes
+        axes = self._axes
         while True:
             self._number += 1
             path = folder / f"{self.name}_{self._number:05d}{self._suffix}"
@@ -124,7 +165,7 @@ class CameraShape:
         # Imported here: it loads scikit-image and scipy.
         from cosmic.vico.api.fibres import place_fibres
 
-        found = place_fibres(picture, self._application.places)
+        found = place_fibres(picture, self._places)
         longest = max(found, key=lambda each: each.length_px, default=None)
         return {
             "fibres": len(found),
@@ -163,7 +204,7 @@ class CameraShape:
 
     def read_configuration(self) -> Readings:
         """Return exposure, gain, binning and trigger; NaN, 0 and empty without a camera."""
-        settings, now_s = self._unit.thread.settings, unix_now_s()
+        settings, now_s = self.settings, unix_now_s()
         values: dict[str, object] = {
             "exposure_s": settings.exposure_s if settings is not None else math.nan,
             "gain_db": settings.gain_db if settings is not None else math.nan,
@@ -192,7 +233,7 @@ class CameraShape:
 
     @property
     def _source(self) -> str:
-        info = self._unit.thread.info
+        info = self.info
         return f"camera:{info.key if info is not None else self.name}"
 
 

@@ -75,7 +75,7 @@ class CameraUnit:
     def shown(self) -> Picture | None:
         """Return the newest picture, background corrected; None before the first."""
         newest = self.thread.newest
-        return self._corrected(newest) if newest is not None else None
+        return self.corrected(newest) if newest is not None else None
 
     def start(self) -> None:
         """Begin to look for the camera and to take pictures."""
@@ -105,7 +105,8 @@ class CameraUnit:
         except ConfigError as exc:
             logger.warning("%s: %s", self._place.name, exc)
 
-    def _corrected(self, picture: Picture) -> Picture:
+    def corrected(self, picture: Picture) -> Picture:
+        """Return a picture without the background, where there is one that fits."""
         binning = self._binning()
         if not self.background.frames or self.background.misfit(picture.frame, binning):
             return picture  # of another size it is shown as it comes
@@ -119,7 +120,7 @@ class CameraUnit:
     def _analyse(self, picture: Picture) -> Analysis | None:
         if not any(state.on for state in self.chain.states):
             return None
-        return self.chain.run(self._corrected(picture))
+        return self.chain.run(self.corrected(picture))
 
     def _prepare(self, camera: Camera) -> CameraSettings:
         """Return what is configured, and what the camera has where nothing is."""

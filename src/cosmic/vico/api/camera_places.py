@@ -1,0 +1,81 @@
+"""Places on the platform, as one camera sees them: a part of `CameraHandle`."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+from cosmic.frame.errors import NotAvailable
+from cosmic.frame.task import Task
+from cosmic.vico.api.places import CalibrationShown, Pixel, Places
+from cosmic.vico.core.picture import Picture
+
+
+class CameraPlaces(ABC):
+    """What pixels of a camera mean on the platform; any thread."""
+
+    name: str
+
+    @property
+    @abstractmethod
+    def _places(self) -> Places | None:
+        """What joins pixels and platform."""
+
+    @property
+    @abstractmethod
+    def _newest(self) -> Picture | None:
+        """The newest picture as it came."""
+
+    @property
+    def calibration_problem(self) -> str:
+        """Why pixels cannot be told as places on the platform; empty when they can."""
+        places, newest = self._places, self._newest
+        if places is None:
+            return "micromanipulation is not hosted here"
+        return places.problem(newest) if newest is not None else "no picture yet"
+
+    def platform_um(self, place_px: Pixel) -> tuple[float, float] | None:
+        """Return where on the platform a pixel of the newest picture is; None where unknown."""
+        places, newest = self._places, self._newest
+        if places is None or newest is None or places.problem(newest):
+            return None
+        return places.platform_um(newest, place_px)
+
+    @property
+    def targets(self) -> Sequence[str]:
+        """What can be moved to a place in the picture, such as "left"."""
+        places = self._places
+        return places.targets if places is not None else ()
+
+    @property
+    def calibrated(self) -> Sequence[CalibrationShown]:
+        """The maps from platform to picture that are in force for this camera."""
+        places = self._places
+        known = places.calibrated if places is not None else ()
+        return tuple(each for each in known if each.camera == self.name)
+
+    def calibrate_stage(self, tool: str) -> Task:
+        """Begin to measure such a map by moving a tool; see `Vico.calibrate_stage`."""
+        return self._moving.calibrate_stage(tool, self.name)
+
+    def find_rotation_centre(self) -> Task:
+        """Begin to measure about which place the plate turns; see `Vico.find_rotation_centre`."""
+        return self._moving.find_rotation_centre(self.name)
+
+    @property
+    def _moving(self) -> Places:
+        places = self._places
+        if places is None:
+            raise NotAvailable("micromanipulation is not hosted here: no tool can be moved")
+        return places
+
+    def click_to_move(self, place_px: Pixel, what: str) -> str:
+        """Begin to move `what` to a pixel of the newest picture, and say what was begun.
+
+        Raises
+        ------
+        MoveRefused, NotAvailable
+            The gate says no, or the place cannot be told.
+        """
+        places, newest = self._places, self._newest
+        if places is None or newest is None:
+            raise NotAvailable(self.calibration_problem)
+        return places.move_to(newest, place_px, what)
