@@ -8,8 +8,8 @@ from cosmic.frame.errors import CosmicError, MoveCancelled, StoppedError
 from cosmic.frame.task import Task
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.api.group import move_together
-from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.orders import MoveTo
+from cosmic.mico.core.ports import ManagerPort
 
 logger = logging.getLogger(__name__)
 
@@ -17,7 +17,7 @@ logger = logging.getLogger(__name__)
 class Mover:
     """Moves some axes for one task, and remembers where they stood."""
 
-    def __init__(self, manager: DeviceManager, axes: Mapping[str, AxisUnit], clock: Clock) -> None:
+    def __init__(self, manager: ManagerPort, axes: Mapping[str, AxisUnit], clock: Clock) -> None:
         self._manager = manager
         self._axes = dict(axes)
         self._clock = clock

@@ -16,11 +16,10 @@ from cosmic.mico.api.group import waited_for
 from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.linked import linked_movement
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
-from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.device_commander import DeviceCommander
-from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.orders import FREQUENCY_HZ, Motion, MoveBy, MoveTo
+from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.positioner import Confidence, PositionerState, Status, class_for
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
 
@@ -33,7 +32,7 @@ class Axis(AxisShape):
     without importing bluesky; give plans `movable`, which has a name that bluesky admits.
     """
 
-    def __init__(self, name: str, manager: DeviceManager, commander: DeviceCommander) -> None:
+    def __init__(self, name: str, manager: ManagerPort, commander: DeviceCommander) -> None:
         self._name = name
         self._manager = manager
         self._channel = manager.address(name).channel
@@ -100,13 +99,13 @@ class Axis(AxisShape):
         NotAvailable
             It is set, and there is no collision model.
         """
-        model = self._manager.gate.checker
-        return isinstance(model, CollisionManager) and self._name not in model.taken_out
+        model = self._manager.exemptions
+        return model is not None and self._name not in model.taken_out
 
     @collision_detection.setter
     def collision_detection(self, on: bool) -> None:
-        model = self._manager.gate.checker
-        if not isinstance(model, CollisionManager):
+        model = self._manager.exemptions
+        if model is None:
             raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the platform file")
         change = model.take_in if on else model.take_out
         change(self._name, source=self.commander.source)

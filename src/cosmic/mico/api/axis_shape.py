@@ -19,9 +19,9 @@ from cosmic.frame.plan_shape import (
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.entry import Number, as_number
 from cosmic.mico.api.move_status import MoveStatus, refused
-from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.orders import MoveTo
+from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.positioner import PositionerState
 
 # How far from a target an axis still counts as standing at it: more than the noise of any sensor.
@@ -33,7 +33,7 @@ class AxisShape:
 
     parent: None = None
     _name: str
-    _manager: DeviceManager
+    _manager: ManagerPort
     _halt: Callable[[], None]
     _begin: Callable[[Number], Movement]
     _asked: tuple[float, MoveStatus] | None = None
@@ -152,7 +152,7 @@ class AxisMovable(AxisShape):
     def __init__(
         self,
         name: str,
-        manager: DeviceManager,
+        manager: ManagerPort,
         halt: Callable[[], None],
         begin: Callable[[Number], Movement],
     ) -> None:

@@ -7,7 +7,7 @@ from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.callback import CollisionCallbackBase
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.collision.model import BodyPair, SceneModel, pair_of
-from cosmic.mico.core.device_manager import DeviceManager
+from cosmic.mico.core.ports import ManagerPort
 
 
 class Collision:
@@ -19,7 +19,7 @@ class Collision:
         Who commands through this object, for the log.
     """
 
-    def __init__(self, manager: DeviceManager, model: CollisionManager, source: str) -> None:
+    def __init__(self, manager: ManagerPort, model: CollisionManager, source: str) -> None:
         self._manager = manager
         self._model = model
         self._source = source

@@ -8,10 +8,10 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, MoveCancelled
 from cosmic.frame.listeners import tell
 from cosmic.frame.task import Task
-from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.group_start import GroupStart
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.orders import Motion, Order
+from cosmic.mico.core.ports import ManagerPort
 
 T = TypeVar("T", covariant=True)
 
@@ -119,7 +119,7 @@ class GroupMovement:
 
 
 def move_together(
-    manager: DeviceManager,
+    manager: ManagerPort,
     motions: Mapping[str, Motion],
     task: Task,
     *,

@@ -17,7 +17,7 @@ from cosmic.frame.errors import (
 from cosmic.frame.task import Task
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.api.group import move_together
-from cosmic.mico.core.device_manager import DeviceManager
+from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.positioner import Confidence
 from cosmic.mico.core.sequence.plan import PlannedStep, plan_sequence
 from cosmic.mico.core.sequence.report import SequenceReport, StepReport, StepState
@@ -66,7 +66,7 @@ class InitialisationRun:
 
     def __init__(
         self,
-        manager: DeviceManager,
+        manager: ManagerPort,
         *,
         skip_known: bool = False,
         confirm: Confirm | None = None,
@@ -178,7 +178,7 @@ class InitialisationRun:
             self._on_report(report)
 
 
-def plan(manager: DeviceManager, *, skip_known: bool = False) -> tuple[PlannedStep, ...]:
+def plan(manager: ManagerPort, *, skip_known: bool = False) -> tuple[PlannedStep, ...]:
     """Return the steps as they would be made now."""
     return plan_sequence(manager.settings, manager.states(), skip_known=skip_known)
 

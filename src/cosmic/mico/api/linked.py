@@ -5,9 +5,9 @@ from threading import Lock
 
 from cosmic.frame.errors import CosmicError, MoveCancelled
 from cosmic.mico.api.group import GroupMovement
-from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.orders import Motion
+from cosmic.mico.core.ports import ManagerPort
 
 
 class LinkedMovement(Movement):
@@ -45,7 +45,7 @@ def _cancelled(error: Exception) -> bool:
 
 
 def linked_movement(
-    manager: DeviceManager,
+    manager: ManagerPort,
     axis: str,
     motion: Motion,
     *,

@@ -12,7 +12,7 @@ from cosmic.frame.task_application import Job
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
 from cosmic.mico.core.collision.collision_manager import CollisionManager
-from cosmic.mico.core.device_manager import DeviceManager
+from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.poses import PoseBook
 from cosmic.mico.core.positioner import Confidence, PositionerState, class_for
 from cosmic.mico.core.rules import Limits
@@ -32,7 +32,7 @@ class Worker(Protocol):
     """What carries out long operations and finds ways: the application."""
 
     @property
-    def manager(self) -> DeviceManager:
+    def manager(self) -> ManagerPort:
         """Where the axes are."""
 
     @property

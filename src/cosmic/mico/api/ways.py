@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from cosmic.frame.errors import CosmicError, MoveCancelled
 from cosmic.frame.task import Task
 from cosmic.mico.api.group import move_together
-from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.orders import Motion, MoveTo
 from cosmic.mico.core.planning.problem import Plan
+from cosmic.mico.core.ports import ManagerPort
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def way_from_plan(plan: Plan) -> Way:
     )
 
 
-def follow(manager: DeviceManager, way: Way, task: Task, source: str) -> None:
+def follow(manager: ManagerPort, way: Way, task: Task, source: str) -> None:
     """Go `way` part by part and end `task`; in the application's thread.
 
     The gate decides each part again when its turn comes.

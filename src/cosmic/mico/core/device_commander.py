@@ -1,13 +1,14 @@
 """`DeviceCommander`: the run-time API of one device, decoupled by signals (thesis 6.1.2)."""
 
+from abc import abstractmethod
 from collections.abc import Callable
 from enum import Flag, auto
+from typing import Protocol
 
 from PySide6.QtCore import QMetaObject, QObject, Qt, Signal, SignalInstance
 
 from cosmic.frame.errors import NotConnectedError
 from cosmic.frame.units import AxisUnit
-from cosmic.mico.core.device import Device
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.orders import (
     Calibrate,
@@ -32,6 +33,50 @@ class CommanderType(Flag):
     OUTPUT = auto()
     """It hears what became of them."""
     INPUT_OUTPUT = INPUT | OUTPUT
+
+
+class Commanded(Protocol):
+    """What a commander is joined to: a `Device`, or its counterpart of another process."""
+
+    @property
+    @abstractmethod
+    def position_changed(self) -> SignalInstance:
+        """See `Device`, as the other signals."""
+
+    @property
+    @abstractmethod
+    def state_changed(self) -> SignalInstance:
+        """The state of a positioner changed."""
+
+    @property
+    @abstractmethod
+    def movement_ended(self) -> SignalInstance:
+        """A movement ended."""
+
+    @property
+    @abstractmethod
+    def movement_refused(self) -> SignalInstance:
+        """The gate refused a movement."""
+
+    @abstractmethod
+    def submit(self, order: Order) -> None:
+        """Queue `order`."""
+
+    @abstractmethod
+    def renew_jog(self, order: Order) -> None:
+        """Keep the jog started by `order` alive."""
+
+    @abstractmethod
+    def steer_jog(self, order: Order, velocity: float) -> None:
+        """Keep the movement started by `order` alive at a signed speed."""
+
+    @abstractmethod
+    def halt(self, channel: int, why: str) -> None:
+        """Stop one channel past every queue."""
+
+    @abstractmethod
+    def set_frequency(self, channel: int, frequency_hz: int) -> None:
+        """Limit the closed-loop speed of one channel."""
 
 
 class DeviceCommander(QObject):
@@ -171,7 +216,7 @@ class DeviceCommander(QObject):
         return order
 
 
-def join(device: Device, commander: DeviceCommander, kind: CommanderType) -> None:
+def join(device: Commanded, commander: DeviceCommander, kind: CommanderType) -> None:
     """Connect a commander to a device, parting it from any other.
 
     The connections are direct: a command goes into the device's queue in the caller's thread, so

@@ -20,6 +20,7 @@ from cosmic.frame.errors import (
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
+from cosmic.mico.core.collision.exemptions import Exemptions
 from cosmic.mico.core.data_container import NO_DEVICE, DeviceDataContainer, Memory
 from cosmic.mico.core.device import Device
 from cosmic.mico.core.device_commander import CommanderType, DeviceCommander, join
@@ -131,6 +132,17 @@ class DeviceManager(QObject):
     def mode(self) -> Mode:
         """What the manager is at."""
         return self._mode
+
+    @property
+    def ready(self) -> bool:
+        """True while axes can be moved."""
+        return self._mode is Mode.RUN_TIME
+
+    @property
+    def exemptions(self) -> Exemptions | None:
+        """What is left out of the collision check; None without a collision model."""
+        checker = self.gate.checker
+        return checker if isinstance(checker, Exemptions) else None
 
     @property
     def missing(self) -> tuple[str, ...]:

@@ -14,9 +14,8 @@ from cosmic.frame.errors import RecordingError, RecordingExistsError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.file_names import check_base_name, check_directory
 from cosmic.frame.threads import WorkerThread
-from cosmic.mico.core.device import Device
-from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.messages import MovementBegun, MovementEnded
+from cosmic.mico.core.ports import DevicePort, ManagerPort
 from cosmic.mico.core.positioner import class_for
 from cosmic.mico.core.trajectory.model import Place, Statement, Trajectory
 from cosmic.mico.core.trajectory.parser import END_OF_RECORDING
@@ -86,7 +85,7 @@ class TrajectoryRecorder(WorkerThread):
 
     def __init__(
         self,
-        manager: DeviceManager,
+        manager: ManagerPort,
         path: Path,
         head: Trajectory,
         policy: FailurePolicy,
@@ -104,7 +103,7 @@ class TrajectoryRecorder(WorkerThread):
         self.path = directory / path.name
         self._sources = None if sources is None else frozenset(sources)
         self._queue: SimpleQueue[_Begun | _Ended | None] = SimpleQueue()
-        self._joined: list[Device] = []
+        self._joined: list[DevicePort] = []
         self._error: RecordingError | None = None
         self._lines = 0
         self._size = 0

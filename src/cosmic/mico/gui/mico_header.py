@@ -106,7 +106,10 @@ class MicoHeader(QWidget):
         # Wraps where the panel is narrow: the picture beside it needs the width.
         line = FlowLayout(STEP_PX)
         buttons = (self._initialise, self._steps, self._rescan, self._undo)
-        for widget in (*buttons, caption, *self._speeds.values()):
+        speeds, row = tight_row(STEP_PX)
+        for widget in (caption, *self._speeds.values()):
+            row.addWidget(widget)
+        for widget in (*buttons, speeds):
             line.addWidget(widget)
         column = QVBoxLayout(self)
         column.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)

@@ -8,7 +8,6 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
     QDoubleSpinBox,
-    QHBoxLayout,
     QLabel,
     QProgressBar,
     QSpinBox,
@@ -18,6 +17,7 @@ from PySide6.QtWidgets import (
 
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.theme import STEP_PX, number_font
 from cosmic.mico.api.trajectory_player import SPEEDS
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
@@ -57,12 +57,15 @@ class RecordBar(QWidget):
         self.told = ElidedLabel()
         self.told.setFont(number_font())
         self._recording = False
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(STEP_PX)
+        row, flow = QWidget(), FlowLayout(STEP_PX)
+        row.setLayout(flow)
         for widget in (self.button, self.source, self.timed, QLabel("counted from"), self.pose):
-            row.addWidget(widget)
-        row.addWidget(self.told, 1)
+            flow.addWidget(widget)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(STEP_PX // 2)
+        column.addWidget(row)
+        column.addWidget(self.told)
         self.button.clicked.connect(self._on_clicked)
         self.set_poses([])
 
@@ -191,10 +194,10 @@ class RunBar(QWidget):
         self.show_state(None, ready=False)
 
     def _arrange(self) -> None:
-        row, beside = tight_row(STEP_PX)
+        row, flow = QWidget(), FlowLayout(STEP_PX)
+        row.setLayout(flow)
         for widget in (self.run, self.pause, self.step, self.cancel, self.loops, self.speed):
-            beside.addWidget(widget)
-        beside.addStretch(1)
+            flow.addWidget(widget)
         below, under = tight_row(STEP_PX)
         under.addWidget(self.progress, 2)
         under.addWidget(self.left, 3)

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QFileDialog, QLabel, QVBoxLayout, QWidget
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, tight_row
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, ui_font
 from cosmic.frame.task import Task
@@ -102,13 +103,16 @@ class TrajectoryPanel(QWidget):
         head, beside = tight_row(STEP_PX)
         beside.addWidget(self.badge)
         beside.addWidget(self.title, 1)
+        buttons, flow = QWidget(), FlowLayout(STEP_PX)
+        buttons.setLayout(flow)
         for button in (self.open_button, self.mirror_button, self.rehearse_button):
-            beside.addWidget(button)
+            flow.addWidget(button)
         column = QVBoxLayout(self)
         column.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
         column.setSpacing(STEP_PX)
         column.addWidget(self.record_bar)
         column.addWidget(head)
+        column.addWidget(buttons)
         column.addWidget(self.lines, 1)
         for widget in (self.report, self.question, self.run_bar, self.poses_box):
             column.addWidget(widget)

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.core.device_commander import DeviceCommander
-from cosmic.mico.core.device_manager import DeviceManager, Mode
+from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.positioner import class_for
 from cosmic.mico.core.stop_latch import StopState
 from cosmic.mico.core.teleoperation.driver import AxisDriver
@@ -58,7 +58,7 @@ class Teleoperation:
 
     def __init__(
         self,
-        manager: DeviceManager,
+        manager: ManagerPort,
         policy: FailurePolicy,
         sources: InputSources | None = None,
     ) -> None:
@@ -205,7 +205,7 @@ class Teleoperation:
 
     def _refuse_if_not_ready(self) -> None:
         stop = self._manager.latch.state
-        if self._closed or self._manager.mode is not Mode.RUN_TIME:
+        if self._closed or not self._manager.ready:
             raise NotAvailable("MiCo is not ready; wait, or rescan")
         if stop.latched:
             raise NotAvailable(f"motion is stopped ({stop.reason}); reset the stop first")
