@@ -13,6 +13,8 @@ Mask = npt.NDArray[np.bool_]
 
 LEAST_POINTS: Final = 6
 CLEAR_SIGMAS: Final = 5.0
+FREE_PART: Final = 0.125
+"""Of a way: the part that the probe is taken to be free on."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,16 +98,32 @@ def free_force_un(points: Points) -> Floats:
             ways, forces, times = (
                 values[branch] for values in (points.way_um, points.force_un, points.time_s)
             )
-            free = np.argsort(ways, kind="stable")[: max(2, len(ways) // 8)]
+            free = np.argsort(ways, kind="stable")[: max(2, round(FREE_PART * len(ways)))]
             ends.append((float(np.mean(times[free])), float(np.median(forces[free]))))
     times_s, levels = zip(*sorted(ends), strict=True)
     return np.asarray(np.interp(points.time_s, times_s, levels), dtype=np.float64)
 
 
-def stuck(points: Points) -> Mask:
-    """Return where the fibre clings to the probe that goes back, and pulls."""
-    below = points.force_un - free_force_un(points)
-    return ~points.loading & (below < -CLEAR_SIGMAS * points.std_un)
+def stuck(points: Points, drift_un_sqrt_s: float) -> Mask:
+    """Return where the fibre clings to the probe that goes back, and pulls.
+
+    From the last contact down to where it lets go: the points between are no part of the
+    baseline, even where the pull is too small to be seen.
+    """
+    out, nothing = points.loading, np.zeros(len(points.way_um), dtype=np.bool_)
+    if out.sum() < LEAST_POINTS or out.all():
+        return nothing
+    free = out & (points.way_um <= np.quantile(points.way_um[out], FREE_PART))
+    level = float(np.mean(points.force_un[free]))
+    waited_s = np.maximum(points.time_s - float(np.mean(points.time_s[free])), 0.0)
+    noise = np.sqrt(points.std_un**2 + drift_un_sqrt_s**2 * waited_s)
+    pulls = ~out & (points.force_un - level < -CLEAR_SIGMAS * noise)
+    if not pulls.any():
+        return nothing
+    hinge = rough(points, out, np.full(len(points.way_um), level)).hinge_um
+    lowest = float(np.min(points.way_um[pulls]))
+    between = (points.way_um >= lowest) & (points.way_um <= hinge)
+    return np.asarray(~out & (pulls | between), dtype=np.bool_)
 
 
 def rough(points: Points, branch: Mask, baseline_un: Floats) -> Rough:

@@ -17,6 +17,9 @@ from cosmic.frame.config import StrictModel
 DRY_EI_N_M2: Final = 5e-11
 """Of a dry fibre, from which to begin when nothing else is known."""
 
+LEAST_SPREAD: Final = 1.8
+"""Longest over shortest span: spans close together do not tell the clamp from the stiffness."""
+
 
 class SpanLimits(StrictModel):
     """What spans a procedure may choose.
@@ -95,7 +98,7 @@ def plan_spans(
     ei = ei_guess_n_m2 * UN_UM2_PER_N_M2
     # At a push of stroke_part * span the force is 3 EI stroke_part / span^2.
     enough = math.sqrt(3.0 * ei * limits.stroke_part / limits.wanted_un)
-    longest = min(room_um, max(enough, limits.shortest_um))
+    longest = min(room_um, max(enough, LEAST_SPREAD * limits.shortest_um))
     shortest = max(limits.shortest_um, longest / 2.0)
     remaining = limits.count - len(done)
     places = _spread(shortest, longest, limits.count)

@@ -21,6 +21,7 @@ from cosmic.autonomy.bending.symptoms import (
 )
 
 ROUNDS: Final = 2
+CLOSE_SIGMAS: Final = 2.5
 POOR_PROBABILITY: Final = 1e-4
 POOR_PART: Final = 0.02
 """Of the highest force: what is left unexplained below this does no harm."""
@@ -65,8 +66,10 @@ class _Model:
     def covariance(self, values: Floats) -> Floats:
         """Return the noise foreseen: readings, stage times slope, and the zero's random walk."""
         slope = np.zeros(len(self._points.way_um))
-        touched = self.contact(values) > 0.0
         for number, branch in enumerate(self.branches):
+            # Just before the hinge too: there, a stage a little ahead has touched already.
+            ahead = self._points.way_um - values[2 * number + 1]
+            touched = ahead > -CLOSE_SIGMAS * self._settings.way_std_um
             slope[branch & touched] = math.exp(min(values[2 * number], 20.0))
         single = self._points.std_un**2 + (slope * self._settings.way_std_um) ** 2
         walk = np.minimum(self._elapsed_s[:, None], self._elapsed_s[None, :])
@@ -111,7 +114,7 @@ def fit_span(span: Span, *, settings: FitSettings, place_um: float, length_um: f
         The span is not whole.
     """
     points = points_of(span)
-    points = points.but(clings(points))
+    points = points.but(clings(points, settings.drift_un_sqrt_s))
     height = points.force_un - free_force_un(points)
     peak = float(np.max(height))
     if not peak > CLEAR_SIGMAS * float(np.median(points.std_un)) / math.sqrt(3.0):
