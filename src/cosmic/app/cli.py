@@ -9,15 +9,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from cosmic.app.cli_stations import (
+    add_station_commands,
+    line_options,
+    make_certificates,
+    serve_station,
+)
 from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.errors import CosmicError
 
 if TYPE_CHECKING:
     from cosmic.app.run_window import WindowOptions
 
-NOT_BUILT: Final = {
-    "serve": "a station without a window",
-}
 _WINDOW_SIZE: Final = (1600, 1000)
 
 
@@ -25,8 +28,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Carry out one command and return the exit code: 0 well, 1 failed, 2 not understood."""
     parser = _parser()
     chosen, unknown = parser.parse_known_args(arguments)
-    if chosen.command in NOT_BUILT:
-        return _fail(f"{chosen.command}: {NOT_BUILT[chosen.command]} is not built yet", code=2)
     if unknown:
         parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     try:
@@ -44,13 +45,17 @@ def _carry_out(chosen: argparse.Namespace, parser: argparse.ArgumentParser) -> i
         return _scene(chosen)
     if chosen.command == "export":
         return _export(chosen)
+    if chosen.command == "certificates":
+        return make_certificates(chosen)
+    if chosen.command == "serve":
+        return serve_station(chosen)
     return _window(chosen, parser)
 
 
-def _fail(text: str, code: int = 1) -> int:
+def _fail(text: str) -> int:
     for line in text.splitlines():
         sys.stderr.write(f"cosmic: {line}\n")
-    return code
+    return 1
 
 
 # The commands
@@ -157,7 +162,8 @@ def _display_there() -> bool:
 
 
 def _parser() -> argparse.ArgumentParser:
-    window = _window_options()
+    platform = _platform_options()
+    window = _window_options(platform)
     parser = argparse.ArgumentParser(
         prog="cosmic",
         description="Control software for a microrobotic platform. Without a command: the "
@@ -173,6 +179,11 @@ def _parser() -> argparse.ArgumentParser:
         screenshot=None,
         size=None,
         theme=None,
+        serve=False,
+        listen=None,
+        name=None,
+        certificates=None,
+        connect=None,
     )
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     commands.add_parser("mico", help="the window of MiCo alone", parents=[window])
@@ -194,12 +205,11 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--to", choices=("csv", "tdms"), default="csv", help="format; CSV")
     export.add_argument("--output", type=Path, metavar="FILE", help="beside the recording if none")
     export.add_argument("--overwrite", action="store_true", help="replace a file that exists")
-    for name, what in NOT_BUILT.items():
-        commands.add_parser(name, help=f"{what} (not built yet)", add_help=False)
+    add_station_commands(commands, platform)
     return parser
 
 
-def _window_options() -> argparse.ArgumentParser:
+def _platform_options() -> argparse.ArgumentParser:
     # Suppressed defaults, so that an option before the command is not reset by the command.
     options = argparse.ArgumentParser(add_help=False, argument_default=argparse.SUPPRESS)
     add = options.add_argument
@@ -207,6 +217,15 @@ def _window_options() -> argparse.ArgumentParser:
     add("--rate", type=float, help="how many times faster than the wall the simulation runs")
     add("--cold", action="store_true", help="start the simulation at power-up, nothing referenced")
     add("--sample", metavar="NAME", help="what lies on the simulated plate, such as forty-dry")
+    return options
+
+
+def _window_options(platform: argparse.ArgumentParser) -> argparse.ArgumentParser:
+    options = argparse.ArgumentParser(
+        add_help=False, argument_default=argparse.SUPPRESS, parents=[platform, line_options()]
+    )
+    add = options.add_argument
+    add("--serve", action="store_true", help="let other programs use what runs here")
     add("--offscreen", type=_seconds, metavar="SECONDS", help="show nothing, close after SECONDS")
     add("--screenshot", type=Path, metavar="FILE", help="with --offscreen: save a picture")
     add("--size", type=_size, metavar="WxH", help="size of the window, such as 1600x1000")

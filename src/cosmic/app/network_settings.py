@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -72,15 +73,12 @@ def require_network() -> None:
     NotAvailable
         It is not; the text says what to do.
     """
-    try:
-        import cryptography  # noqa: F401
-        import msgpack  # noqa: F401
-        import zenoh  # noqa: F401
-    except ImportError as exc:
+    missing = [name for name in ("cryptography", "msgpack", "zenoh") if find_spec(name) is None]
+    if missing:
         raise NotAvailable(
-            f"stations need the extra 'net', which is not installed here ({exc.name} is missing): "
-            "install cosmic[net]"
-        ) from exc
+            "stations need the extra 'net', which is not installed here "
+            f"({', '.join(missing)}): install cosmic[net]"
+        )
 
 
 def serving(
@@ -124,7 +122,8 @@ def serving(
     try:
         line = Line(endpoint, True, called, found, tuple(access))
     except ConfigError as exc:
-        raise ConfigError(f"{exc}\n{_WHAT_TO_DO}") from exc
+        known = endpoint.startswith(("tcp/", "tls/"))
+        raise ConfigError(f"{exc}\n{_WHAT_TO_DO}" if known else str(exc)) from exc
     return Serving(line, access)
 
 

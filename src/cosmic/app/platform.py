@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import cosmic
+from cosmic.app.hosting import Site, build_daqco, build_mico, build_vico
 from cosmic.app.platform_file import KNOWN_APPLICATIONS, PlatformFile, load_platform, load_twin
-from cosmic.app.scene_fit import load_checker
 from cosmic.autonomy.couplings import join_teleoperation
 from cosmic.autonomy.interlocks import (
     join_force_limits,
@@ -15,25 +14,14 @@ from cosmic.autonomy.interlocks import (
 )
 from cosmic.autonomy.places import join_places
 from cosmic.daqco.api.application import DaqcoApplication
-from cosmic.daqco.core.settings import DaqcoSettings
-from cosmic.daqco.hw.factory import make_library
-from cosmic.daqco.hw.sim_signal import Source
 from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import Clock, RatedClock
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.api.application import MicoApplication
-from cosmic.mico.hw.factory import make_controller, make_simulated
-from cosmic.mico.hw.interface import Controller
 from cosmic.twin.sample import put_on
 from cosmic.twin.scene import Scene
 from cosmic.vico.api.application import VicoApplication
-from cosmic.vico.core.settings import Backend, VicoSettings
-from cosmic.vico.hw.factory import make_camera_library
-from cosmic.vico.hw.interface import CameraLibrary
-from cosmic.vico.hw.peripheral_factory import make_lens, make_light
-from cosmic.vico.hw.peripherals import Lens
-from cosmic.vico.hw.sim_peripherals import SimPeripherals
 
 if TYPE_CHECKING:
     from cosmic.mico.hw.sim_scu3d_faults import Faults
@@ -125,15 +113,15 @@ def build_platform(
         twin = load_twin(file, path)
         twin = twin if sample is None else put_on(twin, sample, seed)
         scene = Scene.from_settings(twin, clock, seed=seed, cold=cold, folder=path.parent)
-    site = _Site(file, path, clock, FailurePolicy(), scene, seed)
+    site = Site(file, path, clock, FailurePolicy(), scene, seed)
     hosted = [name for name in applications if name in file.platform.applications]
     mico, faults, daqco, vico = None, None, None, None
     if "mico" in hosted:
-        mico, faults = _build_mico(site, mico_gui)
+        mico, faults = build_mico(site, mico_gui)
     if "daqco" in hosted and file.daqco is not None:
-        daqco = _build_daqco(site, file.daqco, daqco_gui)
+        daqco = build_daqco(site, file.daqco, daqco_gui)
     if "vico" in hosted and file.vico is not None:
-        vico = _build_vico(site, file.vico, vico_gui)
+        vico = build_vico(site, file.vico, vico_gui)
     if daqco is not None and mico is not None:
         join_force_limits(daqco, mico)
         join_teleoperation(mico, daqco)
@@ -152,109 +140,3 @@ def build_platform(
         daqco=daqco,
         vico=vico,
     )
-
-
-@dataclass(frozen=True)
-class _Site:
-    """What the applications of one process share while they are built."""
-
-    file: PlatformFile
-    path: Path
-    clock: Clock
-    policy: FailurePolicy
-    scene: Scene | None
-    seed: int
-
-
-def _build_mico(
-    site: _Site, gui_factory: GuiFactory | None
-) -> "tuple[MicoApplication, Faults | None]":
-    settings = site.file.mico
-    controller: Controller
-    faults: Faults | None = None
-    if site.scene is not None:
-        controller, faults = make_simulated(site.scene)
-    else:
-        controller = make_controller(settings.backend, library_path=settings.library)
-    application = MicoApplication(
-        controller,
-        settings,
-        clock=site.clock,
-        policy=site.policy,
-        checker=load_checker(site.file, site.path),
-        platform=site.file.platform.name,
-        folder=site.path.parent,
-        gui_factory=gui_factory,
-    )
-    return application, faults
-
-
-def _build_daqco(
-    site: _Site, settings: DaqcoSettings, gui_factory: GuiFactory | None
-) -> DaqcoApplication:
-    library = make_library(
-        settings.backend,
-        clock=site.clock,
-        scene_sources=_sources(site.scene),
-        clock_sources=settings.clock_sources,
-        seed=site.seed,
-    )
-    return DaqcoApplication(
-        library,
-        settings,
-        clock=site.clock,
-        policy=site.policy,
-        software=f"CoSMic {cosmic.__version__}",
-        configuration=site.path.read_text(encoding="utf-8"),
-        gui_factory=gui_factory,
-    )
-
-
-def _build_vico(
-    site: _Site, settings: VicoSettings, gui_factory: GuiFactory | None
-) -> VicoApplication:
-    scene, simulation = site.scene, None
-    if scene is not None and scene.lens is not None and scene.light is not None:
-        simulation = SimPeripherals(scene.lens, scene.light, site.clock, site.seed)
-
-    def make_library(backend: Backend) -> CameraLibrary:
-        return make_camera_library(
-            backend,
-            clock=site.clock,
-            scene=scene,
-            sources=settings.sources,
-            producers=settings.producers,
-            seed=site.seed,
-        )
-
-    def open_lens() -> Lens | None:
-        lens = settings.lens
-        return make_lens(
-            lens.backend,
-            port=lens.port,
-            homed=lens.homed,
-            limits_counts=lens.limits_counts,
-            simulation=simulation,
-        )
-
-    return VicoApplication(
-        make_library,
-        open_lens,
-        lambda: make_light(settings.light.backend, port=settings.light.port, simulation=simulation),
-        settings,
-        clock=site.clock,
-        policy=site.policy,
-        gui_factory=gui_factory,
-    )
-
-
-def _sources(scene: Scene | None) -> dict[tuple[str, str], Source]:
-    """Return what the twin connects to the inputs of the simulated boards."""
-    if scene is None or scene.force_side is None:
-        return {}
-    sensors = scene.force_side.sensors
-    sources: dict[tuple[str, str], Source] = {}
-    for place, name in scene.settings.sensor_wiring.items():
-        board, _, number = place.partition("/")
-        sources[board, number] = sensors[name]
-    return sources

@@ -1,5 +1,6 @@
 """What a platform.toml says, read and checked."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -56,13 +57,24 @@ def load_platform(config: str | Path | None) -> tuple[PlatformFile, Path]:
     """
     path = platform_path(config)
     file = load_model(path, PlatformFile)
-    unknown = [name for name in file.platform.applications if name not in KNOWN_APPLICATIONS]
+    check_applications(file.platform.applications, f"{path}: platform.applications")
+    return file, path
+
+
+def check_applications(names: Iterable[str], where: str) -> None:
+    """Check that each application is one there is.
+
+    Raises
+    ------
+    ConfigError
+        One is not.
+    """
+    unknown = [name for name in names if name not in KNOWN_APPLICATIONS]
     if unknown:
         raise ConfigError(
-            f"{path}: platform.applications: unknown application {unknown[0]!r}; "
+            f"{where}: unknown application {unknown[0]!r}; "
             f"known are {', '.join(KNOWN_APPLICATIONS)}"
         )
-    return file, path
 
 
 def load_twin(file: PlatformFile, path: Path) -> TwinSettings:

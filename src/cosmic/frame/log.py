@@ -68,14 +68,14 @@ def _as_text(record: logging.LogRecord) -> logging.LogRecord:
 
 
 def set_up_logging(
-    ring: RingBufferHandler, *, file: Path | None = None, console: bool = False
+    ring: RingBufferHandler | None = None, *, file: Path | None = None, console: bool = False
 ) -> Callable[[], None]:
     """Send the records of ``cosmic`` to `ring`, a rotating file and the terminal.
 
     Returns the function that undoes it.
     """
     root = logging.getLogger("cosmic")
-    handlers: list[logging.Handler] = [ring]
+    handlers: list[logging.Handler] = [] if ring is None else [ring]
     formatter = logging.Formatter(LINE_FORMAT, TIME_FORMAT)
     if file is not None:
         file.parent.mkdir(parents=True, exist_ok=True)

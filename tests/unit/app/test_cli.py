@@ -159,18 +159,80 @@ def test_init_into_a_file_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert complaints(capsys)
 
 
-# What is not there, or not understood
+# Stations
 
 
 @pytest.mark.parametrize(
-    "arguments",
-    [["serve"], ["serve", "--applications", "mico"], ["--rate", "2", "serve"]],
+    ("arguments", "wanted"),
+    [
+        (["--applications", "miko"], "unknown application 'miko'; known are mico, daqco, vico"),
+        (["--listen", "tcp/0.0.0.0:7447"], "only tls with certificates is allowed"),
+        (["--listen", "tls/0.0.0.0:7447"], "tls needs certificates"),
+        (["--listen", "somewhere"], "'somewhere' is no endpoint"),
+        (["--name", "fibre station"], "letters, digits, - and _"),
+        (["--certificates", "nowhere"], "nowhere/authority.pem: there is no such file"),
+        (["--connect", "fibervision"], "'fibervision' is no station; it reads NAME=tcp/"),
+        (["--config", "nowhere.toml"], "nowhere.toml: there is no such file"),
+    ],
 )
-def test_what_is_not_built_says_so(
-    arguments: list[str], capsys: pytest.CaptureFixture[str]
+def test_a_station_that_cannot_be_says_why(
+    arguments: list[str], wanted: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(arguments) == 2
-    assert "not built yet" in complaints(capsys)[0]
+    assert main(["serve", *arguments]) == 1
+    assert wanted in "\n".join(complaints(capsys))
+
+
+def test_whoever_wants_to_serve_other_computers_is_told_what_to_do(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["serve", "--listen", "tcp/192.168.1.5:7447"]) == 1
+    said = "\n".join(complaints(capsys))
+    assert "cosmic certificates FOLDER --stations" in said
+    assert "[network]" in said
+
+
+def test_an_application_that_the_platform_file_leaves_out_cannot_be_served(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    edit(folder / "platform.toml", '["mico", "daqco", "vico"]', '["mico"]')
+    assert main(["serve", "--applications", "daqco", "--config", str(folder)]) == 1
+    assert "describes no daqco" in complaints(capsys)[0]
+
+
+def test_certificates_are_made_for_each_station(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "made"
+    arguments = ["certificates", str(target), "--stations", "fiberstation,vision"]
+    assert main([*arguments, "--address", "fiberstation=192.168.1.5"]) == 0
+    said = capsys.readouterr().out
+    for name in ("fiberstation", "vision"):
+        assert f"{target / name}: for {name}" in said
+        assert (target / name / "key.pem").stat().st_mode & 0o077 == 0, "nobody else reads it"
+    assert str(target / "authority") in said
+    assert main(arguments) == 1
+    assert "is there already" in complaints(capsys)[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        (["--stations", ","], "name at least one"),
+        (["--stations", "one,one"], "stands there twice"),
+        (["--stations", "one/two"], "letters, digits, - and _"),
+        (["--stations", "one", "--address", "192.168.1.5"], "it reads STATION=HOST"),
+        (["--stations", "one", "--address", "two=192.168.1.5"], "not among the stations"),
+    ],
+)
+def test_certificates_that_cannot_be_made_say_why(
+    tmp_path: Path, arguments: list[str], wanted: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["certificates", str(tmp_path / "made"), *arguments]) == 1
+    assert wanted in complaints(capsys)[0]
+    assert not (tmp_path / "made").exists()
+
+
+# What is not there, or not understood
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,139 @@
+"""Makes the applications of one process out of the platform file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import cosmic
+from cosmic.app.platform_file import PlatformFile
+from cosmic.app.scene_fit import load_checker
+from cosmic.daqco.api.application import DaqcoApplication
+from cosmic.daqco.core.settings import DaqcoSettings
+from cosmic.daqco.hw.factory import make_library
+from cosmic.daqco.hw.sim_signal import Source
+from cosmic.frame.application import GuiFactory
+from cosmic.frame.clock import Clock
+from cosmic.frame.failure import FailurePolicy
+from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.hw.factory import make_controller, make_simulated
+from cosmic.mico.hw.interface import Controller
+from cosmic.twin.scene import Scene
+from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.core.settings import Backend, VicoSettings
+from cosmic.vico.hw.factory import make_camera_library
+from cosmic.vico.hw.interface import CameraLibrary
+from cosmic.vico.hw.peripheral_factory import make_lens, make_light
+from cosmic.vico.hw.peripherals import Lens
+from cosmic.vico.hw.sim_peripherals import SimPeripherals
+
+if TYPE_CHECKING:
+    from cosmic.mico.hw.sim_scu3d_faults import Faults
+
+
+@dataclass(frozen=True)
+class Site:
+    """What the applications of one process share while they are built."""
+
+    file: PlatformFile
+    path: Path
+    clock: Clock
+    policy: FailurePolicy
+    scene: Scene | None
+    seed: int
+
+
+def build_mico(
+    site: Site, gui_factory: GuiFactory | None
+) -> "tuple[MicoApplication, Faults | None]":
+    """Make MiCo, and what injects faults into its simulated controller."""
+    settings = site.file.mico
+    controller: Controller
+    faults: Faults | None = None
+    if site.scene is not None:
+        controller, faults = make_simulated(site.scene)
+    else:
+        controller = make_controller(settings.backend, library_path=settings.library)
+    application = MicoApplication(
+        controller,
+        settings,
+        clock=site.clock,
+        policy=site.policy,
+        checker=load_checker(site.file, site.path),
+        platform=site.file.platform.name,
+        folder=site.path.parent,
+        gui_factory=gui_factory,
+    )
+    return application, faults
+
+
+def build_daqco(
+    site: Site, settings: DaqcoSettings, gui_factory: GuiFactory | None
+) -> DaqcoApplication:
+    """Make DAQCo."""
+    library = make_library(
+        settings.backend,
+        clock=site.clock,
+        scene_sources=_sources(site.scene),
+        clock_sources=settings.clock_sources,
+        seed=site.seed,
+    )
+    return DaqcoApplication(
+        library,
+        settings,
+        clock=site.clock,
+        policy=site.policy,
+        software=f"CoSMic {cosmic.__version__}",
+        configuration=site.path.read_text(encoding="utf-8"),
+        gui_factory=gui_factory,
+    )
+
+
+def build_vico(
+    site: Site, settings: VicoSettings, gui_factory: GuiFactory | None
+) -> VicoApplication:
+    """Make ViCo."""
+    scene, simulation = site.scene, None
+    if scene is not None and scene.lens is not None and scene.light is not None:
+        simulation = SimPeripherals(scene.lens, scene.light, site.clock, site.seed)
+
+    def make_library(backend: Backend) -> CameraLibrary:
+        return make_camera_library(
+            backend,
+            clock=site.clock,
+            scene=scene,
+            sources=settings.sources,
+            producers=settings.producers,
+            seed=site.seed,
+        )
+
+    def open_lens() -> Lens | None:
+        lens = settings.lens
+        return make_lens(
+            lens.backend,
+            port=lens.port,
+            homed=lens.homed,
+            limits_counts=lens.limits_counts,
+            simulation=simulation,
+        )
+
+    return VicoApplication(
+        make_library,
+        open_lens,
+        lambda: make_light(settings.light.backend, port=settings.light.port, simulation=simulation),
+        settings,
+        clock=site.clock,
+        policy=site.policy,
+        gui_factory=gui_factory,
+    )
+
+
+def _sources(scene: Scene | None) -> dict[tuple[str, str], Source]:
+    """Return what the twin connects to the inputs of the simulated boards."""
+    if scene is None or scene.force_side is None:
+        return {}
+    sensors = scene.force_side.sensors
+    sources: dict[tuple[str, str], Source] = {}
+    for place, name in scene.settings.sensor_wiring.items():
+        board, _, number = place.partition("/")
+        sources[board, number] = sensors[name]
+    return sources

@@ -1,0 +1,102 @@
+"""Offers the applications of this process to others."""
+
+import logging
+from contextlib import ExitStack
+from importlib import import_module
+from typing import Protocol, runtime_checkable
+
+import cosmic
+from cosmic.app.network_settings import Serving
+from cosmic.app.platform import Platform
+from cosmic.app.station_facts import ITSELF, StationFacts, StationSide
+from cosmic.frame.errors import ConfigError
+from cosmic.frame.network.lease import StationLease
+from cosmic.frame.network.station import Station
+
+logger = logging.getLogger(__name__)
+
+
+@runtime_checkable
+class _Closing(Protocol):
+    def close(self) -> None: ...
+
+
+class StationHost:
+    """A platform as a station that others reach; `close` it in every case.
+
+    Only what this process hosts is offered: what it reaches elsewhere is not passed on.
+
+    Raises
+    ------
+    ConfigError
+        There is nothing to offer.
+    StationAway
+        It cannot listen there.
+    """
+
+    def __init__(self, platform: Platform, how: Serving) -> None:
+        # Imported here: they need the extra `net`.
+        from cosmic.frame.network.server_listener import ServerListener
+        from cosmic.frame.network.zenoh_wire import ZenohWire
+
+        sides = _sides(platform)
+        if not sides:
+            raise ConfigError(f"{how.name}: no application runs here that could be served")
+        self._how = how
+        lease = StationLease(f"the operator at {how.name}")
+        self._station = Station(how.name, platform.policy, lease)
+        self._applications = tuple(sides)
+        with ExitStack() as undo:
+            for name, side in sides.items():
+                if isinstance(side, _Closing):
+                    undo.callback(side.close)
+                self._station.host(name, side)
+            facts = _facts(platform, self._applications)
+            self._station.host(ITSELF, StationSide(facts, lease))
+            listener = ServerListener(self._station, ZenohWire(how.line), how.allowed)
+            undo.callback(listener.shut_down)
+            listener.start()
+            self._undo = undo.pop_all()
+        logger.info("%s", self.address)
+
+    @property
+    def address(self) -> str:
+        """Its name, what it serves, and where: one line."""
+        served = ", ".join(self._applications)
+        return f"{self._how.name} serves {served} at {self._how.line.endpoint}"
+
+    @property
+    def name(self) -> str:
+        """How others call it."""
+        return self._how.name
+
+    @property
+    def lease(self) -> StationLease:
+        """Who may move."""
+        return self._station.lease
+
+    def close(self) -> None:
+        """Stop what clients have set in motion, send them away and answer no more; any state."""
+        self._undo.close()
+
+
+def _sides(platform: Platform) -> dict[str, object]:
+    """Return what answers for each application that runs in this process."""
+    # Imported here: whoever serves nothing loads none of it.
+    found = {"mico": platform.mico, "daqco": platform.daqco, "vico": platform.vico}
+    sides: dict[str, object] = {}
+    for name, application in found.items():
+        if application is not None:
+            module = import_module(f"cosmic.{name}.api.station_side")
+            sides[name] = getattr(module, f"{name.capitalize()}StationSide")(application)
+    return sides
+
+
+def _facts(platform: Platform, applications: tuple[str, ...]) -> StationFacts:
+    return StationFacts(
+        platform=platform.file.platform.name,
+        simulated=platform.simulated,
+        rate=platform.clock.rate,
+        applications=applications,
+        software=f"CoSMic {cosmic.__version__}",
+    )
