@@ -1,0 +1,364 @@
+"""`ProcedureRun`: one run of a procedure, with pause, step and abort."""
+
+import logging
+import threading
+from collections.abc import Callable
+from enum import StrEnum
+from typing import Generic, TypeVar
+
+from typing_extensions import override
+
+from cosmic.autonomy.procedures.conduct import Conductor
+from cosmic.autonomy.procedures.failures import (
+    DEFECT,
+    ProcedureAborted,
+    ProcedureStopped,
+)
+from cosmic.autonomy.procedures.operation import OperationFailed
+from cosmic.autonomy.procedures.pending import Reins
+from cosmic.autonomy.procedures.procedure import Procedure, outline_of
+from cosmic.autonomy.procedures.times import OperationTimes
+from cosmic.autonomy.procedures.tree import NodeEvent, NodeView, TreeKeeper
+from cosmic.frame.clock import Clock
+from cosmic.frame.errors import CosmicError, DeviceTimeout, NotAvailable, WrongThreadError
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.listeners import tell
+from cosmic.frame.threads import WorkerThread, forbid_waiting_here
+
+logger = logging.getLogger(__name__)
+
+W = TypeVar("W")
+
+
+class RunState(StrEnum):
+    """What a run is at; the value is the word."""
+
+    READY = "ready"
+    RUNNING = "running"
+    PAUSING = "pausing"
+    PAUSED = "paused"
+    ABORTING = "aborting"
+    DONE = "done"
+    FAILED = "failed"
+    ABORTED = "aborted"
+
+
+OVER = frozenset({RunState.DONE, RunState.FAILED, RunState.ABORTED})
+
+
+class ProcedureRun(Generic[W]):
+    """Carries out a procedure once, in a thread of its own or in the caller's; any thread.
+
+    Parameters
+    ----------
+    procedure : Procedure
+        What to do.
+    work : W
+        What its operations share.
+    clock : Clock
+        The platform's; all waiting goes by it.
+    policy : FailurePolicy
+        Told of a defect in an operation, which stops all motion.
+    stopped : callable or None
+        Returns why motion is stopped, or None; a run ends when it is, even where it only waits.
+    """
+
+    def __init__(
+        self,
+        procedure: Procedure[W],
+        work: W,
+        clock: Clock,
+        policy: FailurePolicy,
+        *,
+        stopped: Callable[[], str | None] | None = None,
+    ) -> None:
+        self.procedure = procedure
+        self.work = work
+        self.times = OperationTimes()
+        self._policy = policy
+        self._keeper = TreeKeeper(outline_of(procedure.root), clock)
+        self._keeper.subscribe(self.times.note)
+        self._keeper.subscribe(lambda _event: tell(self._listeners))
+        self._reins = Reins(clock)
+        self._conductor = Conductor(
+            procedure, work, self._keeper, self._reins, self._on_rest, stopped
+        )
+        self._lock = threading.RLock()
+        self._state = RunState.READY
+        self._failure: Exception | None = None
+        self._over = threading.Event()
+        self._listeners: tuple[Callable[[], object], ...] = ()
+        self._thread: WorkerThread | None = None
+        self._ident: int | None = None
+
+    @override
+    def __repr__(self) -> str:
+        return f"<ProcedureRun {self.procedure.name!r}, {self.state}>"
+
+    # What is known of it
+
+    @property
+    def name(self) -> str:
+        """Name of the procedure."""
+        return self.procedure.name
+
+    @property
+    def state(self) -> RunState:
+        """What it is at."""
+        return self._state
+
+    @property
+    def over(self) -> bool:
+        """True when it has ended, well or not."""
+        return self._over.is_set()
+
+    @property
+    def failure(self) -> Exception | None:
+        """What it failed with; None while it runs, and when it ended well."""
+        return self._failure
+
+    @property
+    def not_safe(self) -> str:
+        """Why things could not be made safe at the end; empty when they were, or need not be."""
+        return self._conductor.not_safe
+
+    @property
+    def tree(self) -> NodeView:
+        """What each part is at now."""
+        return self._keeper.snapshot()
+
+    def subscribe(self, listener: Callable[[NodeEvent], object]) -> Callable[[], None]:
+        """Call `listener(event)` at each change of a part, in order, in the run's thread.
+
+        Returns the function that ends it.
+        """
+        return self._keeper.subscribe(listener)
+
+    def on_change(self, listener: Callable[[], object]) -> Callable[[], None]:
+        """Call `listener()` when anything changed, in the thread that changed it.
+
+        Returns the function that ends it.
+        """
+        with self._lock:
+            self._listeners = (*self._listeners, listener)
+
+        def remove() -> None:
+            with self._lock:
+                self._listeners = tuple(each for each in self._listeners if each != listener)
+
+        return remove
+
+    # What can be asked of it
+
+    def start(self) -> None:
+        """Begin, in a thread of its own; returns at once.
+
+        Raises
+        ------
+        NotAvailable
+            It was begun before.
+        """
+        self._begin(RunState.RUNNING)
+        self._thread = _RunThread(self._carry_out, self.abort, self.name, self._policy)
+        _keep(self._thread)
+        self._thread.start()
+
+    def run_here(self) -> None:
+        """Carry it out in the calling thread, to its end.
+
+        Raises
+        ------
+        OperationFailed
+            What it failed with.
+        ProcedureAborted
+            It was aborted.
+        NotAvailable
+            It was begun before.
+        """
+        forbid_waiting_here(f"running {self.name!r}")
+        self._begin(RunState.RUNNING)
+        self._carry_out()
+        if self._failure is not None:
+            raise self._failure
+
+    def pause(self) -> None:
+        """Rest at the next place where that is safe; harmless when it does not run."""
+        with self._lock:
+            if self._state is not RunState.RUNNING and not (
+                self._state is RunState.PAUSING and self._reins.stepping
+            ):
+                return
+            self._reins.pausing = True
+            self._state = RunState.PAUSING
+        self._changed()
+
+    def resume(self) -> None:
+        """Go on after a pause or a step; harmless when it does not pause."""
+        with self._lock:
+            if self._state not in (RunState.PAUSED, RunState.PAUSING):
+                return
+            self._reins.pausing = self._reins.stepping = False
+            self._reins.turn += 1
+            self._state = RunState.RUNNING
+        self._changed()
+
+    def step(self) -> None:
+        """Carry out one operation, then rest: the first, the next, or the one that runs.
+
+        Raises
+        ------
+        NotAvailable
+            It is over.
+        """
+        with self._lock:
+            if self._state in OVER or self._state is RunState.ABORTING:
+                raise NotAvailable(f"{self.name} is over; begin a new run")
+            begin = self._state is RunState.READY
+            self._reins.pausing, self._reins.stepping = False, True
+            self._reins.turn += 1
+            if not begin:
+                self._state = RunState.PAUSING
+        if begin:
+            self.start()
+        else:
+            self._changed()
+
+    def abort(self, reason: str = "aborted") -> None:
+        """End it at once: what moves is cancelled, nothing is undone, then it is made safe.
+
+        Returns at once; harmless when it is over. The second time ends the making safe too.
+        """
+        with self._lock:
+            if self._state in OVER:
+                return
+            self._reins.aborts += 1
+            if self._reins.abort_reason is None:
+                self._reins.abort_reason = reason
+            begun = self._state is not RunState.READY
+            if begun:
+                self._state = RunState.ABORTING
+        if begun:
+            self._changed()
+        else:
+            self._end(RunState.ABORTED, ProcedureAborted(f"{self.name}: {reason}"))
+
+    def wait(self, timeout_s: float | None = None) -> None:
+        """Wait for the end; raises what it failed with.
+
+        Raises
+        ------
+        OperationFailed, ProcedureAborted
+            How it ended.
+        DeviceTimeout
+            It had not ended after `timeout_s` of wall time; it goes on.
+        WrongThreadError
+            Called in the GUI thread, or in the run's own.
+        """
+        if not self.over:
+            forbid_waiting_here(f"waiting for {self.name!r}")
+            if threading.get_ident() == self._ident:
+                raise WrongThreadError(f"{self.name} cannot wait for itself")
+        if not self._over.wait(timeout_s):
+            raise DeviceTimeout(f"{self.name} had not ended after {timeout_s:g} s")
+        self.join()
+        if self._failure is not None:
+            raise self._failure
+
+    def join(self) -> None:
+        """Wait until its thread is gone; for whoever closes the platform, after `abort`."""
+        if self._thread is not None and threading.get_ident() != self._ident:
+            self._thread.join()
+
+    # The run's own thread
+
+    def _begin(self, state: RunState) -> None:
+        with self._lock:
+            if self._state is not RunState.READY:
+                raise NotAvailable(f"{self.name} was begun already; make a new run of it")
+            self._state = RunState.PAUSING if self._reins.stepping else state
+        logger.info("%s begins", self.name)
+        self._changed()
+
+    def _carry_out(self) -> None:
+        self._ident = threading.get_ident()
+        try:
+            self._conductor.carry_out()
+        except ProcedureAborted as exc:
+            self._end(RunState.ABORTED, exc)
+        except CosmicError as exc:
+            self._end(RunState.FAILED, exc)
+        except Exception as exc:  # noqa: BLE001 - whoever waits for the end is told
+            self._policy.report(exc, f"procedure {self.name!r}")
+            self._end(RunState.FAILED, _defect(exc))
+        except BaseException as exc:
+            self._end(RunState.ABORTED, ProcedureAborted(f"{self.name}: {type(exc).__name__}"))
+            raise
+        else:
+            self._end(RunState.DONE, None)
+
+    def _end(self, state: RunState, failure: Exception | None) -> None:
+        with self._lock:
+            self._state, self._failure = state, failure
+        if failure is None:
+            logger.info("%s finished", self.name)
+        else:
+            told = logger.error if state is RunState.FAILED else logger.warning
+            if isinstance(failure, ProcedureStopped):
+                told = logger.warning
+            told("%s %s: %s", self.name, state, failure)
+        self._over.set()
+        self._changed()
+
+    def _on_rest(self, *, resting: bool) -> None:
+        with self._lock:
+            if self._state is RunState.ABORTING:
+                return
+            reins = self._reins
+            wanted = reins.pausing or reins.stepping
+            if resting and wanted:
+                self._state = RunState.PAUSED
+            else:
+                self._state = RunState.PAUSING if wanted else RunState.RUNNING
+        tell(self._listeners)
+
+    def _changed(self) -> None:
+        self._reins.ring()
+        tell(self._listeners)
+
+
+def _defect(error: Exception) -> OperationFailed:
+    failure = OperationFailed(DEFECT, f"{type(error).__name__}: {error}")
+    failure.__cause__ = error
+    return failure
+
+
+_kept: list[WorkerThread] = []
+
+
+def _keep(thread: WorkerThread) -> None:
+    """Hold on to it until it has ended: Qt aborts the process over one let go before."""
+    _kept[:] = [*(each for each in _kept if not each.isFinished()), thread]
+
+
+class _RunThread(WorkerThread):
+    """The thread of one run."""
+
+    def __init__(
+        self,
+        carry_out: Callable[[], None],
+        abort: Callable[[str], None],
+        name: str,
+        policy: FailurePolicy,
+    ) -> None:
+        super().__init__(f"procedure {name}", policy)
+        self._carry_out = carry_out
+        self._abort = abort
+
+    @override
+    def run_body(self) -> None:
+        self._carry_out()
+
+    @override
+    def request_end(self) -> None:
+        self._abort("the program is closing")
+        super().request_end()
