@@ -110,7 +110,7 @@ def serving(
     from cosmic.frame.network.line_settings import Line
 
     found = own_certificates(settings, folder, certificates)
-    called = name or settings.name or _as_name(platform)
+    called = name or settings.name or _proven_name(found) or _as_name(platform)
     access = settings.access
     try:
         checked_name(called)
@@ -151,6 +151,14 @@ def own_certificates(
     from cosmic.frame.network.certificates import station_certificates
 
     return station_certificates(where)
+
+
+def _proven_name(certificates: "Certificates | None") -> str:
+    if certificates is None:
+        return ""
+    from cosmic.frame.network.certificates import name_in
+
+    return name_in(certificates)
 
 
 def _as_name(title: str) -> str:

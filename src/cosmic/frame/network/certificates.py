@@ -150,6 +150,21 @@ def station_certificates(folder: Path) -> Certificates:
     return found
 
 
+def name_in(files: Certificates) -> str:
+    """Return the name that a certificate proves.
+
+    Raises
+    ------
+    ConfigError
+        It cannot be read, or bears none.
+    """
+    try:
+        certificate = x509.load_pem_x509_certificate(files.certificate.read_bytes())
+        return str(certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)[0].value)
+    except (OSError, ValueError, IndexError) as exc:
+        raise ConfigError(f"{files.certificate}: the name in it cannot be read: {exc}") from exc
+
+
 def _name(text: str) -> x509.Name:
     return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, text)])
 

@@ -7,7 +7,7 @@ import pytest
 from cryptography import x509
 
 from cosmic.frame.errors import ConfigError
-from cosmic.frame.network.certificates import make_certificates, station_certificates
+from cosmic.frame.network.certificates import make_certificates, name_in, station_certificates
 from cosmic.frame.network.line_settings import Certificates, Line
 from cosmic.frame.network.zenoh_wire import config
 
@@ -22,6 +22,7 @@ def test_each_station_gets_all_it_needs_and_a_key_that_only_its_owner_reads(tmp_
         authority = x509.load_pem_x509_certificate(files.authority.read_bytes())
         certificate.verify_directly_issued_by(authority)
         assert certificate.subject.rfc4514_string() == f"CN={name}"
+        assert name_in(files) == name
         assert stat.S_IMODE(files.key.stat().st_mode) == 0o600
     hosts = x509.load_pem_x509_certificate(made["fibres"].certificate.read_bytes()).extensions
     names = hosts.get_extension_for_class(x509.SubjectAlternativeName).value
@@ -33,6 +34,13 @@ def test_a_station_that_comes_later_is_signed_by_the_same_authority(tmp_path: Pa
     first = make_certificates(tmp_path, "fibres")["fibres"]
     second = make_certificates(tmp_path, "vision")["vision"]
     assert first.authority.read_bytes() == second.authority.read_bytes()
+
+
+def test_a_certificate_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    files = make_certificates(tmp_path, "fibres")["fibres"]
+    files.certificate.write_text("nonsense")
+    with pytest.raises(ConfigError, match=r"certificate\.pem"):
+        name_in(files)
 
 
 def test_nothing_is_overwritten_and_no_name_is_let_through(tmp_path: Path) -> None:
