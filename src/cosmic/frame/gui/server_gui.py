@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Final
 
-from PySide6.QtCore import QSettings, Qt, Signal
+from PySide6.QtCore import QSettings, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
 
@@ -12,6 +12,7 @@ from cosmic.frame.gui.keys_dialog import KeyList, KeysDialog
 from cosmic.frame.gui.layout_store import LayoutStore
 from cosmic.frame.gui.menus import ServerMenus
 from cosmic.frame.gui.palette import ThemeName
+from cosmic.frame.gui.tab_bars import hide_stale_tab_bars
 from cosmic.frame.gui.theme import STEP_PX, apply_theme, current_palette
 from cosmic.frame.gui.top_bar import TopBar
 from cosmic.frame.overrides import override
@@ -196,6 +197,7 @@ class CosmicServerGui(QMainWindow):
     def reset_layout(self) -> None:
         """Put all panels back to where they are at a first start."""
         self._store.reset(self)
+        hide_stale_tab_bars(self)
 
     def _on_message_clicked(self) -> None:
         if LOG_TITLE in self._docks:
@@ -226,6 +228,7 @@ class CosmicServerGui(QMainWindow):
             self._size_panels()
             self._store.remember_default(self)
             self._store.restore(self)
+            QTimer.singleShot(0, self, lambda: hide_stale_tab_bars(self))
         super().showEvent(event)
 
     @override

@@ -3,12 +3,14 @@
 from typing import Final
 
 from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QComboBox, QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.theme import STEP_PX
+from cosmic.frame.overrides import override
 from cosmic.frame.task import Progress, Task
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.settings import GroupSettings
@@ -91,6 +93,11 @@ class PosesBox(QWidget):
         for button in (self.go, self.remove):
             button.setEnabled(bool(names))
         self.way.setEnabled(bool(names) and has_model)
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        self.refresh()  # others teach poses too: the console, a script
+        super().showEvent(event)
 
     def _on_teach(self) -> None:
         name, group = self.name.text().strip(), self.group.currentText()

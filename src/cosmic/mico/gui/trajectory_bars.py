@@ -56,6 +56,7 @@ class RecordBar(QWidget):
         self.pose = tipped(QComboBox(), "Named pose that recorded positions count from")
         self.told = ElidedLabel()
         self.told.setFont(number_font())
+        self.told.hide()
         self._recording = False
         row, flow = QWidget(), FlowLayout(STEP_PX)
         row.setLayout(flow)
@@ -94,6 +95,7 @@ class RecordBar(QWidget):
         for widget in (self.source, self.timed, self.pose):
             widget.setEnabled(not recording)
         self.told.set_text(text)
+        self.told.setVisible(bool(text))
 
     def _on_clicked(self) -> None:
         (self.stop_requested if self._recording else self.record_requested).emit()
