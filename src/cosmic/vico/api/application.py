@@ -1,7 +1,7 @@
 """ViCo as a CoSMic application (thesis 5.2): cameras, lens and light of one platform."""
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt
@@ -111,6 +111,28 @@ class VicoApplication(TaskApplication):
             self.status_changed.emit()
 
         return self.begin("Looking for cameras", job)
+
+    def use(self, camera: str, key: str) -> Task:
+        """Begin to take the pictures of `camera` with the one of that key."""
+        self.unit(camera).use(key)
+        task = Task(f"{camera}: {key}")
+        task.finish()
+        return task
+
+    @property
+    def has_lens(self) -> bool:
+        """The platform has a motorised lens."""
+        return self.settings.lens.backend != "none"
+
+    @property
+    def has_light(self) -> bool:
+        """The platform has a lamp that can be dimmed."""
+        return self.settings.light.backend != "none"
+
+    @property
+    def cameras(self) -> Sequence[str]:
+        """Names of the cameras, in the order of the platform file."""
+        return tuple(self.units)
 
     def unit(self, name: str) -> CameraUnit:
         """Return a camera by its name.

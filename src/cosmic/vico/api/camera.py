@@ -76,6 +76,11 @@ class CameraHandle(CameraPlaces, CameraShape):
         """Why no pictures come; empty when all is well."""
         return self._thread.problem
 
+    @property
+    def refused(self) -> str:
+        """Why the last wish of a window was not granted, where that was heard later; or empty."""
+        return ""
+
     # Pictures
 
     def latest(self) -> Picture | None:
@@ -156,6 +161,11 @@ class CameraHandle(CameraPlaces, CameraShape):
         return Seen.of(newest) if newest is not None else None
 
     # Files
+
+    @property
+    def elsewhere(self) -> str:
+        """Whose disk files go to, where it is not this computer's; empty: it is."""
+        return ""
 
     @property
     def directory(self) -> Path:

@@ -13,6 +13,9 @@ from cosmic.frame.task import Task
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.camera import CameraHandle
 from cosmic.vico.api.lens import LensHandle, LightHandle
+from cosmic.vico.api.remote_application import RemoteVicoApplication
+from cosmic.vico.api.remote_camera import RemoteCameraHandle
+from cosmic.vico.api.remote_lens import RemoteLensHandle, RemoteLightHandle
 from cosmic.vico.hw.interface import CameraInfo, Pixels
 
 if TYPE_CHECKING:
@@ -23,12 +26,15 @@ if TYPE_CHECKING:
 class Vico:
     """Cameras, lens and light of the platform; any thread."""
 
-    def __init__(self, application: VicoApplication) -> None:
+    def __init__(self, application: VicoApplication | RemoteVicoApplication) -> None:
         self._application = application
         self._handles: dict[str, CameraHandle] = {}
-        settings = application.settings
-        self.lens = LensHandle(application) if settings.lens.backend != "none" else None
-        self.light = LightHandle(application) if settings.light.backend != "none" else None
+        self._lens: LensHandle
+        self._light: LightHandle
+        if isinstance(application, RemoteVicoApplication):
+            self._lens, self._light = RemoteLensHandle(application), RemoteLightHandle(application)
+        else:
+            self._lens, self._light = LensHandle(application), LightHandle(application)
         self._listeners: tuple[Callable[[], object], ...] = ()
         # At once and by a function that keeps this object: a call that still waits in a queue when
         # a plain object goes would reach what is no more.
@@ -36,21 +42,36 @@ class Vico:
         application.status_changed.connect(lambda: self._tell(), direct)
 
     @property
-    def application(self) -> VicoApplication:
+    def application(self) -> VicoApplication | RemoteVicoApplication:
         """The application behind it."""
         return self._application
 
     @property
     def cameras(self) -> Sequence[str]:
         """Names of the cameras, in the order of the platform file."""
-        return tuple(self._application.units)
+        return tuple(self._application.cameras)
 
     def camera(self, name: str = "") -> CameraHandle:
         """Return a camera, or the first; raises `ConfigError` where there is none of that name."""
         chosen = name or self._application.first_camera
         if chosen not in self._handles:
-            self._handles[chosen] = CameraHandle(self._application, chosen)
+            application = self._application
+            self._handles[chosen] = (
+                RemoteCameraHandle(application, chosen)
+                if isinstance(application, RemoteVicoApplication)
+                else CameraHandle(application, chosen)
+            )
         return self._handles[chosen]
+
+    @property
+    def lens(self) -> LensHandle | None:
+        """The motorised lens; None where there is none."""
+        return self._lens if self._application.has_lens else None
+
+    @property
+    def light(self) -> LightHandle | None:
+        """The lamp; None where there is none."""
+        return self._light if self._application.has_light else None
 
     @property
     def found(self) -> Sequence[CameraInfo]:
@@ -63,10 +84,7 @@ class Vico:
 
     def use(self, camera: str, key: str) -> Task:
         """Begin to take the pictures of `camera` with the one of that key."""
-        self._application.unit(camera).use(key)
-        task = Task(f"{camera}: {key}")
-        task.finish()
-        return task
+        return self._application.use(camera, key)
 
     def on_change(self, listener: Callable[[], object]) -> Callable[[], None]:
         """Call `listener()`, in any thread, when anything but pictures and counters changed."""
