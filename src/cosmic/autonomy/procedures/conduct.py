@@ -9,8 +9,9 @@ from cosmic.autonomy.procedures.failures import (
     ProcedureStopped,
 )
 from cosmic.autonomy.procedures.operation import OperationFailed
-from cosmic.autonomy.procedures.pending import Pending, Reins
+from cosmic.autonomy.procedures.pending import Pending
 from cosmic.autonomy.procedures.procedure import Procedure
+from cosmic.autonomy.procedures.reins import Reins
 from cosmic.autonomy.procedures.tree import TreeKeeper
 from cosmic.autonomy.procedures.walk import Branch, Course, Place, Walk, perform
 from cosmic.frame.clock import WALL

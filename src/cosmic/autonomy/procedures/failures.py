@@ -61,3 +61,10 @@ def _cause(error: CosmicError) -> str:
         (ConfigError, "configuration"),
     )
     return next((word for kind, word in kinds if isinstance(error, kind)), "error")
+
+
+def defect_of(error: BaseException) -> OperationFailed:
+    """Return the failure that stands for a mistake in an operation, with `error` as its cause."""
+    failure = OperationFailed(DEFECT, f"{type(error).__name__}: {error}")
+    failure.__cause__ = error
+    return failure

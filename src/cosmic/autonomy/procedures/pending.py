@@ -4,73 +4,18 @@ import logging
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from threading import Condition
 from typing import Final, cast
 
 from typing_extensions import override
 
 from cosmic.autonomy.procedures.operation import Awaited, SafePoint
-from cosmic.frame.clock import Clock
+from cosmic.autonomy.procedures.reins import Reins
 from cosmic.frame.errors import CosmicError
 
 logger = logging.getLogger(__name__)
 
-POLL_WALL_S: Final = 0.05
-"""How often at least whoever waits looks whether it was ended."""
-LOOK_WALL_S: Final = 0.002
-"""How often something is looked at that cannot tell of its end."""
-LOOK_S: Final = 0.01
-"""The same where a test moves the time."""
 GUARD_S: Final = 0.02
 """How often the condition of a guard is looked at, in the platform's time."""
-
-
-class OperationEnd(SafePoint):
-    """Yielded after each unit operation: one who goes step by step rests there."""
-
-
-OPERATION_END: Final = OperationEnd()
-
-
-class Reins:
-    """What others want of a run, and a bell for its thread; any thread."""
-
-    def __init__(self, clock: Clock) -> None:
-        self.clock = clock
-        self.bell = Condition()
-        self.abort_reason: str | None = None
-        self.aborts = 0
-        self.pausing = False
-        self.stepping = False
-        self.turn = 0
-        self._rung = False
-
-    @property
-    def poll_s(self) -> float:
-        """The longest wait between two looks, in the platform's time."""
-        return POLL_WALL_S * self.clock.rate or math.inf
-
-    @property
-    def look_s(self) -> float:
-        """The wait between two looks at something that cannot tell of its end."""
-        return LOOK_WALL_S * self.clock.rate or LOOK_S
-
-    def rests_at(self, place: SafePoint) -> bool:
-        """Tell whether the run is to rest at `place`."""
-        return self.stepping if isinstance(place, OperationEnd) else self.pausing
-
-    def ring(self, *_who: object) -> None:
-        """Have the thread of the run look again at once."""
-        with self.bell:
-            self._rung = True
-            self.bell.notify_all()
-
-    def wait(self, until_s: float) -> None:
-        """Wait until the bell rings, or until `until_s`."""
-        with self.bell:
-            if not self._rung:
-                self.clock.wait(self.bell, until_s)
-            self._rung = False
 
 
 class Pending(ABC):

@@ -3,47 +3,27 @@
 import logging
 import threading
 from collections.abc import Callable
-from enum import StrEnum
 from typing import Generic, TypeVar
 
 from typing_extensions import override
 
 from cosmic.autonomy.procedures.conduct import Conductor
-from cosmic.autonomy.procedures.failures import (
-    DEFECT,
-    ProcedureAborted,
-    ProcedureStopped,
-)
-from cosmic.autonomy.procedures.operation import OperationFailed
-from cosmic.autonomy.procedures.pending import Reins
+from cosmic.autonomy.procedures.failures import ProcedureAborted, ProcedureStopped, defect_of
 from cosmic.autonomy.procedures.procedure import Procedure, outline_of
+from cosmic.autonomy.procedures.reins import Reins
+from cosmic.autonomy.procedures.run_state import OVER, RunState
+from cosmic.autonomy.procedures.run_thread import RunThread
 from cosmic.autonomy.procedures.times import OperationTimes
 from cosmic.autonomy.procedures.tree import NodeEvent, NodeView, TreeKeeper
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import CosmicError, DeviceTimeout, NotAvailable, WrongThreadError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.listeners import tell
-from cosmic.frame.threads import WorkerThread, forbid_waiting_here
+from cosmic.frame.threads import forbid_waiting_here
 
 logger = logging.getLogger(__name__)
 
 W = TypeVar("W")
-
-
-class RunState(StrEnum):
-    """What a run is at; the value is the word."""
-
-    READY = "ready"
-    RUNNING = "running"
-    PAUSING = "pausing"
-    PAUSED = "paused"
-    ABORTING = "aborting"
-    DONE = "done"
-    FAILED = "failed"
-    ABORTED = "aborted"
-
-
-OVER = frozenset({RunState.DONE, RunState.FAILED, RunState.ABORTED})
 
 
 class ProcedureRun(Generic[W]):
@@ -77,8 +57,7 @@ class ProcedureRun(Generic[W]):
         self.times = OperationTimes()
         self._policy = policy
         self._keeper = TreeKeeper(outline_of(procedure.root), clock)
-        self._keeper.subscribe(self.times.note)
-        self._keeper.subscribe(lambda _event: tell(self._listeners))
+        self._keeper.subscribe(self._on_event)
         self._reins = Reins(clock)
         self._conductor = Conductor(
             procedure, work, self._keeper, self._reins, self._on_rest, stopped
@@ -88,7 +67,7 @@ class ProcedureRun(Generic[W]):
         self._failure: Exception | None = None
         self._over = threading.Event()
         self._listeners: tuple[Callable[[], object], ...] = ()
-        self._thread: WorkerThread | None = None
+        self._thread: RunThread | None = None
         self._ident: int | None = None
 
     @override
@@ -128,17 +107,11 @@ class ProcedureRun(Generic[W]):
         return self._keeper.snapshot()
 
     def subscribe(self, listener: Callable[[NodeEvent], object]) -> Callable[[], None]:
-        """Call `listener(event)` at each change of a part, in order, in the run's thread.
-
-        Returns the function that ends it.
-        """
+        """Call `listener(event)` at each change of a part, in order, in the run's thread."""
         return self._keeper.subscribe(listener)
 
     def on_change(self, listener: Callable[[], object]) -> Callable[[], None]:
-        """Call `listener()` when anything changed, in the thread that changed it.
-
-        Returns the function that ends it.
-        """
+        """Call `listener()` when anything changed, in any thread; returns what ends it."""
         with self._lock:
             self._listeners = (*self._listeners, listener)
 
@@ -158,9 +131,8 @@ class ProcedureRun(Generic[W]):
         NotAvailable
             It was begun before.
         """
-        self._begin(RunState.RUNNING)
-        self._thread = _RunThread(self._carry_out, self.abort, self.name, self._policy)
-        _keep(self._thread)
+        self._begin()
+        self._thread = RunThread(self._carry_out, self.abort, self.name, self._policy)
         self._thread.start()
 
     def run_here(self) -> None:
@@ -176,7 +148,7 @@ class ProcedureRun(Generic[W]):
             It was begun before.
         """
         forbid_waiting_here(f"running {self.name!r}")
-        self._begin(RunState.RUNNING)
+        self._begin()
         self._carry_out()
         if self._failure is not None:
             raise self._failure
@@ -184,9 +156,7 @@ class ProcedureRun(Generic[W]):
     def pause(self) -> None:
         """Rest at the next place where that is safe; harmless when it does not run."""
         with self._lock:
-            if self._state is not RunState.RUNNING and not (
-                self._state is RunState.PAUSING and self._reins.stepping
-            ):
+            if self._state not in (RunState.RUNNING, RunState.PAUSING):
                 return
             self._reins.pausing = True
             self._state = RunState.PAUSING
@@ -235,8 +205,7 @@ class ProcedureRun(Generic[W]):
             if self._reins.abort_reason is None:
                 self._reins.abort_reason = reason
             begun = self._state is not RunState.READY
-            if begun:
-                self._state = RunState.ABORTING
+            self._state = RunState.ABORTING if begun else RunState.ABORTED
         if begun:
             self._changed()
         else:
@@ -271,11 +240,11 @@ class ProcedureRun(Generic[W]):
 
     # The run's own thread
 
-    def _begin(self, state: RunState) -> None:
+    def _begin(self) -> None:
         with self._lock:
             if self._state is not RunState.READY:
                 raise NotAvailable(f"{self.name} was begun already; make a new run of it")
-            self._state = RunState.PAUSING if self._reins.stepping else state
+            self._state = RunState.PAUSING if self._reins.stepping else RunState.RUNNING
         logger.info("%s begins", self.name)
         self._changed()
 
@@ -289,7 +258,7 @@ class ProcedureRun(Generic[W]):
             self._end(RunState.FAILED, exc)
         except Exception as exc:  # noqa: BLE001 - whoever waits for the end is told
             self._policy.report(exc, f"procedure {self.name!r}")
-            self._end(RunState.FAILED, _defect(exc))
+            self._end(RunState.FAILED, defect_of(exc))
         except BaseException as exc:
             self._end(RunState.ABORTED, ProcedureAborted(f"{self.name}: {type(exc).__name__}"))
             raise
@@ -302,63 +271,27 @@ class ProcedureRun(Generic[W]):
         if failure is None:
             logger.info("%s finished", self.name)
         else:
-            told = logger.error if state is RunState.FAILED else logger.warning
-            if isinstance(failure, ProcedureStopped):
-                told = logger.warning
+            meant = state is RunState.ABORTED or isinstance(failure, ProcedureStopped)
+            told = logger.warning if meant else logger.error
             told("%s %s: %s", self.name, state, failure)
         self._over.set()
         self._changed()
+
+    def _on_event(self, event: NodeEvent) -> None:
+        self.times.note(event)
+        tell(self._listeners)
 
     def _on_rest(self, *, resting: bool) -> None:
         with self._lock:
             if self._state is RunState.ABORTING:
                 return
             reins = self._reins
-            wanted = reins.pausing or reins.stepping
-            if resting and wanted:
-                self._state = RunState.PAUSED
+            if not (reins.pausing or reins.stepping):
+                self._state = RunState.RUNNING
             else:
-                self._state = RunState.PAUSING if wanted else RunState.RUNNING
+                self._state = RunState.PAUSED if resting else RunState.PAUSING
         tell(self._listeners)
 
     def _changed(self) -> None:
         self._reins.ring()
         tell(self._listeners)
-
-
-def _defect(error: Exception) -> OperationFailed:
-    failure = OperationFailed(DEFECT, f"{type(error).__name__}: {error}")
-    failure.__cause__ = error
-    return failure
-
-
-_kept: list[WorkerThread] = []
-
-
-def _keep(thread: WorkerThread) -> None:
-    """Hold on to it until it has ended: Qt aborts the process over one let go before."""
-    _kept[:] = [*(each for each in _kept if not each.isFinished()), thread]
-
-
-class _RunThread(WorkerThread):
-    """The thread of one run."""
-
-    def __init__(
-        self,
-        carry_out: Callable[[], None],
-        abort: Callable[[str], None],
-        name: str,
-        policy: FailurePolicy,
-    ) -> None:
-        super().__init__(f"procedure {name}", policy)
-        self._carry_out = carry_out
-        self._abort = abort
-
-    @override
-    def run_body(self) -> None:
-        self._carry_out()
-
-    @override
-    def request_end(self) -> None:
-        self._abort("the program is closing")
-        super().request_end()

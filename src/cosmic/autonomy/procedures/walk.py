@@ -8,19 +8,18 @@ from dataclasses import dataclass
 from typing import Final, Generic, Self, TypeVar
 
 from cosmic.autonomy.procedures.failures import (
-    DEFECT,
     ProcedureStopped,
     UndoFailed,
+    defect_of,
     failure_of,
 )
 from cosmic.autonomy.procedures.operation import OperationFailed, UnitOperation, Wish
 from cosmic.autonomy.procedures.pending import (
-    OPERATION_END,
     ForEnd,
     Pending,
-    Reins,
     pending_of,
 )
+from cosmic.autonomy.procedures.reins import OPERATION_END, Reins
 from cosmic.autonomy.procedures.tree import NodeState, Path, TreeKeeper
 from cosmic.frame.errors import CosmicError, StoppedError
 
@@ -169,8 +168,7 @@ def perform(part: Part[W], place: Place[W]) -> Course:
         failure = failure_of(exc)
         keeper.end(path, NodeState.FAILED, failure)
     except BaseException as exc:
-        text = f"{type(exc).__name__}: {exc}"
-        keeper.end(path, NodeState.FAILED, OperationFailed(DEFECT, text))
+        keeper.end(path, NodeState.FAILED, defect_of(exc))
         raise
     else:
         keeper.end(path, NodeState.DONE)
