@@ -2,15 +2,18 @@
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from threading import RLock
-from typing import Final
+from typing import Final, TypeVar
 
 from PySide6.QtCore import QObject, Qt
 from typing_extensions import override
 
+from cosmic.daqco.api.files import LocalFiles
+from cosmic.daqco.api.ports import Told
 from cosmic.daqco.api.recorder import Recorder
 from cosmic.daqco.core.chunk import DataChunk
-from cosmic.daqco.core.limits import Limit, LimitGuard
+from cosmic.daqco.core.limits import Crossing, Limit, LimitGuard
 from cosmic.daqco.core.plan import make_plan, restarts
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings, ScaleSettings
@@ -26,6 +29,8 @@ from cosmic.frame.task_application import TaskApplication
 from cosmic.frame.threads import WorkerThread
 
 logger = logging.getLogger(__name__)
+
+T = TypeVar("T")
 
 FIRST_DATA_S: Final = 1.0
 
@@ -71,6 +76,7 @@ class DaqcoApplication(TaskApplication):
         self.clock = clock
         self.buffer = UDaqBuffer()
         self.guard = LimitGuard(clock)
+        self.files = LocalFiles(self)
         self._policy = policy
         self._settings = settings
         self._lock = RLock()
@@ -88,6 +94,16 @@ class DaqcoApplication(TaskApplication):
     def settings(self) -> DaqcoSettings:
         """What is in force."""
         return self._settings
+
+    @property
+    def away(self) -> str:
+        """Why the station with the boards cannot be reached: it is here."""
+        return ""
+
+    @property
+    def directory(self) -> Path:
+        """Where recordings go unless somebody says otherwise."""
+        return Path(self.settings.directory).expanduser() if self.settings.directory else Path.cwd()
 
     @property
     def problem(self) -> str:
@@ -310,6 +326,19 @@ class DaqcoApplication(TaskApplication):
             for each in settings.channel
         )
         self.apply(settings.model_copy(update={"scale": scales, "channel": channels}))
+
+    def on_crossing(self, listener: Callable[[Crossing], object]) -> None:
+        """Call `listener(crossing)` after each trip, in the thread that saw it."""
+        self.guard.subscribe(lambda crossing: (listener(crossing), None)[1])
+
+    def carry_out(self, action: Callable[[], T], told: Told[T]) -> None:
+        """Do `action` now and tell its result, or what it raised; nothing waits for a line here."""
+        try:
+            result = action()
+        except CosmicError as exc:
+            told(None, exc)
+        else:
+            told(result, None)
 
     # The end
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 
-from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.channel_shape import ChannelHandle
+from cosmic.daqco.api.ports import DaqcoHost
 from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.limits import LOWEST_RATE_HZ, Crossing, Limit
@@ -18,7 +18,6 @@ from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, LimitSettings
 from cosmic.daqco.hw.interface import BoardInfo
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
-from cosmic.frame.file_names import space_left
 from cosmic.frame.listeners import tell
 from cosmic.frame.task import Task
 
@@ -46,7 +45,7 @@ class DaqLimit:
 class Daqco:
     """Channels, recordings and limits of the platform; any thread."""
 
-    def __init__(self, application: DaqcoApplication) -> None:
+    def __init__(self, application: DaqcoHost) -> None:
         self._application = application
         self._recorder = application.recorder
         self._listeners: tuple[Callable[[], object], ...] = ()
@@ -61,9 +60,14 @@ class Daqco:
     # What is in force
 
     @property
-    def application(self) -> DaqcoApplication:
+    def application(self) -> DaqcoHost:
         """The application behind it."""
         return self._application
+
+    @property
+    def away(self) -> str:
+        """Why the station with the boards cannot be reached; empty while it can, and at home."""
+        return self._application.away
 
     @property
     def settings(self) -> DaqcoSettings:
@@ -105,7 +109,8 @@ class Daqco:
     def counters(self) -> DaqCounters:
         """What has been counted since acquisition began."""
         state = self._recorder.state
-        return DaqCounters(self._application.buffer.samples, state.lost, state.backlog)
+        buffer = self._application.buffer
+        return DaqCounters(buffer.samples, state.lost + buffer.lost, state.backlog)
 
     def boards(self) -> Sequence[BoardInfo]:
         """Return the boards there are, as found at the last look for them."""
@@ -230,7 +235,7 @@ class Daqco:
     @property
     def directory(self) -> Path:
         """Where recordings go unless somebody says otherwise."""
-        return Path(self.settings.directory).expanduser() if self.settings.directory else Path.cwd()
+        return self._application.directory
 
     def start_recording(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write what is acquired to `path` until `stop_recording`.
@@ -272,7 +277,7 @@ class Daqco:
 
     def free_bytes(self, directory: Path) -> int:
         """Return how much room there is for recordings in `directory`."""
-        return space_left(directory, 1.0).free_bytes
+        return self._application.files.free_bytes(directory)
 
     def export(self, source: Path, target: Path) -> Task:
         """Begin to export a recording to CSV or TDMS, by the suffix of `target`.
@@ -282,22 +287,7 @@ class Daqco:
         NotAvailable
             Another long operation is under way.
         """
-        # Imported here: its libraries take their time to load.
-        from cosmic.daqco.api.export import export_file
-
-        def job(task: Task) -> None:
-            def report(fraction: float) -> bool:
-                task.report(fraction, target.name)
-                return not task.cancel_requested
-
-            try:
-                export_file(source, target.suffix.lstrip("."), target, report)
-                task.report(1.0, "done")
-                task.finish()
-            except CosmicError as exc:
-                task.fail(exc)
-
-        return self._application.begin(f"Export to {target.name}", job)
+        return self._application.files.export(source, target)
 
     # Limits
 

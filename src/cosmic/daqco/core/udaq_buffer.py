@@ -43,6 +43,11 @@ class UDaqBuffer(QObject):
         """How many samples a channel came in since the start."""
         return self._samples
 
+    @property
+    def lost(self) -> int:
+        """How many samples a channel did not reach this process: none on the way to here."""
+        return 0
+
     def get_latest_data(self) -> dict[str, float]:
         """Return the newest value of every channel in its physical unit; empty before any."""
         chunk = self._latest
@@ -67,6 +72,10 @@ class UDaqBuffer(QObject):
                 self._receivers = tuple(each for each in self._receivers if each is not receiver)
 
         return unsubscribe
+
+    def follow(self, receiver: Receiver) -> Callable[[], None]:
+        """As `subscribe`: here a display gets every chunk as well."""
+        return self.subscribe(receiver)
 
     def wait_for_data(self, timeout_s: float) -> bool:
         """Wait until there is a latest value; False after `timeout_s` of wall time."""

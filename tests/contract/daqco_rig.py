@@ -1,0 +1,144 @@
+"""DAQCo at home, and from another station over either transport, with a source that tests turn."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from typing_extensions import override
+
+from contract.station_rig import connected, free_port, listening
+from cosmic.daqco.api.application import DaqcoApplication
+from cosmic.daqco.api.daqco import Daqco
+from cosmic.daqco.api.remote_application import RemoteDaqcoApplication
+from cosmic.daqco.api.station_side import DaqcoStationSide
+from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, ScaleSettings
+from cosmic.daqco.hw.sim_library import SimulatedLibrary
+from cosmic.daqco.hw.sim_signal import Source
+from cosmic.frame.clock import WallClock
+from cosmic.frame.failure import Failure, FailurePolicy
+from cosmic.frame.network.in_process import InProcessTransport
+from cosmic.frame.network.line_settings import Line
+from cosmic.frame.network.station import Station
+from cosmic.frame.network.transport import Transport
+
+FORCE = ScaleSettings(name="Probe", unit="uN", coefficients=(0.0, 20.0))
+
+
+class Knob(Source):
+    """A voltage that a test sets."""
+
+    def __init__(self) -> None:
+        self.level_v = 0.5
+
+    @override
+    def volts(self, times_s: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        return np.full(times_s.shape, self.level_v)
+
+
+@dataclass
+class Home:
+    """The application that has the boards."""
+
+    application: DaqcoApplication
+    library: SimulatedLibrary
+    knob: Knob
+    policy: FailurePolicy
+    failures: list[Failure] = field(default_factory=list)
+
+
+@dataclass
+class DaqcoRig:
+    """`daqco` is what is tested; `remote` is None at home."""
+
+    home: Home
+    daqco: Daqco
+    remote: RemoteDaqcoApplication | None = None
+
+
+def settings(folder: Path, channels: int = 2, rate_hz: float = 1000.0) -> DaqcoSettings:
+    """Return a channel "force" in micronewtons and others in volts."""
+    others = tuple(
+        ChannelSettings(name=f"channel{number}", board="Dev1", input=f"ai{number}")
+        for number in range(1, channels)
+    )
+    force = ChannelSettings(name="force", board="Dev1", input="ai0", scale="Probe")
+    return DaqcoSettings(
+        rate_hz=rate_hz, directory=str(folder), scale=(FORCE,), channel=(force, *others)
+    )
+
+
+@contextmanager
+def at_home(wanted: DaqcoSettings) -> Iterator[Home]:
+    """Acquire with a simulated board."""
+    clock, knob, policy = WallClock(), Knob(), FailurePolicy()
+    library = SimulatedLibrary(clock, {("Dev1", "ai0"): knob})
+    application = DaqcoApplication(library, wanted, clock=clock, policy=policy)
+    home = Home(application, library, knob, policy)
+    policy.subscribe(home.failures.append)
+    application.initialize()
+    try:
+        yield home
+    finally:
+        application.shut_down()
+
+
+@contextmanager
+def hosted(home: Home, endpoint: str = "") -> Iterator[Station]:
+    """Offer it on a station, which listens at `endpoint` if one is given."""
+    station, side = Station("fibres", home.policy), DaqcoStationSide(home.application)
+    side.host_on(station)
+    with ExitStack() as stack:
+        stack.callback(side.close)
+        if endpoint:
+            line = Line(endpoint, listens=True, station="fibres")
+            stack.enter_context(listening(station, line))
+        yield station
+
+
+@contextmanager
+def elsewhere(transport: Transport, *, initialize: bool = True) -> Iterator[RemoteDaqcoApplication]:
+    """Use it over a transport."""
+    remote = RemoteDaqcoApplication(transport, FailurePolicy())
+    try:
+        if initialize:
+            remote.initialize()
+        yield remote
+    finally:
+        remote.shut_down()
+
+
+@contextmanager
+def daqco_rig(where: str, wanted: DaqcoSettings) -> Iterator[DaqcoRig]:
+    """Yield DAQCo; `where` is "home", "in-process" or "zenoh"."""
+    with ExitStack() as stack:
+        home = stack.enter_context(at_home(wanted))
+        if where == "home":
+            yield DaqcoRig(home, Daqco(home.application))
+            return
+        endpoint = f"tcp/127.0.0.1:{free_port()}" if where == "zenoh" else ""
+        station = stack.enter_context(hosted(home, endpoint))
+        transport: Transport
+        if endpoint:
+            transport = stack.enter_context(connected(endpoint))
+        else:
+            transport = InProcessTransport(station, "vision")
+            stack.callback(transport.close)
+        remote = stack.enter_context(elsewhere(transport))
+        yield DaqcoRig(home, Daqco(remote), remote)
+
+
+def gather(daqco: Daqco) -> tuple[list[int], list[int], Callable[[], None]]:
+    """Return first samples and lengths of the chunks that come, and what ends it."""
+    firsts: list[int] = []
+    lengths: list[int] = []
+
+    def take(chunk: object) -> None:
+        assert hasattr(chunk, "first_sample")
+        assert hasattr(chunk, "samples")
+        firsts.append(chunk.first_sample)
+        lengths.append(chunk.samples)
+
+    return firsts, lengths, daqco.subscribe(take)

@@ -1,0 +1,186 @@
+"""What a script does with ``rig.daqco`` it does the same at home and from another station."""
+
+import itertools
+from collections.abc import Iterator
+from pathlib import Path
+from threading import Event
+
+import pytest
+
+from contract.daqco_rig import DaqcoRig, daqco_rig, settings
+from contract.station_rig import wait_until
+from cosmic.daqco.api.daqco import Daqco
+from cosmic.daqco.api.recording import open_recording
+from cosmic.daqco.core.chunk import DataChunk
+from cosmic.daqco.core.limits import Crossing
+from cosmic.daqco.core.scale import Scale
+from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable, RecordingError
+
+EVERYWHERE = ["home", "in-process", "zenoh"]
+ELSEWHERE = EVERYWHERE[1:]
+
+
+@pytest.fixture(params=EVERYWHERE)
+def rig(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[DaqcoRig]:
+    with daqco_rig(request.param, settings(tmp_path)) as made:
+        yield made
+
+
+@pytest.fixture(params=ELSEWHERE)
+def away_rig(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[DaqcoRig]:
+    with daqco_rig(request.param, settings(tmp_path)) as made:
+        yield made
+
+
+# --- what is known ----------------------------------------------------------------------------
+
+
+def test_everything_is_known_as_it_is_at_home(rig: DaqcoRig) -> None:
+    daqco, home = rig.daqco, rig.home.application
+    assert daqco.running
+    assert daqco.problem == daqco.away == ""
+    assert daqco.settings == home.settings
+    assert daqco.channels == ("force", "channel1")
+    assert daqco.units == {"force": "uN", "channel1": "V"}
+    assert daqco.scales == home.scales()
+    assert daqco.rate_hz == 1000.0
+    assert daqco.highest_rate_hz() == 15_000.0
+    assert [each.name for each in daqco.boards()] == ["Dev1", "Dev2"]
+    assert daqco.directory == home.directory
+    assert daqco.free_bytes(daqco.directory) > 0
+    assert daqco.counters.lost == 0
+
+
+def test_latest_is_what_the_sensor_says(rig: DaqcoRig) -> None:
+    assert rig.daqco.latest()["force"] == pytest.approx(10.0, abs=0.1)
+    rig.home.knob.level_v = 2.0
+    assert wait_until(lambda: rig.daqco.latest()["force"] > 39.0)
+
+
+def test_whoever_subscribes_gets_every_sample_in_order_and_read_only(rig: DaqcoRig) -> None:
+    chunks: list[DataChunk] = []
+    end = rig.daqco.subscribe(chunks.append)
+    assert wait_until(lambda: sum(each.samples for each in list(chunks)) > 300)
+    end()
+    for before, after in itertools.pairwise(chunks):
+        assert after.first_sample == before.first_sample + before.samples
+    assert chunks[0].channels == ("force", "channel1")
+    assert chunks[0].scales[0].unit == "uN"
+    assert chunks[0].values[0] == pytest.approx(10.0, abs=0.1)
+    assert not chunks[0].volts.flags.writeable
+
+
+# --- what is commanded ------------------------------------------------------------------------
+
+
+def test_a_command_is_seen_in_the_next_line_of_the_script(rig: DaqcoRig) -> None:
+    daqco = rig.daqco
+    daqco.configure(rate_hz=2000.0)
+    assert daqco.rate_hz == daqco.settings.rate_hz == 2000.0
+    daqco.set_scale("channel1", Scale("Lamp", "mW", (1.0, 2.0)))
+    assert daqco.units["channel1"] == "mW"
+    daqco.stop()
+    assert not daqco.running
+    daqco.start()
+    assert daqco.running
+    assert wait_until(lambda: daqco.latest_chunk is not None)
+
+
+def test_what_is_refused_at_home_is_refused_with_the_same_exception(rig: DaqcoRig) -> None:
+    daqco = rig.daqco
+    before = daqco.settings
+    channel = before.channel[0].model_copy(update={"board": "Dev9"})
+    unknown = before.model_copy(update={"channel": (channel,)})
+    with pytest.raises(CosmicError, match="Dev9") as refused:
+        daqco.apply(unknown)
+    assert type(refused.value).__name__ == "NotConnectedError"
+    with pytest.raises(ConfigError):
+        daqco.configure(rate_hz=float("nan"))
+    with pytest.raises(ConfigError, match="no active channel"):
+        daqco.arm_limit("nothing", high=1.0)
+    with pytest.raises(ConfigError):
+        daqco.set_scale("nothing", Scale("Lamp", "mW", (1.0, 2.0)))
+    assert daqco.settings == before
+    assert daqco.running
+    assert not rig.home.failures
+
+
+def test_a_channel_averages_and_flies_for_a_plan(rig: DaqcoRig) -> None:
+    channel = rig.daqco["force"]
+    status = channel.trigger()
+    assert status.exception(5.0) is None
+    assert channel.read()["force"]["value"] == pytest.approx(10.0, abs=0.1)
+    assert channel.kickoff().exception(5.0) is None
+    assert channel.complete().exception(5.0) is None
+    assert sum(len(page["time"]) for page in channel.collect_pages()) > 0
+
+
+# --- recordings -------------------------------------------------------------------------------
+
+
+def test_a_recording_lies_on_the_disk_of_the_boards_and_is_complete(rig: DaqcoRig) -> None:
+    daqco = rig.daqco
+    file = daqco.directory / "run.h5"
+    with daqco.record(file):
+        assert daqco.recording.active
+        assert daqco.recording.path == file
+        begun = rig.home.application.buffer.samples
+        assert wait_until(lambda: rig.home.application.buffer.samples > begun + 200)
+        daqco.mark("half time")
+        with pytest.raises(NotAvailable, match="recording"):
+            daqco.configure(rate_hz=500.0)
+    assert not daqco.recording.active
+    with open_recording(file) as recording:
+        assert recording.complete
+        assert recording.samples >= 200
+        assert [event.text for event in recording.events] == ["half time"]
+    with pytest.raises(RecordingError):
+        daqco.start_recording(file)
+    task = daqco.export(file, file.with_suffix(".csv"))
+    task.wait(10.0)
+    assert file.with_suffix(".csv").stat().st_size > 0
+
+
+def test_an_export_that_cannot_be_fails_with_the_reason(rig: DaqcoRig) -> None:
+    folder = rig.daqco.directory
+    with pytest.raises(RecordingError, match=r"nothing\.h5"):
+        rig.daqco.export(folder / "nothing.h5", folder / "nothing.csv").wait(10.0)
+
+
+# --- limits -----------------------------------------------------------------------------------
+
+
+def test_a_limit_stops_where_the_board_is_and_is_heard_of_elsewhere(rig: DaqcoRig) -> None:
+    stopped_there: list[str] = []
+    stopped_here: list[str] = []
+    crossings: list[Crossing] = []
+    rig.home.application.guard.trip = stopped_there.append
+    if rig.remote is not None:
+        rig.remote.guard.trip = stopped_here.append
+    rig.daqco.application.on_crossing(crossings.append)
+    rig.daqco.arm_limit("force", high=30.0, hysteresis=2.0)
+    assert [each.settings.armed for each in rig.daqco.limits] == [True]
+    assert not rig.daqco.limits[0].crossed
+    rig.home.knob.level_v = 2.0
+    assert wait_until(lambda: bool(crossings) and rig.daqco.limits[0].crossed)
+    assert crossings[0].channel == "force"
+    assert crossings[0].value == pytest.approx(40.0, abs=0.5)
+    assert len(stopped_there) == 1
+    assert rig.remote is None or stopped_here == stopped_there
+    with pytest.raises(NotAvailable, match="still beyond"):
+        rig.daqco.reset_limit("force")
+    rig.home.knob.level_v = 0.5
+    assert wait_until(lambda: not rig.home.application.guard.limits["force"].beyond)
+    rig.daqco.reset_limit("force")
+    assert not rig.daqco.limits[0].crossed
+    rig.daqco.remove_limit("force")
+    assert rig.daqco.limits == ()
+    assert len(crossings) == 1
+
+
+def test_a_limit_that_somebody_else_set_is_known_as_well(away_rig: DaqcoRig) -> None:
+    changed = Event()
+    away_rig.daqco.on_change(changed.set)
+    Daqco(away_rig.home.application).arm_limit("force", high=30.0)
+    assert wait_until(lambda: [each.settings.armed for each in away_rig.daqco.limits] == [True])
+    assert changed.wait(5.0)
