@@ -89,7 +89,7 @@ def at_home(wanted: DaqcoSettings) -> Iterator[Home]:
 def hosted(home: Home, endpoint: str = "") -> Iterator[Station]:
     """Offer it on a station, which listens at `endpoint` if one is given."""
     station, side = Station("fibres", home.policy), DaqcoStationSide(home.application)
-    side.host_on(station)
+    station.host("daqco", side)
     with ExitStack() as stack:
         stack.callback(side.close)
         if endpoint:

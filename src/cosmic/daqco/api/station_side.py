@@ -15,7 +15,6 @@ from cosmic.daqco.api.station_folders import EXPORTS, RECORDINGS, StationFolders
 from cosmic.daqco.api.station_report import (
     CROSSINGS,
     FAILURES,
-    HOSTED_AS,
     DaqFolder,
     DaqRecordingReport,
     DaqReport,
@@ -35,7 +34,7 @@ MOST_CROSSINGS: Final = 20
 
 
 class DaqcoStationSide:
-    """Offers a `DaqcoApplication` to other stations; `host_on` a station, at last `close`.
+    """Offers a `DaqcoApplication` to other stations once a `Station` hosts it; at last `close`.
 
     Limits are watched here, where the boards are, and what they stop here is stopped whoever
     listens. Commands return a report, so that who gave one sees at once what came of it.
@@ -60,15 +59,8 @@ class DaqcoStationSide:
 
     # Hosting
 
-    def host_on(self, station: Station, name: str = HOSTED_AS) -> None:
-        """Offer it under `name`, and publish samples and reports from now on, once.
-
-        Raises
-        ------
-        ValueError
-            The station hosts one of that name.
-        """
-        station.host(name, self)
+    def on_hosted(self, station: Station) -> None:
+        """Publish samples and reports on this station from now on; `close` ends it."""
         application = self._application
         reports = ReportSender(self._report, station.publish, station.policy)
         self._station, self._reports = station, reports
