@@ -156,11 +156,10 @@ class Guard(Node[W]):
         if watch.broken():
             raise self._failure(watch, "it was so before the part began")
         branch = Branch(perform(self.parts[0], place.child(0)), walk.reins)
-        left: list[Pending] = []
         try:
             while not watch.broken():
                 branch.go()
-                if branch.pending is None:
+                if branch.over:
                     return
                 yield Watched(branch.pending, watch)
         finally:
@@ -214,18 +213,17 @@ class Parallel(Node[W]):
                     except OperationFailed as exc:
                         failed, failure = number, exc
                         break
-                waiting = [each.pending for each in branches if each.pending is not None]
-                if failure is None and waiting:
-                    yield ForAny(waiting)
+                    # One at a time: whoever ends the whole ends it before the next goes on.
+                    yield ForAny([each.pending for each in branches if not each.over])
         finally:
             for branch in branches:  # first all that moves
                 branch.cancel()
-            left = [each for branch in branches for each in branch.end()]
+            left = [branch.end() for branch in branches]
         if failure is None:
             for walk in walks:
                 place.walk.begun.extend(walk.begun)
             return
-        yield branches[0].until_ended(left)
+        yield branches[0].until_ended(*left)
         yield from self._give_up(place.walk, walks, failed, failure)
 
     @staticmethod

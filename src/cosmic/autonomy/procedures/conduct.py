@@ -97,8 +97,7 @@ class Conductor(Generic[W]):
     def _drive(self, branch: Branch, look: Callable[[], None]) -> None:
         while not branch.over:
             look()
-            if branch.pending is not None:
-                self._wait(branch.pending, look)
+            self._wait(branch.pending, look)
             branch.go()
 
     def _wait(self, pending: Pending, look: Callable[[], None]) -> None:
@@ -134,7 +133,7 @@ class Conductor(Generic[W]):
         """Cancel what moves, close all that was begun, and wait a moment for it to come to rest."""
         left = branch.end()
         until_s = WALL.now_s() + ENDING_WALL_S
-        while any(each.under_way() for each in left) and WALL.now_s() < until_s:
+        while left.under_way() and WALL.now_s() < until_s:
             now_s = self._reins.clock.now_s()
             self._reins.wait(now_s + self._reins.look_s)
 

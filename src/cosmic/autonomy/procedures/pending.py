@@ -47,6 +47,18 @@ class Pending(ABC):
         return False
 
 
+class ForNothing(Pending):
+    """Nothing: the branch has not begun yet."""
+
+    @override
+    def ready(self) -> bool:
+        return True
+
+    @override
+    def look_again_s(self, now_s: float) -> float:
+        return now_s
+
+
 class ForTime(Pending):
     """Seconds of the platform's time."""
 
@@ -134,15 +146,15 @@ class ForAny(Pending):
     @property
     @override
     def resting(self) -> bool:
-        return all(part.resting for part in self._parts)
+        return bool(self._parts) and all(part.resting for part in self._parts)
 
     @override
     def ready(self) -> bool:
-        return any(part.ready() for part in self._parts)
+        return not self._parts or any(part.ready() for part in self._parts)
 
     @override
     def look_again_s(self, now_s: float) -> float:
-        return min(part.look_again_s(now_s) for part in self._parts)
+        return min((part.look_again_s(now_s) for part in self._parts), default=now_s)
 
     @override
     def cancel(self) -> None:

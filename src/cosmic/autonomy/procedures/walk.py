@@ -16,6 +16,7 @@ from cosmic.autonomy.procedures.failures import (
 from cosmic.autonomy.procedures.operation import OperationFailed, UnitOperation, Wish
 from cosmic.autonomy.procedures.pending import (
     ForEnd,
+    ForNothing,
     Pending,
     pending_of,
 )
@@ -202,13 +203,13 @@ class Branch:
     def __init__(self, steps: Course, reins: Reins) -> None:
         self._steps = steps
         self._reins = reins
-        self.pending: Pending | None = None
+        self.pending: Pending = ForNothing()
         self.over = False
 
     @property
     def ready(self) -> bool:
         """True when it may go on."""
-        return self.pending is None or self.pending.ready()
+        return self.pending.ready()
 
     def go(self) -> None:
         """Go on to the next thing it waits for, or to its end; raises what it fails with."""
@@ -221,21 +222,21 @@ class Branch:
                 except (TypeError, ValueError) as exc:
                     wish = self._steps.throw(exc)
         except StopIteration:
-            self.over, self.pending = True, None
+            self.over = True
         except BaseException:
-            self.over, self.pending = True, None
+            self.over = True
             raise
 
     def _next(self) -> Wish | Pending:
-        pending, self.pending = self.pending, None
-        if pending is None:
+        pending, self.pending = self.pending, ForNothing()
+        if isinstance(pending, ForNothing):
             return next(self._steps)
         try:
             value = pending.result()
         except StoppedError as exc:
             # Whatever the operation makes of it: after a stop nothing goes on.
             with suppress(StopIteration):
-                self._steps.throw(exc)
+                self.pending = pending_of(self._steps.throw(exc), self._reins)
             self.end()
             raise ProcedureStopped(str(exc)) from exc
         except Exception as exc:  # noqa: BLE001 - it is the operation's to handle
@@ -244,17 +245,16 @@ class Branch:
 
     def cancel(self) -> None:
         """Cancel what it waits for."""
-        if self.pending is not None:
-            self.pending.cancel()
+        self.pending.cancel()
 
-    def end(self) -> list[Pending]:
+    def end(self) -> Pending:
         """End it at once and return what may yet be moving."""
-        self.cancel()
-        left = [] if self.pending is None else [self.pending]
-        self.over, self.pending = True, None
+        pending, self.pending = self.pending, ForNothing()
+        pending.cancel()
+        self.over = True
         self._steps.close()
-        return left
+        return pending
 
-    def until_ended(self, left: list[Pending]) -> Pending:
+    def until_ended(self, *left: Pending) -> Pending:
         """Return the wait for the end of what `end` returned."""
         return ForEnd(self._reins, left, ENDING_S)
