@@ -98,7 +98,7 @@ class StateReader:
             problem=handle.problem,
             has_background=handle.has_background,
             links=tuple(handle.algorithms),
-            formats=tuple(handle.formats),
+            formats=tuple(replace(each, name=str(each.name)) for each in handle.formats),
             recording=SentRecording.of(handle.recording),
             axes=dict(unit.recordings.axes),
             rotation=places.rotation_centre(name) if places is not None else None,
