@@ -56,16 +56,27 @@ def load_model(path: Path, model: type[M]) -> M:
     ConfigError
         One line per wrong, missing or unknown key, each with file, key and reason.
     """
-    data = read_toml(path)
+    return check_model(path, read_toml(path), model)
+
+
+def check_model(path: Path, data: object, model: type[M], *, under: str = "") -> M:
+    """Return what was read from `path`, or the table `under` of it, as `model`.
+
+    Raises
+    ------
+    ConfigError
+        As `load_model` does.
+    """
     try:
         return model.model_validate(data)
     except ValidationError as exc:
-        raise ConfigError("\n".join(_lines(path, exc))) from None
+        raise ConfigError("\n".join(_lines(path, exc, under))) from None
 
 
-def _lines(path: Path, error: ValidationError) -> list[str]:
+def _lines(path: Path, error: ValidationError, under: str) -> list[str]:
+    table = (under,) if under else ()
     return [
-        f"{path}: {_key(item['loc'])}: {_reason(item['type'], item['msg'])}{_given(item)}"
+        f"{path}: {_key(table + item['loc'])}: {_reason(item['type'], item['msg'])}{_given(item)}"
         for item in error.errors(include_url=False)
     ]
 
