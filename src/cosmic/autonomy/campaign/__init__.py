@@ -1,0 +1,1 @@
+"""Campaigns: many fibres after one recipe, each with its record."""

@@ -1,0 +1,142 @@
+"""Recipes: what a campaign does, in one TOML file."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import Field
+
+from cosmic.autonomy.campaign.stop_rule import StopSettings
+from cosmic.frame.config import StrictModel, check_model, load_model, shipped_config_dir
+from cosmic.frame.errors import ConfigError
+
+RECIPES: Final = "recipes"
+
+
+class SampleSettings(StrictModel):
+    """What lies on the plate.
+
+    Attributes
+    ----------
+    name : str
+        Of the twin's sample; empty on a real platform.
+    """
+
+    name: str = ""
+    description: str = ""
+
+
+class OutputSettings(StrictModel):
+    """What is kept and made besides the records."""
+
+    pictures: bool = True
+    html: bool = True
+    pdf: bool = True
+    table: bool = True
+
+
+class TwinChoice(StrictModel):
+    """How the simulated platform runs; a real one does not look at it.
+
+    Attributes
+    ----------
+    rate : float
+        Platform seconds for one of the wall.
+    faults : bool
+        Whether operations fail now and then, as on a real platform.
+    """
+
+    seed: int = Field(0, ge=0)
+    rate: float = Field(20.0, gt=0.0, le=1000.0)
+    faults: bool = True
+
+
+class RecipeFile(StrictModel):
+    """A recipe as it stands in its file.
+
+    Attributes
+    ----------
+    parameters : dict
+        Of the procedure, which checks them.
+    """
+
+    procedure: str
+    description: str = ""
+    operator: str = ""
+    sample: SampleSettings = SampleSettings()
+    stop: StopSettings
+    parameters: dict[str, Any] = Field(default_factory=dict)
+    output: OutputSettings = OutputSettings()
+    twin: TwinChoice = TwinChoice()
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """A recipe that was checked.
+
+    Attributes
+    ----------
+    name : str
+        Of the file, without its ending.
+    text : str
+        The file as it was read: it goes into the campaign's record.
+    parameters : StrictModel
+        Of the procedure; None where the recipe was loaded without knowing procedures.
+    """
+
+    name: str
+    path: Path
+    text: str
+    file: RecipeFile
+    parameters: StrictModel | None = None
+
+
+def load_recipe(path: Path, *, procedures: Mapping[str, type[StrictModel]] | None = None) -> Recipe:
+    """Read a recipe.
+
+    Parameters
+    ----------
+    path : Path
+        A file, or the name of a shipped recipe such as "bend-test".
+    procedures : mapping, optional
+        Parameters of each procedure that there is, by its name; None: neither the procedure's
+        name nor its parameters are looked at.
+
+    Raises
+    ------
+    ConfigError
+        One line per fault, each with file, key and reason.
+    """
+    path = _found(path)
+    file = load_model(path, RecipeFile)
+    parameters = None
+    if procedures is not None:
+        if file.procedure not in procedures:
+            known = ", ".join(sorted(procedures)) or "none"
+            raise ConfigError(
+                f"{path}: procedure: there is no procedure {file.procedure!r}; known: {known}"
+            )
+        parameters = check_model(
+            path, file.parameters, procedures[file.procedure], under="parameters"
+        )
+    text = path.read_text(encoding="utf-8")
+    return Recipe(name=path.stem, path=path, text=text, file=file, parameters=parameters)
+
+
+def shipped_recipes() -> dict[str, Path]:
+    """Return the recipes that ship with CoSMic, by name."""
+    folder = shipped_config_dir() / RECIPES
+    return {each.stem: each for each in sorted(folder.glob("*.toml"))}
+
+
+def _found(path: Path) -> Path:
+    if path.suffix or path.exists() or path.parent != Path():
+        return path
+    shipped = shipped_recipes()
+    if path.name not in shipped:
+        raise ConfigError(
+            f"{path}: there is no such file, and no shipped recipe of this name; "
+            f"shipped: {', '.join(shipped) or 'none'}"
+        )
+    return shipped[path.name]

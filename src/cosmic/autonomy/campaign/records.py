@@ -1,0 +1,218 @@
+"""What a campaign keeps of itself and of each fibre."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.autonomy.bending.result import BendingResult
+from cosmic.autonomy.bending.span import Span
+from cosmic.frame.errors import CosmicError
+
+Floats = npt.NDArray[np.float64]
+Image = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
+Value = str | int | float | bool | None
+
+
+class CampaignError(CosmicError):
+    """A campaign's folder cannot be written or read; the text names it and what to do."""
+
+
+class Outcome(StrEnum):
+    """How a fibre's treatment ended."""
+
+    RUNNING = "running"
+    GOOD = "good"
+    DOUBTFUL = "measured, not trusted"
+    FAILED = "failed"
+    INTERRUPTED = "interrupted"
+
+
+FINISHED = frozenset({Outcome.GOOD, Outcome.DOUBTFUL, Outcome.FAILED})
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where the middle of a fibre lies on the plate, and how it is turned.
+
+    In the coordinates of the plate, which turn with the table: they stay true when it turns.
+    """
+
+    x_plate_um: float
+    y_plate_um: float
+    angle_deg: float
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What the picture says about a fibre; nan where it was not measured.
+
+    Attributes
+    ----------
+    curl : float
+        Length over the distance of the ends, less one.
+    """
+
+    length_um: float = math.nan
+    length_std_um: float = math.nan
+    width_um: float = math.nan
+    curl: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class OperationRecord:
+    """One try of one operation; times on the platform's clock."""
+
+    name: str
+    began_s: float
+    ended_s: float
+    attempt: int = 1
+    cause: str = ""
+    text: str = ""
+
+    @property
+    def failed(self) -> bool:
+        """Whether it did not do what it should."""
+        return bool(self.cause)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """One picture with what is needed to measure on it.
+
+    Attributes
+    ----------
+    name : str
+        What it shows, such as "before grasp".
+    pixels : ndarray, shape (height, width), uint8 or uint16
+    scale_um_px : float
+        nan where it is not known.
+    """
+
+    name: str
+    pixels: Image
+    taken_s: float
+    scale_um_px: float = math.nan
+    zoom: float = math.nan
+    focus_um: float = math.nan
+    light_percent: float = math.nan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Series:
+    """Values over time, such as the positions of an axis or the force.
+
+    Attributes
+    ----------
+    unit : str
+        Of the values, "um" or "uN".
+    time_s, values : ndarray, shape (n,), float64
+        Times are on the platform's clock.
+    """
+
+    name: str
+    unit: str
+    time_s: Floats
+    values: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FibreRecord:
+    """All that is kept of one fibre; times are on the platform's clock.
+
+    Attributes
+    ----------
+    number : int
+        As `CampaignStore.begin_fibre` gave it.
+    outcome : Outcome
+    cause, text : str
+        Why it failed: short and the same for all failures of a kind, and in full.
+    found, left : Pose
+        Where it lay, and where it was put; None where that is not known.
+    bending : BendingResult
+        None where it was not measured.
+    """
+
+    number: int
+    outcome: Outcome
+    began_s: float
+    ended_s: float
+    found: Pose | None = None
+    left: Pose | None = None
+    shape: Shape = Shape()
+    cause: str = ""
+    text: str = ""
+    attempts: int = 1
+    peak_force_un: float = math.nan
+    bending: BendingResult | None = None
+    spans: tuple[Span, ...] = ()
+    pictures: tuple[Picture, ...] = ()
+    operations: tuple[OperationRecord, ...] = ()
+    series: tuple[Series, ...] = ()
+
+    @property
+    def duration_s(self) -> float:
+        """How long it took."""
+        return self.ended_s - self.began_s
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationNote:
+    """One calibration in force.
+
+    Attributes
+    ----------
+    residual, unit : float, str
+        How well it fits, such as 0.4 "um".
+    made : str
+        When, ISO 8601.
+    """
+
+    name: str
+    residual: float
+    unit: str
+    made: str
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignInfo:
+    """What a campaign is.
+
+    Attributes
+    ----------
+    recipe_text : str
+        The recipe file as it was read.
+    started : str
+        ISO 8601, local time with its zone.
+    versions : mapping
+        Of CoSMic and the packages it stands on.
+    hardware : str
+        "digital twin" or the platform's name.
+    """
+
+    name: str
+    procedure: str
+    sample: str
+    recipe_text: str
+    started: str
+    description: str = ""
+    operator: str = ""
+    hardware: str = "digital twin"
+    seed: int = 0
+    rate: float = 1.0
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class JournalEntry:
+    """One line of the journal."""
+
+    number: int
+    fibre: int | None
+    time_s: float
+    operation: str
+    phase: str
+    payload: Mapping[str, Value]

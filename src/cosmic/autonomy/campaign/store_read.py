@@ -1,0 +1,211 @@
+"""Reading a campaign, also while it is written, and by another process."""
+
+import json
+import sqlite3
+from collections.abc import Generator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from cosmic.autonomy.campaign.records import (
+    FINISHED,
+    CalibrationNote,
+    CampaignError,
+    CampaignInfo,
+    FibreRecord,
+    Image,
+    JournalEntry,
+    Picture,
+)
+from cosmic.autonomy.campaign.store_curves import read_curves
+from cosmic.autonomy.campaign.store_files import DATABASE
+from cosmic.autonomy.campaign.store_rows import Cell, Row, fibre_record, number
+from cosmic.autonomy.campaign.store_schema import SCHEMA_VERSION
+
+
+class CampaignReader:
+    """What a campaign's folder holds; each call reads anew; any thread."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def check(self) -> None:
+        """See that this is a campaign that can be read.
+
+        Raises
+        ------
+        CampaignError
+            It is not.
+        """
+        version = self.version()
+        if version == 0:
+            raise CampaignError(f"{self.folder} holds no campaign: its begin was cut off")
+        if version != SCHEMA_VERSION:
+            raise CampaignError(
+                f"{self.folder / DATABASE} is of version {version}, and this program reads "
+                f"version {SCHEMA_VERSION}: open it with the program that wrote it"
+            )
+
+    def version(self) -> int:
+        """Return the version of the tables; 0 where there is no campaign."""
+        if not (self.folder / DATABASE).exists():
+            return 0
+        with self._line() as line:
+            return int(line.execute("PRAGMA user_version").fetchone()[0])
+
+    def info(self) -> CampaignInfo:
+        """Return what the campaign is."""
+        (row,) = self._rows("SELECT * FROM campaign")
+        return CampaignInfo(
+            name=str(row["name"]),
+            procedure=str(row["procedure"]),
+            sample=str(row["sample"]),
+            recipe_text=str(row["recipe_text"]),
+            started=str(row["started"]),
+            description=str(row["description"]),
+            operator=str(row["operator"]),
+            hardware=str(row["hardware"]),
+            seed=int(number(row["seed"])),
+            rate=number(row["rate"]),
+            versions=json.loads(str(row["versions_json"])),
+        )
+
+    def ended(self) -> tuple[str, str]:
+        """Return when the campaign ended last, ISO 8601, and why; both empty while it runs."""
+        (row,) = self._rows("SELECT ended, end_reason FROM campaign")
+        return str(row["ended"]), str(row["end_reason"])
+
+    def elapsed_s(self) -> float:
+        """Return how long all runs took together, on the platform's clock."""
+        rows = self._rows(
+            "SELECT run.begin_s AS begin_s, max(coalesce(run.end_s, run.begin_s),"
+            " coalesce(max(fibre.ended_s), run.begin_s), coalesce(max(fibre.began_s), run.begin_s))"
+            " AS end_s FROM run LEFT JOIN fibre ON fibre.run = run.number GROUP BY run.number"
+        )
+        return sum(number(row["end_s"]) - number(row["begin_s"]) for row in rows)
+
+    def calibrations(self) -> tuple[CalibrationNote, ...]:
+        """Return the calibrations that were in force, oldest first."""
+        return tuple(
+            CalibrationNote(
+                str(row["name"]), number(row["residual"]), str(row["unit"]), str(row["made"])
+            )
+            for row in self._rows("SELECT DISTINCT name, residual, unit, made FROM calibration")
+        )
+
+    def fibres(self) -> tuple[FibreRecord, ...]:
+        """Return all fibres without curves and pictures, those in treatment included."""
+        spans = self._by_fibre("SELECT * FROM span ORDER BY fibre, number")
+        steps = self._by_fibre("SELECT * FROM operation ORDER BY fibre, number")
+        return tuple(
+            fibre_record(row, spans.get(row["number"], []), steps.get(row["number"], []))
+            for row in self._rows("SELECT * FROM fibre ORDER BY number")
+        )
+
+    def finished(self) -> tuple[FibreRecord, ...]:
+        """Return the fibres that have their end, without curves and pictures."""
+        return tuple(each for each in self.fibres() if each.outcome in FINISHED)
+
+    def fibre(self, fibre: int) -> FibreRecord:
+        """Return one fibre with curves and pictures.
+
+        Raises
+        ------
+        CampaignError
+            There is none of that number, or its file cannot be read.
+        """
+        rows = self._rows("SELECT * FROM fibre WHERE number = ?", fibre)
+        if not rows:
+            raise CampaignError(f"{self.folder} has no fibre {fibre}")
+        spans = self._rows("SELECT * FROM span WHERE fibre = ? ORDER BY number", fibre)
+        steps = self._rows("SELECT * FROM operation WHERE fibre = ? ORDER BY number", fibre)
+        record = fibre_record(rows[0], spans, steps)
+        if not rows[0]["file"]:
+            return record
+        measured, fitted, series = read_curves(self.folder / str(rows[0]["file"]))
+        bending = record.bending
+        if bending is not None:
+            fits = [
+                replace(fit, fitted_un=curve)
+                for fit, curve in zip(bending.spans, fitted, strict=False)
+            ]
+            bending = replace(bending, spans=tuple(fits))
+        return replace(
+            record, bending=bending, spans=measured, series=series, pictures=self.pictures(fibre)
+        )
+
+    def pictures(self, fibre: int) -> tuple[Picture, ...]:
+        """Return the pictures of one fibre."""
+        rows = self._rows("SELECT * FROM picture WHERE fibre = ? ORDER BY number", fibre)
+        return tuple(
+            Picture(
+                name=str(row["name"]),
+                pixels=_pixels(self.folder / str(row["file"])),
+                taken_s=number(row["taken_s"]),
+                scale_um_px=number(row["scale_um_px"]),
+                zoom=number(row["zoom"]),
+                focus_um=number(row["focus_um"]),
+                light_percent=number(row["light_percent"]),
+            )
+            for row in rows
+        )
+
+    def journal(self, last: int | None = None) -> tuple[JournalEntry, ...]:
+        """Return the journal, oldest first; of it only the `last` lines, if told."""
+        rows = self._rows(
+            "SELECT * FROM journal ORDER BY number DESC LIMIT ?", -1 if last is None else last
+        )
+        return tuple(
+            JournalEntry(
+                number=int(number(row["number"])),
+                fibre=None if row["fibre"] is None else int(row["fibre"]),
+                time_s=number(row["time_s"]),
+                operation=str(row["operation"]),
+                phase=str(row["phase"]),
+                payload=json.loads(str(row["payload_json"])),
+            )
+            for row in reversed(rows)
+        )
+
+    # ------------------------------------------------------------------ inside
+
+    @contextmanager
+    def _line(self) -> Generator[sqlite3.Connection]:
+        file = self.folder / DATABASE
+        if not file.exists():
+            raise CampaignError(f"{self.folder} holds no campaign: there is no {DATABASE} in it")
+        try:
+            line = sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro", uri=True, timeout=10.0)
+            try:
+                line.row_factory = sqlite3.Row
+                yield line
+            finally:
+                line.close()
+        except sqlite3.Error as exc:
+            raise CampaignError(f"{file} cannot be read: {exc}") from exc
+
+    def _rows(self, query: str, *values: Cell) -> list[Row]:
+        with self._line() as line:
+            return [dict(row) for row in line.execute(query, values).fetchall()]
+
+    def _by_fibre(self, query: str) -> dict[Cell, list[Row]]:
+        found: dict[Cell, list[Row]] = {}
+        for row in self._rows(query):
+            found.setdefault(row["fibre"], []).append(row)
+        return found
+
+
+def _pixels(file: Path) -> Image:
+    try:
+        data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
+    except OSError as exc:
+        raise CampaignError(f"{file} cannot be read: {exc.strerror or exc}") from exc
+    pixels = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
+    if pixels is None:
+        raise CampaignError(f"{file} is no picture any more")
+    if pixels.dtype == np.uint16:
+        return np.asarray(pixels, dtype=np.uint16)
+    return np.asarray(pixels, dtype=np.uint8)

@@ -1,0 +1,78 @@
+"""Recipes are read strictly, and every fault is named with its file, key and reason."""
+
+from pathlib import Path
+
+import pytest
+
+from cosmic.autonomy.bending.plan import SpanLimits
+from cosmic.autonomy.campaign.recipe import load_recipe, shipped_recipes
+from cosmic.frame.config import StrictModel
+from cosmic.frame.errors import ConfigError
+
+
+class Push(StrictModel):
+    spans: SpanLimits = SpanLimits()
+
+
+class Parameters(StrictModel):
+    push: Push = Push()
+
+
+PROCEDURES: dict[str, type[StrictModel]] = {
+    "bend test": Parameters,
+    "transport": Parameters,
+    "ping-pong": Parameters,
+}
+
+
+@pytest.mark.parametrize("name", ["bend-test", "quick", "ping-pong", "transport"])
+def test_a_shipped_recipe_is_found_by_its_name_and_is_right(name: str) -> None:
+    assert name in shipped_recipes()
+    recipe = load_recipe(Path(name), procedures=PROCEDURES)
+    assert recipe.name == name
+    assert recipe.file.sample.name
+    assert recipe.text.startswith("#")
+    assert isinstance(recipe.parameters, Parameters)
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('procedure = "bend test"', ("stop: key is missing",)),
+        ('procedure = "bend test"\n[stop]\n', ("stop: give at least one of count",)),
+        ('procedure = "bend test"\n[stop]\ncount = 0', ("stop.count: ", "has 0")),
+        ('procedure = "bend test"\n[stop]\ncuont = 3', ("stop.cuont: unknown key",)),
+        ('procedure = "fly"\n[stop]\ncount = 3', ("procedure: ", "'fly'", "bend test, ping-pong")),
+        (
+            'procedure = "bend test"\n[stop]\ncount = 3\n[parameters.push.spans]\ncount = 99',
+            ("parameters.push.spans.count: ", "has 99"),
+        ),
+        (
+            'procedure = "bend test"\n[stop]\ncount = 3\n[parameters.push]\nforce = 1',
+            ("parameters.push.force: unknown key",),
+        ),
+        ('procedure = "bend test"\n[stop]\ncount = 3\n[twin]\nrate = nan', ("twin.rate: ",)),
+        ("procedure = ", ("not valid TOML",)),
+    ],
+)
+def test_a_wrong_recipe_is_refused_with_file_key_and_reason(
+    text: str, words: tuple[str, ...], tmp_path: Path
+) -> None:
+    path = written(tmp_path, text)
+    with pytest.raises(ConfigError) as caught:
+        load_recipe(path, procedures=PROCEDURES)
+    for word in (str(path), *words):
+        assert word in str(caught.value)
+
+
+def test_a_recipe_that_is_not_there_says_which_ones_ship() -> None:
+    with pytest.raises(ConfigError, match="no shipped recipe of this name; shipped: bend-test"):
+        load_recipe(Path("bent-test"))
+    with pytest.raises(ConfigError, match="there is no such file"):
+        load_recipe(Path("nowhere/mine.toml"))
