@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject
 from typing_extensions import override
 
 from cosmic.frame.application import CosmicApplicationBase, GuiFactory
-from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
+from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.transport import Presence, Rule, Subscription, Transport
 from cosmic.frame.task import Task
@@ -63,7 +63,7 @@ class RemoteVicoApplication(CosmicApplicationBase):
         self._streams: list[Stream[Any]] = []
         self._subscriptions: list[Subscription] = []
         self._forget: Callable[[], None] | None = None
-        self._refused = ""
+        self._refused: dict[str, str] = {}
         self._jobs: dict[str, JobThread] = {}
 
     # Starting and ending
@@ -204,16 +204,17 @@ class RemoteVicoApplication(CosmicApplicationBase):
         """Have a stream opened in a thread that may wait."""
         self.calls.later(stream.open)
 
-    def say_refused(self, error: CosmicError) -> None:
-        """Tell why something that a window asked for was not done."""
-        logger.warning("ViCo at another station refused: %s", error)
-        self._refused = str(error)
-        self.status_changed.emit()
+    def note_refusal(self, camera: str, text: str) -> None:
+        """Note why a wish of a camera's view was not granted; empty with the next wish."""
+        if text:
+            logger.warning("%s at another station: %s", camera, text)
+        if text != self._refused.get(camera, ""):
+            self._refused[camera] = text
+            self.status_changed.emit()
 
-    @property
-    def refused(self) -> str:
-        """Why the last wish of a window was not granted; empty before there was one."""
-        return self._refused
+    def refused(self, camera: str) -> str:
+        """Return why the last wish of a camera's view was not granted; or empty."""
+        return self._refused.get(camera, "")
 
     def jobs(self, camera: str) -> JobThread:
         """Return the thread in which plans take their pictures."""

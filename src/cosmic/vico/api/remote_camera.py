@@ -7,9 +7,9 @@ from typing import Final
 from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errors import DeviceTimeout, NotAvailable
+from cosmic.frame.errors import CosmicError, DeviceTimeout, NotAvailable
 from cosmic.frame.network.ongoing import Ongoing
-from cosmic.frame.task import Task
+from cosmic.frame.task import Progress, Task
 from cosmic.frame.threads import forbid_waiting_here
 from cosmic.vico.api.camera import CameraHandle
 from cosmic.vico.api.camera_shown import FormatShown, LinkShown, Seen
@@ -96,7 +96,7 @@ class RemoteCameraHandle(CameraHandle):
     @property
     @override
     def refused(self) -> str:
-        return self._remote.refused
+        return self._remote.refused(self.name)
 
     # Pictures
 
@@ -151,22 +151,36 @@ class RemoteCameraHandle(CameraHandle):
 
     @override
     def start(self) -> Task:
-        return self._begin(f"Starting {self.name}", "start")
+        return self._told(self._begin(f"Starting {self.name}", "start"))
 
     @override
     def stop(self, success: bool = True) -> Task:
-        return self._begin(f"Stopping {self.name}", "stop")
+        return self._told(self._begin(f"Stopping {self.name}", "stop"))
 
     @override
     def software_trigger(self) -> None:
         self._do("software_trigger")
 
     def _do(self, function: str, **arguments: object) -> None:
-        remote = self._remote
-        self._calls.do(function, refused=remote.say_refused, camera=self.name, **arguments)
+        self._remote.note_refusal(self.name, "")
+        self._calls.do(function, refused=self._on_refused, camera=self.name, **arguments)
 
     def _begin(self, title: str, function: str, **arguments: object) -> Task:
+        self._remote.note_refusal(self.name, "")
         return self._calls.begin(title, function, camera=self.name, **arguments)
+
+    def _told(self, task: Task) -> Task:
+        """Tell how a task failed that no widget follows."""
+
+        def on_progress(progress: Progress) -> None:
+            if progress.done and progress.error:
+                self._remote.note_refusal(self.name, progress.error)
+
+        task.subscribe(on_progress)
+        return task
+
+    def _on_refused(self, error: CosmicError) -> None:
+        self._remote.note_refusal(self.name, str(error))
 
     # Machine vision
 
@@ -259,7 +273,7 @@ class RemoteCameraHandle(CameraHandle):
     @property
     @override
     def _newest(self) -> Picture | None:
-        return self.latest()
+        return self.latest() if may_wait_here() else self._pictures.last
 
     @property
     @override

@@ -55,7 +55,11 @@ class RemotePlaces(Places):
         calls = self._remote.calls
         if may_wait_here():
             return str(calls.call("click_to_move", **arguments))
-        calls.do("click_to_move", refused=self._remote.say_refused, **arguments)
+        camera, remote = picture.camera, self._remote
+        remote.note_refusal(camera, "")
+        calls.do(
+            "click_to_move", refused=lambda exc: remote.note_refusal(camera, str(exc)), **arguments
+        )
         return f"{what}: asked to move to x {x_um:.1f}, y {y_um:.1f} µm"
 
     @override

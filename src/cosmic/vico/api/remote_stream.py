@@ -45,6 +45,11 @@ class Stream(Generic[T]):
         """It is being received, and something has come."""
         return self._live
 
+    @property
+    def last(self) -> T | None:
+        """What came last; nobody looks again because of that."""
+        return self._newest
+
     def newest(self) -> T | None:
         """Return what came last, and have more sent for a while."""
         self._looked_s = WALL.now_s()

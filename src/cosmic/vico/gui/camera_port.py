@@ -123,6 +123,11 @@ class CameraPort(Protocol):
     def problem(self) -> str:
         """Why no pictures come, such as an unplugged camera; empty when all is well."""
 
+    @property
+    @abstractmethod
+    def refused(self) -> str:
+        """Why the last wish was not granted, where that was heard later; or empty."""
+
     # Pictures
 
     @abstractmethod
@@ -188,6 +193,11 @@ class CameraPort(Protocol):
         """The newest result; None while nothing is on."""
 
     # Files
+
+    @property
+    @abstractmethod
+    def elsewhere(self) -> str:
+        """Whose disk files go to, where it is not this computer's; empty: it is."""
 
     @property
     @abstractmethod

@@ -72,6 +72,7 @@ class CameraView(QWidget):
         self._histogram: Histogram | None = None
         self._readouts, self._was_running = 0, False
         self._pointed: Pixel | None = None
+        self._refused = ""
         self.view = PictureView()
         self.cross, self.scale_bar = Crosshair(), ScaleBar()
         self.seen, self.note = SeenLayer(), Note()
@@ -256,6 +257,11 @@ class CameraView(QWidget):
         self.tools.refresh()
         self.recorder.refresh()
         self._show_state()
+        if camera.refused != self._refused:
+            self._refused = camera.refused
+            self.say(
+                f"{state_look(State.REFUSED).glyph} {camera.refused}" if camera.refused else ""
+            )
 
     def _on_live(self) -> None:
         try:

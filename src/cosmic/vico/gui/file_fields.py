@@ -23,6 +23,11 @@ from cosmic.frame.gui.theme import STEP_PX
 class FileFields(QWidget):
     """Fields for name and directory; `problem` says why they cannot be used.
 
+    Parameters
+    ----------
+    elsewhere : str
+        Whose disk it is, where it is not this computer's: nobody can look at it from here.
+
     Signals
     -------
     edited()
@@ -38,14 +43,16 @@ class FileFields(QWidget):
         parent: QWidget | None = None,
         *,
         now: Callable[[], datetime] = datetime.now,
+        elsewhere: str = "",
     ) -> None:
         super().__init__(parent)
-        self._now = now
+        self._now, self._elsewhere = now, elsewhere
         self.base = tipped(QLineEdit(base), "Base of the file names")
         self.stamp = tipped(QCheckBox("append time"), "Append date and time to each name")
         self.stamp.setChecked(True)
-        self.directory = tipped(QLineEdit(str(directory)), "Where files are stored")
-        self.browse = push_button("Browse…", "Choose the directory")
+        self.directory = tipped(QLineEdit(str(directory)), elsewhere or "Where files are stored")
+        self.browse = push_button("Browse…", elsewhere or "Choose the directory")
+        self.browse.setEnabled(not elsewhere)
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setSpacing(STEP_PX // 2)
@@ -65,12 +72,17 @@ class FileFields(QWidget):
     @property
     def folder(self) -> Path:
         """The directory as it stands in its field."""
-        return Path(self.directory.text()).expanduser()
+        folder = Path(self.directory.text())
+        return folder if self._elsewhere else folder.expanduser()
 
     @property
     def problem(self) -> str:
         """Why the entries cannot be used; empty when they can."""
-        return name_problem(self.base.text()) or directory_problem(self.directory.text())
+        return name_problem(self.base.text()) or self._directory_problem
+
+    @property
+    def _directory_problem(self) -> str:
+        return "" if self._elsewhere else directory_problem(self.directory.text())
 
     def path(self, suffix: str, *, exact: bool = False) -> Path:
         """Return the whole path for a file that begins now; `exact` names milliseconds too."""
@@ -84,7 +96,7 @@ class FileFields(QWidget):
 
     def _on_edited(self) -> None:
         mark_refusal(self.base, name_problem(self.base.text()))
-        mark_refusal(self.directory, directory_problem(self.directory.text()))
+        mark_refusal(self.directory, self._directory_problem)
         self.edited.emit()
 
     def _on_browse(self) -> None:

@@ -56,7 +56,7 @@ class RecordBar(QWidget):
         self.more = push_button("File…", "Show the fields for name, directory and format")
         self.more.setCheckable(True)
         self.format = tipped(QComboBox(), "How recordings are written")
-        self.files = FileFields(port.directory, port.name, now=now)
+        self.files = FileFields(port.directory, port.name, now=now, elsewhere=port.elsewhere)
         self.told, self.tasks = ElidedLabel(), TaskBar()
         self.told.setFont(number_font())
         self._fields = QWidget()
@@ -184,7 +184,7 @@ class RecordBar(QWidget):
 
     def _unless_there(self, path: Path, act: Callable[[bool], object]) -> None:
         """Do it, after a question where it would overwrite something."""
-        if path.exists():
+        if not self._port.elsewhere and path.exists():
             overwrite_question(self, path, lambda: self._try(lambda: act(True))).open()
             self.refresh()
         else:

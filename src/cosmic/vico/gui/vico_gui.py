@@ -5,6 +5,7 @@ from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 
 from cosmic.frame.application import CosmicApplicationBase
 from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.api.remote_application import RemoteVicoApplication
 from cosmic.vico.api.vico import Vico
 from cosmic.vico.gui.camera_view import CameraView
 from cosmic.vico.gui.lens_panel import LensPanel
@@ -30,11 +31,12 @@ class VicoGui(QObject):
 
 def make_vico_gui(application: CosmicApplicationBase) -> VicoGui:
     """Make the GUI component of ViCo; GUI thread."""
-    if not isinstance(application, VicoApplication):
+    if not isinstance(application, VicoApplication | RemoteVicoApplication):
         raise TypeError(f"{application.title} is not ViCo")
-    gui = VicoGui(Vico(application))
-    for place in application.settings.camera:
-        gui.cameras[place.name].setWindowTitle(place.shown)
+    vico = Vico(application)
+    gui = VicoGui(vico)
+    for name, view in gui.cameras.items():
+        view.setWindowTitle(vico.camera(name).title)
     return gui
 
 
