@@ -31,8 +31,8 @@ class VicoStationSide:
         self._lens, self._light = LensHandle(application), LightHandle(application)
         self._feeds: list[VicoFeed] = []
 
-    def attach(self, station: Station) -> None:
-        """Publish pictures and state on `station` from now on; `close` ends it."""
+    def on_hosted(self, station: Station) -> None:
+        """Publish pictures and state on this station from now on; `close` ends it."""
         feed = VicoFeed(self._application, self._reader, station)
         feed.start()
         self._feeds.append(feed)
