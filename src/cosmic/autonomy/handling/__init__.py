@@ -1,0 +1,1 @@
+"""Unit operations that handle single fibres."""

@@ -1,0 +1,180 @@
+"""Places on the plate that stay the same while it turns, and the turn that suits a gripper."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cosmic.autonomy.handling.settings import GraspSettings
+from cosmic.vico.core.pixel_map import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class PlateFrame:
+    """The plate, turning about a place on the platform."""
+
+    centre_um: tuple[float, float] = (0.0, 0.0)
+
+    def on_plate(self, platform_um: Floats, angle_deg: float) -> Floats:
+        """Return where places lie on the plate, which stands at `angle_deg`; shape (n, 2)."""
+        return np.asarray((platform_um - np.array(self.centre_um)) @ _turn(angle_deg))
+
+    def on_platform(self, plate_um: Floats, angle_deg: float) -> Floats:
+        """Return where places on the plate are on the platform."""
+        return np.asarray(plate_um @ _turn(angle_deg).T + np.array(self.centre_um))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A fibre on the plate that may be taken up.
+
+    Attributes
+    ----------
+    line_um : ndarray, shape (n, 2)
+        Centre line on the plate.
+    length_um, width_um, curl : float
+        As seen in the survey; by them it is known again.
+    problem : str
+        Why it is not taken; empty when it may be.
+    """
+
+    line_um: Floats
+    length_um: float
+    width_um: float
+    curl: float
+    contrast: float
+    problem: str = ""
+
+    @property
+    def place_um(self) -> tuple[float, float]:
+        """Its middle on the plate."""
+        x, y = self.line_um.mean(axis=0).tolist()
+        return x, y
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reach:
+    """How a gripper gets at a candidate.
+
+    Attributes
+    ----------
+    angle_deg : float
+        Where the table is to stand.
+    line_um : ndarray, shape (n, 2)
+        Where the fibre will be on the platform, from the end that is grasped.
+    tip_um : (float, float)
+        Where the middle between the jaws' tips goes.
+    """
+
+    candidate: Candidate
+    angle_deg: float
+    line_um: Floats
+    tip_um: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Jaws:
+    """What `reaches` must know of a gripper.
+
+    Attributes
+    ----------
+    forward : float
+        1 or -1: which way along x it points.
+    length_um, half_um : float
+        Of the jaws behind their tips, and from their middle to the outside, open.
+    """
+
+    forward: float = 1.0
+    length_um: float = 6000.0
+    half_um: float = 260.0
+
+
+@dataclass(frozen=True, slots=True)
+class Neighbours:
+    """Everything on the plate that a gripper should not come down on."""
+
+    lines_um: Sequence[Floats] = field(default_factory=tuple)
+
+
+def reaches(
+    candidate: Candidate,
+    frame: PlateFrame,
+    jaws: Jaws,
+    settings: GraspSettings,
+    others: Neighbours,
+    angle_now_deg: float,
+) -> list[Reach]:
+    """Return the ways to take a candidate, the one with the smallest turn first."""
+    found = []
+    for line in (candidate.line_um, candidate.line_um[::-1]):
+        wanted = 0.0 if jaws.forward > 0.0 else 180.0
+        angle = _wrapped(wanted - _direction_deg(line, settings.inside_um))
+        turned = frame.on_platform(line, angle)
+        tip = along(turned, settings.inside_um)
+        reach = Reach(candidate, angle, turned, (float(tip[0]), float(tip[1])))
+        if _in_reach(reach, jaws, settings) and _clear(reach, frame, jaws, settings, others):
+            found.append(reach)
+    return sorted(found, key=lambda each: abs(each.angle_deg - angle_now_deg))
+
+
+def along(line: Floats, way_um: float) -> Floats:
+    """Return the place so far along a line from its begin."""
+    way = ways(line)
+    return np.array([np.interp(way_um, way, line[:, 0]), np.interp(way_um, way, line[:, 1])])
+
+
+def ways(line: Floats) -> Floats:
+    """Return how far along a line each of its points lies."""
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    return np.concatenate([np.zeros(1), np.cumsum(steps)])
+
+
+def _direction_deg(line: Floats, inside_um: float) -> float:
+    """Return where a fibre points to from where it is grasped: there it must lie along the jaws."""
+    tip, near = along(line, 0.0), along(line, 2.0 * inside_um)
+    local = math.atan2(near[1] - tip[1], near[0] - tip[0])
+    chord = math.atan2(line[-1, 1] - line[0, 1], line[-1, 0] - line[0, 0])
+    # A strongly curled one lies between both, so that its free end is not far aside.
+    apart = math.remainder(chord - local, math.tau)
+    return math.degrees(local + 0.3 * apart)
+
+
+def _in_reach(reach: Reach, jaws: Jaws, settings: GraspSettings) -> bool:
+    x, y = reach.tip_um
+    return (
+        x * jaws.forward <= settings.reach_x_um
+        and abs(y) <= settings.reach_y_um
+        and abs(reach.angle_deg) <= settings.largest_turn_deg
+    )
+
+
+def _clear(
+    reach: Reach, frame: PlateFrame, jaws: Jaws, settings: GraspSettings, others: Neighbours
+) -> bool:
+    """Return whether nothing else lies where the jaws come down."""
+    x, y = reach.tip_um
+    for line in others.lines_um:
+        turned = frame.on_platform(line, reach.angle_deg)
+        behind = (x - turned[:, 0]) * jaws.forward
+        beside = np.abs(turned[:, 1] - y)
+        under = (behind > -settings.clear_um) & (behind < jaws.length_um)
+        if (under & (beside < jaws.half_um + settings.clear_um)).any():
+            return False
+    return True
+
+
+def distance_um(line: Floats, other: Floats) -> float:
+    """Return the smallest distance of the points of two lines."""
+    away = line[:, None, :] - other[None, :, :]
+    return float(np.sqrt((away**2).sum(axis=2).min()))
+
+
+def _turn(angle_deg: float) -> Floats:
+    angle = math.radians(angle_deg)
+    cos, sin = math.cos(angle), math.sin(angle)
+    return np.array([[cos, -sin], [sin, cos]])
+
+
+def _wrapped(angle_deg: float) -> float:
+    return math.remainder(angle_deg, 360.0)

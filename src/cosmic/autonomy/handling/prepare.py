@@ -1,0 +1,306 @@
+"""Operations before the first fibre: out of the way, and calibrated as far as is not fresh."""
+
+from collections.abc import Generator
+from dataclasses import replace
+
+from typing_extensions import override
+
+from cosmic.autonomy.handling.operation import FibreOperation
+from cosmic.autonomy.handling.plate import PlateFrame
+from cosmic.autonomy.handling.sight import map_at
+from cosmic.autonomy.handling.work import FibreWork, Measured
+from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Wish
+from cosmic.autonomy.tools import expected, tip_um
+from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.mico.core.positioner import Confidence
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.tool_settings import ToolSettings
+from cosmic.vico.core.vision.algorithms import grey
+from cosmic.vico.core.vision.tips import find_gripper, find_probe
+from cosmic.vico.core.vision.tool_types import GripperTips, NotSeen, ToolEnd
+
+REACH_PX = 40.0
+POOR = "calibration poor"
+PLATE = "map of the plate"
+HELD = "map where fibres are held"
+TABLE = "rotation centre"
+PROBE = "probe against gripper"
+
+
+class MakeReady(FibreOperation):
+    """Tools out of the way, speeds set, the force limit armed, the jaws closed and opened."""
+
+    name = "make ready"
+
+    @override
+    def precondition(self, work: FibreWork) -> None:
+        for tool in self._tools(work):
+            for name in (tool.x_axis, tool.y_axis, *filter(None, [tool.z_axis])):
+                details = work.mico[name].details
+                if details.confidence is not Confidence.KNOWN:
+                    raise OperationFailed("not initialised", f"{name}: initialise the platform")
+                if details.zero != 0.0:
+                    raise OperationFailed("zero set", f"{name}: clear its zero, then begin again")
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        if work.ready:
+            return
+        settings, places = work.settings, work.settings.places
+        for tool in self._tools(work):
+            for name in (tool.x_axis, tool.y_axis, *filter(None, [tool.z_axis])):
+                work.mico[name].set_closed_loop_frequency(settings.frequency_hz)
+        if settings.push.stop_un > 0.0:
+            limit = settings.push.stop_un
+            work.daqco.arm_limit(settings.push.channel, low=-limit, high=limit, hysteresis=5.0)
+        heights = {}
+        if settings.other:
+            other = work.tool(settings.other)
+            heights[other.z_axis] = 5000.0
+        heights[work.gripper.z_axis] = max(
+            places.travel_um - work.gripper.tip_um[2],
+            work.mico[work.gripper.z_axis].position_um or 0.0,
+        )
+        yield work.go(heights)
+        yield from retract_probe(work)
+        if settings.other:
+            other = work.tool(settings.other)
+            yield work.go({other.x_axis: 4000.0 if other.forward[0] < 0.0 else -4000.0})
+        yield from zero_jaws(work)
+        yield from zoom_to(work, settings.zoom)
+        work.ready = True
+        yield SAFE_POINT
+
+    @staticmethod
+    def _tools(work: FibreWork) -> list[ToolSettings]:
+        names = [work.settings.gripper, work.settings.probe, work.settings.other]
+        return [work.tool(name) for name in names if name]
+
+
+def retract_probe(work: FibreWork) -> Steps:
+    """Take the probe away from where fibres are held and lie."""
+    x, y = work.tip_now(work.probe)
+    away = work.settings.places.probe_away_y_um
+    if y < away - 1.0:
+        yield work.go(work.at(work.probe, x, away))
+
+
+def zero_jaws(work: FibreWork) -> Steps:
+    """Close the jaws to their stop, so that steps count from there, and open them."""
+    yield from move_jaws(work, -1100.0)
+    work.gap_um = 0.0
+    yield from move_jaws(work, work.settings.grasp.gap_um)
+
+
+def move_jaws(work: FibreWork, by_um: float) -> Steps:
+    """Open the jaws, or close them: open loop, a step at full voltage is what the file says."""
+    axis = work.mico[work.gripper.gap_axis]
+    step_um = next(
+        (
+            each.step_um
+            for each in work.mico.application.manager.settings.positioner
+            if each.name == work.gripper.gap_axis and each.step_um
+        ),
+        1.0,
+    )
+    steps = round(by_um / step_um)
+    if steps:
+        # They may be at the plate; the gate knows of no smaller movement than their whole travel.
+        with work.mico.collision.contact("grasp"):
+            yield axis.steps(steps, frequency_hz=work.settings.grasp.gripper_hz, wait=False)
+    if work.gap_um is not None:
+        work.gap_um = max(0.0, work.gap_um + steps * step_um)
+
+
+class Calibrated(FibreOperation):
+    """A calibration that is made when there is none, or it is too old; refused when poor."""
+
+    key = ""
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        now_s = work.clock.now_s()
+        if work.calibration.fresh(self.key, now_s, work.settings.calibration.age_s):
+            return
+        try:
+            yield from self.measure(work)
+        except NotAvailable as exc:
+            raise OperationFailed(POOR, f"{self.key}: {exc}") from exc
+        yield SAFE_POINT
+
+    def measure(self, work: FibreWork) -> Steps:
+        """Measure it, and keep it by `kept`."""
+        raise NotImplementedError
+
+    def kept(self, work: FibreWork, residual: float, unit: str, largest: float) -> None:
+        """Note that it was made, or refuse it."""
+        if not residual <= largest:
+            raise OperationFailed(
+                POOR, f"{self.key}: residual {residual:.3g} {unit}, at most {largest:g} is allowed"
+            )
+        work.calibration.made[self.key] = Measured(work.clock.now_s(), residual, unit)
+
+
+class CalibratePlate(Calibrated):
+    """Where on the plate the pixels lie, by the gripper's tip just above it."""
+
+    name = "calibrate at the plate"
+    key = PLATE
+
+    @override
+    def measure(self, work: FibreWork) -> Steps:
+        place = work.settings.calibration
+        residual = yield from calibrate_at(work, place.place_x_um, place.place_y_um, place.place_um)
+        self.kept(work, residual, "px", place.residual_px)
+
+
+class CalibrateHeld(Calibrated):
+    """The same at the height of the probe."""
+
+    name = "calibrate at the probe's height"
+    key = HELD
+
+    @override
+    def measure(self, work: FibreWork) -> Steps:
+        place = work.settings.calibration
+        residual = yield from calibrate_at(
+            work, place.place_x_um, place.place_y_um, work.hold_tip_um
+        )
+        self.kept(work, residual, "px", place.residual_px)
+
+
+def calibrate_at(
+    work: FibreWork, x_um: float, y_um: float, z_um: float
+) -> Generator[Wish, object, float]:
+    """Take the gripper there, have the camera calibrated by it, and take it up again.
+
+    Returns the residual, px.
+    """
+    tool, travel = work.gripper, work.settings.places.travel_um
+    yield work.go_up(max(travel, work.height_now()))
+    yield work.go(work.at(tool, x_um * work.jaws.forward, y_um))
+    begun = work.vico.calibrated
+    with work.mico.collision.contact("grasp"):
+        yield work.go_up(z_um)
+        yield work.vico.calibrate_stage(tool.name, work.settings.camera)
+        yield work.go_up(max(travel, z_um))
+    new = [each for each in work.vico.calibrated if each not in begun]
+    return max((each.residual_px for each in new), default=0.0)
+
+
+class FindRotationCentre(Calibrated):
+    """About which place the plate turns, by a fibre that lies on it."""
+
+    name = "find the rotation centre"
+    key = TABLE
+
+    @override
+    def precondition(self, work: FibreWork) -> None:
+        if work.settings.calibration.rotation_centre and not work.lines_um:
+            raise OperationFailed("no fibre", "nothing lies on the plate to turn with it")
+
+    @override
+    def measure(self, work: FibreWork) -> Steps:
+        settings = work.settings.calibration
+        if not settings.rotation_centre:
+            work.calibration.frame = PlateFrame()
+            self.kept(work, 0.0, "um", settings.rotation_std_um)
+            return
+        yield from clear_picture(work)
+        yield work.vico.find_rotation_centre(work.settings.camera)
+        found = work.vico.rotation_centre(work.settings.camera)
+        if found is None:
+            raise NotAvailable("no rotation centre was found")
+        work.calibration.frame = PlateFrame(found.centre_um)
+        work.surveyed = False  # what was seen on the plate lies elsewhere in the new frame
+        self.kept(work, found.std_um, "um", settings.rotation_std_um)
+
+
+def clear_picture(work: FibreWork) -> Steps:
+    """Take gripper and probe out of the picture."""
+    places = work.settings.places
+    yield work.go_up(max(places.travel_um, work.height_now()))
+    yield from retract_probe(work)
+    x, y = places.away_x_um * work.jaws.forward, places.bin_y_um
+    yield work.go(work.at(work.gripper, x, y) | work.at(work.probe, places.hold_x_um, 4900.0))
+
+
+class ComparePlaces(Calibrated):
+    """Where the probe's tip is in the frame of the gripper, on one picture with both."""
+
+    name = "see probe and gripper"
+    key = PROBE
+
+    @override
+    def measure(self, work: FibreWork) -> Steps:
+        zoom = work.settings.calibration.compare_zoom
+        yield from zoom_to(work, zoom)
+        try:
+            yield from self._compare(work)
+        finally:
+            work.zoomed = None
+        yield from zoom_to(work, work.settings.zoom)
+
+    def _compare(self, work: FibreWork) -> Steps:
+        places, settings = work.settings.places, work.settings.calibration
+        hold = places.hold_x_um, places.hold_y_um, work.hold_tip_um
+        residual = yield from calibrate_at(work, places.hold_x_um * work.jaws.forward, *hold[1:])
+        yield work.go(work.at(work.gripper, *hold[:2]))
+        yield work.go_up(hold[2])
+        beside = places.hold_x_um + settings.compare_beside_um * work.jaws.forward
+        before = places.hold_y_um + settings.compare_before_um
+        # Aside while it is far back, then straight ahead: nothing is beside its way.
+        yield work.go({work.probe.x_axis: beside - work.probe.tip_um[0]})
+        yield work.go(work.at(work.probe, beside, before))
+        picture = yield work.picture()
+        assert isinstance(picture, Picture)
+        work.calibration.probe_off_um = probe_off_um(work, picture)
+        yield from retract_probe(work)
+        self.kept(work, residual, "px", settings.residual_px)
+
+
+def zoom_to(work: FibreWork, zoom: float) -> Steps:
+    """Zoom there, where the lens is not there already."""
+    lens = work.vico.lens
+    if lens is None or work.zoomed == zoom:
+        return
+    yield lens.zoom_to(zoom)
+    work.zoomed = zoom
+
+
+def probe_off_um(work: FibreWork, picture: Picture) -> tuple[float, float]:
+    """Return how far the probe's tip is from where its stages say, by a picture of both."""
+    off = []
+    for tool in (work.probe, work.gripper):
+        found = see_tip(work, picture, tool)
+        if isinstance(found, NotSeen):
+            raise NotAvailable(f"{tool.shown} was not seen: {found.reason}")
+        believed = tip_um(tool, picture.circumstances.positions)
+        if believed is None:
+            raise NotAvailable(f"{tool.name}: where it stands is not known")
+        seen_px = found.hold_px if isinstance(found, GripperTips) else found.tip_px
+        seen = work.mapped(picture, work.hold_tip_um).to_um(seen_px)
+        off.append((float(seen[0]) - believed[0], float(seen[1]) - believed[1]))
+    (px, py), (gx, gy) = off
+    return px - gx, py - gy
+
+
+def see_tip(
+    work: FibreWork, picture: Picture, tool: ToolSettings
+) -> GripperTips | ToolEnd | NotSeen:
+    """Look for a tool's tip where its stages say it is, with the jaws as far open as counted."""
+    positions = picture.circumstances.positions
+    tip = tip_um(tool, positions)
+    if tip is None:
+        return NotSeen("where it stands is not known")
+    try:
+        mapped = map_at(work.vision.places, picture, tip[2])
+    except CosmicError as exc:
+        return NotSeen(str(exc))
+    wanted = expected(tool, mapped, tip[:2], positions, REACH_PX)
+    if wanted is None:
+        return NotSeen("it is too small on the picture; zoom in")
+    if not tool.gap_axis:
+        return find_probe(grey(picture.data), wanted)
+    gap_px = (work.gap_um or 0.0) / mapped.scale_um_px
+    return find_gripper(grey(picture.data), replace(wanted, gap_px=gap_px))

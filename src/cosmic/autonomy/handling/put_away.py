@@ -1,0 +1,137 @@
+"""Operations that get rid of a fibre, and see that it is gone."""
+
+from typing import Final
+
+from typing_extensions import override
+
+from cosmic.autonomy.handling.grasp import in_jaws, seen_at
+from cosmic.autonomy.handling.operation import FibreOperation
+from cosmic.autonomy.handling.prepare import move_jaws, retract_probe
+from cosmic.autonomy.handling.work import FibreWork
+from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
+from cosmic.vico.core.picture import Picture
+
+ADHESION: Final = "jaw adhesion"
+GIVEN_UP: Final = "given up"
+WIPE_UM: Final = 250.0
+SHAKES: Final = 4
+SHAKE_UM: Final = 60.0
+
+
+class ToBin(FibreOperation):
+    """The fibre is carried to where fibres are put away."""
+
+    name = "carry to the bin"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        places = work.settings.places
+        yield from retract_probe(work)
+        yield work.go_up(max(places.travel_um, work.height_now()))
+        yield work.go(bin_place(work))
+        with work.mico.collision.contact("grasp"):
+            yield work.go_up(places.bin_um)
+
+
+def bin_place(work: FibreWork) -> dict[str, float]:
+    """Return where the gripper's axes stand above the bin."""
+    places = work.settings.places
+    return work.at(work.gripper, places.bin_x_um * work.jaws.forward, places.bin_y_um)
+
+
+class Release(FibreOperation):
+    """The jaws open, and leave."""
+
+    name = "release"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        places, forward = work.settings.places, work.jaws.forward
+        gap = work.gap_um or 0.0
+        yield from move_jaws(work, work.settings.grasp.gap_um - gap)
+        with work.mico.collision.contact("grasp"):
+            yield work.go_up(places.travel_um)
+        yield work.go(work.at(work.gripper, places.view_x_um * forward, places.view_y_um))
+
+    @override
+    def verify(self, work: FibreWork) -> Steps | None:
+        return see_released(work)
+
+
+def see_released(work: FibreWork) -> Steps:
+    """See by picture that nothing hangs at the jaws."""
+    fibre = work.in_hand()
+    picture = yield work.picture()
+    assert isinstance(picture, Picture)
+    if seen_at(work, fibre, picture, in_jaws(work, fibre), 0.0):
+        failure = OperationFailed(ADHESION, f"fibre {fibre.number} still hangs at the jaws")
+        work.failures.append((Release.name, failure))
+        raise failure
+    fibre.held = False
+
+
+class Wipe(FibreOperation):
+    """The jaws are taken back to the bin, pressed to the plate, shaken and drawn along it."""
+
+    name = "shake and wipe"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        places = work.settings.places
+        yield work.go_up(max(places.travel_um, work.height_now()))
+        yield work.go(bin_place(work))
+        with work.mico.collision.contact("grasp"):
+            yield work.go_up(places.grasp_um)
+            for _ in range(SHAKES):
+                yield from move_jaws(work, -SHAKE_UM)
+                yield from move_jaws(work, SHAKE_UM)
+            x, y = work.tip_now(work.gripper)
+            yield work.go(work.at(work.gripper, x, y + WIPE_UM))
+            yield work.go(work.at(work.gripper, x - WIPE_UM * work.jaws.forward * 0.5, y))
+            yield work.go_up(places.bin_um)
+
+
+class Finish(FibreOperation):
+    """The fibre is done with."""
+
+    name = "note the result"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        fibre = work.in_hand()
+        fibre.done_s, fibre.put_away = work.clock.now_s(), True
+        work.finished.append(fibre)
+        work.fibre = None
+        yield SAFE_POINT
+
+
+class NoteFailure(FibreOperation):
+    """Keeps what the fibre in hand failed by, before anything else is done with it."""
+
+    name = "note the failure"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        fibre = work.in_hand()
+        if work.failures:
+            operation, failure = work.failures[-1]
+            fibre.failure = OperationFailed(failure.cause, f"{operation}: {failure.text}")
+        yield SAFE_POINT
+
+
+class GiveUp(FibreOperation):
+    """Says what a fibre was given up for, once the jaws are empty and out of the way."""
+
+    name = "give it up"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        fibre = work.in_hand()
+        fibre.done_s = work.clock.now_s()
+        work.finished.append(fibre)
+        if not fibre.put_away and fibre.tries:
+            work.surveyed = False
+        work.given_up.append(fibre.reach.candidate)
+        work.fibre = None
+        yield SAFE_POINT
+        raise fibre.failure or OperationFailed(GIVEN_UP, f"fibre {fibre.number}")

@@ -1,0 +1,185 @@
+"""Operations that bring a fibre and the gripper together."""
+
+from typing import Final
+
+import numpy as np
+from typing_extensions import override
+
+from cosmic.autonomy.handling.operation import FibreOperation
+from cosmic.autonomy.handling.plate import along, ways
+from cosmic.autonomy.handling.prepare import move_jaws, see_tip
+from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen
+from cosmic.autonomy.handling.work import FibreInHand, FibreWork
+from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.pixel_map import Floats
+from cosmic.vico.core.vision.tool_types import GripperTips
+
+LOST = "lost"
+TIP_NOT_SEEN = "tip not seen"
+STAND_BACK_UM: Final = 900.0
+MARGIN_UM: Final = 250.0
+SAME_LENGTH: Final = 0.05
+LOOKS: Final = 2
+
+
+class Turn(FibreOperation):
+    """The table turns the fibre along the jaws, which wait behind where its end will be."""
+
+    name = "turn the table"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        fibre = work.in_hand()
+        (x, y), angle = fibre.reach.tip_um, fibre.reach.angle_deg
+        yield work.go_up(max(work.settings.places.travel_um, work.height_now()))
+        behind = work.at(work.gripper, x - STAND_BACK_UM * work.jaws.forward, y)
+        yield work.go({work.table: angle} | behind)
+        yield SAFE_POINT
+
+
+class FindAgain(FibreOperation):
+    """The fibre is looked for where the turn has brought it, and measured."""
+
+    name = "find it again"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        fibre = work.in_hand()
+        if fibre.tries:
+            x, y = work.tip_now(work.gripper)
+            yield work.go_up(work.settings.places.travel_um)
+            yield work.go(work.at(work.gripper, x - STAND_BACK_UM * work.jaws.forward, y))
+        for look in range(LOOKS):
+            picture = yield work.picture()
+            assert isinstance(picture, Picture)
+            mapped = work.mapped(picture)
+            line_px = mapped.to_px(fibre.reach.line_um)
+            margin_px = MARGIN_UM * (1.0 + look) / mapped.scale_um_px
+            box = box_around(line_px, margin_px, picture)
+            seen = _matching(find_seen(picture, mapped, box), fibre)
+            if seen is not None:
+                _take_note(work, fibre, seen, picture)
+                return
+        work.surveyed = False
+        raise OperationFailed(
+            LOST, f"fibre {fibre.number} was not found again where the table has turned it"
+        )
+
+
+def _matching(found: list[SeenFibre], fibre: FibreInHand) -> SeenFibre | None:
+    """Return the fibre that is meant, known by its place and length."""
+    wanted, length = fibre.reach.line_um, fibre.reach.candidate.length_um
+    fitting = []
+    for each in found:
+        away = float(np.linalg.norm(each.line_um.mean(axis=0) - wanted.mean(axis=0)))
+        if abs(each.length_um - length) <= SAME_LENGTH * length and away <= MARGIN_UM:
+            fitting.append((away, each))
+    return min(fitting, key=lambda pair: pair[0])[1] if fitting else None
+
+
+def _take_note(work: FibreWork, fibre: FibreInHand, seen: SeenFibre, picture: Picture) -> None:
+    start = fibre.reach.line_um[0]
+    turned = np.linalg.norm(seen.line_um[0] - start) > np.linalg.norm(seen.line_um[-1] - start)
+    step = -1 if turned else 1
+    fibre.seen = seen
+    fibre.line_um, fibre.line_px = seen.line_um[::step], seen.line_px[::step]
+    fibre.inside_um = work.settings.grasp.inside_um
+    fibre.free_um = seen.length_um - fibre.inside_um
+    fibre.pictures["geometry"] = picture
+
+
+def line_of(fibre: FibreInHand) -> Floats:
+    """Return the fibre's line on the platform, from the end that is grasped."""
+    return fibre.reach.line_um if fibre.line_um is None else fibre.line_um
+
+
+class Shift(FibreOperation):
+    """The next try is made a little to one side, then to the other."""
+
+    name = "try beside it"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        fibre, shift = work.in_hand(), work.settings.grasp.shift_um
+        side = 1.0 if fibre.tries % 2 else -1.0
+        fibre.shift_um = side * shift * ((fibre.tries + 1) // 2)
+        yield SAFE_POINT
+
+
+class Approach(FibreOperation):
+    """The open jaws come down around the fibre."""
+
+    name = "approach and descend"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        fibre, places = work.in_hand(), work.settings.places
+        x, y = along(line_of(fibre), fibre.inside_um).tolist()
+        yield work.go(work.at(work.gripper, x, y))
+        with work.mico.collision.contact("grasp"):
+            yield work.go_up(places.grasp_um)
+
+    @override
+    def undo(self, work: FibreWork) -> Steps:
+        with work.mico.collision.contact("grasp"):
+            yield work.go_up(work.settings.places.travel_um)
+
+
+class Refine(FibreOperation):
+    """Jaws and fibre are seen on one picture, and the jaws are moved until the fibre is between."""
+
+    name = "refine by picture"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        fibre, settings = work.in_hand(), work.settings.grasp
+        for _ in range(settings.corrections):
+            picture = yield work.picture()
+            assert isinstance(picture, Picture)
+            off = _off_um(work, fibre, picture)
+            if off is None:
+                continue
+            if abs(off - fibre.shift_um) <= settings.close_enough_um:
+                return
+            x, y = work.tip_now(work.gripper)
+            with work.mico.collision.contact("grasp"):
+                yield work.go(work.at(work.gripper, x, y + off - fibre.shift_um))
+        picture = yield work.picture()
+        assert isinstance(picture, Picture)
+        off = _off_um(work, fibre, picture)
+        if off is None or abs(off - fibre.shift_um) > 2.0 * settings.close_enough_um:
+            raise OperationFailed(
+                TIP_NOT_SEEN, "the jaws were not seen around the fibre; look at light and focus"
+            )
+
+
+def _off_um(work: FibreWork, fibre: FibreInHand, picture: Picture) -> float | None:
+    """Return how far the fibre is from the middle between the jaws, in y; None: not seen."""
+    found = see_tip(work, picture, work.gripper)
+    if not isinstance(found, GripperTips):
+        return None
+    hold = work.mapped(picture).to_um(found.hold_px)
+    line = line_of(fibre)
+    order = np.argsort(line[:, 0])
+    beside = float(np.interp(hold[0], line[order, 0], line[order, 1]))
+    way = float(np.interp(hold[0], line[order, 0], ways(line)[order]))
+    fibre.inside_um, fibre.free_um = way, fibre.length_um - way
+    return beside - float(hold[1])
+
+
+class CloseJaws(FibreOperation):
+    """The jaws close around the fibre."""
+
+    name = "close the gripper"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        gap = work.gap_um if work.gap_um is not None else work.settings.grasp.gap_um
+        yield from move_jaws(work, -(gap + work.settings.grasp.closing_um))
+        work.gap_um = 0.0
+        work.in_hand().tries += 1
+
+    @override
+    def undo(self, work: FibreWork) -> Steps:
+        yield from move_jaws(work, work.settings.grasp.gap_um)

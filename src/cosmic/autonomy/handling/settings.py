@@ -1,0 +1,215 @@
+"""Settings of the operations that handle fibres; they are the parameters of a recipe."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from cosmic.autonomy.bending.plan import SpanLimits
+from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.frame.config import StrictModel
+
+
+class PlaceSettings(StrictModel):
+    """Where things are done: places of the middle between the jaws' tips, on the platform.
+
+    Attributes
+    ----------
+    travel_um : float
+        Height at which the jaws travel above the plate.
+    grasp_um : float
+        Height of the jaws' lower edge when they close around a fibre on the plate.
+    test_um, test_aside_um : float
+        How high and how far aside a grasped fibre is carried to see whether it follows.
+    hold_x_um, hold_y_um : float
+        Where a fibre is held while the probe pushes it; the height is that of the probe.
+    hold_above_tip_um : float
+        How much higher than the jaws' lower edge they hold a fibre.
+    bin_x_um, bin_y_um, bin_um : float
+        Where fibres are put away, and from what height.
+    view_x_um, view_y_um : float
+        Where the empty jaws are looked at.
+    away_x_um : float
+        Out of the picture, so that the whole sample can be seen.
+    probe_away_y_um : float
+        Place of the probe's tip while nothing is measured.
+    """
+
+    travel_um: float = Field(400.0, gt=0.0)
+    grasp_um: float = 3.0
+    test_um: float = Field(120.0, gt=0.0)
+    test_aside_um: float = Field(150.0, gt=0.0)
+    hold_x_um: float = 0.0
+    hold_y_um: float = 600.0
+    hold_above_tip_um: float = 10.0
+    bin_x_um: float = -9000.0
+    bin_y_um: float = 0.0
+    bin_um: float = Field(40.0, gt=0.0)
+    view_x_um: float = -5000.0
+    view_y_um: float = 0.0
+    away_x_um: float = -9000.0
+    probe_away_y_um: float = 4000.0
+
+
+class GraspSettings(StrictModel):
+    """How a fibre is chosen and taken up.
+
+    Attributes
+    ----------
+    shortest_um, longest_um : float
+        Length of fibres that are taken.
+    inside_um : float
+        Length of fibre between the jaws.
+    clear_um : float
+        Room around a fibre, and under the jaws, without any other.
+    gap_um : float
+        Opening of the jaws when they come down.
+    closing_um : float
+        How much further than that they close, so that they are closed whatever a step is worth.
+    gripper_hz : float
+        Frequency of the gripper's steps.
+    close_enough_um : float
+        How far beside the middle between the jaws a fibre may lie when they close.
+    corrections : int
+        How often their place is corrected by picture.
+    tries : int
+        How often a grasp is tried.
+    shift_um : float
+        How far aside of the first try the second and third are made.
+    reach_x_um, reach_y_um : float
+        Largest x of a grasp, in the direction the gripper points to, and largest distance in y.
+    largest_turn_deg : float
+        How far the table may stand from zero.
+    """
+
+    shortest_um: float = Field(500.0, gt=0.0)
+    longest_um: float = Field(4000.0, gt=0.0)
+    inside_um: float = Field(250.0, gt=0.0)
+    clear_um: float = Field(70.0, gt=0.0)
+    gap_um: float = Field(300.0, gt=0.0, le=1000.0)
+    closing_um: float = Field(60.0, gt=0.0)
+    gripper_hz: float = Field(5000.0, gt=0.0, le=18500.0)
+    close_enough_um: float = Field(25.0, gt=0.0)
+    corrections: int = Field(3, ge=1, le=10)
+    tries: int = Field(4, ge=1, le=10)
+    shift_um: float = Field(30.0, ge=0.0)
+    reach_x_um: float = 1400.0
+    reach_y_um: float = Field(4300.0, gt=0.0)
+    largest_turn_deg: float = Field(155.0, gt=0.0)
+
+
+class PushSettings(StrictModel):
+    """How the probe looks for a fibre and pushes it.
+
+    Attributes
+    ----------
+    channel : str
+        Which force is felt.
+    stand_off_um : float
+        How far from where the fibre should be the probe begins to look for it.
+    search_um : float
+        How far beyond that it looks.
+    search_step_um : float
+        Largest step of the search; stiffer fibres and shorter spans make it smaller.
+    stiffest_ei_n_m2 : float
+        Of the stiffest fibre there may be: what the steps of the first search are made for.
+    contact_un : float
+        Force above the baseline that means contact.
+    limit_un : float
+        No step is made that may lead beyond this force.
+    stop_un : float
+        Force limit of the acquisition that stops everything; 0: none is armed.
+    settle_s, average_s : float
+        Rest after a step, and the time over which the force is averaged.
+    search_average_s : float
+        The same while the fibre is looked for.
+    steps_out, steps_back : int
+        Steps of one push.
+    retreat_um : float
+        How far the probe goes back from the fibre between spans.
+    spans : SpanLimits
+        What spans there may be.
+    fit : FitSettings
+        What the fit knows of the instrument.
+    """
+
+    channel: str = "force"
+    stand_off_um: float = Field(40.0, gt=0.0)
+    search_um: float = Field(120.0, gt=0.0)
+    search_step_um: float = Field(5.0, gt=0.0)
+    stiffest_ei_n_m2: float = Field(4e-10, gt=0.0)
+    contact_un: float = Field(0.6, gt=0.0)
+    limit_un: float = Field(110.0, gt=0.0)
+    stop_un: float = Field(140.0, ge=0.0)
+    settle_s: float = Field(0.02, ge=0.0)
+    average_s: float = Field(0.04, gt=0.0)
+    search_average_s: float = Field(0.02, gt=0.0)
+    steps_out: int = Field(9, ge=4)
+    steps_back: int = Field(6, ge=3)
+    retreat_um: float = Field(12.0, gt=0.0)
+    spans: SpanLimits = Field(default_factory=SpanLimits)
+    fit: FitSettings = Field(default_factory=FitSettings)
+
+
+class CalibrationSettings(StrictModel):
+    """How good and how fresh calibrations must be.
+
+    Attributes
+    ----------
+    place_x_um, place_y_um, place_um : float
+        Where the gripper is looked at above the plate.
+    residual_px : float
+        Largest RMS residual of a map.
+    rotation_std_um : float
+        Largest standard deviation of the rotation centre.
+    age_s : float
+        Oldest calibration that is used, on the platform's clock.
+    rotation_centre : bool
+        The rotation centre is measured; otherwise it is taken to be the platform's origin.
+    compare_zoom : float
+        Magnification at which probe and gripper are seen together.
+    compare_beside_um, compare_before_um : float
+        How far ahead of the jaws, and how far in front of where a fibre is held, the probe stands.
+    """
+
+    place_x_um: float = -1900.0
+    place_y_um: float = 0.0
+    place_um: float = 12.0
+    residual_px: float = Field(0.5, gt=0.0)
+    rotation_std_um: float = Field(3.0, gt=0.0)
+    age_s: float = Field(7200.0, gt=0.0)
+    rotation_centre: bool = True
+    compare_zoom: float = Field(2.0, gt=0.0)
+    compare_beside_um: float = 700.0
+    compare_before_um: float = 250.0
+
+
+class HandlingSettings(StrictModel):
+    """All settings of the operations that handle fibres.
+
+    Attributes
+    ----------
+    gripper, other : str
+        Tool that takes fibres up, and the one that is parked; "" for none.
+    probe : str
+        Tool that pushes.
+    camera : str
+        Camera that looks; "" is the first.
+    zoom : float
+        Magnification of all pictures.
+    frequency_hz : float
+        Closed-loop frequency of all linear axes; it limits their speed.
+    re_survey : int
+        After so many fibres the sample is looked at again; 0: only when none is left.
+    """
+
+    gripper: Literal["left", "right"] = "left"
+    other: str = "right"
+    probe: str = "probe"
+    camera: str = ""
+    zoom: float = Field(0.58, gt=0.0)
+    frequency_hz: float = Field(10000.0, ge=1.0, le=18500.0)
+    re_survey: int = Field(0, ge=0)
+    places: PlaceSettings = Field(default_factory=PlaceSettings)
+    grasp: GraspSettings = Field(default_factory=GraspSettings)
+    push: PushSettings = Field(default_factory=PushSettings)
+    calibration: CalibrationSettings = Field(default_factory=CalibrationSettings)

@@ -1,0 +1,174 @@
+"""Pictures as procedures want them: exposed after what was done, and what is on them."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cosmic.autonomy.places import PlatformPlaces
+from cosmic.frame.clock import WALL, Clock
+from cosmic.frame.errors import DeviceTimeout, NotAvailable
+from cosmic.vico.api.camera import CameraHandle
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.pixel_map import Floats, PixelMap
+from cosmic.vico.core.vision.algorithms import grey
+from cosmic.vico.core.vision.fibre import Fibre
+
+LIMIT_WALL_S: Final = 8.0
+Box = tuple[int, int, int, int]
+
+
+class PictureWanted:
+    """A picture exposed from a time on; to be yielded by an operation."""
+
+    def __init__(self, camera: CameraHandle, clock: Clock) -> None:
+        self._camera = camera
+        self._since_s = clock.now_s()
+        self._late_wall_s = WALL.now_s() + LIMIT_WALL_S
+        self._picture: Picture | None = None
+
+    @property
+    def done(self) -> bool:
+        """It is there, or was given up."""
+        if self._picture is None:
+            newest = self._camera.latest()
+            if newest is not None and newest.frame.exposed_s >= self._since_s:
+                self._picture = newest
+        return self._picture is not None or WALL.now_s() > self._late_wall_s
+
+    def wait(self, timeout_s: float | None = None) -> Picture:
+        """Wait for it, and return it.
+
+        Raises
+        ------
+        NotAvailable
+            None came in time; the text says why.
+        DeviceTimeout
+            It had not come after `timeout_s` of wall time.
+        """
+        if not self.done:
+            left_s = max(0.0, self._late_wall_s - WALL.now_s())
+            wait_s = left_s if timeout_s is None else min(timeout_s, left_s)
+            try:
+                self._picture = self._camera.next_picture(wait_s, self._since_s)
+            except NotAvailable as exc:
+                if not self.done:
+                    raise DeviceTimeout(str(exc)) from exc
+        if self._picture is None:
+            why = self._camera.problem or "none arrived"
+            raise NotAvailable(f"no picture of {self._camera.name} in {LIMIT_WALL_S:g} s: {why}")
+        return self._picture
+
+    def cancel(self) -> None:
+        """Want it no longer: nothing was set in motion."""
+        self._late_wall_s = -math.inf
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenFibre:
+    """A fibre on a picture and on the platform.
+
+    Attributes
+    ----------
+    line_um, line_px : ndarray, shape (n, 2)
+        Centre line on the platform and on the picture.
+    """
+
+    fibre: Fibre
+    line_um: Floats
+    line_px: Floats
+    scale_um_px: float
+
+    @property
+    def length_um(self) -> float:
+        """Along the centre line."""
+        return self.fibre.length_px * self.scale_um_px
+
+    @property
+    def width_um(self) -> float:
+        """Mean width."""
+        return self.fibre.width_px * self.scale_um_px
+
+
+def find_seen(picture: Picture, mapped: PixelMap, box: Box | None = None) -> list[SeenFibre]:
+    """Find fibres on a picture, or on a part of it: left, top, right, bottom in pixels."""
+    # Imported here: it loads scikit-image and scipy.
+    from cosmic.vico.core.vision.finding import find_fibres
+
+    height, width = picture.data.shape[:2]
+    left, top, right, bottom = box or (0, 0, width, height)
+    image = np.ascontiguousarray(grey(picture.data)[top:bottom, left:right])
+    if min(image.shape) < 16:
+        return []
+    found = []
+    for fibre in find_fibres(image):
+        line_px = fibre.centre_line_px + np.array([left, top], dtype=np.float64)
+        found.append(SeenFibre(fibre, mapped.to_um(line_px), line_px, mapped.scale_um_px))
+    return found
+
+
+def box_around(line_px: Floats, margin_px: float, picture: Picture) -> Box:
+    """Return the part of a picture around a line."""
+    height, width = picture.data.shape[:2]
+    low, high = line_px.min(axis=0) - margin_px, line_px.max(axis=0) + margin_px
+    return (
+        max(0, math.floor(low[0])),
+        max(0, math.floor(low[1])),
+        min(width, math.ceil(high[0]) + 1),
+        min(height, math.ceil(high[1]) + 1),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """What lies along a line.
+
+    Attributes
+    ----------
+    contrast : float
+        How much darker than the ground it is, grey levels; 0 off the picture.
+    offset_px : float
+        How far beside the line, to the left of its direction on the screen.
+    """
+
+    contrast: float
+    offset_px: float
+
+
+def trace_along(picture: Picture, line_px: Floats, reach_px: float) -> Trace:
+    """Look for something dark along a line, or beside it up to `reach_px`."""
+    image = grey(picture.data)
+    points = _spaced(np.asarray(line_px, dtype=np.float64))
+    ahead = np.gradient(points, axis=0)
+    ahead = ahead / np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-9)
+    normal = np.column_stack([ahead[:, 1], -ahead[:, 0]])
+    offsets = np.arange(-2.0 * reach_px, 2.0 * reach_px + 0.5, 0.5)
+    places = points[:, None, :] + offsets[None, :, None] * normal[:, None, :]
+    rows, columns = np.rint(places[..., 1]).astype(int), np.rint(places[..., 0]).astype(int)
+    height, width = image.shape
+    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+    if not inside.mean() > 0.8:
+        return Trace(0.0, 0.0)
+    greys = image[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)].astype(np.float64)
+    profile = np.median(greys, axis=0)
+    smooth = np.convolve(np.pad(profile, 2, mode="edge"), np.ones(5) / 5.0, mode="valid")
+    ground = float(np.percentile(smooth, 75))
+    near = np.abs(offsets) <= reach_px
+    darkest = int(np.argmin(np.where(near, smooth, np.inf)))
+    return Trace(max(0.0, ground - float(smooth[darkest])), float(offsets[darkest]))
+
+
+def _spaced(line: Floats) -> Floats:
+    """Return points a pixel apart along a line."""
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    count = max(4, int(way[-1]) + 1)
+    at = np.linspace(0.0, way[-1], count)
+    return np.column_stack([np.interp(at, way, line[:, 0]), np.interp(at, way, line[:, 1])])
+
+
+def map_at(places: object, picture: Picture, height_um: float, tool: str | None = None) -> PixelMap:
+    """Return the map for things at a height; raises `NotAvailable` where it was not measured."""
+    if not isinstance(places, PlatformPlaces):
+        raise NotAvailable("pixels cannot be told as places: micromanipulation is not hosted here")
+    return places.map_of(picture, height_um, tool)

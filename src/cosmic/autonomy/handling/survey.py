@@ -1,0 +1,134 @@
+"""Operations that look at the whole sample and choose a fibre."""
+
+from collections import Counter
+
+from typing_extensions import override
+
+from cosmic.autonomy.handling.operation import FibreOperation
+from cosmic.autonomy.handling.plate import Candidate, Neighbours, distance_um, reaches
+from cosmic.autonomy.handling.prepare import clear_picture
+from cosmic.autonomy.handling.sight import SeenFibre, find_seen
+from cosmic.autonomy.handling.work import FibreInHand, FibreWork
+from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.pixel_map import Floats
+
+CROSSING = "crossing"
+NOT_CERTAIN = "not certain"
+TOO_SHORT = "too short"
+TOO_LONG = "too long"
+TOO_NEAR = "too near to another"
+OUT_OF_FIELD = "out of the field"
+GIVEN_UP = "given up before"
+OUT_OF_REACH = "out of reach"
+NONE_LEFT = "no fibre"
+SAME_UM = 120.0
+SAME_LENGTH = 0.05
+
+
+class Survey(FibreOperation):
+    """A wide picture, and what lies on it; only when it is due."""
+
+    name = "survey"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        due = work.settings.re_survey and work.since_survey >= work.settings.re_survey
+        if work.surveyed and work.candidates and not due:
+            return
+        yield from clear_picture(work)
+        picture = yield work.picture()
+        assert isinstance(picture, Picture)
+        mapped = work.mapped(picture)
+        look(work, find_seen(picture, mapped))
+        yield SAFE_POINT
+
+
+def look(work: FibreWork, seen: list[SeenFibre]) -> None:
+    """Take note of what lies on the plate, and of what may be taken."""
+    angle, frame = work.table_deg, work.calibration.frame
+    found = [_candidate(work, each, frame.on_plate(each.line_um, angle)) for each in seen]
+    work.lines_um = [each.line_um for each in found]
+    judged = []
+    for each in found:
+        problem = each.problem or _lonely(work, each)
+        judged.append(
+            Candidate(
+                each.line_um, each.length_um, each.width_um, each.curl, each.contrast, problem
+            )
+        )
+    work.candidates = [each for each in judged if not each.problem]
+    work.skipped = Counter(each.problem for each in judged if each.problem)
+    work.surveyed, work.since_survey = True, 0
+
+
+def _candidate(work: FibreWork, seen: SeenFibre, line_um: Floats) -> Candidate:
+    settings, doubts = work.settings.grasp, " ".join(seen.fibre.doubts)
+    problem = ""
+    if "border" in doubts:
+        problem = OUT_OF_FIELD
+    elif "cross" in doubts or "branch" in doubts or "several" in doubts:
+        problem = CROSSING
+    elif not seen.fibre.certain:
+        problem = NOT_CERTAIN
+    elif seen.length_um < settings.shortest_um:
+        problem = TOO_SHORT
+    elif seen.length_um > settings.longest_um:
+        problem = TOO_LONG
+    return Candidate(
+        line_um,
+        seen.length_um,
+        seen.width_um,
+        seen.fibre.curl,
+        seen.fibre.contrast,
+        problem,
+    )
+
+
+def _lonely(work: FibreWork, candidate: Candidate) -> str:
+    if any(same_fibre(candidate, each) for each in work.given_up):
+        return GIVEN_UP
+    near = (
+        distance_um(candidate.line_um, line) < work.settings.grasp.clear_um
+        for line in work.lines_um
+        if line is not candidate.line_um
+    )
+    return TOO_NEAR if any(near) else ""
+
+
+def same_fibre(one: Candidate, other: Candidate) -> bool:
+    """Return whether two sightings on the plate are of one fibre."""
+    (x0, y0), (x1, y1) = one.place_um, other.place_um
+    near = abs(x0 - x1) < SAME_UM and abs(y0 - y1) < SAME_UM
+    return near and abs(one.length_um - other.length_um) < SAME_LENGTH * other.length_um
+
+
+class Choose(FibreOperation):
+    """The fibre that is got at with the smallest turn of the table."""
+
+    name = "choose a fibre"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        angle = work.table_deg
+        best = None
+        for candidate in work.candidates:
+            others = Neighbours([line for line in work.lines_um if line is not candidate.line_um])
+            ways = reaches(
+                candidate, work.calibration.frame, work.jaws, work.settings.grasp, others, angle
+            )
+            if ways and (
+                best is None or abs(ways[0].angle_deg - angle) < abs(best.angle_deg - angle)
+            ):
+                best = ways[0]
+        if best is None:
+            work.skipped[OUT_OF_REACH] += len(work.candidates)
+            work.candidates = []
+            told = ", ".join(f"{count} {why}" for why, count in sorted(work.skipped.items()))
+            raise OperationFailed(NONE_LEFT, f"none that can be taken up ({told or 'plate empty'})")
+        work.candidates = [each for each in work.candidates if each is not best.candidate]
+        work.numbers += 1
+        work.since_survey += 1
+        work.forces.take_peak_un()
+        work.fibre = FibreInHand(work.numbers, best, found_s=work.clock.now_s())
+        yield SAFE_POINT

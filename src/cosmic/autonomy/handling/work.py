@@ -1,0 +1,312 @@
+"""What operations share: handles, calibration, sample, and the fibre in hand."""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from cosmic.autonomy.bending.result import BendingResult
+from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.handling.force import ForceWatch
+from cosmic.autonomy.handling.plate import Candidate, Jaws, PlateFrame, Reach
+from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.handling.sight import PictureWanted, SeenFibre, map_at
+from cosmic.autonomy.procedures.operation import OperationFailed
+from cosmic.autonomy.tools import axis_targets
+from cosmic.daqco.api.daqco import Daqco
+from cosmic.frame.clock import Clock
+from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.mico import Mico
+from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.api.vico import Vico
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.pixel_map import Floats, PixelMap
+from cosmic.vico.core.tool_settings import ToolSettings
+
+
+class Handles(Protocol):
+    """A rig, as `cosmic.connect()` returns it."""
+
+    @property
+    def mico(self) -> Mico:
+        """Micromanipulation."""
+        ...
+
+    @property
+    def daqco(self) -> Daqco:
+        """Data acquisition."""
+        ...
+
+    @property
+    def vico(self) -> Vico:
+        """Vision."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """One calibration: when it was made, on the platform's clock, and how well it fits.
+
+    Attributes
+    ----------
+    residual : float
+        RMS, in `unit`.
+    """
+
+    time_s: float
+    residual: float
+    unit: str
+
+
+@dataclass(slots=True)
+class Calibration:
+    """What was measured before fibres are handled, by name, with when and how well.
+
+    Attributes
+    ----------
+    frame : PlateFrame
+        About which place the plate turns.
+    probe_off_um : (float, float)
+        How far the probe's tip is from where its stages say, in the frame of the gripper.
+    """
+
+    made: dict[str, Measured] = field(default_factory=dict)
+    frame: PlateFrame = field(default_factory=PlateFrame)
+    probe_off_um: tuple[float, float] = (0.0, 0.0)
+
+    def fresh(self, name: str, now_s: float, age_s: float) -> bool:
+        """Return whether a calibration is there and not too old."""
+        found = self.made.get(name)
+        return found is not None and now_s - found.time_s <= age_s
+
+
+@dataclass(slots=True, eq=False)
+class FibreInHand:
+    """The fibre that is being handled, as it becomes known.
+
+    Attributes
+    ----------
+    reach : Reach
+        How the gripper gets at it.
+    seen : SeenFibre or None
+        As it lay on the plate, turned for the gripper; its line begins where it is grasped.
+    inside_um, free_um : float
+        Length between the jaws and beyond them.
+    shift_um : float
+        How far aside of the middle this try grasps.
+    contact_um : float or None
+        Place of the probe's tip across the fibre when they last met.
+    """
+
+    number: int
+    reach: Reach
+    seen: SeenFibre | None = None
+    line_um: Floats | None = None
+    line_px: Floats | None = None
+    inside_um: float = 0.0
+    free_um: float = 0.0
+    tries: int = 0
+    shift_um: float = 0.0
+    held: bool = False
+    contact_um: float | None = None
+    ei_guess_n_m2: float | None = None
+    spans: list[Span] = field(default_factory=list)
+    pictures: dict[str, Picture] = field(default_factory=dict)
+    bending: BendingResult | None = None
+    peak_un: float = 0.0
+    found_s: float = 0.0
+    done_s: float = 0.0
+    put_away: bool = False
+    failure: OperationFailed | None = None
+
+    @property
+    def length_um(self) -> float:
+        """Along its centre line, as it lay on the plate."""
+        return self.seen.length_um if self.seen is not None else self.reach.candidate.length_um
+
+    @property
+    def width_um(self) -> float:
+        """Mean width, as it lay on the plate."""
+        return self.seen.width_um if self.seen is not None else self.reach.candidate.width_um
+
+    @property
+    def curl(self) -> float:
+        """Length over projected length, less one."""
+        return self.seen.fibre.curl if self.seen is not None else self.reach.candidate.curl
+
+
+@dataclass(slots=True, eq=False)
+class FibreWork:
+    """Everything that operations on fibres share; belongs to the thread of the run.
+
+    Attributes
+    ----------
+    candidates : list of Candidate
+        Of the last survey, less those that were taken; on the plate.
+    given_up : list of Candidate
+        Those on which grasping failed: they are not tried a second time.
+    skipped : Counter of str
+        Why fibres of the last survey are not taken, and how many.
+    fibre : FibreInHand or None
+        The one in hand.
+    finished : list of FibreInHand
+        Those that were put away.
+    gap_um : float or None
+        Opening of the jaws, as steps since they were closed say; None before.
+    failures : list of (str, OperationFailed)
+        Every failure of an operation by its name, those included that a further try mended.
+    """
+
+    mico: Mico
+    daqco: Daqco
+    vico: Vico
+    settings: HandlingSettings
+    clock: Clock
+    forces: ForceWatch
+    calibration: Calibration = field(default_factory=Calibration)
+    candidates: list[Candidate] = field(default_factory=list)
+    lines_um: list[Floats] = field(default_factory=list)
+    given_up: list[Candidate] = field(default_factory=list)
+    skipped: Counter[str] = field(default_factory=Counter)
+    ready: bool = False
+    zoomed: float | None = None
+    surveyed: bool = False
+    since_survey: int = 0
+    fibre: FibreInHand | None = None
+    finished: list[FibreInHand] = field(default_factory=list)
+    numbers: int = 0
+    gap_um: float | None = None
+    failures: list[tuple[str, OperationFailed]] = field(default_factory=list)
+
+    @classmethod
+    def on(cls, rig: Handles, settings: HandlingSettings | None = None) -> "FibreWork":
+        """Return the work on a platform; close it at the end.
+
+        Raises
+        ------
+        ConfigError
+            The platform has no such tool, camera or force channel.
+        NotAvailable
+            An application is not hosted.
+        """
+        settings = settings or HandlingSettings()
+        clock = vision_of(rig.vico).clock
+        forces = ForceWatch(rig.daqco, settings.push.channel, clock)
+        work = cls(rig.mico, rig.daqco, rig.vico, settings, clock, forces)
+        for name in (settings.gripper, settings.probe, *filter(None, [settings.other])):
+            work.tool(name)
+        rig.vico.camera(settings.camera)
+        forces.open()
+        return work
+
+    def close(self) -> None:
+        """Let go of the force channel."""
+        self.forces.close()
+
+    # What the platform has
+
+    @property
+    def vision(self) -> VicoApplication:
+        """The application behind cameras and places."""
+        return vision_of(self.vico)
+
+    def tool(self, name: str) -> ToolSettings:
+        """Return a tool of the platform file."""
+        tools = {each.name: each for each in self.vision.settings.tool}
+        if name not in tools:
+            known = ", ".join(tools) or "none"
+            raise ConfigError(f"there is no tool {name!r}; the platform has: {known}")
+        return tools[name]
+
+    @property
+    def gripper(self) -> ToolSettings:
+        """The tool that takes fibres up."""
+        return self.tool(self.settings.gripper)
+
+    @property
+    def probe(self) -> ToolSettings:
+        """The tool that pushes."""
+        return self.tool(self.settings.probe)
+
+    @property
+    def jaws(self) -> Jaws:
+        """The gripper as the choice of a fibre must know it."""
+        half_um = self.gripper.width_um + self.settings.grasp.gap_um / 2.0
+        return Jaws(forward=1.0 if self.gripper.forward[0] > 0.0 else -1.0, half_um=half_um)
+
+    @property
+    def table(self) -> str:
+        """Name of the axis that turns the plate."""
+        return self.vision.settings.table_axis
+
+    @property
+    def table_deg(self) -> float:
+        """Where the table stands."""
+        angle = self.mico[self.table].angle_deg
+        if angle is None:
+            raise NotAvailable(f"{self.table}: its angle is not known; initialise the platform")
+        return angle
+
+    @property
+    def hold_tip_um(self) -> float:
+        """Height of the jaws' lower edge when a fibre is held in front of the probe."""
+        return self.probe.tip_um[2] - self.settings.places.hold_above_tip_um
+
+    # Moving; places are those of a tool's tip
+
+    def at(
+        self, tool: ToolSettings, x_um: float, y_um: float, z_um: float | None = None
+    ) -> dict[str, float]:
+        """Return where the axes of a tool stand with its tip at a place."""
+        targets = axis_targets(tool, x_um, y_um)
+        if z_um is not None:
+            targets[tool.z_axis] = z_um - tool.tip_um[2]
+        return targets
+
+    def go(self, targets: Mapping[str, float]) -> GroupMovement:
+        """Begin to move; to be yielded."""
+        return self.mico.move(dict(targets), wait=False)
+
+    def go_up(self, z_um: float) -> GroupMovement:
+        """Begin to move the gripper to a height; to be yielded."""
+        return self.go({self.gripper.z_axis: z_um - self.gripper.tip_um[2]})
+
+    def tip_now(self, tool: ToolSettings) -> tuple[float, float]:
+        """Return where a tool's tip is, as its stages say."""
+        x, y = self.mico[tool.x_axis].position_um, self.mico[tool.y_axis].position_um
+        if x is None or y is None:
+            raise NotAvailable(f"{tool.name}: where it stands is not known; initialise it")
+        return tool.tip_um[0] + x, tool.tip_um[1] + y
+
+    def height_now(self) -> float:
+        """Return the height of the gripper's tip, as its stage says."""
+        z = self.mico[self.gripper.z_axis].position_um
+        if z is None:
+            raise NotAvailable(f"{self.gripper.name}: its height is not known; initialise it")
+        return self.gripper.tip_um[2] + z
+
+    # Looking
+
+    def picture(self) -> PictureWanted:
+        """Return the next picture to be exposed; to be yielded."""
+        return PictureWanted(self.vico.camera(self.settings.camera), self.clock)
+
+    def mapped(self, picture: Picture, height_um: float = 0.0) -> PixelMap:
+        """Return the map of a picture for things at a height above the plate."""
+        plate_um = self.vision.settings.plate_um
+        return map_at(self.vision.places, picture, plate_um + height_um)
+
+    def in_hand(self) -> FibreInHand:
+        """Return the fibre in hand."""
+        if self.fibre is None:
+            raise NotAvailable("no fibre was chosen: choose one first")
+        return self.fibre
+
+
+def vision_of(vico: Vico) -> VicoApplication:
+    """Return the application behind the cameras; raises `NotAvailable` at another station."""
+    application = vico.application
+    if not isinstance(application, VicoApplication):
+        raise NotAvailable("cameras of another station: handle fibres where they are")
+    return application

@@ -1,0 +1,91 @@
+"""The bend test: a fibre is taken up, pushed as a cantilever at several spans, and put away."""
+
+from cosmic.autonomy.handling.grasp import MISSED, Carry, TestGrasp
+from cosmic.autonomy.handling.prepare import (
+    CalibrateHeld,
+    CalibratePlate,
+    ComparePlaces,
+    FindRotationCentre,
+    MakeReady,
+)
+from cosmic.autonomy.handling.push import NO_CONTACT, NOT_TRUSTED, FitSpans, PushSpans
+from cosmic.autonomy.handling.put_away import (
+    ADHESION,
+    Finish,
+    GiveUp,
+    NoteFailure,
+    Release,
+    ToBin,
+    Wipe,
+)
+from cosmic.autonomy.handling.reach import (
+    TIP_NOT_SEEN,
+    Approach,
+    CloseJaws,
+    FindAgain,
+    Refine,
+    Shift,
+    Turn,
+)
+from cosmic.autonomy.handling.safe import make_safe
+from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.handling.survey import Choose, Survey
+from cosmic.autonomy.handling.work import FibreWork
+from cosmic.autonomy.procedures.combinators import Fallback, Retry, Sequence
+from cosmic.autonomy.procedures.procedure import Procedure
+from cosmic.autonomy.procedures.walk import Part
+
+RELEASES = 4
+PUSHES = 2
+
+
+def build_bend_test(settings: HandlingSettings | None = None) -> Procedure[FibreWork]:
+    """Return the procedure for one fibre; run it again for the next, on the same work."""
+    settings = settings or HandlingSettings()
+    measured = Retry(
+        Sequence[FibreWork]("measure", PushSpans(), FitSpans()),
+        PUSHES,
+        only={NO_CONTACT, NOT_TRUSTED},
+    )
+    return Procedure(
+        "bend test",
+        Sequence("bend test", *beginning(), one_fibre(settings, measured)),
+        make_safe=make_safe,
+    )
+
+
+def beginning() -> tuple[Part[FibreWork], ...]:
+    """Return what comes before a fibre; little of it where all is fresh."""
+    return (
+        Sequence(
+            "prepare",
+            MakeReady(),
+            CalibratePlate(),
+            CalibrateHeld(),
+            ComparePlaces(),
+            Survey(),
+            FindRotationCentre(),
+        ),
+        Sequence("choose", Survey(), Choose()),
+    )
+
+
+def one_fibre(settings: HandlingSettings, measured: Part[FibreWork]) -> Part[FibreWork]:
+    """Return the way of one fibre from the plate by `measured` to the bin, whatever happens."""
+    grasped = Retry(
+        Sequence[FibreWork]("grasp", FindAgain(), Approach(), Refine(), CloseJaws(), TestGrasp()),
+        settings.grasp.tries,
+        only={MISSED, TIP_NOT_SEEN},
+        between=Shift(),
+    )
+    return Fallback(
+        "one fibre",
+        Sequence("fibre", Turn(), grasped, Carry(), measured, put_away(), Finish()),
+        Sequence("give up", NoteFailure(), put_away(), GiveUp()),
+    )
+
+
+def put_away() -> Part[FibreWork]:
+    """Return the way to the bin, with the jaws seen to be empty at the end."""
+    released = Retry(Release(), RELEASES, only={ADHESION}, between=Wipe())
+    return Sequence("put away", ToBin(), released)
