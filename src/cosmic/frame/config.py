@@ -27,6 +27,17 @@ def shipped_config_dir() -> Path:
     return installed if installed.is_dir() else package.parents[1] / "config"
 
 
+def user_file(name: str, folder: Path | None) -> Path | None:
+    """Return where something of the user's is kept beside the platform file.
+
+    None, for in memory only: without a name or a folder, or with the configuration that ships
+    with CoSMic, which is nobody's to change.
+    """
+    if not name or folder is None or folder.resolve() == shipped_config_dir():
+        return None
+    return folder / name
+
+
 def read_toml(path: Path) -> dict[str, object]:
     """Read a TOML file.
 

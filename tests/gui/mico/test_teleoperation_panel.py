@@ -162,3 +162,12 @@ def test_what_cannot_be_started_says_why(qtbot, panel):
     press_start(qtbot, panel)
     assert "reset the stop first" in panel.message.text()
     assert panel.sign.words == "off"
+
+
+def test_a_changed_profile_is_taken_back_as_it_was_configured(panel, qtbot):
+    steering = teleoperation(panel)
+    steering.edit_axis("sticks", 0, scale=2.0)
+    panel.profiles.setCurrentText("sticks")
+    qtbot.mouseClick(panel.as_configured, Qt.MouseButton.LeftButton)
+    assert steering.profile("sticks").axis[0].scale == 1.0
+    assert panel.table.item(0, SCALE).text() == "1"

@@ -3,20 +3,18 @@
 import logging
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 from typing_extensions import override
 
 from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import Clock
-from cosmic.frame.errors import CosmicError, DeviceError, MoveRefused, NotAvailable
+from cosmic.frame.errors import CosmicError, DeviceError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.task import Task
-from cosmic.frame.task_application import TaskApplication
-from cosmic.mico.api.initialisation import Confirm, InitialisationRun
+from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.trajectory_site import TrajectorySite
-from cosmic.mico.api.ways import Way, follow, way_from_plan
+from cosmic.mico.api.ways import Way, way_from_plan
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT, CollisionChecker
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.collision_manager import CollisionManager
@@ -29,27 +27,13 @@ from cosmic.mico.hw.interface import Controller
 
 logger = logging.getLogger(__name__)
 
-WAY_BUDGET_S: Final = 1.0
-"""How long a way is looked for, in wall time."""
 
+class MicoApplication(MicoApplicationBase):
+    """Owns the `DeviceManager` and carries out what takes long, in its own thread."""
 
-class MicoApplication(TaskApplication):
-    """Owns the `DeviceManager` and carries out what takes long, in its own thread.
-
-    Signals
-    -------
-    way_found(Way), way_missing(MoveVerdict)
-        How `search_way` ended.
-    initialisation_changed(SequenceReport)
-        The initialisation sequence is further; in the application's thread.
-    status_changed()
-        Devices came or went, or MiCo failed.
-    """
-
-    rescanned = Signal()
-    way_found = Signal(object)
-    way_missing = Signal(object)
-    initialisation_changed = Signal(object)
+    manager: DeviceManager
+    collision: CollisionManager | None
+    undo: UndoHistory
 
     def __init__(
         self,
@@ -78,12 +62,13 @@ class MicoApplication(TaskApplication):
             WayFinder(self.manager, self.collision.model) if self.collision is not None else None
         )
         self.undo = UndoHistory(self.manager)
-        self.teleoperation = Teleoperation(self.manager, policy)
+        self.teleoperation = Teleoperation(self.manager, policy, folder=folder)
         self.trajectories = TrajectorySite(self, policy, platform, folder)
         self._failure = ""
         self._forget = policy.on_safe_stop(self.manager.stop)
 
     @property
+    @override
     def failure(self) -> str:
         """Why MiCo cannot work; empty when it can."""
         return self._failure
@@ -116,27 +101,7 @@ class MicoApplication(TaskApplication):
         if self.clearance_watch is not None:
             self.clearance_watch.start()
 
-    def initialise_platform(
-        self, *, skip_known: bool = False, confirm: Confirm | None = None
-    ) -> Task:
-        """Carry the initialisation sequence out; returns at once.
-
-        `initialisation_changed` tells how far it is; the arguments are those of
-        `Mico.initialise`.
-
-        Raises
-        ------
-        NotAvailable
-            Another long operation is under way.
-        """
-        run = InitialisationRun(
-            self.manager,
-            skip_known=skip_known,
-            confirm=confirm,
-            on_report=self.initialisation_changed.emit,
-        )
-        return self.begin("Initialisation", run.run)
-
+    @override
     def rescan(self) -> Task:
         """Look again for the hardware; returns at once.
 
@@ -149,6 +114,7 @@ class MicoApplication(TaskApplication):
 
     # Ways round (ECM)
 
+    @override
     def find_way(self, targets: Mapping[str, float], budget_s: float) -> Way:
         """Return a way of some axes to `targets`, in gate coordinates; waits for it.
 
@@ -162,33 +128,6 @@ class MicoApplication(TaskApplication):
         if self.way_finder is None:
             raise NotAvailable(f"{NO_MODEL_TEXT}: without one there is nothing to go round")
         return way_from_plan(self.way_finder.find(targets, budget_s))
-
-    def search_way(self, targets: Mapping[str, float], budget_s: float = WAY_BUDGET_S) -> Task:
-        """Look for a way in the application's thread; `way_found` or `way_missing` tells."""
-
-        def search(task: Task) -> None:
-            try:
-                way = self.find_way(targets, budget_s)
-            except MoveRefused as exc:
-                self.way_missing.emit(exc.verdict)
-                task.fail(exc)
-            except CosmicError as exc:
-                task.fail(exc)
-            else:
-                self.way_found.emit(way)
-                task.finish()
-
-        return self.begin("Looking for a way", search)
-
-    def follow_way(self, way: Way, source: str) -> Task:
-        """Go a way that was found; returns at once.
-
-        Raises
-        ------
-        NotAvailable
-            Another long operation is under way.
-        """
-        return self.begin("Going round", lambda task: follow(self.manager, way, task, source))
 
     def _rescan(self, task: Task) -> None:
         task.report(0.1, "closing and opening the library")

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from cosmic.frame.config import shipped_config_dir
+from cosmic.frame.config import user_file
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.task import Task
 from cosmic.frame.task_application import Job
@@ -24,8 +24,6 @@ from cosmic.mico.core.trajectory.rehearsal import Rehearsal, Stage, Told, rehear
 if TYPE_CHECKING:
     from cosmic.mico.api.trajectory_player import TrajectoryPlayer
     from cosmic.mico.core.trajectory_recorder import TrajectoryRecorder
-
-POSES_IN_MEMORY: Final = ""
 
 
 class Worker(Protocol):
@@ -70,7 +68,7 @@ class TrajectorySite:
         self.recorder: TrajectoryRecorder | None = None
         self.manager = worker.manager
         self.platform = platform
-        self.poses = PoseBook(_poses_path(self.manager.settings.poses, folder))
+        self.poses = PoseBook(user_file(self.manager.settings.poses, folder))
         self._answers: PureAnswers | None = None
         self._rehearsing = Lock()
 
@@ -166,10 +164,3 @@ class TrajectorySite:
         checker = pure_copy(live, self._answers, self.manager.names())
         axes = bound.trajectory.axes
         return checker, ClearanceSearch(self._answers.sweep, axes, live.ignored_pairs)
-
-
-def _poses_path(name: str, folder: Path | None) -> Path | None:
-    """Return where named poses are kept; the shipped configuration is nobody's to change."""
-    if folder is None or name == POSES_IN_MEMORY or folder.resolve() == shipped_config_dir():
-        return None
-    return folder / name

@@ -61,6 +61,10 @@ class TeleoperationPanel(QWidget):
         self.devices = named(QComboBox(), "teleoperationDevice")
         self.profiles = named(QComboBox(), "teleoperationProfile")
         self.start = named(push_button("Start", ""), "teleoperationStart")
+        self.as_configured = named(
+            push_button("As configured", "Take this profile as the platform file has it"),
+            "profileAsConfigured",
+        )
         self.sign = PhaseSign()
         self.rates = ElidedLabel()
         self.bars = InputBars()
@@ -125,10 +129,12 @@ class TeleoperationPanel(QWidget):
         for widget in (self.pace, QLabel("fine:"), self.fine_share, QLabel("by"), self.fine_button):
             row.addWidget(widget)
         row.addWidget(self.rates, 1)
+        row.addWidget(self.as_configured)
         return row
 
     def _connect(self) -> None:
         self.start.clicked.connect(self._on_start)
+        self.as_configured.clicked.connect(lambda: self._edit(self._teleoperation.reset_profile))
         self.profiles.currentIndexChanged.connect(self._on_profile_chosen)
         self.table.changed.connect(self._on_table_changed)
         self.table.refused.connect(self._say)

@@ -106,6 +106,7 @@ class TeleoperationSettings(StrictModel):
     feedback_un: float = Field(default=100.0, gt=0)
     soft_force_un: float = Field(default=60.0, gt=0)
     hard_force_un: float = Field(default=140.0, gt=0)
+    profiles: str = "profiles.toml"
     profile: Annotated[tuple[TeleoperationProfileSettings, ...], Field(strict=False)] = ()
 
     @model_validator(mode="after")

@@ -3,10 +3,10 @@
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from threading import RLock
 
-from pydantic import ValidationError
-
+from cosmic.frame.config import user_file
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.core.device_commander import DeviceCommander
@@ -16,6 +16,7 @@ from cosmic.mico.core.stop_latch import StopState
 from cosmic.mico.core.teleoperation.driver import AxisDriver
 from cosmic.mico.core.teleoperation.input_thread import InputThread, Steering
 from cosmic.mico.core.teleoperation.mapping import Converter, ProfileMapping
+from cosmic.mico.core.teleoperation.profile_book import ProfileBook
 from cosmic.mico.core.teleoperation.settings import TeleoperationProfileSettings
 from cosmic.mico.core.teleoperation.state import (
     RateMeter,
@@ -61,13 +62,14 @@ class Teleoperation:
         manager: ManagerPort,
         policy: FailurePolicy,
         sources: InputSources | None = None,
+        folder: Path | None = None,
     ) -> None:
         self._manager = manager
         self._policy = policy
         self.settings = manager.settings.teleoperation
         self.sources = sources or InputSources(simulated=manager.controller.simulated)
         self.coupling: ForceCoupling | None = None
-        self._profiles = {each.name: each for each in self.settings.profile}
+        self._book = ProfileBook(self.settings, user_file(self.settings.profiles, folder))
         self._lock = RLock()
         self._thread: InputThread | None = None
         self._device: InputDevice | None = None
@@ -98,20 +100,29 @@ class Teleoperation:
     @property
     def profiles(self) -> tuple[TeleoperationProfileSettings, ...]:
         """The profiles as they are now, in their order."""
-        return tuple(self._profiles.values())
+        return self._book.profiles
 
     def profile(self, name: str) -> TeleoperationProfileSettings:
         """Return a profile; raises `NotAvailable` where there is none of that name."""
-        found = self._profiles.get(name)
-        if found is None:
-            known = ", ".join(self._profiles) or "none"
-            raise NotAvailable(f"there is no teleoperation profile {name!r}; there are: {known}")
-        return found
+        return self._book[name]
+
+    def reset_profile(self, name: str) -> TeleoperationProfileSettings:
+        """Use a profile as the platform file has it; returns it.
+
+        Raises
+        ------
+        NotAvailable
+            The platform file has none of that name.
+        ConfigError
+            As `set_profile`.
+        """
+        return self._use(self._book.given(name))
 
     def set_profile(self, profile: TeleoperationProfileSettings) -> None:
-        """Use `profile` from now on, in place of the one of its name; the file is left as it is.
+        """Use `profile` from now on, in place of the one of its name.
 
-        Steering goes on with it once the sticks were at rest.
+        It is kept in the file of `[mico.teleoperation] profiles`; the platform file stays as it
+        is. Steering goes on with it once the sticks were at rest.
 
         Raises
         ------
@@ -126,13 +137,13 @@ class Teleoperation:
             running = thread is not None and self.state.profile == profile.name
             if thread is not None and running and not thread.stopped:
                 mapping = self._mapping(profile)
-                before = self._mapping(self._profiles[profile.name])
+                before = self._mapping(self._book[profile.name])
                 if set(mapping.positioners) - set(before.positioners):
                     raise ConfigError(
                         f"profile {profile.name!r}: stop before it moves other positioners"
                     )
                 thread.remap(mapping, self._converter(mapping))
-            self._profiles[profile.name] = profile
+            self._book.put(profile)
 
     def edit_axis(self, name: str, index: int, **changes: object) -> TeleoperationProfileSettings:
         """Change one row of a profile's mapping and use it; returns the profile.
@@ -142,12 +153,7 @@ class Teleoperation:
         ConfigError
             As `set_profile`; or a value is none that the key takes.
         """
-        before = self.profile(name)
-        rows = [each.model_dump() for each in before.axis]
-        if not 0 <= index < len(rows):
-            raise ConfigError(f"profile {name!r} has no row {index}")
-        rows[index] |= changes
-        return self.edit_profile(name, axis=rows)
+        return self._use(self._book.edited_axis(name, index, changes))
 
     def edit_profile(self, name: str, **changes: object) -> TeleoperationProfileSettings:
         """Change keys of a profile and use it; returns the profile.
@@ -157,15 +163,11 @@ class Teleoperation:
         ConfigError
             As `set_profile`; or a value is none that the key takes.
         """
-        whole = self.profile(name).model_dump() | changes
-        try:
-            after = TeleoperationProfileSettings.model_validate(whole)
-        except ValidationError as exc:
-            first = exc.errors(include_url=False)[0]
-            where = ".".join(str(part) for part in first["loc"])
-            raise ConfigError(f"profile {name!r}: {where}: {first['msg']}") from None
-        self.set_profile(after)
-        return after
+        return self._use(self._book.edited(name, changes))
+
+    def _use(self, profile: TeleoperationProfileSettings) -> TeleoperationProfileSettings:
+        self.set_profile(profile)
+        return profile
 
     def _kinds(self) -> dict[str, str]:
         return {each.name: each.kind for each in self._manager.settings.positioner}
