@@ -7,6 +7,7 @@ from typing import Any, Final
 from pydantic import BaseModel
 
 import cosmic
+from cosmic.app.remote_station import StationControl
 from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.control.handle import ControlHandle
 from cosmic.autonomy.control.law import ControlState
@@ -23,6 +24,14 @@ from cosmic.daqco.core.recording_format import AxisPosition, Overrun, RecordedEv
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.errors import DeviceFault, ExportCancelled, RecordingExistsError
+from cosmic.frame.network.errors import (
+    Busy,
+    CallRefused,
+    CommandExpired,
+    RemoteDefect,
+    StationAway,
+    StationTimeout,
+)
 from cosmic.frame.plan_shape import PlanStatus
 from cosmic.frame.task import Progress, Task
 from cosmic.mico.api.axis import Axis, Jogging
@@ -64,6 +73,7 @@ from cosmic.vico.hw.interface import CameraCounters, CameraRanges, CameraSetting
 
 CLASSES: Final[dict[str, type]] = {
     "Rig": cosmic.Rig,
+    "StationControl": StationControl,
     "Mico": Mico,
     "Collision": Collision,
     "Approach": Approach,
@@ -153,6 +163,12 @@ FURTHER_EXCEPTIONS: Final = (
     ExportCancelled,
     TrajectoryError,
     AwayFromStartError,
+    StationAway,
+    StationTimeout,
+    Busy,
+    CommandExpired,
+    CallRefused,
+    RemoteDefect,
 )
 # Attributes that an object gets when it is made, which the class does not show.
 MADE_LATER: Final = {

@@ -1,5 +1,6 @@
 """Makes the applications of one process out of the platform file."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -42,10 +43,33 @@ class Site:
     seed: int
 
 
-def build_mico(
+@dataclass(frozen=True)
+class Hosted:
+    """The applications of one process, and what injects faults into its simulated controller."""
+
+    mico: MicoApplication | None = None
+    daqco: DaqcoApplication | None = None
+    vico: VicoApplication | None = None
+    faults: "Faults | None" = None
+
+
+def build_applications(
+    site: Site, names: Sequence[str], guis: Mapping[str, GuiFactory | None]
+) -> Hosted:
+    """Make the applications of those names that the platform file describes."""
+    mico, faults, daqco, vico = None, None, None, None
+    if "mico" in names:
+        mico, faults = _build_mico(site, guis.get("mico"))
+    if "daqco" in names and site.file.daqco is not None:
+        daqco = _build_daqco(site, site.file.daqco, guis.get("daqco"))
+    if "vico" in names and site.file.vico is not None:
+        vico = _build_vico(site, site.file.vico, guis.get("vico"))
+    return Hosted(mico, daqco, vico, faults)
+
+
+def _build_mico(
     site: Site, gui_factory: GuiFactory | None
 ) -> "tuple[MicoApplication, Faults | None]":
-    """Make MiCo, and what injects faults into its simulated controller."""
     settings = site.file.mico
     controller: Controller
     faults: Faults | None = None
@@ -66,10 +90,9 @@ def build_mico(
     return application, faults
 
 
-def build_daqco(
+def _build_daqco(
     site: Site, settings: DaqcoSettings, gui_factory: GuiFactory | None
 ) -> DaqcoApplication:
-    """Make DAQCo."""
     library = make_library(
         settings.backend,
         clock=site.clock,
@@ -88,10 +111,9 @@ def build_daqco(
     )
 
 
-def build_vico(
+def _build_vico(
     site: Site, settings: VicoSettings, gui_factory: GuiFactory | None
 ) -> VicoApplication:
-    """Make ViCo."""
     scene, simulation = site.scene, None
     if scene is not None and scene.lens is not None and scene.light is not None:
         simulation = SimPeripherals(scene.lens, scene.light, site.clock, site.seed)

@@ -1,18 +1,17 @@
 """A platform as its files describe it: configuration in, running applications out."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cosmic.app.hosting import Site, build_daqco, build_mico, build_vico
+from cosmic.app.elsewhere import Elsewhere, open_stations
+from cosmic.app.hosting import Site, build_applications
+from cosmic.app.joins import join_here, join_stations
+from cosmic.app.network_settings import own_certificates
 from cosmic.app.platform_file import KNOWN_APPLICATIONS, PlatformFile, load_platform, load_twin
-from cosmic.autonomy.couplings import join_teleoperation
-from cosmic.autonomy.interlocks import (
-    join_force_limits,
-    join_positions,
-    join_stage_positions,
-)
-from cosmic.autonomy.places import join_places
+from cosmic.app.serve_options import StationAddress
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import Clock, RatedClock
@@ -29,7 +28,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Platform:
-    """What one process runs: the applications, their clock, and the policy for failures."""
+    """What one process runs: the applications, their clock, and the policy for failures.
+
+    An application that another station hosts stands in the place of one of its own.
+    """
 
     file: PlatformFile
     path: Path
@@ -39,29 +41,72 @@ class Platform:
     faults: "Faults | None" = None
     daqco: DaqcoApplication | None = None
     vico: VicoApplication | None = None
+    elsewhere: Elsewhere = field(default_factory=Elsewhere)
 
     @property
     def simulated(self) -> bool:
-        """True when no hardware moves."""
-        return self.file.mico.backend == "simulated"
+        """True when no hardware moves, neither here nor at the stations used."""
+        real_here = self.file.mico.backend != "simulated" and bool(self.own)
+        return not real_here and all(each.facts.simulated for each in self.elsewhere.stations)
+
+    @property
+    def own(self) -> "dict[str, MicoApplication | DaqcoApplication | VicoApplication]":
+        """The applications that run in this process, by name."""
+        return {
+            name: each for name, each in self._all.items() if name not in self.elsewhere.host_of
+        }
+
+    @property
+    def _all(self) -> "dict[str, MicoApplication | DaqcoApplication | VicoApplication]":
+        found = {"mico": self.mico, "daqco": self.daqco, "vico": self.vico}
+        return {name: each for name, each in found.items() if each is not None}
+
+    @property
+    def failure(self) -> str:
+        """Why MiCo, if it runs here, has no devices; empty when all is well."""
+        return self.mico.failure if self.mico is not None and "mico" in self.own else ""
+
+    def begin_elsewhere(self) -> None:
+        """Begin to use what other stations host; what they have is known when this returns."""
+        for name, each in self._all.items():
+            if name in self.elsewhere.host_of:
+                each.initialize()
+        join_stations(self.mico, self.daqco, self.elsewhere, self.policy)
 
     def initialize(self) -> None:
-        """Open the hardware of every application."""
-        if self.mico is not None:
-            self.mico.initialize()
-        if self.daqco is not None:
-            self.daqco.initialize()
-        if self.vico is not None:
-            self.vico.initialize()
+        """Open the hardware of every application that runs here."""
+        for each in self.own.values():
+            each.initialize()
 
     def shut_down(self) -> None:
         """Stop and close every application; any state. Motion ends first."""
-        if self.mico is not None:
-            self.mico.shut_down()
-        if self.daqco is not None:
-            self.daqco.shut_down()
-        if self.vico is not None:
-            self.vico.shut_down()
+        with ExitStack() as at_end:  # from the last line to the first, whatever fails
+            at_end.callback(self.elsewhere.close)
+            for each in (self.vico, self.daqco, self.mico):
+                if each is not None:
+                    at_end.callback(each.shut_down)
+
+
+@dataclass(frozen=True)
+class Uses:
+    """Which stations elsewhere a process uses, and as whom.
+
+    Attributes
+    ----------
+    stations : tuple of StationAddress
+        Whose applications stand in the place of own ones.
+    program : str
+        What kind of program this is, such as "window": so the stations call it.
+    certificates : Path or None
+        Folder to prove itself with, in place of the one in the platform file.
+    every : bool
+        Use all that they host, and not only those among the applications asked for.
+    """
+
+    stations: tuple[StationAddress, ...] = ()
+    program: str = "script"
+    certificates: Path | None = None
+    every: bool = True
 
 
 def build_platform(
@@ -72,6 +117,7 @@ def build_platform(
     cold: bool = False,
     seed: int = 0,
     sample: str | None = None,
+    uses: Uses = Uses(),
     mico_gui: GuiFactory | None = None,
     daqco_gui: GuiFactory | None = None,
     vico_gui: GuiFactory | None = None,
@@ -83,9 +129,11 @@ def build_platform(
     config : path or None
         A platform.toml or its folder; None is the one that ships with CoSMic.
     applications : tuple of str
-        Which to make, as far as the platform file names them.
+        Which to make, as far as the platform file names them and no station hosts them.
     rate, cold, seed, sample
         Of the simulated platform; see `cosmic.connect`.
+    uses : Uses
+        Stations to connect to; the lines stand when this returns.
     mico_gui, daqco_gui, vico_gui : callable or None
         Make the applications' GUI components, where there is a window.
 
@@ -95,48 +143,68 @@ def build_platform(
         The configuration is wrong, or a rate other than 1 was asked for real hardware.
     NotConnectedError
         The vendor library is not there.
+    StationAway
+        A station does not answer.
     """
     file, path = load_platform(config)
-    simulated = file.mico.backend == "simulated"
-    if not simulated and (rate != 1.0 or cold or sample is not None):
+    _check_simulation(file, path, rate=rate, only_simulated=cold or sample is not None)
+    try:
+        clock = RatedClock(rate)
+    except (TypeError, ValueError) as exc:
+        raise ConfigError(f"rate: {exc}") from None
+    policy = FailurePolicy()
+    guis = {"mico": mico_gui, "daqco": daqco_gui, "vico": vico_gui}
+    with ExitStack() as undo:
+        elsewhere = _connect(uses, applications, file, path, policy)
+        undo.callback(elsewhere.close)
+        hosted = [
+            name
+            for name in applications
+            if name in file.platform.applications and name not in elsewhere.host_of
+        ]
+        scene = None
+        if file.mico.backend == "simulated" and hosted:
+            twin = load_twin(file, path)
+            twin = twin if sample is None else put_on(twin, sample, seed)
+            scene = Scene.from_settings(twin, clock, seed=seed, cold=cold, folder=path.parent)
+        site = Site(file, path, clock, policy, scene, seed)
+        own = build_applications(site, hosted, guis)
+        join_here(own, site)
+        used = {name: elsewhere.application(name, policy, guis[name]) for name in guis}
+        platform = Platform(
+            file=file,
+            path=path,
+            clock=clock,
+            policy=policy,
+            mico=own.mico or used["mico"],
+            faults=own.faults,
+            daqco=own.daqco or used["daqco"],
+            vico=own.vico or used["vico"],
+            elsewhere=elsewhere,
+        )
+        platform.begin_elsewhere()
+        undo.pop_all()
+    return platform
+
+
+def _check_simulation(file: PlatformFile, path: Path, *, rate: float, only_simulated: bool) -> None:
+    if file.mico.backend != "simulated" and (rate != 1.0 or only_simulated):
         raise ConfigError(
             f"{path}: mico.backend: only the simulated platform has a rate, --cold or --sample"
         )
     if rate != 1.0 and file.daqco is not None and file.daqco.backend != "simulated":
         raise ConfigError(f"{path}: daqco.backend: real boards have no rate; leave --rate out")
-    try:
-        clock = RatedClock(rate)
-    except (TypeError, ValueError) as exc:
-        raise ConfigError(f"rate: {exc}") from None
-    scene = None
-    if simulated:
-        twin = load_twin(file, path)
-        twin = twin if sample is None else put_on(twin, sample, seed)
-        scene = Scene.from_settings(twin, clock, seed=seed, cold=cold, folder=path.parent)
-    site = Site(file, path, clock, FailurePolicy(), scene, seed)
-    hosted = [name for name in applications if name in file.platform.applications]
-    mico, faults, daqco, vico = None, None, None, None
-    if "mico" in hosted:
-        mico, faults = build_mico(site, mico_gui)
-    if "daqco" in hosted and file.daqco is not None:
-        daqco = build_daqco(site, file.daqco, daqco_gui)
-    if "vico" in hosted and file.vico is not None:
-        vico = build_vico(site, file.vico, vico_gui)
-    if daqco is not None and mico is not None:
-        join_force_limits(daqco, mico)
-        join_teleoperation(mico, daqco)
-        join_positions(daqco.recorder, mico, clock)
-    if vico is not None and mico is not None:
-        join_stage_positions(vico, mico)
-        kept_in = vico.settings.calibration
-        join_places(vico, mico, path.parent / kept_in if kept_in else None)
-    return Platform(
-        file=file,
-        path=path,
-        clock=clock,
-        policy=site.policy,
-        mico=mico,
-        faults=faults,
-        daqco=daqco,
-        vico=vico,
+
+
+def _connect(
+    uses: Uses, applications: Sequence[str], file: PlatformFile, path: Path, policy: FailurePolicy
+) -> Elsewhere:
+    if not uses.stations:
+        return Elsewhere()
+    return open_stations(
+        uses.stations,
+        policy,
+        program=uses.program,
+        certificates=own_certificates(file.network, path.parent, uses.certificates),
+        wanted=KNOWN_APPLICATIONS if uses.every else applications,
     )

@@ -30,11 +30,11 @@ logger = logging.getLogger(__name__)
 CONNECT_LIMIT_S: Final = 5.0
 """How long a station may take to answer at the start."""
 
-ControlListener = Callable[["ControlState"], None]
+ControlListener = Callable[["StationControl"], None]
 
 
 @dataclass(frozen=True, slots=True)
-class ControlState:
+class StationControl:
     """Who may move things at a station, as seen from here.
 
     Attributes
@@ -151,15 +151,15 @@ class RemoteStation:
     # Who may move there
 
     @property
-    def control(self) -> ControlState:
+    def control(self) -> StationControl:
         """Who may move things there."""
         with self._lock:
             lease, away = self._lease, self._away
         if away or lease is None:
-            return ControlState(self.name, away=away)
+            return StationControl(self.name, away=away)
         here = self._connection.holds_lease and lease.holder == self._client
         offered = lease.offered and lease.local
-        return ControlState(self.name, lease.holder, here=here, offered=offered)
+        return StationControl(self.name, lease.holder, here=here, offered=offered)
 
     def on_control(self, listener: ControlListener) -> Callable[[], None]:
         """Call `listener` now and at each change; returns the function that ends it."""

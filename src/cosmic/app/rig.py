@@ -3,17 +3,20 @@
 import atexit
 import logging
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from typing_extensions import override
 
-from cosmic.app.platform import Platform, build_platform
-from cosmic.app.platform_file import KNOWN_APPLICATIONS
+from cosmic.app.platform import Platform, Uses, build_platform
+from cosmic.app.platform_file import KNOWN_APPLICATIONS, check_applications
+from cosmic.app.remote_station import StationControl
+from cosmic.app.serve_options import StationAddress
 from cosmic.autonomy.control.control import Control
 from cosmic.daqco.api.daqco import Daqco
-from cosmic.frame.errors import ConfigError, NotAvailable, NotConnectedError
+from cosmic.frame.errors import NotAvailable, NotConnectedError
 from cosmic.mico.api.mico import Mico
 from cosmic.vico.api.vico import Vico
 
@@ -36,7 +39,7 @@ class Rig:
         self._daqco = Daqco(platform.daqco) if platform.daqco is not None else None
         self._vico = Vico(platform.vico) if platform.vico is not None else None
         self._control: Control | None = None
-        if self._mico is not None:
+        if self._mico is not None and "mico" in platform.own:
             self._control = Control(
                 self._mico,
                 self._daqco,
@@ -79,10 +82,39 @@ class Rig:
 
     @property
     def control(self) -> Control:
-        """Control loops; raises `NotAvailable` where mico is not hosted."""
+        """Control loops; raises `NotAvailable` where mico is not hosted in this process."""
+        if self._control is None and self._mico is not None:
+            raise NotAvailable("mico runs at another station; run the control loop there")
         if self._control is None:
             raise NotAvailable("mico is not hosted here; a control loop has nothing to move")
         return self._control
+
+    @property
+    def stations(self) -> dict[str, StationControl]:
+        """The other stations in use, by name, with who may move things there."""
+        return {each.name: each.control for each in self._platform.elsewhere.stations}
+
+    def take_control(self) -> None:
+        """Take the right to move things at every station in use; all of them, or none.
+
+        Raises
+        ------
+        MoveRefused
+            Another holds it, or the operator there keeps it (`NO_LEASE`).
+        StationAway
+            A station cannot be reached.
+        """
+        with ExitStack() as undo:
+            for each in self._platform.elsewhere.stations:
+                if not each.control.here:
+                    each.take_control()
+                    undo.callback(each.release_control)
+            undo.pop_all()
+
+    def release_control(self) -> None:
+        """Give the right to move back at every station; what moves by it stops."""
+        for each in self._platform.elsewhere.stations:
+            each.release_control()
 
     @property
     def stopped(self) -> str | None:
@@ -91,7 +123,14 @@ class Rig:
         return mico.manager.latch.state.reason if mico is not None else None
 
     def stop(self, reason: str = "stop from a script") -> None:
-        """Stop every axis now; nothing moves again before `reset_stop`. Returns at once."""
+        """Stop every axis now; nothing moves again before `reset_stop`. Returns at once.
+
+        Raises
+        ------
+        StationAway
+            The axes are at a station that cannot be reached. What this program had begun to move
+            there stops by itself.
+        """
         if self._platform.mico is not None:
             self._platform.mico.manager.stop(reason)
 
@@ -112,6 +151,8 @@ class Rig:
         NotAvailable
             The platform is real: it has troubles of its own.
         """
+        if self._platform.faults is None and "mico" in self._platform.elsewhere.host_of:
+            raise NotAvailable("mico runs at another station; inject faults there")
         if self._platform.faults is None:
             raise NotAvailable("faults can be injected into a simulated platform only")
         return self._platform.faults
@@ -146,6 +187,7 @@ def connect(
     cold: bool = False,
     seed: int = 0,
     sample: str | None = None,
+    certificates: str | Path | None = None,
 ) -> Rig:
     """Start the platform in this process and return it; no window and no event loop needed.
 
@@ -157,12 +199,16 @@ def connect(
         Which of "mico", "daqco", "vico" to host, as far as the platform file names them.
     rate : float
         How many times faster than the wall the simulated platform runs at most.
-    stations : mapping
-        Addresses of other stations.
+    stations : mapping of str to str
+        Other stations by name, with where they listen, such as
+        ``{"fibervision": "tcp/127.0.0.1:7448"}``. What they host is used there and not hosted here.
     cold : bool
         Start the simulated platform at power-up, with no position known.
     seed : int
         Of everything random in the simulated platform.
+    certificates : path or None
+        Folder with which to prove who this is, for stations at ``tls/``; None: the one that the
+        platform file names.
     sample : str or None
         What lies on the simulated plate, as twin.toml names it, such as "forty-dry"; None: the
         fibres that twin.toml lists.
@@ -173,26 +219,31 @@ def connect(
         The configuration is wrong; a line for every mistake with file, key and reason.
     NotConnectedError
         The vendor library is not there, or no device answers.
+    StationAway
+        A station does not answer.
     NotAvailable
-        `stations` was given: other stations are not built yet.
+        What stations need is not installed.
     """
-    if stations:
-        raise NotAvailable("other stations are not built yet; leave stations out")
     if isinstance(applications, str):
         applications = (applications,)
-    unknown = [name for name in applications if name not in KNOWN_APPLICATIONS]
-    if unknown:
-        raise ConfigError(
-            f"applications: unknown application {unknown[0]!r}; "
-            f"known are {', '.join(KNOWN_APPLICATIONS)}"
-        )
+    check_applications(applications, "applications")
+    uses = Uses(
+        tuple(StationAddress(*each) for each in (stations or {}).items()),
+        certificates=None if certificates is None else Path(certificates),
+    )
     platform = build_platform(
-        config, applications=tuple(applications), rate=rate, cold=cold, seed=seed, sample=sample
+        config,
+        applications=tuple(applications),
+        rate=rate,
+        cold=cold,
+        seed=seed,
+        sample=sample,
+        uses=uses,
     )
     rig = Rig(platform)
     atexit.register(rig.close)
     platform.initialize()
-    if platform.mico is not None and platform.mico.failure:
+    if platform.failure:
         rig.close()
-        raise NotConnectedError(platform.mico.failure)
+        raise NotConnectedError(platform.failure)
     return rig

@@ -8,8 +8,8 @@ from contextlib import ExitStack, contextmanager
 from threading import Event
 from typing import Final
 
-from cosmic.app.network_settings import serving
-from cosmic.app.platform import Platform, build_platform
+from cosmic.app.network_settings import Serving, serving
+from cosmic.app.platform import Platform, Uses, build_platform
 from cosmic.app.platform_file import check_applications, load_platform
 from cosmic.app.serve_options import ServeOptions
 from cosmic.app.station_host import StationHost
@@ -47,12 +47,12 @@ def serve(options: ServeOptions) -> int:
     with ExitStack() as at_end:
         at_end.callback(set_up_logging(console=True))
         ended = at_end.enter_context(_ending_signals())
-        platform = _build(options, options.applications or file.platform.applications)
+        platform = _build(options, how, options.applications or file.platform.applications)
         at_end.callback(platform.shut_down)
         at_end.callback(install_hooks(platform.policy))
         platform.initialize()
-        if platform.mico is not None and platform.mico.failure:
-            raise NotConnectedError(platform.mico.failure)
+        if platform.failure:
+            raise NotConnectedError(platform.failure)
         host = StationHost(platform, how)
         at_end.callback(host.close)  # first of all, so that nobody is answered any more
         sys.stdout.write(f"{host.address}\n")
@@ -61,7 +61,7 @@ def serve(options: ServeOptions) -> int:
     return 0
 
 
-def _build(options: ServeOptions, hosted: tuple[str, ...]) -> Platform:
+def _build(options: ServeOptions, how: Serving, hosted: tuple[str, ...]) -> Platform:
     platform = build_platform(
         options.config,
         applications=hosted,
@@ -69,6 +69,7 @@ def _build(options: ServeOptions, hosted: tuple[str, ...]) -> Platform:
         cold=options.cold,
         seed=options.seed,
         sample=options.sample,
+        uses=Uses(options.stations, how.name, options.certificates, every=True),
     )
     for name in options.applications:
         if getattr(platform, name) is None:
