@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cosmic.daqco.api.files import NamedFile, named_file
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.settings import (
     COLOURS,
@@ -16,6 +17,7 @@ from cosmic.daqco.core.settings import (
 )
 from cosmic.daqco.hw.interface import BoardInfo
 from cosmic.frame.errors import ConfigError, CosmicError
+from cosmic.frame.file_names import directory_problem
 from cosmic.frame.task import Task
 
 FORCE = ScaleSettings(name="Probe", unit="uN", coefficients=(0.0, 20.0))
@@ -94,6 +96,8 @@ class FakePort:
         self.settings = given
         self.running = True
         self.problem = ""
+        self.away = ""
+        self.elsewhere = ""
         self.counters = Counted()
         self.recording = Recorded()
         self.limits: tuple[Limited, ...] = tuple(Limited(each) for each in given.limit)
@@ -114,7 +118,21 @@ class FakePort:
     def rate_hz(self) -> float:
         return self.settings.rate_hz
 
-    def subscribe(self, receiver: Callable[[DataChunk], object]) -> Callable[[], None]:
+    def carry_out(self, action, told) -> None:
+        try:
+            result = action()
+        except CosmicError as exc:
+            told(None, exc)
+        else:
+            told(result, None)
+
+    def folder_problem(self, directory: str) -> str:
+        return directory_problem(directory)
+
+    def name_recording(self, base, option, directory, when) -> NamedFile:
+        return named_file(base, option, directory, when)
+
+    def follow(self, receiver: Callable[[DataChunk], object]) -> Callable[[], None]:
         self._receivers.append(receiver)
         return lambda: self._receivers.remove(receiver)
 

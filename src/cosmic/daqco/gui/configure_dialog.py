@@ -1,5 +1,6 @@
 """`UDaqConfigureDialog`: rates, channels and scales (thesis, Table F.3)."""
 
+from collections.abc import Callable
 from typing import Final
 
 from PySide6.QtCore import Qt
@@ -16,6 +17,7 @@ from PySide6.QtWidgets import (
 
 from cosmic.daqco.core.scale import VOLTS
 from cosmic.daqco.core.settings import HIGHEST_RATE_HZ, LOWEST_RATE_HZ
+from cosmic.daqco.gui.asking import Asking
 from cosmic.daqco.gui.channel_form import ChannelForm
 from cosmic.daqco.gui.channel_tree import ChannelTree
 from cosmic.daqco.gui.dialog import FieldDialog, button_box
@@ -70,6 +72,7 @@ class UDaqConfigureDialog(FieldDialog):
         self.buttons = button_box(Button.Apply | Button.Ok | Button.Cancel)
         self._build()
         self._connect()
+        self._asking = Asking(port, self)
         self._relay = PortRelay(port, self)
         self._relay.changed.connect(self._on_changed)
         self._fill(0)
@@ -243,22 +246,37 @@ class UDaqConfigureDialog(FieldDialog):
         self._draft.rate_hz, self._draft.refresh_hz = self.rate.value(), self.refresh.value()
         return True
 
-    def apply(self) -> bool:
-        """Put the draft in force; False when it was refused, and the dialog then says why."""
+    def apply(self) -> None:
+        """Put the draft in force; where it is refused, the dialog then says why."""
+        self._apply(self._on_applied)
+
+    def _apply(self, told: Callable[[object, CosmicError | None], None]) -> None:
         self.message.set_text("")
         if not (self._take_form() and self._take_rates()):
             self.message.set_text("◆ REFUSED: see the field")
-            return False
+            return
         try:
             settings = self._draft.settings()
-            if settings != self._port.settings:
-                self._port.apply(settings)
         except CosmicError as exc:
-            self.message.set_text(f"◆ REFUSED: {exc}")
-            return False
-        self._fill(self._row)
-        return True
+            told(None, exc)
+            return
+        if settings == self._port.settings:
+            told(None, None)
+            return
+        self.buttons.setEnabled(False)
+        self._asking.ask(lambda: self._port.apply(settings), told)
+
+    def _on_applied(self, _result: object, error: CosmicError | None) -> None:
+        self.buttons.setEnabled(True)
+        if error is not None:
+            self.message.set_text(f"◆ REFUSED: {error}")
+        else:
+            self._fill(self._row)
 
     def _on_ok(self) -> None:
-        if self.apply():
+        self._apply(self._on_ok_answered)
+
+    def _on_ok_answered(self, result: object, error: CosmicError | None) -> None:
+        self._on_applied(result, error)
+        if error is None:
             self.accept()

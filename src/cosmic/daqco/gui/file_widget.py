@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 from PySide6.QtCore import QTimer
 from PySide6.QtGui import QResizeEvent
@@ -16,13 +16,15 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from cosmic.daqco.api.files import NamedFile
 from cosmic.daqco.core.recording_format import SUFFIX
 from cosmic.daqco.gui.amounts import recording_text, room_text
 from cosmic.daqco.gui.append_row import append_row
+from cosmic.daqco.gui.asking import Asking, Told
 from cosmic.daqco.gui.file_naming import name_pattern
 from cosmic.daqco.gui.ports import DaqPort
 from cosmic.frame.errors import CosmicError
-from cosmic.frame.file_names import NameOption, directory_problem, file_name, name_problem
+from cosmic.frame.file_names import NameOption, name_problem
 from cosmic.frame.gui.ask_directory import ask_directory
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
@@ -33,9 +35,12 @@ from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, number_font
 from cosmic.frame.overrides import override
 
+T = TypeVar("T")
+
 LOOK_MS: Final = 500
 BYTES_A_SAMPLE: Final = 8
 WIDE_PX: Final = 110 * STEP_PX
+_BROWSE: Final = "Choose the directory"
 
 
 class UDaqFileWidget(QWidget):
@@ -56,13 +61,15 @@ class UDaqFileWidget(QWidget):
     ) -> None:
         super().__init__(parent)
         self._port, self._now = port, now
-        self._asking: QMessageBox | None = None
+        self._question: QMessageBox | None = None
+        self._waits = ""
+        self._asking = Asking(port, self)
         self._error, self._columns, self._chosen = "", 0, False
         self.base = tipped(QLineEdit("recording"), "Base of the file name")
         self.full_name = tipped(QLineEdit(), "")
         self.full_name.setReadOnly(True)
         self.directory = tipped(QLineEdit(str(port.directory)), "Where the file is stored")
-        self.browse = push_button("Browse…", "Choose the directory")
+        self.browse = push_button("Browse…", _BROWSE)
         self.start = named(push_button("Start recording", ""), "startRecording")
         self.stop = named(push_button("Stop recording", ""), "stopRecording")
         self.badge, self.told = StateBadge(State.UNKNOWN), ElidedLabel()
@@ -170,12 +177,14 @@ class UDaqFileWidget(QWidget):
         """Show what is being recorded, what may be done now and how much room there is."""
         recording = self._port.recording
         wrong_name = "" if recording.active else name_problem(self.base.text(), SUFFIX)
-        wrong_folder = "" if recording.active else directory_problem(self.directory.text())
+        text = self.directory.text()
+        wrong_folder = "" if recording.active else self._port.folder_problem(text)
         mark_refusal(self.base, wrong_name)
         mark_refusal(self.directory, wrong_folder)
         self._show_name(wrong_name)
         for widget in (self.base, self.directory, self.browse, *self.options.buttons()):
             widget.setEnabled(not recording.active)
+        self._show_browse()
         self._enable(wrong_name or wrong_folder)
         self._tell()
         self._show_room(wrong_folder)
@@ -192,30 +201,35 @@ class UDaqFileWidget(QWidget):
             self.full_name.setText(text)
         self.full_name.setToolTip(tip)
 
-    def _example(self) -> str:
-        return f"Now: {self._name_now()}"
+    def _show_browse(self) -> None:
+        where = self._port.elsewhere
+        self.browse.setEnabled(self.browse.isEnabled() and not where)
+        self.browse.setToolTip(f"The files lie {where}; type the directory" if where else _BROWSE)
 
-    def _name_now(self) -> str:
-        return file_name(
-            self.base.text(),
-            self.append,
-            suffix=SUFFIX,
-            when=self._now(),
-            directory=self.folder,
-        )
+    def _example(self) -> str:
+        if self._port.elsewhere:
+            return "The name is completed when the recording begins"
+        try:
+            return f"Now: {self._name_now().path.name}"
+        except CosmicError as exc:
+            return str(exc)
+
+    def _name_now(self) -> NamedFile:
+        return self._port.name_recording(self.base.text(), self.append, self.folder, self._now())
 
     def _enable(self, wrong: str) -> None:
-        recording, asking = self._port.recording, self._asking is not None
+        recording, asking = self._port.recording, self._question is not None
         reasons = (
             (recording.active, "A recording is running"),
             (asking, "Answer the question first"),
+            (bool(self._waits), self._waits),
             (not self._port.running, "Nothing is being acquired: start the acquisition first"),
             (bool(wrong), wrong),
         )
         reason = next((text for applies, text in reasons if applies), "")
         self.start.setEnabled(not reason)
         self.start.setToolTip(reason or "Record what is acquired into the file named above")
-        self.stop.setEnabled(recording.active)
+        self.stop.setEnabled(recording.active and not self._waits)
         self.stop.setToolTip(
             "Stop recording and close the file" if recording.active else "Nothing is being recorded"
         )
@@ -257,43 +271,47 @@ class UDaqFileWidget(QWidget):
         self._on_edited()
 
     def _on_start(self) -> None:
-        self.start.setEnabled(False)
-        self._error = ""
-        try:
-            path = self.folder / self._name_now()
-            there = path.stat() if path.exists() else None
-        except (OSError, CosmicError) as exc:
-            self._error = str(exc)
-            self.refresh()
-            return
-        if there is not None:
-            self._ask(path, there.st_size)
-        else:
-            self._record(path)
+        self._ask(self._name_now, self._on_named, "The name is being completed")
 
-    def _ask(self, path: Path, size_bytes: int) -> None:
+    def _ask(self, action: Callable[[], T], told: Told[T], what: str) -> None:
+        self._error, self._waits = "", what
+        self.refresh()
+        self._asking.ask(action, told)
+
+    def _answered(self, error: CosmicError | None) -> None:
+        self._waits = ""
+        self._error = str(error) if error is not None else ""
+        self.refresh()
+
+    def _on_named(self, named: NamedFile | None, error: CosmicError | None) -> None:
+        self._answered(error)
+        if named is None:
+            return
+        if named.size_bytes is not None:
+            self._ask_to_overwrite(named.path, named.size_bytes)
+        else:
+            self._record(named.path)
+
+    def _ask_to_overwrite(self, path: Path, size_bytes: int) -> None:
         box = overwrite_question(self, path, lambda: self._record(path, overwrite=True), size_bytes)
         box.finished.connect(self._on_answered)
-        self._asking = box
+        self._question = box
         box.open()
         self.refresh()
 
     def _on_answered(self) -> None:
-        self._asking = None
+        self._question = None
         self.refresh()
 
     def _record(self, path: Path, *, overwrite: bool = False) -> None:
-        try:
-            self._port.start_recording(path, overwrite=overwrite)
-        except CosmicError as exc:
-            self._error = str(exc)
-        self.refresh()
+        self._ask(
+            lambda: self._port.start_recording(path, overwrite=overwrite),
+            self._on_done,
+            "The recording begins",
+        )
 
     def _on_stop(self) -> None:
-        self.stop.setEnabled(False)
-        self._error = ""
-        try:
-            self._port.stop_recording()
-        except CosmicError as exc:
-            self._error = str(exc)
-        self.refresh()
+        self._ask(self._port.stop_recording, self._on_done, "The file is being closed")
+
+    def _on_done(self, _result: object, error: CosmicError | None) -> None:
+        self._answered(error)

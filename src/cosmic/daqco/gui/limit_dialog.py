@@ -1,5 +1,7 @@
 """Sets the force limit of a channel: crossing it stops every actuator."""
 
+from collections.abc import Callable
+
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -11,6 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from cosmic.daqco.core.settings import LimitSettings
+from cosmic.daqco.gui.asking import Asking
 from cosmic.daqco.gui.dialog import FieldDialog, button_box
 from cosmic.daqco.gui.ports import DaqPort, LimitState
 from cosmic.daqco.gui.value_field import ValueField
@@ -40,6 +43,7 @@ class LimitDialog(FieldDialog):
         self.message = QLabel()
         self.message.setWordWrap(True)
         self.buttons = button_box(Button.Ok | Button.Cancel)
+        self._asking = Asking(port, self)
         self._build()
         self.channel.setCurrentText(channel)
         self._show()
@@ -104,19 +108,20 @@ class LimitDialog(FieldDialog):
 
     def _on_ok(self) -> None:
         wanted = self._read()
-        if wanted is None:
-            return
-        try:
-            self._port.set_limit(wanted)
-        except CosmicError as exc:
-            self.message.setText(f"◆ REFUSED: {exc}")
-        else:
-            self.accept()
+        if wanted is not None:
+            self._ask(lambda: self._port.set_limit(wanted))
 
     def _on_remove(self) -> None:
-        try:
-            self._port.remove_limit(self.channel.currentText())
-        except CosmicError as exc:
-            self.message.setText(f"◆ REFUSED: {exc}")
-        else:
+        channel = self.channel.currentText()
+        self._ask(lambda: self._port.remove_limit(channel))
+
+    def _ask(self, action: Callable[[], None]) -> None:
+        self.buttons.setEnabled(False)
+        self._asking.ask(action, self._on_answered)
+
+    def _on_answered(self, _result: object, error: CosmicError | None) -> None:
+        self.buttons.setEnabled(True)
+        if error is None:
             self.accept()
+        else:
+            self.message.setText(f"◆ REFUSED: {error}")

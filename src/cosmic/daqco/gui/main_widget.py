@@ -17,7 +17,9 @@ from PySide6.QtWidgets import (
 )
 
 from cosmic.daqco.api.application import DaqcoApplication
-from cosmic.daqco.api.daqco import Daqco
+from cosmic.daqco.api.remote_application import RemoteDaqcoApplication
+from cosmic.daqco.api.window_port import WindowPort
+from cosmic.daqco.gui.asking import Asking
 from cosmic.daqco.gui.configure_dialog import UDaqConfigureDialog
 from cosmic.daqco.gui.file_widget import UDaqFileWidget
 from cosmic.daqco.gui.limit_dialog import LimitDialog
@@ -44,7 +46,8 @@ class UDaqMainWidget(QWidget):
     Signals
     -------
     close_requested()
-        File > Stop DAQCo was chosen: acquisition was stopped; whoever hosts the widget closes it.
+        File > Stop DAQCo was chosen: acquisition was stopped, unless it runs at another station;
+        whoever hosts the widget closes it.
     """
 
     close_requested = Signal()
@@ -66,6 +69,7 @@ class UDaqMainWidget(QWidget):
         self._build_menus()
         self._build()
         self.plotter.limit_requested.connect(self.edit_limit)
+        self._asking = Asking(port, self)
         self._relay = PortRelay(port, self)
         self._relay.changed.connect(self._on_changed)
         self._on_changed()
@@ -136,26 +140,34 @@ class UDaqMainWidget(QWidget):
 
     def _on_changed(self) -> None:
         port = self._port
-        running, recording = port.running, port.recording.active
-        self.state.setText("ACQUIRING" if running else "STOPPED")
+        running, recording, away = port.running, port.recording.active, port.away
+        for widget in (self.plotter, self.files):
+            widget.setEnabled(not away)
+        for action in (self.configure, self.limits):
+            action.setEnabled(not away)
+            action.setToolTip(away)
+        self.state.setText("AWAY" if away else "ACQUIRING" if running else "STOPPED")
         self.state.set_tone("quiet" if running else "warning")
         active = sum(each.active for each in port.settings.channel)
         self.rate_text.set_text(f"{active} × {port.rate_hz:g} Hz")
-        self.start.setEnabled(not running)
+        self.start.setEnabled(not running and not away)
         self.stop.setEnabled(running)
         self.start_recording.setEnabled(running and not recording)
-        self.stop_recording.setEnabled(recording)
-        self.export.setEnabled(True)
+        self.stop_recording.setEnabled(recording and not away)
+        self.export.setEnabled(not port.elsewhere)
+        self.export.setToolTip(f"The recordings lie {port.elsewhere}" if port.elsewhere else "")
+        self.quit.setText("&Close this panel" if port.elsewhere else "&Stop DAQCo")
         self._say(port.problem)
 
     def _say(self, text: str) -> None:
         self.error.set_text(f"■ {text}" if text else "")
 
     def _do(self, action: Callable[[], object]) -> None:
-        try:
-            action()
-        except CosmicError as exc:
-            self._say(str(exc))
+        self._asking.ask(action, self._on_done)
+
+    def _on_done(self, _result: object, error: CosmicError | None) -> None:
+        if error is not None:
+            self._say(str(error))
         else:
             self._on_changed()
 
@@ -168,7 +180,7 @@ class UDaqMainWidget(QWidget):
         self._do(self._port.stop)
 
     def _on_quit(self) -> None:
-        if self._port.running:
+        if self._port.running and not self._port.elsewhere:
             self._do(self._port.stop)
         self.close_requested.emit()
         if self.isWindow():
@@ -215,7 +227,7 @@ class UDaqMainWidget(QWidget):
 
 
 def make_daqco_gui(application: CosmicApplicationBase) -> UDaqMainWidget:
-    """Return the GUI component of a `DaqcoApplication`; its `gui_factory`."""
-    if not isinstance(application, DaqcoApplication):
+    """Return the GUI component of DAQCo, here or at another station; its `gui_factory`."""
+    if not isinstance(application, (DaqcoApplication, RemoteDaqcoApplication)):
         raise TypeError(f"{application!r} is no DaqcoApplication")
-    return UDaqMainWidget(Daqco(application))
+    return UDaqMainWidget(WindowPort(application))

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QVBoxLayout, QWidg
 
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.settings import ChannelSettings
+from cosmic.daqco.gui.asking import Asking
 from cosmic.daqco.gui.channel_list import ChannelList
 from cosmic.daqco.gui.limit_banner import LimitBanner
 from cosmic.daqco.gui.plot.chart import Chart, Trace
@@ -64,9 +65,10 @@ class UDaqPlotter(QWidget):
         self._readout = QTimer(self, interval=READOUT_MS)
         self._build()
         self._connect()
+        self._asking = Asking(port, self)
         self._relay = PortRelay(port, self)
         self._relay.changed.connect(self._on_changed)
-        self._relay.keep(port.subscribe(self.inbox.put))
+        self._relay.keep(port.follow(self.inbox.put))
         self._on_changed()
         self._readout.start()
 
@@ -287,10 +289,11 @@ class UDaqPlotter(QWidget):
             self.window_text.setText(self.cursors.text())
 
     def _on_reset_requested(self, channel: str) -> None:
-        try:
-            self._port.reset_limit(channel)
-        except CosmicError as exc:
-            self.problem.set_text(str(exc))
+        self._asking.ask(lambda: self._port.reset_limit(channel), self._on_reset)
+
+    def _on_reset(self, _result: object, error: CosmicError | None) -> None:
+        if error is not None:
+            self.problem.set_text(str(error))
 
     @override
     def sizeHint(self) -> QSize:

@@ -6,14 +6,19 @@ Protocol of properties, so that a frozen dataclass of the application will do.
 
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
+from datetime import datetime
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeVar
 
+from cosmic.daqco.api.files import NamedFile
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, LimitSettings
+from cosmic.daqco.gui.asking import Told
 from cosmic.daqco.hw.interface import BoardInfo
+from cosmic.frame.file_names import NameOption
 from cosmic.frame.task import Task
 
+T = TypeVar("T")
 Unsubscribe = Callable[[], None]
 
 
@@ -97,7 +102,8 @@ class LimitState(Protocol):
 class DaqPort(Protocol):
     """The application as its widgets see it; all of it may be called in the GUI thread.
 
-    Methods that refuse raise a `CosmicError` whose text is fit for the operator.
+    Methods that refuse raise a `CosmicError` whose text is fit for the operator. Where the boards
+    are at another station, what commands would wait for the line: `carry_out` has it done.
     """
 
     # What is in force
@@ -124,6 +130,16 @@ class DaqPort(Protocol):
 
     @property
     @abstractmethod
+    def away(self) -> str:
+        """Why the station with the boards cannot be reached; empty while it can."""
+
+    @property
+    @abstractmethod
+    def elsewhere(self) -> str:
+        """Where the files lie, such as "at the station fibres"; empty on this computer."""
+
+    @property
+    @abstractmethod
     def counters(self) -> Counters:
         """What has been counted."""
 
@@ -145,16 +161,24 @@ class DaqPort(Protocol):
     # Listening
 
     @abstractmethod
-    def subscribe(self, receiver: Callable[[DataChunk], object]) -> Unsubscribe:
-        """Call `receiver(chunk)` with every chunk, in order, in the acquisition thread.
+    def follow(self, receiver: Callable[[DataChunk], object]) -> Unsubscribe:
+        """Call `receiver(chunk)` with the newest samples, in order, in another thread.
 
-        A chunk has the active channels only, in the order of the settings. The receiver returns
-        at once. After the returned function was called, no more calls begin.
+        At home with every chunk; from another station some may be passed over. A chunk has the
+        active channels only, in the order of the settings. The receiver returns at once. After
+        the returned function was called, no more calls begin.
         """
 
     @abstractmethod
     def on_change(self, listener: Callable[[], object]) -> Unsubscribe:
         """Call `listener()`, in any thread, when anything but samples and counters changed."""
+
+    @abstractmethod
+    def carry_out(self, action: Callable[[], T], told: Told[T]) -> None:
+        """Do `action`, which commands; `told(result, error)` at its end, maybe in another thread.
+
+        At home both is done at once.
+        """
 
     # Acquisition
 
@@ -190,6 +214,16 @@ class DaqPort(Protocol):
     @abstractmethod
     def stop_recording(self) -> None:
         """Close the file; returns when it is closed or when closing it failed (see `failure`)."""
+
+    @abstractmethod
+    def folder_problem(self, directory: str) -> str:
+        """Return why nothing can be recorded in `directory`; empty when it can."""
+
+    @abstractmethod
+    def name_recording(
+        self, base: str, option: NameOption, directory: Path, when: datetime
+    ) -> NamedFile:
+        """Return the file for a recording that is begun now; it commands."""
 
     @abstractmethod
     def free_bytes(self, directory: Path) -> int:

@@ -1,0 +1,45 @@
+"""Has the application do what may take a while, without the window waiting for it."""
+
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import Protocol, TypeVar
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QWidget
+from shiboken6 import isValid
+
+from cosmic.frame.errors import CosmicError
+
+T = TypeVar("T")
+Told = Callable[[T | None, CosmicError | None], object]
+
+
+class CarriesOut(Protocol):
+    """What an application offers to its widgets, as far as it matters here."""
+
+    @abstractmethod
+    def carry_out(self, action: Callable[[], T], told: Told[T]) -> None:
+        """Do `action`; `told(result, error)` at its end, maybe in another thread."""
+
+
+class Asking(QObject):
+    """Belongs to a widget, which is told in the GUI thread; nothing is told once it is gone."""
+
+    _told = Signal(object, object, object)
+
+    def __init__(self, port: CarriesOut, widget: QWidget) -> None:
+        super().__init__(widget)
+        self._port = port
+        self._told.connect(self._on_told)
+
+    def ask(self, action: Callable[[], T], told: Told[T]) -> None:
+        """Have `action` done and call `told(result, error)`: at home before this returns."""
+
+        def tell(result: T | None, error: CosmicError | None) -> None:
+            if isValid(self):  # the widget may go while a station is asked
+                self._told.emit(told, result, error)
+
+        self._port.carry_out(action, tell)
+
+    def _on_told(self, told: Told[object], result: object, error: CosmicError | None) -> None:
+        told(result, error)
