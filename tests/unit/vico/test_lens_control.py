@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 
 from contract.peripheral_rig import PeripheralRig
-from cosmic.frame.clock import RatedClock
+from cosmic.frame.clock import WALL, RatedClock
 from cosmic.frame.errors import (
     ConfigError,
     CosmicError,
@@ -18,6 +18,8 @@ from cosmic.frame.errors import (
     NotConnectedError,
 )
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.caller import Call, Caller, carrying_out
+from cosmic.frame.network.dead_man import DeadMan, Pulse
 from cosmic.frame.task import Task
 from cosmic.vico.core.lens_control import PeripheralThread
 from cosmic.vico.hw.peripheral_factory import make_lens, make_light
@@ -287,3 +289,20 @@ def test_homing_that_somebody_stops_is_said(make: Make) -> None:
     stranded = failure(task)
     assert isinstance(stranded, DeviceError) and stranded.fault == DeviceFault.REFERENCE
     assert bench.thread.state.focus is not None and not bench.thread.state.focus.homed
+
+
+def test_a_movement_from_elsewhere_stops_when_whoever_commanded_it_is_gone(make: Make) -> None:
+    bench = make(rate=1.0).start()
+    pulse = Pulse("vision", limit_s=5.0, clock=WALL)
+    with carrying_out(Call(Caller("vision", "secret"), DeadMan(pulse, 5.0))):
+        task = bench.thread.seek(FOCUS, 7900)
+    wait_until(lambda: bench.thread.state.moving)
+    pulse.end("vision is gone")
+    error = failure(task)
+    assert isinstance(error, MoveCancelled)
+    assert "vision is gone" in str(error)
+    wait_until(lambda: not bench.thread.state.moving)
+    assert bench.true_counts(FOCUS) < 7800
+    with carrying_out(Call(Caller("vision", "secret"), DeadMan(pulse, 5.0))):
+        assert "vision is gone" in str(failure(bench.thread.home()))
+    assert not bench.thread.state.moving

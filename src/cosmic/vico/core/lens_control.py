@@ -12,6 +12,7 @@ from typing_extensions import override
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.caller import current_call
 from cosmic.frame.task import Task
 from cosmic.frame.threads import WorkerThread
 from cosmic.vico.core.lens_history import LensHistory
@@ -143,8 +144,11 @@ class PeripheralThread(WorkerThread):
             order.task.fail(MoveCancelled("aborted before it began"))
 
     def _move(self, title: str, targets: Mapping[LensAxis, int | None]) -> Task:
+        call = current_call()
+        dead_man = call.dead_man if call is not None else None
+
         def carry_out(task: Task) -> None:
-            self._lens.begin(Move(task, targets, self._clock, self._timeout_s))
+            self._lens.begin(Move(task, targets, self._clock, self._timeout_s, dead_man))
 
         task = self._put(_Order(Task(title), carry_out, lasts=True))
         task.on_cancel(self.abort)

@@ -6,6 +6,7 @@ from typing import Final
 
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, DeviceError, DeviceFault, DeviceTimeout
+from cosmic.frame.network.dead_man import DeadMan
 from cosmic.frame.task import Task
 from cosmic.vico.hw.peripherals import LensAxis, LensState
 
@@ -26,6 +27,8 @@ class Move:
         Where to; None: home.
     timeout_s : float
         Platform time after which it has failed.
+    dead_man : DeadMan or None
+        Ends it when whoever commanded it from another process falls silent.
     over : bool
         It has ended, with `error` or well; the task is told by `tell_end`.
     """
@@ -34,12 +37,18 @@ class Move:
     targets: Mapping[LensAxis, int | None]
     clock: Clock
     timeout_s: float
+    dead_man: DeadMan | None = None
     begun_s: float = 0.0
     begun_wall_s: float = 0.0
     first: dict[LensAxis, int] = field(default_factory=dict)
     left: set[LensAxis] = field(default_factory=set)
     over: bool = False
     error: CosmicError | None = None
+
+    @property
+    def abandoned(self) -> str:
+        """Why nobody watches over it any more; empty while somebody does."""
+        return self.dead_man.why if self.dead_man is not None else ""
 
     def begin(self) -> None:
         """Count from now; the commands have been sent."""

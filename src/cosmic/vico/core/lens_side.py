@@ -143,6 +143,8 @@ class LensSide:
         lens = self._lens
         if lens is None:
             raise NotAvailable(self.problem or "the platform has no motorised lens")
+        if why := move.abandoned:
+            raise MoveCancelled(f"not begun: {why}")
         try:
             for axis, target in move.targets.items():
                 # Where it stood until now, for frames exposed before it moves.
@@ -160,17 +162,21 @@ class LensSide:
         move.begin()
         self._moves.append(move)
 
-    def abort(self) -> None:
+    def abort(self, why: str = "aborted") -> None:
         """Stop both motors."""
         try:
             if self._lens is not None:
                 self._lens.abort()
         except CosmicError as exc:
             self._lose(exc)
-        self._end(self._moves, MoveCancelled("aborted"))
+        self._end(self._moves, MoveCancelled(why))
 
     def look(self) -> None:
         """Ask what moves, and now and then what rests; a line that fails is closed."""
+        why = next((each.abandoned for each in self._moves if each.abandoned), "")
+        if why:
+            logger.warning("the lens is stopped: %s", why)
+            self.abort(f"stopped: {why}")
         lens = self._lens
         if lens is None:
             return
