@@ -3,9 +3,9 @@
 from contextlib import AbstractContextManager
 
 from cosmic.frame.errors import NotAvailable
+from cosmic.mico.api.ports import CollisionPort
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.callback import CollisionCallbackBase
-from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.collision.model import BodyPair, SceneModel, pair_of
 from cosmic.mico.core.ports import ManagerPort
 
@@ -19,15 +19,24 @@ class Collision:
         Who commands through this object, for the log.
     """
 
-    def __init__(self, manager: ManagerPort, model: CollisionManager, source: str) -> None:
+    def __init__(self, manager: ManagerPort, model: CollisionPort, source: str) -> None:
         self._manager = manager
         self._model = model
         self._source = source
 
     @property
     def scene(self) -> SceneModel:
-        """The bodies, joints and pairs that are watched."""
-        return self._model.model
+        """The bodies, joints and pairs that are watched.
+
+        Raises
+        ------
+        NotAvailable
+            The platform is at another station, and its scene is not known here.
+        """
+        scene = self._model.model
+        if scene is None:
+            raise NotAvailable("the scene is not known in this process; ask at its station")
+        return scene
 
     def clearance(self) -> Approach:
         """Return the nearest pair of watched bodies where they stand now.

@@ -11,7 +11,7 @@ from cosmic.frame.errors import MoveRefused, NotAvailable
 from cosmic.frame.task import Progress, Task
 from cosmic.frame.threads import forbid_waiting_here
 from cosmic.frame.verdict import MoveVerdict
-from cosmic.mico.api.application import WAY_BUDGET_S, MicoApplication
+from cosmic.mico.api.application_base import WAY_BUDGET_S, MicoApplicationBase
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.collision import Collision
@@ -23,10 +23,10 @@ from cosmic.mico.api.trajectories import Trajectories
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
-from cosmic.mico.core.device import Device
 from cosmic.mico.core.device_commander import DeviceCommander
 from cosmic.mico.core.links import Link
 from cosmic.mico.core.orders import Motion, MoveBy, MoveTo
+from cosmic.mico.core.ports import DevicePort
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 from cosmic.mico.core.undo import UndoEntry
 from cosmic.mico.hw.interface import PositionerKind
@@ -37,19 +37,19 @@ class Mico:
 
     Parameters
     ----------
-    application : MicoApplication
+    application : MicoApplicationBase
         Where the hardware is.
     source : str
         Who commands through this object, for the log: "script", "window", "key".
     """
 
-    def __init__(self, application: MicoApplication, source: str = "script") -> None:
+    def __init__(self, application: MicoApplicationBase, source: str = "script") -> None:
         self._application = application
         self._manager = application.manager
         self._source = source
         self._commanders: dict[int, DeviceCommander] = {}
         self._axes: dict[str, Axis] = {}
-        self._joined: dict[int, Device] = {}
+        self._joined: dict[int, DevicePort] = {}
         self._joining = Lock()
         self._connect()
         # Direct, because a script has no event loop that a queued call could arrive in.
@@ -68,7 +68,7 @@ class Mico:
                     self._manager.connect_device_commander(index, commander)
 
     @property
-    def application(self) -> MicoApplication:
+    def application(self) -> MicoApplicationBase:
         """The application behind it."""
         return self._application
 

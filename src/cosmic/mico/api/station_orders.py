@@ -9,7 +9,8 @@ from cosmic.frame.errors import CosmicError, MoveCancelled
 from cosmic.frame.network.errors import RemoteDefect
 from cosmic.frame.network.travelling_errors import to_plain
 from cosmic.mico.api.group import GroupMovement
-from cosmic.mico.api.station_words import Outcome, Outcomes, StampedState
+from cosmic.mico.api.station_tell import MicoTeller
+from cosmic.mico.api.station_words import Outcome, Outcomes
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.orders import Order
 
@@ -25,11 +26,9 @@ class Ordered:
     Any thread.
     """
 
-    def __init__(
-        self, group: GroupMovement, state_of: Callable[[str], StampedState | None]
-    ) -> None:
+    def __init__(self, group: GroupMovement, teller: MicoTeller) -> None:
         self._group = group
-        self._state_of = state_of
+        self._teller = teller
 
     @property
     def title(self) -> str:
@@ -53,7 +52,7 @@ class Ordered:
         """Wait for all and return how they ended; raises `DeviceTimeout`."""
         self._group.exception(timeout_s)
         of = {name: self._outcome(name, each) for name, each in self._group.movements.items()}
-        return Outcomes(of, self._group.start_skew_ms)
+        return Outcomes(of, self._teller.status(), self._group.start_skew_ms)
 
     def _outcome(self, name: str, movement: Movement) -> Outcome:
         error = movement.exception()
@@ -62,7 +61,7 @@ class Ordered:
         return Outcome(
             position=movement.wait() if error is None else None,
             error=None if error is None else to_plain(error),
-            state=self._state_of(name),
+            state=self._teller.state_of(name),
         )
 
 

@@ -9,7 +9,8 @@ from cosmic.frame.network.remote import remote
 from cosmic.frame.network.station import Station
 from cosmic.frame.task import Task
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
-from cosmic.mico.api.application import WAY_BUDGET_S, MicoApplication
+from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.application_base import WAY_BUDGET_S
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.station_orders import Key, OrderBook, Ordered
 from cosmic.mico.api.station_tell import MicoTeller
@@ -18,6 +19,7 @@ from cosmic.mico.api.station_words import (
     COMMANDS,
     MicoFacts,
     MicoPicture,
+    MicoStatus,
     SentMotion,
     StampedState,
 )
@@ -27,7 +29,6 @@ from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.orders import FREQUENCY_HZ, Jog, Order, Steer
 from cosmic.mico.core.poses import Pose
-from cosmic.mico.core.stop_latch import StopState
 
 logger = logging.getLogger(__name__)
 
@@ -157,7 +158,7 @@ class MicoStationSide:
         self._orders.keep(key, axis, order)
         self._log(f"{axis}: {motion}", source)
         manager.device(axis).submit(order)
-        return Ordered(GroupMovement({axis: order.movement}), self._teller.state_of)
+        return Ordered(GroupMovement({axis: order.movement}), self._teller)
 
     @remote(moves=True)
     def order_together(
@@ -191,7 +192,7 @@ class MicoStationSide:
                 self._orders.keep((token, numbers.get(axis, 0)), axis, order)
             except MoveCancelled:
                 group.cancel()
-        return Ordered(group, self._teller.state_of)
+        return Ordered(group, self._teller)
 
     @remote(moves=True)
     def undo(self, number: int, numbers: dict[str, int]) -> Ordered:
@@ -209,15 +210,15 @@ class MicoStationSide:
             self._orders.keep(self._key(numbers.get(axis, 0)), axis, order)
         group = GroupMovement.of(orders)
         group.add_callback(lambda ended: history.drop(entry) if ended.success else None)
-        return Ordered(group, self._teller.state_of)
+        return Ordered(group, self._teller)
 
     # Stopping
 
     @remote(at_once=True)
-    def stop(self, reason: str = "stop") -> StopState:
+    def stop(self, reason: str = "stop") -> MicoStatus:
         """Stop every axis and stay stopped; anybody may."""
         self._manager.stop(f"{reason} (from {self._who()})")
-        return self._manager.latch.state
+        return self._teller.status()
 
     @remote(at_once=True)
     def halt(self, axis: str, up_to: int = 0, why: str = "stopped") -> None:
@@ -234,11 +235,11 @@ class MicoStationSide:
                 order.movement.cancel()
 
     @remote(moves=True)
-    def reset_stop(self) -> StopState:
+    def reset_stop(self) -> MicoStatus:
         """Allow motion again; the holder of the lease may, and the station's own operator."""
         self._log("reset of the stop", "")
         self._manager.reset_stop()
-        return self._manager.latch.state
+        return self._teller.status()
 
     # Settings that change how things move
 
@@ -260,30 +261,34 @@ class MicoStationSide:
         self._manager.device(axis).set_frequency(channel, frequency_hz)
 
     @remote(moves=True)
-    def link(self, first: str, second: str, ratio: float) -> None:
+    def link(self, first: str, second: str, ratio: float) -> MicoStatus:
         """Link two axes."""
         for name in (first, second):
             self._manager.address(name)
         self._log(f"link of {first} and {second}, {ratio:g}", "")
         self._manager.links.add(first, second, ratio)
+        return self._teller.status()
 
     @remote(moves=True)
-    def unlink(self, axis: str) -> bool:
+    def unlink(self, axis: str) -> MicoStatus:
         """Take away every link of an axis."""
         self._log(f"{axis}: unlinked", "")
-        return self._manager.links.remove(axis)
+        self._manager.links.remove(axis)
+        return self._teller.status()
 
     @remote(moves=True)
-    def watch_axis(self, axis: str, watched: bool) -> None:
+    def watch_axis(self, axis: str, watched: bool) -> MicoStatus:
         """Take an axis out of collision detection, or in again."""
         change = self._model().take_in if watched else self._model().take_out
         change(axis, source=self._who())
+        return self._teller.status()
 
     @remote(moves=True)
-    def set_contact(self, name: str, allowed: bool) -> None:
+    def set_contact(self, name: str, allowed: bool) -> MicoStatus:
         """Let the bodies of an operation touch, or watch them again."""
         change = self._model().allow_contact if allowed else self._model().forbid_contact
         change(name, source=self._who())
+        return self._teller.status()
 
     # What takes long
 
@@ -307,18 +312,20 @@ class MicoStationSide:
     # Poses
 
     @remote
-    def put_pose(self, name: str, positions: dict[str, float]) -> None:
+    def put_pose(self, name: str, positions: dict[str, float]) -> MicoStatus:
         """Keep a named pose."""
         for axis in positions:
             self._manager.address(axis)
         self._log(f"pose {name!r}", "")
         self._application.trajectories.poses.put(Pose(name, positions))
+        return self._teller.status()
 
     @remote
-    def remove_pose(self, name: str) -> None:
+    def remove_pose(self, name: str) -> MicoStatus:
         """Forget a named pose."""
         self._log(f"pose {name!r} removed", "")
         self._application.trajectories.poses.remove(name)
+        return self._teller.status()
 
     # Who asks
 

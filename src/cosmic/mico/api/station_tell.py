@@ -127,6 +127,12 @@ class MicoTeller(WorkerThread):
             self._tell_status(self._read_status())
             return MicoPicture(self._status, states)
 
+    def status(self) -> MicoStatus:
+        """Return how MiCo is as a whole, now."""
+        with self._changed:
+            self._tell_status(self._read_status())
+            return self._status
+
     def note(self, name: str) -> StampedState | None:
         """Look at an axis now, which somebody has just changed, and return its state."""
         state = self._manager.state(name)

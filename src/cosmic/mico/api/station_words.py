@@ -197,9 +197,10 @@ class Outcome:
 @transferable
 @dataclass(frozen=True, slots=True)
 class Outcomes:
-    """How the movements of one order ended, by axis."""
+    """How the movements of one order ended, by axis, and how MiCo is since."""
 
     of: Mapping[str, Outcome]
+    status: MicoStatus
     skew_ms: float | None = None
 
 

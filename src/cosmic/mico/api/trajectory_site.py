@@ -9,6 +9,7 @@ from cosmic.frame.config import user_file
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.task import Task
 from cosmic.frame.task_application import Job
+from cosmic.mico.api.ports import CollisionPort
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
 from cosmic.mico.core.collision.collision_manager import CollisionManager
@@ -34,7 +35,7 @@ class Worker(Protocol):
         """Where the axes are."""
 
     @property
-    def collision(self) -> CollisionManager | None:
+    def collision(self) -> CollisionPort | None:
         """The collision model, where there is one."""
 
     def begin(self, title: str, job: Job) -> Task:
@@ -157,7 +158,7 @@ class TrajectorySite:
 
     def _pure_gate(self, bound: Bound) -> tuple[CollisionChecker, ClearanceSearch | None]:
         live = self.worker.collision
-        if live is None:
+        if not isinstance(live, CollisionManager):  # at another station, whose gate will decide
             return NoCollisionModel(), None
         if self._answers is None:
             self._answers = PureAnswers(live.model)

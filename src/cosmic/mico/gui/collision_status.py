@@ -2,7 +2,7 @@
 
 from PySide6.QtCore import QObject, Signal
 
-from cosmic.mico.core.collision.collision_manager import CollisionManager
+from cosmic.mico.api.ports import CollisionPort
 
 
 class CollisionStatus(QObject):
@@ -20,7 +20,7 @@ class CollisionStatus(QObject):
     changed = Signal()
     _told = Signal()
 
-    def __init__(self, model: CollisionManager | None) -> None:
+    def __init__(self, model: CollisionPort | None) -> None:
         super().__init__()
         self._model = model
         self._told.connect(self._on_told)

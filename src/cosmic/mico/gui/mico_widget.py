@@ -9,7 +9,7 @@ from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.gui.theme import State
 from cosmic.frame.task import Task
-from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.group_start import GroupStarted
 from cosmic.mico.core.settings import GroupSettings, PositionerSettings
@@ -296,8 +296,8 @@ class MicoWidget(QWidget):
 
 
 def make_mico_gui(application: CosmicApplicationBase) -> MicoWidget:
-    """Return the GUI component of a `MicoApplication`; its `gui_factory`."""
-    if not isinstance(application, MicoApplication):
+    """Return the GUI component of a `MicoApplicationBase`; its `gui_factory`."""
+    if not isinstance(application, MicoApplicationBase):
         raise TypeError(f"{application!r} is no MicoApplication")
     return MicoWidget(Mico(application, "window"))
 

@@ -1,0 +1,122 @@
+"""What scripts and windows use of MiCo, whether it runs in this process or at a station."""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import Final
+
+from PySide6.QtCore import Signal
+
+from cosmic.frame.errors import CosmicError, MoveRefused
+from cosmic.frame.task import Task
+from cosmic.frame.task_application import TaskApplication
+from cosmic.mico.api.initialisation import Confirm, InitialisationRun
+from cosmic.mico.api.ports import CollisionPort, UndoPort
+from cosmic.mico.api.trajectory_site import TrajectorySite
+from cosmic.mico.api.ways import Way, follow
+from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
+from cosmic.mico.core.ports import ManagerPort
+from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
+
+WAY_BUDGET_S: Final = 1.0
+"""How long a way is looked for, in wall time."""
+
+
+class MicoApplicationBase(TaskApplication):
+    """MiCo, here or at a station: what it has, and what it carries out in its own thread.
+
+    Signals
+    -------
+    way_found(Way), way_missing(MoveVerdict)
+        How `search_way` ended.
+    initialisation_changed(SequenceReport)
+        The initialisation sequence is further; in the application's thread.
+    status_changed()
+        Devices came or went, or MiCo failed.
+    """
+
+    rescanned = Signal()
+    way_found = Signal(object)
+    way_missing = Signal(object)
+    initialisation_changed = Signal(object)
+
+    manager: ManagerPort
+    collision: CollisionPort | None
+    clearance_watch: ClearanceWatch | None
+    undo: UndoPort
+    teleoperation: Teleoperation
+    trajectories: TrajectorySite
+
+    @property
+    @abstractmethod
+    def failure(self) -> str:
+        """Why MiCo cannot work; empty when it can."""
+
+    @abstractmethod
+    def rescan(self) -> Task:
+        """Look again for the hardware; returns at once.
+
+        Raises
+        ------
+        NotAvailable
+            Another long operation is under way.
+        """
+
+    @abstractmethod
+    def find_way(self, targets: Mapping[str, float], budget_s: float) -> Way:
+        """Return a way of some axes to `targets`, in gate coordinates; waits for it.
+
+        Raises
+        ------
+        NotAvailable
+            There is no collision model.
+        MoveRefused
+            No way was found; the verdict says what blocks.
+        """
+
+    def initialise_platform(
+        self, *, skip_known: bool = False, confirm: Confirm | None = None
+    ) -> Task:
+        """Carry the initialisation sequence out; returns at once.
+
+        `initialisation_changed` tells how far it is; the arguments are those of
+        `Mico.initialise`.
+
+        Raises
+        ------
+        NotAvailable
+            Another long operation is under way.
+        """
+        run = InitialisationRun(
+            self.manager,
+            skip_known=skip_known,
+            confirm=confirm,
+            on_report=self.initialisation_changed.emit,
+        )
+        return self.begin("Initialisation", run.run)
+
+    def search_way(self, targets: Mapping[str, float], budget_s: float = WAY_BUDGET_S) -> Task:
+        """Look for a way in the application's thread; `way_found` or `way_missing` tells."""
+
+        def search(task: Task) -> None:
+            try:
+                way = self.find_way(targets, budget_s)
+            except MoveRefused as exc:
+                self.way_missing.emit(exc.verdict)
+                task.fail(exc)
+            except CosmicError as exc:
+                task.fail(exc)
+            else:
+                self.way_found.emit(way)
+                task.finish()
+
+        return self.begin("Looking for a way", search)
+
+    def follow_way(self, way: Way, source: str) -> Task:
+        """Go a way that was found; returns at once.
+
+        Raises
+        ------
+        NotAvailable
+            Another long operation is under way.
+        """
+        return self.begin("Going round", lambda task: follow(self.manager, way, task, source))

@@ -1,0 +1,254 @@
+"""The way from here to the MiCo of a station: commands in their order, stops past them."""
+
+import logging
+from collections.abc import Callable, Mapping
+from queue import SimpleQueue
+from threading import Event, Lock
+from typing import Final, Protocol, runtime_checkable
+from weakref import WeakKeyDictionary
+
+from typing_extensions import override
+
+from cosmic.frame.errors import CosmicError, WrongThreadError
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.errors import StationAway, StationTimeout
+from cosmic.frame.network.ongoing import Ongoing
+from cosmic.frame.network.transport import CALL_TIMEOUT_S, Transport
+from cosmic.frame.threads import WorkerThread, forbid_waiting_here
+from cosmic.mico.core.movement import Movement
+
+logger = logging.getLogger(__name__)
+
+Arguments = Mapping[str, object]
+
+APPLICATION: Final = "mico"
+RENEW_LIMIT_S: Final = 0.2
+"""A sign that a key is still held is worth nothing later than this."""
+STOP_LIMIT_S: Final = 1.0
+
+
+def may_wait_here() -> bool:
+    """Return whether this thread may wait for an answer of another process."""
+    try:
+        forbid_waiting_here("a call")
+    except WrongThreadError:
+        return False
+    return True
+
+
+class Lane(WorkerThread):
+    """Carries out what is put in, one after the other; a lane does not wait for another."""
+
+    def __init__(self, name: str, policy: FailurePolicy) -> None:
+        super().__init__(name, policy)
+        self._jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
+
+    def put(self, job: Callable[[], None]) -> None:
+        """Have `job` carried out; returns at once. It may raise a `CosmicError`."""
+        self._jobs.put(job)
+
+    @override
+    def run_body(self) -> None:
+        while not self.end_requested:
+            job = self._jobs.get()
+            if job is None:
+                continue
+            try:
+                job()
+            except CosmicError as exc:
+                logger.warning("%s: %s", self.name, exc)
+
+    @override
+    def request_end(self) -> None:
+        super().request_end()
+        self._jobs.put(None)
+
+
+class Waited:
+    """A job that somebody may wait for."""
+
+    def __init__(self, job: Callable[[], object]) -> None:
+        self._job = job
+        self._over = Event()
+        self._result: object = None
+        self._error: CosmicError | None = None
+
+    def run(self) -> None:
+        """Carry it out; in the lane's thread."""
+        try:
+            self._result = self._job()
+        except CosmicError as exc:
+            self._error = exc
+        finally:
+            self._over.set()
+
+    def wait(self, timeout_s: float) -> object:
+        """Return its result; raises what it raised, and `StationTimeout`."""
+        if not self._over.wait(timeout_s):
+            raise StationTimeout(f"{APPLICATION}: no answer after {timeout_s:g} s")
+        if self._error is not None:
+            raise self._error
+        return self._result
+
+
+@runtime_checkable
+class _Telling(Protocol):
+    def add_callback(self, callback: Callable[[object], None]) -> None: ...
+
+
+class CommandLine:
+    """Calls the MiCo of a station; any thread.
+
+    Commands go one after the other, so that they arrive in the order in which they were given.
+    A stop has a lane of its own, and so have the signs that a key is still held, of which only
+    the newest counts. Where the calling thread must not wait (a window), nothing waits. What a
+    call says of the axes goes to `heed`.
+    """
+
+    def __init__(self, transport: Transport, policy: FailurePolicy) -> None:
+        self._transport = transport
+        self._policy = policy
+        self._orders = Lane("mico orders", policy)
+        self._stops = Lane("mico stops", policy)
+        self._renewals = Lane("mico keeps alive", policy)
+        self._lock = Lock()
+        self._newest: dict[tuple[str, int], Callable[[], None]] = {}
+        self._numbers: WeakKeyDictionary[Movement, int] = WeakKeyDictionary()
+        self._open = False
+        self.heed: Callable[[object], None] = lambda _told: None
+
+    @property
+    def transport(self) -> Transport:
+        """The station."""
+        return self._transport
+
+    def start(self) -> None:
+        """Begin to carry out what is put in."""
+        for lane in (self._orders, self._stops, self._renewals):
+            lane.start()
+        self._open = True
+
+    def close(self) -> None:
+        """End the lanes; harmless the second time."""
+        self._open = False
+        for lane in (self._orders, self._stops, self._renewals):
+            lane.request_end()
+        for lane in (self._orders, self._stops, self._renewals):
+            lane.join()
+
+    def call(
+        self, function: str, arguments: Arguments, timeout_s: float = CALL_TIMEOUT_S
+    ) -> object:
+        """Call a function there now, in this thread; raises as `Transport.call`."""
+        return self._transport.call(APPLICATION, function, arguments, timeout_s=timeout_s)
+
+    def note_number(self, movement: Movement, number: int) -> None:
+        """Remember under which number the station will know a movement."""
+        with self._lock:
+            self._numbers[movement] = number
+
+    def number_of(self, movement: Movement) -> int:
+        """Return that number; -1 where the movement was never ordered there."""
+        with self._lock:
+            return self._numbers.get(movement, -1)
+
+    # In their order
+
+    def post(self, job: Callable[[], None]) -> None:
+        """Have `job` carried out after what was put in before; returns at once."""
+        self._check_open()
+        self._orders.put(job)
+
+    def run(self, job: Callable[[], object], timeout_s: float = 2 * CALL_TIMEOUT_S) -> object:
+        """Have `job` carried out after what was put in before, and return its result.
+
+        Raises
+        ------
+        StationTimeout
+            Others before it took too long.
+        CosmicError
+            What it raised.
+        """
+        self._check_open()
+        waited = Waited(job)
+        self._orders.put(waited.run)
+        return waited.wait(timeout_s)
+
+    def do(self, function: str, arguments: Arguments) -> None:
+        """Call a function in its order; what it says of the axes is taken note of.
+
+        Waits where this thread may, and raises; otherwise a failure is only logged.
+        """
+
+        def job() -> None:
+            self.heed(self.call(function, arguments))
+
+        if may_wait_here():
+            self.run(job)
+        else:
+            self.post(job)
+
+    # Past everything
+
+    def at_once(self, function: str, arguments: Arguments) -> None:
+        """Call what overtakes everything.
+
+        Waits where this thread may, and raises; otherwise a failure goes to the policy, loudly.
+        """
+        self._check_open()
+        waits = may_wait_here()
+
+        def job() -> None:
+            self.heed(self.call(function, arguments, STOP_LIMIT_S))
+
+        def loud() -> None:
+            try:
+                job()
+            except CosmicError as exc:
+                self._policy.report(exc, f"{function} was NOT carried out at the station")
+
+        if waits:
+            waited = Waited(job)
+            self._stops.put(waited.run)
+            waited.wait(2 * STOP_LIMIT_S)
+        else:
+            self._stops.put(loud)
+
+    def withdraw(self, number: int) -> None:
+        """Give an order up; returns at once, from any thread."""
+        arguments = {"numbers": [number]}
+        self._stops.put(lambda: _forget(self.call("withdraw", arguments, STOP_LIMIT_S)))
+
+    def renew(self, function: str, axis: str, number: int, **more: object) -> None:
+        """Say that somebody still holds the key; only the newest word counts."""
+        arguments = {"axis": axis, "number": number, **more}
+        key = (axis, number)
+        with self._lock:
+            waiting = key in self._newest
+            self._newest[key] = lambda: _forget(self.call(function, arguments, RENEW_LIMIT_S))
+        if not waiting:
+            self._renewals.put(lambda: self._send_newest(key))
+
+    def _send_newest(self, key: tuple[str, int]) -> None:
+        with self._lock:
+            job = self._newest.pop(key)
+        job()
+
+    def _check_open(self) -> None:
+        if not self._open:
+            raise StationAway("the connection to MiCo is closed")
+
+
+def when_over(ongoing: Ongoing, callback: Callable[[], None]) -> None:
+    """Call `callback` once `ongoing` has ended, in the thread that ends it."""
+    if isinstance(ongoing, _Telling):
+        ongoing.add_callback(lambda _ended: callback())
+    else:
+        subscribe = getattr(ongoing, "subscribe", None)
+        if subscribe is None:
+            raise TypeError(f"the end of {ongoing!r} cannot be followed")
+        subscribe(lambda progress: callback() if progress.done else None)
+
+
+def _forget(_result: object) -> None:
+    """Do nothing with what a call returned."""
