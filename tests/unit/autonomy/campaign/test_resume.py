@@ -1,0 +1,75 @@
+"""A campaign goes on after an end without warning, trusting no position of before."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from cosmic.autonomy.campaign.records import Outcome, Pose
+from cosmic.autonomy.campaign.resume import resume
+from cosmic.autonomy.campaign.store import CampaignStore
+from unit.autonomy.campaign.sample_records import INFO, failed, good
+
+LEFT_THERE = Pose(1000.0, -500.0, 20.0)
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[CampaignStore]:
+    with CampaignStore.create(tmp_path, INFO) as opened:
+        yield opened
+
+
+def left_behind(store: CampaignStore) -> None:
+    """Finish a fibre that stays where it was found."""
+    record = failed(store.begin_fibre(time_s=0.0))
+    store.finish_fibre(replace(record, found=LEFT_THERE))
+
+
+def test_what_was_in_treatment_is_marked_and_the_last_steps_are_told(store: CampaignStore) -> None:
+    left_behind(store)
+    number = store.begin_fibre(Pose(0.0, 0.0, 0.0), time_s=30.0)
+    store.note("lift", "move", {"left_z_um": -500.0}, time_s=33.0, fibre=number)
+    plan = resume(store)
+    assert (plan.finished, plan.interrupted) == (1, (number,))
+    assert (plan.last[-1].operation, plan.last[-1].fibre) == ("lift", number)
+    assert [each.outcome for each in store.reader.fibres()] == [
+        Outcome.FAILED,
+        Outcome.INTERRUPTED,
+    ]
+    assert resume(store).interrupted == (), "an interruption is told once"
+
+
+@pytest.mark.parametrize(
+    ("pose", "length_um", "done"),
+    [
+        (LEFT_THERE, 1500.0, True),
+        (Pose(1080.0, -430.0, 28.0), 1540.0, True),
+        (Pose(1000.0, -500.0, 200.0), 1500.0, True),  # the same line, the other end first
+        (Pose(1400.0, -500.0, 20.0), 1500.0, False),
+        (LEFT_THERE, 1900.0, False),
+        (Pose(1000.0, -500.0, 80.0), 1500.0, False),
+    ],
+)
+def test_a_treated_fibre_is_known_again_by_place_and_length(
+    store: CampaignStore, pose: Pose, length_um: float, done: bool
+) -> None:
+    left_behind(store)
+    assert resume(store).is_done(pose, length_um) is done
+
+
+def test_a_fibre_that_was_put_away_is_not_looked_for_where_it_lay(store: CampaignStore) -> None:
+    record = good(store.begin_fibre(time_s=0.0))
+    store.finish_fibre(record)
+    plan = resume(store)
+    assert record.found is not None
+    assert record.left is not None
+    assert not plan.is_done(record.found, record.shape.length_um)
+    assert plan.is_done(record.left, record.shape.length_um)
+
+
+def test_an_interrupted_fibre_is_tried_once_more_only(store: CampaignStore) -> None:
+    store.begin_fibre(LEFT_THERE, time_s=0.0)
+    assert not resume(store).is_done(LEFT_THERE, 1500.0)
+    store.begin_fibre(LEFT_THERE, time_s=60.0)
+    assert resume(store).is_done(LEFT_THERE, 1500.0)

@@ -1,0 +1,275 @@
+"""A campaign's folder: every fibre once and whole, whatever happens to the program."""
+
+import errno
+import os
+import resource
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from threading import Event
+
+import numpy as np
+import pytest
+
+from cosmic.autonomy.campaign.journal import Journal
+from cosmic.autonomy.campaign.records import (
+    CalibrationNote,
+    CampaignError,
+    FibreRecord,
+    Outcome,
+    Pose,
+)
+from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.campaign.store_read import CampaignReader
+from unit.autonomy.campaign.sample_records import INFO, failed, good
+
+KILLS = 24
+WRITER = Path(__file__).with_name("killed_writer.py")
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[CampaignStore]:
+    with CampaignStore.create(tmp_path / "campaign", INFO) as opened:
+        yield opened
+
+
+def test_what_is_written_is_read_back_whole(store: CampaignStore) -> None:
+    number = store.begin_fibre(Pose(300.0, -150.0, 12.0), time_s=5.0)
+    record = good(number, began_s=5.0)
+    store.finish_fibre(record)
+    read = CampaignReader(store.folder).fibre(number)
+    assert (read.outcome, read.found, read.left) == (Outcome.GOOD, record.found, record.left)
+    assert read.shape == record.shape
+    assert read.operations == record.operations
+    assert read.bending is not None
+    assert record.bending is not None
+    assert read.bending.ei_n_m2 == record.bending.ei_n_m2
+    assert read.bending.used == record.bending.used
+    for ours, theirs in zip(read.spans, record.spans, strict=True):
+        np.testing.assert_array_equal(ours.force_un, theirs.force_un)
+        np.testing.assert_array_equal(ours.loading, theirs.loading)
+    for fit, same in zip(read.bending.spans, record.bending.spans, strict=True):
+        np.testing.assert_array_equal(fit.fitted_un, same.fitted_un)
+        assert fit.k_un_um == same.k_un_um
+        assert fit.flags == same.flags
+    np.testing.assert_array_equal(read.pictures[0].pixels, record.pictures[0].pixels)
+    assert read.pictures[0].scale_um_px == 7.6
+    assert {each.name: each.unit for each in read.series} == {"left.x": "um", "force": "uN"}
+
+
+def test_a_failed_fibre_keeps_its_cause_and_its_tries(store: CampaignStore) -> None:
+    number = store.begin_fibre(time_s=0.0)
+    store.finish_fibre(failed(number))
+    (read,) = store.reader.finished()
+    assert (read.outcome, read.cause, read.attempts) == (Outcome.FAILED, "missed grasp", 4)
+    assert read.bending is None
+    assert [each.attempt for each in read.operations if each.failed] == [1, 2]
+
+
+def test_a_fibre_has_one_end(store: CampaignStore) -> None:
+    number = store.begin_fibre(time_s=0.0)
+    store.finish_fibre(failed(number))
+    with pytest.raises(CampaignError, match="has its end already: failed"):
+        store.finish_fibre(good(number))
+    with pytest.raises(CampaignError, match="fibre 99 was not begun"):
+        store.finish_fibre(failed(99))
+    with pytest.raises(CampaignError, match="which is no end"):
+        store.finish_fibre(FibreRecord(number, Outcome.RUNNING, 0.0, 1.0))
+    assert [each.cause for each in store.reader.finished()] == ["missed grasp"]
+
+
+def test_the_campaign_says_what_it_is_and_what_held(store: CampaignStore) -> None:
+    store.keep_calibrations([CalibrationNote("plate", 0.4, "um", "2026-03-02T09:00:00")])
+    assert store.reader.info() == INFO
+    assert [each.name for each in store.reader.calibrations()] == ["plate"]
+    assert store.reader.ended() == ("", "")
+    store.end("3 fibres done", time_s=120.0)
+    assert store.reader.ended()[1] == "3 fibres done"
+    assert store.reader.elapsed_s() == 120.0
+
+
+def test_time_counts_from_run_to_run(tmp_path: Path) -> None:
+    with CampaignStore.create(tmp_path, INFO, time_s=100.0) as store:
+        store.finish_fibre(failed(store.begin_fibre(time_s=110.0), began_s=110.0))
+    with CampaignStore.open(tmp_path, time_s=5.0) as store:
+        store.finish_fibre(failed(store.begin_fibre(time_s=10.0), began_s=10.0))
+        # 24 s to the end of the first fibre, then 19 s in the second run.
+        assert store.reader.elapsed_s() == pytest.approx(24.0 + 19.0)
+
+
+def test_the_journal_tells_what_was_about_to_happen(store: CampaignStore) -> None:
+    journal = Journal(store, lambda: 12.5)
+    journal.note("survey", "begin")
+    journal.fibre = store.begin_fibre(time_s=12.0)
+    journal.note("descend", "move", left_z_um=-850.0)
+    last = store.reader.journal(1)[0]
+    assert (last.operation, last.phase, last.fibre, last.time_s) == ("descend", "move", 1, 12.5)
+    assert last.payload == {"left_z_um": -850.0}
+    assert [each.operation for each in store.reader.journal()] == ["survey", "descend"]
+
+
+def test_no_campaign_is_begun_over_another(store: CampaignStore) -> None:
+    with pytest.raises(CampaignError, match="holds a campaign already"):
+        CampaignStore.create(store.folder, INFO)
+
+
+def test_a_folder_without_a_campaign_is_told(tmp_path: Path) -> None:
+    with pytest.raises(CampaignError, match="holds no campaign"):
+        CampaignStore.open(tmp_path)
+    (tmp_path / "campaign.sqlite").write_bytes(b"this is no database, but long enough" * 10)
+    with pytest.raises(CampaignError, match=r"campaign\.sqlite"):
+        CampaignStore.open(tmp_path)
+
+
+def test_a_begin_that_was_cut_off_can_be_begun_again(tmp_path: Path) -> None:
+    (tmp_path / "campaign.sqlite").touch()
+    with pytest.raises(CampaignError, match="its begin was cut off"):
+        CampaignStore.open(tmp_path)
+    with CampaignStore.create(tmp_path, INFO) as store:
+        assert store.reader.info().name == "quick"
+
+
+def test_a_second_writer_is_refused_while_readers_are_not(store: CampaignStore) -> None:
+    with pytest.raises(CampaignError, match="being written there already"):
+        CampaignStore.open(store.folder)
+    assert CampaignReader(store.folder).finished() == ()
+
+
+def test_a_closed_campaign_says_so(tmp_path: Path) -> None:
+    store = CampaignStore.create(tmp_path, INFO)
+    store.close()
+    store.close()
+    with pytest.raises(CampaignError, match="closed"):
+        store.note("survey", "begin", time_s=0.0)
+
+
+# ---------------------------------------------------------------------- full disks
+
+
+def test_a_full_disk_is_told_and_the_fibre_can_be_written_later(
+    store: CampaignStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = store.begin_fibre(time_s=0.0)
+    store.finish_fibre(good(first))
+    second = store.begin_fibre(time_s=30.0)
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(CampaignError, match=r"No space left.*is kept: make room"):
+            store.finish_fibre(good(second))
+    assert not list((store.folder / "fibres").glob("*.part"))
+    assert [each.number for each in store.reader.finished()] == [first]
+    store.finish_fibre(good(second))
+    assert len(store.reader.finished()) == 2
+
+
+def test_a_database_that_cannot_grow_is_told_and_keeps_what_it_has(store: CampaignStore) -> None:
+    store.finish_fibre(good(store.begin_fibre(time_s=0.0)))
+    number = store.begin_fibre(time_s=30.0)
+    largest = max(each.stat().st_size for each in store.folder.iterdir() if each.is_file())
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    text = "x" * 4000
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (largest + 100_000, hard))
+        with pytest.raises(CampaignError, match="cannot be written"):
+            for _ in range(100):
+                store.note("survey", "begin", {"text": text}, time_s=31.0)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert len(store.reader.finished()) == 1
+    store.finish_fibre(good(number))
+    assert len(store.reader.finished()) == 2
+
+
+# ---------------------------------------------------------------------- killed
+
+
+class Writers:
+    """Forks one writer after another."""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, str(WRITER)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            bufsize=1,
+        )
+
+    def start(self, folder: Path) -> int:
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{folder}\n")
+        self._process.stdin.flush()
+        return int(self.line())
+
+    def line(self) -> str:
+        assert self._process.stdout is not None
+        return self._process.stdout.readline().strip()
+
+    def to_the_end(self) -> list[int]:
+        said = iter(self.line, "gone")
+        return [int(each) for each in said if each != "open"]
+
+    def close(self) -> None:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.close()
+        self._process.wait(10)
+        self._process.stdout.close()
+
+
+@pytest.fixture
+def writers() -> Iterator[Writers]:
+    made = Writers()
+    yield made
+    made.close()
+
+
+def test_a_writer_killed_at_any_moment_loses_and_doubles_nothing(
+    tmp_path: Path, writers: Writers
+) -> None:
+    CampaignStore.create(tmp_path, INFO).close()
+    rng, told = np.random.default_rng(5), []
+    for number in range(KILLS):
+        process = writers.start(tmp_path)
+        if number % 6:  # now and then while it still opens the campaign
+            writers.line()
+        Event().wait(float(rng.uniform(0.0, 0.08)))  # any moment will do
+        os.kill(process, signal.SIGKILL)
+        told += writers.to_the_end()
+        reader = CampaignReader(tmp_path)
+        serials = [each.peak_force_un for each in reader.finished()]
+        assert serials == list(range(len(serials)))
+        # What was said to be written is; an end may have been written and not been said.
+        assert set(told) <= set(range(len(serials)))
+        assert len(set(told)) == len(told)
+    finished = CampaignReader(tmp_path).finished()
+    assert len(finished) > KILLS / 2
+    for each in finished:
+        whole = CampaignReader(tmp_path).fibre(each.number)
+        assert whole.series[0].values[-1] == each.peak_force_un
+        assert whole.pictures[0].pixels.shape == (200, 200)
+    with CampaignStore.open(tmp_path) as store:
+        store.interrupt_running()
+        outcomes = {each.outcome for each in store.reader.fibres()}
+        assert outcomes <= {Outcome.GOOD, Outcome.INTERRUPTED}
+        assert not list((tmp_path / "fibres").glob("*.part"))
+
+
+def test_another_process_is_refused_until_the_first_is_gone(
+    tmp_path: Path, writers: Writers
+) -> None:
+    CampaignStore.create(tmp_path, INFO).close()
+    process = writers.start(tmp_path)
+    assert writers.line() == "open"
+    with pytest.raises(CampaignError, match="being written there already"):
+        CampaignStore.open(tmp_path)
+    os.kill(process, signal.SIGKILL)
+    writers.to_the_end()
+    with CampaignStore.open(tmp_path) as store:
+        assert store.reader.info() == INFO
