@@ -7,7 +7,6 @@ from PySide6.QtCore import QObject
 from cosmic.frame.gui.clearance_meter import Clearance
 from cosmic.frame.gui.top_bar import TopBar
 from cosmic.mico.core.collision.answer import Approach
-from cosmic.mico.core.device_manager import Mode
 from cosmic.mico.gui.mico_widget import MicoWidget
 
 NOT_REFERENCED: Final = "not referenced"
@@ -55,7 +54,7 @@ class CollisionBar(QObject):
 
     def _why_unknown(self) -> str:
         manager = self._application.manager
-        if manager.mode is not Mode.RUN_TIME:
+        if not manager.ready:
             return "MiCo is not ready"
         if manager.positions() is None:
             return NOT_REFERENCED

@@ -15,7 +15,7 @@ from typing_extensions import override
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.frame.clock import WALL
-from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.core.teleoperation.mapping import Converter
 from cosmic.mico.core.teleoperation.settings import TeleoperationSettings
 from cosmic.mico.core.teleoperation.teleoperation import ForceCoupling
@@ -168,7 +168,7 @@ class TestAppMiCoConverter(Converter):
         return self._force.slow_down(self._mapping.convert(inputs, fine=fine))
 
 
-def join_teleoperation(mico: MicoApplication, daqco: DaqcoApplication) -> TestAppDAQCoConverter:
+def join_teleoperation(mico: MicoApplicationBase, daqco: DaqcoApplication) -> TestAppDAQCoConverter:
     """Have the hand that steers feel the force, and be slowed down by it.
 
     Chunks are taken while something is steered; returns what takes them.

@@ -6,11 +6,11 @@ from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.recorder import Recorder
 from cosmic.daqco.core.recording_format import AxisPosition
 from cosmic.frame.clock import WALL, Clock
-from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.vico.api.application import VicoApplication
 
 
-def join_force_limits(daqco: DaqcoApplication, mico: MicoApplication) -> None:
+def join_force_limits(daqco: DaqcoApplication, mico: MicoApplicationBase) -> None:
     """Have a limit of DAQCo that is crossed stop every actuator of MiCo, and keep it stopped.
 
     The stop is called in the acquisition thread, past every queue. Where MiCo is not hosted in
@@ -19,7 +19,7 @@ def join_force_limits(daqco: DaqcoApplication, mico: MicoApplication) -> None:
     daqco.guard.trip = mico.manager.stop
 
 
-def join_positions(recorder: Recorder, mico: MicoApplication, clock: Clock) -> None:
+def join_positions(recorder: Recorder, mico: MicoApplicationBase, clock: Clock) -> None:
     """Have the positions of all axes written into every recording, on its clock.
 
     Positions are gate coordinates, at the moment they were read.
@@ -41,7 +41,7 @@ def join_positions(recorder: Recorder, mico: MicoApplication, clock: Clock) -> N
     recorder.position_source = positions
 
 
-def join_stage_positions(vico: VicoApplication, mico: MicoApplication) -> None:
+def join_stage_positions(vico: VicoApplication, mico: MicoApplicationBase) -> None:
     """Have the positions of all axes stand beside every picture; gate coordinates."""
 
     def positions(_time_s: float) -> dict[str, float]:

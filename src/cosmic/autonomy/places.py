@@ -13,7 +13,7 @@ from cosmic.autonomy.stage_procedure import StageProcedure
 from cosmic.autonomy.tools import axis_targets, expected, tip_um
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.task import Task
-from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.core.orders import MoveTo
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.places import CalibrationShown, Pixel, Places, RotationShown
@@ -43,7 +43,9 @@ class PlatformPlaces(Places):
         A tool names an axis that is not there, or a file of calibrations is broken.
     """
 
-    def __init__(self, vico: VicoApplication, mico: MicoApplication, folder: Path | None) -> None:
+    def __init__(
+        self, vico: VicoApplication, mico: MicoApplicationBase, folder: Path | None
+    ) -> None:
         self._vico = vico
         self._manager = mico.manager
         self._tools = {each.name: each for each in vico.settings.tool}
@@ -226,7 +228,7 @@ def tool_mistakes(tools: Sequence[ToolSettings], axes: Collection[str]) -> list[
     ]
 
 
-def join_places(vico: VicoApplication, mico: MicoApplication, folder: Path | None) -> None:
+def join_places(vico: VicoApplication, mico: MicoApplicationBase, folder: Path | None) -> None:
     """Have the pixels of ViCo's cameras mean places on the platform; raises `ConfigError`."""
     places = PlatformPlaces(vico, mico, folder)
     for unit in vico.units.values():

@@ -10,7 +10,7 @@ from cosmic.autonomy.calibrations import Calibrations
 from cosmic.autonomy.moving import Mover
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.task import Task
-from cosmic.mico.core.device_manager import DeviceManager
+from cosmic.mico.core.ports import ManagerPort
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.core.calibration import RotationCentre
 from cosmic.vico.core.calibration_fit import CalibrationRefused, RotationFit, fit_rotation
@@ -34,7 +34,7 @@ class RotationProcedure:
     def __init__(
         self,
         vico: VicoApplication,
-        manager: DeviceManager,
+        manager: ManagerPort,
         calibrations: Calibrations,
         plate_map: Callable[[Picture], PixelMap],
         camera: str,

@@ -15,7 +15,7 @@ from cosmic.autonomy.tip_search import Floats, middle, uncovered
 from cosmic.autonomy.tools import axis_targets, tip_um
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.task import Task
-from cosmic.mico.core.device_manager import DeviceManager
+from cosmic.mico.core.ports import ManagerPort
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.core.calibration import Plane
 from cosmic.vico.core.calibration_fit import CalibrationRefused, MapFit, Sighting, fit_map
@@ -56,7 +56,7 @@ class StageProcedure:
     def __init__(
         self,
         vico: VicoApplication,
-        manager: DeviceManager,
+        manager: ManagerPort,
         calibrations: Calibrations,
         tool: ToolSettings,
         camera: str,

@@ -88,6 +88,7 @@ class MicoApplication(MicoApplicationBase):
             logger.error("MiCo cannot reach its hardware: %s", exc)
         self.status_changed.emit()
 
+    @override
     def initialize_later(self) -> Task:
         """Do what `initialize` does in the application's thread; returns at once.
 

@@ -52,6 +52,10 @@ class MicoApplicationBase(TaskApplication):
         """Why MiCo cannot work; empty when it can."""
 
     @abstractmethod
+    def initialize_later(self) -> Task:
+        """Do what `initialize` does without waiting; `rescanned` tells the end. For windows."""
+
+    @abstractmethod
     def rescan(self) -> Task:
         """Look again for the hardware; returns at once.
 

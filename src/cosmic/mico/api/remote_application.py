@@ -93,6 +93,7 @@ class RemoteMicoApplication(MicoApplicationBase):
         if may_wait_here():
             self._told.wait(FIRST_WORD_S)
 
+    @override
     def initialize_later(self) -> Task:
         """Do what `initialize` does without waiting, for windows."""
         self.initialize()

@@ -12,7 +12,7 @@ from cosmic.frame.task import Task
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.group_start import GroupStarted
-from cosmic.mico.core.settings import GroupSettings, PositionerSettings
+from cosmic.mico.core.settings import GroupSettings, MicoSettings, PositionerSettings
 from cosmic.mico.gui.axis_commands import ConsentRequest
 from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI
 from cosmic.mico.gui.collision_status import CollisionStatus
@@ -63,7 +63,6 @@ class MicoWidget(QWidget):
         self._mico = mico
         self._application = mico.application
         self._manager = mico.application.manager
-        self._settings = self._manager.settings
         self._cards: dict[str, PositionerBaseGUI] = {}
         self._shape: list[tuple[str, str]] = []
         self._dialog: ConsentDialog | None = None
@@ -102,6 +101,10 @@ class MicoWidget(QWidget):
         self._manager.device_lost.connect(self._on_status_changed)
         self._manager.links_changed.connect(self._on_links_changed)
         self._manager.group_started.connect(self._on_group_started)
+
+    @property
+    def _settings(self) -> MicoSettings:
+        return self._manager.settings  # of a station that is away they come later
 
     @property
     def mico(self) -> Mico:
