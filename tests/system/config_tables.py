@@ -39,6 +39,7 @@ from cosmic.twin.force_settings import (
     GripperGeometry,
     JointDrive,
 )
+from cosmic.twin.handling_settings import HandlingSettings
 from cosmic.twin.lens_settings import LensMotorSettings, LensSettings, LightSettings
 from cosmic.twin.optics.settings import (
     OpticsSettings,
@@ -98,6 +99,7 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[geometry.joints]": JointDrive,
     "[geometry.grippers]": GripperGeometry,
     "[contact]": ContactSettings,
+    "[handling]": HandlingSettings,
     "[[fibres]]": FibreSettings,
     "[samples.NAME]": SampleSettings,
     "[force_sensors.NAME]": ForceSensorSettings,

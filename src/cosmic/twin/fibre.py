@@ -2,10 +2,18 @@
 
 import math
 import random
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.twin.centre_line import CentreLine
+from cosmic.twin.fate import Fate
 from cosmic.twin.force_settings import ContactSettings, FibreSettings
+from cosmic.twin.grip import Free, Hold, make_hold
+from cosmic.twin.handling_settings import HandlingSettings
 from cosmic.twin.kinematics import Point
 from cosmic.twin.rod import (
     EI_UN_UM2_PER_N_M2,
@@ -17,6 +25,10 @@ from cosmic.twin.rod import (
 )
 from cosmic.twin.tools import Tool
 
+Floats = npt.NDArray[np.float64]
+PlatePose = tuple[float, float, float]
+Why = Literal["stuck", "hanging"]
+
 SPAN_STEP_UM: Final = 0.02
 """Spans closer than this share one curve; 0.01 % of the force at a span of 600 um."""
 
@@ -24,42 +36,26 @@ NEAREST_UM: Final = 5.0
 """Nearer to a clamp the jaws are in the way."""
 
 
-@dataclass(slots=True)
-class Hold:
-    """One grip on a fibre.
-
-    Attributes
-    ----------
-    at_um : float
-        Place on the fibre, from its first end, where it leaves the jaws.
-    outwards : int
-        +1: the fibre's second end is the one outside the jaws.
-    depth_um : float
-        How far inside the jaws it is really held.
-    """
-
-    at_um: float
-    outwards: int
-    depth_um: float
-
-
 @dataclass(frozen=True, slots=True)
-class FibreState:
-    """What is true of a fibre at one moment.
+class Carried:
+    """A fibre that goes along with a tool without being held.
 
     Attributes
     ----------
-    held_by : tuple of str
-        Grippers; empty while it lies on the plate.
-    ends_um : two points
-        Its ends as if straight, um, world.
-    tension_un : float
-        Pull between two grippers.
+    anchor : str
+        The point it follows, a key of `Workplace.tips`.
+    line_um : ndarray, shape (n, 3), float64
+        Where it is relative to that.
+    angle_rad : float
+        By which its own frame is turned in the world.
+    why : str
+        "stuck" to a jaw that opened, or "hanging" on a held fibre.
     """
 
-    held_by: tuple[str, ...]
-    ends_um: tuple[Point, Point]
-    tension_un: float
+    anchor: str
+    line_um: Floats
+    angle_rad: float
+    why: Why
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,43 +70,112 @@ class Line:
         +1 when it runs towards +x.
     slope, rise : float
         Change of y and of z per um of abscissa.
-    free_um : float
-        Its length, or the distance of the two grippers.
+    reach_um : float
+        Abscissa as far as it goes, or the distance of the two grippers.
+    free : Free or None
+        Its shape where one gripper holds it.
+    lifted_um, peeled_um : float
+        While its far part still lies on the plate: how high the jaws are above it, and at which
+        abscissa it comes down.
     """
 
     start: Point
     towards: int
     slope: float
     rise: float
-    free_um: float
+    reach_um: float
+    free: Free | None = None
+    lifted_um: float = 0.0
+    peeled_um: float = math.inf
 
     def abscissa_um(self, x_um: float) -> float:
         """Return how far along the fibre a place in x is."""
         return (x_um - self.start[0]) * self.towards
 
+    def y_um(self, along_um: float) -> float:
+        """Return where its middle is, across."""
+        aside = 0.0 if self.free is None else self.free.aside_um(along_um)
+        return self.start[1] + self.slope * along_um + aside
+
+    def z_um(self, along_um: float) -> float:
+        """Return how high it is."""
+        height = self.start[2] + self.rise * along_um
+        if self.lifted_um <= 0.0:
+            return height
+        part = min(max(along_um / self.peeled_um, 0.0), 1.0)
+        return height - self.lifted_um * part * part * (3.0 - 2.0 * part)
+
 
 class Fibre:
-    """A straight fibre; changed by the workplace only."""
+    """A fibre; changed by the workplace only.
 
-    def __init__(self, settings: FibreSettings, contact: ContactSettings, seed: str) -> None:
+    Parameters
+    ----------
+    number : int
+        Its number in twin.toml or in the sample; pieces that broke off count on.
+    seed : int
+        Of everything that happens to it.
+    line : CentreLine or None
+        Its shape; None: as the settings have it.
+    """
+
+    def __init__(
+        self,
+        number: int,
+        settings: FibreSettings,
+        contact: ContactSettings,
+        handling: HandlingSettings,
+        seed: int,
+        line: CentreLine | None = None,
+    ) -> None:
+        self.number = number
         self.settings = settings
+        self.key = f"{number} {seed}"
+        self.line_um = line or CentreLine.of(
+            settings.length_um, settings.curl_deg, settings.kink_deg
+        )
         self.holds: dict[str, Hold] = {}
-        self.plate_pose = settings.x_um, settings.y_um, math.radians(settings.angle_deg)
+        self.carried: Carried | None = None
+        self.plate_pose: PlatePose = settings.x_um, settings.y_um, math.radians(settings.angle_deg)
+        self.gone = False
+        self.on_plate = True
+        self.grasps = 0
+        self.falls = 0
         self._contact = contact
-        self._random = random.Random(f"fibre {seed}")
+        energy = handling.adhesion_un * math.exp(
+            handling.adhesion_sigma_ln * random.Random(f"adhesion {self.key}").gauss(0.0, 1.0)
+        )
+        # A strip lifted by h at one end comes off over (18 EI h^2 / energy)^(1/4).
+        self._peel_um2 = 18.0 * settings.ei_n_m2 * EI_UN_UM2_PER_N_M2 / energy
 
     # ------------------------------------------------------------------ grasp and release
 
-    def grip(self, tool: str, *, at_um: float, outwards: int) -> None:
+    def grip(self, tool: Tool, *, at_um: float, outwards: int, fate: Fate) -> None:
         """Have a gripper hold the fibre at a place along it."""
-        depth = self._random.gauss(
-            self._contact.clamp_depth_um, self._contact.clamp_depth_spread_um
-        )
-        self.holds[tool] = Hold(at_um, outwards, max(depth, 0.0))
+        self.holds[tool.name] = make_hold(self.line_um, at_um, outwards, tool.towards, fate)
+        self.carried = None
 
-    def free_of(self, hold: Hold) -> float:
-        """Return the length that stands out of the jaws."""
-        return self.settings.length_um - hold.at_um if hold.outwards > 0 else hold.at_um
+    def lay(self, pose: PlatePose) -> None:
+        """Put it on the plate."""
+        self.plate_pose = pose
+        self.on_plate = True
+        self.carried = None
+        self.holds.clear()
+
+    @property
+    def lies(self) -> bool:
+        """Whether nothing but the plate has it."""
+        return not (self.holds or self.carried or self.gone)
+
+    def height_um(self, tool: Tool) -> float:
+        """Return how high the jaws that hold it are above where it would lie."""
+        return tool.hold[2] - 0.5 * self.settings.thickness_um
+
+    def peeled_um(self, height_um: float) -> float:
+        """Return how much of it is off the plate once it is lifted so high at one end."""
+        return math.sqrt(math.sqrt(self._peel_um2 * height_um * height_um))
+
+    # ------------------------------------------------------------------ between two grippers
 
     def slack_um(self, distance_um: float) -> float:
         """Return the length between both grippers beyond their distance."""
@@ -119,7 +184,7 @@ class Fibre:
 
     def slip(self, distance_um: float) -> None:
         """Let the fibre slide through the second gripper where the pull is too much."""
-        excess = self._tension_un(distance_um) - self._contact.grip_limit_un
+        excess = self.tension_un(distance_um) - self._contact.grip_limit_un
         if excess > 0.0:
             first, second = self.holds.values()
             way = excess * self._axial_um_un(distance_um)
@@ -129,7 +194,8 @@ class Fibre:
         ea_un = self.settings.ea_n * UN_PER_N
         return distance_um / ea_un + 2.0 / self._contact.gripper_un_um
 
-    def _tension_un(self, distance_um: float) -> float:
+    def tension_un(self, distance_um: float) -> float:
+        """Return the pull between both grippers, so far apart."""
         return tension_un(
             ea_un=self.settings.ea_n * UN_PER_N,
             distance_um=distance_um,
@@ -139,35 +205,51 @@ class Fibre:
 
     # ------------------------------------------------------------------ where it is
 
-    def line(self, tools: dict[str, Tool]) -> Line:
+    def line(self, tools: Mapping[str, Tool]) -> Line:
         """Return the free part of the held fibre."""
         names = list(self.holds)
-        first = tools[names[0]]
-        towards = 1 if first.forward[0] > 0.0 else -1
+        first, hold = tools[names[0]], self.holds[names[0]]
         if len(names) == 1:
-            free = self.free_of(self.holds[names[0]])
-            return Line(first.hold, towards, 0.0, 0.0, free)
+            reach = hold.free.reach_um
+            if not self.on_plate:
+                return Line(first.hold, hold.towards, 0.0, hold.fate.rise, reach, hold.free)
+            height = max(self.height_um(first), 0.0)
+            peeled = max(self.peeled_um(height), 1.0)
+            return Line(
+                first.hold, hold.towards, 0.0, 0.0, reach, hold.free, height, min(peeled, reach)
+            )
         second = tools[names[1]]
-        span = max((second.hold[0] - first.hold[0]) * towards, 1.0)
+        span = max((second.hold[0] - first.hold[0]) * hold.towards, 1.0)
         slope = (second.hold[1] - first.hold[1]) / span
         rise = (second.hold[2] - first.hold[2]) / span
-        return Line(first.hold, towards, slope, rise, span)
+        return Line(first.hold, hold.towards, slope, rise, span)
 
-    def state(self, tools: dict[str, Tool], lying: tuple[Point, Point]) -> FibreState:
-        """Return what is true now; `lying`: its ends while it lies on the plate."""
-        if not self.holds:
-            return FibreState((), lying, 0.0)
+    def held_um(self, tools: Mapping[str, Tool]) -> Floats:
+        """Return the undeformed held fibre relative to its first gripper's hold, shape (n, 3)."""
+        hold = next(iter(self.holds.values()))
         line = self.line(tools)
-        (hold, *more) = self.holds.values()
-        pull = self._tension_un(line.free_um) if more else 0.0
-        x, y, z = line.start
-        ends = []
-        for end_um in (0.0, self.settings.length_um):
-            way = (end_um - hold.at_um) * hold.outwards
-            ends.append((x + line.towards * way, y + line.slope * way, z + line.rise * way))
-        return FibreState(tuple(self.holds), (ends[0], ends[1]), pull)
+        if line.free is None:
+            ends = np.array([-hold.at_um, self.line_um.length_um - hold.at_um])
+            along = ends * hold.outwards
+            x = along * hold.towards
+            return np.column_stack([x, line.slope * along, line.rise * along])
+        x, y = hold.line_um.T
+        z = [line.z_um(max(u, 0.0)) - line.start[2] for u in (hold.towards * x).tolist()]
+        return np.column_stack([x, y, z])
 
     # ------------------------------------------------------------------ what the probe feels
+
+    def lever_um(self, line: Line, abscissa_um: float) -> float:
+        """Return the length from the true clamp over which a push there bends it."""
+        hold = next(iter(self.holds.values()))
+        along = max(abscissa_um, NEAREST_UM)
+        return (along if line.free is None else line.free.lever_um(along)) + hold.depth_um
+
+    def strain(self, line: Line, abscissa_um: float, force_un: float) -> float:
+        """Return the strain at the clamp under a force there."""
+        moment = abs(force_un) * self.lever_um(line, abscissa_um)
+        stiffness = self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2
+        return 0.5 * self.settings.thickness_um * moment / stiffness
 
     def curve(self, line: Line, abscissa_um: float, *, edge_um: float, sensor: float) -> PushCurve:
         """Return force over way for a probe at an abscissa.
@@ -181,22 +263,22 @@ class Fibre:
         """
         (hold, *more) = self.holds.values()
         ei = self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2
-        span = _rounded(max(abscissa_um, NEAREST_UM) + hold.depth_um)
-        if not more:
+        span = _rounded(self.lever_um(line, abscissa_um))
+        if line.free is not None:
             return clamped_at_one_end(
                 ei_un_um2=ei,
                 span_um=span,
-                free_um=_rounded(line.free_um + hold.depth_um),
+                free_um=_rounded(span + line.free.beyond_um(max(abscissa_um, NEAREST_UM))),
                 radius_um=edge_um + self.settings.width_um / 2.0,
                 sensor_un_um=sensor,
             )
-        distance = _rounded(line.free_um + hold.depth_um + more[0].depth_um)
+        distance = _rounded(line.reach_um + hold.depth_um + more[0].depth_um)
         return held_at_both_ends(
             ei_un_um2=ei,
             ea_un=self.settings.ea_n * UN_PER_N,
             span_um=min(span, distance - NEAREST_UM),
             distance_um=distance,
-            slack_um=_rounded(self.slack_um(line.free_um)),
+            slack_um=_rounded(self.slack_um(line.reach_um)),
             gripper_un_um=self._contact.gripper_un_um,
             sensor_un_um=sensor,
         )

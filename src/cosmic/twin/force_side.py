@@ -4,13 +4,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
+from cosmic.twin.felt import Moment
 from cosmic.twin.force_sensor import ForceSensor
 from cosmic.twin.kinematics import Point
 from cosmic.twin.settings import TwinSettings
 from cosmic.twin.stage import Stage
 from cosmic.twin.timeline import Floats, Timeline
 from cosmic.twin.tools import make_skeleton
-from cosmic.twin.workplace import Moment, Workplace
+from cosmic.twin.truth import NO_TRUTH, Truth
+from cosmic.twin.twin_faults import TwinFaults
+from cosmic.twin.workplace import Workplace
 
 RIGID_UN_UM: Final = 1e9
 """Stiffness of a probe without a sensor."""
@@ -29,12 +32,18 @@ class ForceSide:
         All stages by name.
     seed : int
         Of noise, drift and how fibres are held.
+    faults : TwinFaults or None
+        What is injected.
+    truth : Truth
+        Told what happens.
 
     Attributes
     ----------
     sensors : dict of str to ForceSensor
         As twin.toml names them. Reading one is all that an acquisition board may do here; the
         rest is the truth, for pictures, logs and tests.
+    offsets : ToolOffsets
+        How far tools are from where the drawing has them.
 
     Raises
     ------
@@ -43,13 +52,23 @@ class ForceSide:
     """
 
     def __init__(
-        self, settings: TwinSettings, folder: Path, stages: Mapping[str, Stage], seed: int
+        self,
+        settings: TwinSettings,
+        folder: Path,
+        stages: Mapping[str, Stage],
+        seed: int,
+        *,
+        faults: TwinFaults | None = None,
+        truth: Truth = NO_TRUTH,
     ) -> None:
         self._stages = stages
         self.skeleton = make_skeleton(settings, folder)
         on_probe = [each for each in settings.force_sensors.values() if each.mounted_on]
         stiffness = on_probe[0].stiffness_un_um if on_probe else RIGID_UN_UM
-        self._workplace = Workplace(settings, self.skeleton, sensor_un_um=stiffness, seed=seed)
+        self._workplace = Workplace(
+            settings, self.skeleton, sensor_un_um=stiffness, seed=seed, faults=faults, truth=truth
+        )
+        self.offsets = self._workplace.offsets
         self._timeline = Timeline(self._workplace, stages, settings.contact.step_s)
         self.sensors = {
             name: ForceSensor(name, each, self.force_un if each.mounted_on else None, seed)
@@ -73,4 +92,4 @@ class ForceSide:
     def tips(self, now_s: float) -> dict[str, Point]:
         """Return where the tips of the tools are, um, world; see `Workplace.tips`."""
         values = {name: each.position_then(now_s) for name, each in self._stages.items()}
-        return self._workplace.tips(values)
+        return self._workplace.tips(values, now_s)

@@ -38,7 +38,8 @@ def put_on(settings: TwinSettings, name: str, seed: int) -> TwinSettings:
         place = stages[gripper.stage]
         stages[gripper.stage] = place.model_copy(update={"start": sample.gap_um})
     fibres = Spread(name, sample, seed).fibres()
-    return settings.model_copy(update={"fibres": fibres, "stages": stages})
+    handling = settings.handling.model_copy(update={"default_faults": sample.faults})
+    return settings.model_copy(update={"fibres": fibres, "stages": stages, "handling": handling})
 
 
 class Spread:
@@ -68,9 +69,10 @@ class Spread:
         sample = self._sample
         found: list[FibreSettings] = []
         # Pairs first: they need the most room.
-        for role, pairs in (("crossing", sample.crossing), ("stuck", sample.stuck)):
-            for _ in range(pairs):
-                found += self._placed(self._pair(role, len(found)))
+        for _ in range(sample.crossing):
+            found += self._placed(self._pair("crossing", len(found)))
+        for _ in range(sample.stuck):
+            found += self._placed(self._pair("stuck", len(found)))
         for _ in range(sample.single):
             found += self._placed([self._drawn("single")])
         for _ in range(sample.debris):

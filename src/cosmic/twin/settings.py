@@ -13,6 +13,7 @@ from cosmic.twin.force_settings import (
     ForceSensorSettings,
     GeometrySettings,
 )
+from cosmic.twin.handling_settings import HandlingSettings
 from cosmic.twin.lens_settings import LensSettings, LightSettings
 from cosmic.twin.optics.settings import OpticsSettings
 from cosmic.twin.sample_settings import SampleSettings
@@ -137,6 +138,7 @@ class TwinSettings(StrictModel):
     geometry: GeometrySettings
     contact: ContactSettings
     fibres: tuple[FibreSettings, ...] = Field(default=(), strict=False)
+    handling: HandlingSettings = HandlingSettings()
     samples: dict[str, SampleSettings] = Field(default_factory=dict)
     force_sensors: dict[str, ForceSensorSettings]
     sensor_wiring: dict[str, str] = Field(default_factory=dict)

@@ -9,8 +9,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.twin.felt import Felt, Moment
 from cosmic.twin.stage import Path, Stage
-from cosmic.twin.workplace import Felt, Moment, Workplace
+from cosmic.twin.workplace import Workplace
 
 Floats = npt.NDArray[np.float64]
 
@@ -103,7 +104,7 @@ class Timeline:
                 self._values[stage.name] = stage.position_then(time_s)
                 if path.end_s <= time_s:
                     self._resting[stage.name] = path
-        self._felt = self._workplace.look(self._values)
+        self._felt = self._workplace.look(self._values, time_s)
         self._times_s.append(time_s)
         self._forces_un.append(self._felt.total_un)
 

@@ -20,12 +20,20 @@ class Tool(NamedTuple):
     forward : (float, float)
         Unit vector in the plane, from the jaws outwards.
     gap_um : float
+    before_um : float
+        The gap at the look before.
     """
 
     name: str
     hold: Point
     forward: tuple[float, float]
     gap_um: float
+    before_um: float
+
+    @property
+    def towards(self) -> int:
+        """+1 when the jaws point towards +x."""
+        return 1 if self.forward[0] > 0.0 else -1
 
 
 class Gripper:
@@ -40,13 +48,28 @@ class Gripper:
         self._stage = stage
         self._hold = _halfway(*self.slides, hold_height_um)
 
-    def jaws_at(self, values: Mapping[str, float]) -> tuple[Point, Point]:
+    def jaws_at(self, values: Mapping[str, float], offset: Point) -> tuple[Point, Point]:
         """Return the inner lower edges of both jaws' tips."""
-        return self.slides[0].at(values), self.slides[1].at(values)
+        return added(self.slides[0].at(values), offset), added(self.slides[1].at(values), offset)
 
-    def tool(self, name: str, values: Mapping[str, float]) -> Tool:
-        """Return the gripper with the stages at `values`."""
-        return Tool(name, self._hold.at(values), self._forward, values[self._stage])
+    def tool(
+        self, name: str, values: Mapping[str, float], offset: Point, before_um: float | None = None
+    ) -> Tool:
+        """Return the gripper with the stages at `values`.
+
+        Parameters
+        ----------
+        offset : (float, float, float)
+            How far its tip is from where it is drawn.
+        """
+        gap = values[self._stage]
+        before = gap if before_um is None else before_um
+        return Tool(name, added(self._hold.at(values), offset), self._forward, gap, before)
+
+
+def added(point: Point, offset: Point) -> Point:
+    """Return a point moved by an offset."""
+    return point[0] + offset[0], point[1] + offset[1], point[2] + offset[2]
 
 
 def _halfway(first: Slide, second: Slide, higher_um: float) -> Slide:

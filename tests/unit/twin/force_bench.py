@@ -3,10 +3,10 @@
 import numpy as np
 
 from cosmic.frame.clock import ManualClock
+from cosmic.twin.felt import Moment, Push
 from cosmic.twin.force_settings import FibreSettings
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import TwinSettings, shipped_settings
-from cosmic.twin.workplace import Moment, Push
 
 FIBRE = FibreSettings(
     length_um=2000.0,

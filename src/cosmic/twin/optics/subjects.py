@@ -1,20 +1,21 @@
 """What there is to be seen at a moment: fibres, tools, the plate."""
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from cosmic.twin.felt import Moment, Push
+from cosmic.twin.fibre_state import FibreState
 from cosmic.twin.force_side import ForceSide
 from cosmic.twin.kinematics import Floats, Point, Slide
 from cosmic.twin.optics.ground import on_plate
-from cosmic.twin.optics.shapes import bridge, cantilever, lying
+from cosmic.twin.optics.shapes import bridge, cantilever
 from cosmic.twin.optics.solids import read_solids
 from cosmic.twin.settings import TwinSettings
 from cosmic.twin.stage import Stage
-from cosmic.twin.workplace import Moment, Push
+from cosmic.twin.tools import added
 
 NEAREST_UM = 5.0
 """A probe nearer to the jaws than this bends nothing that could be seen."""
@@ -104,93 +105,111 @@ class Subjects:
         values = {name: each.position_then(at_s) for name, each in self._stages.items()}
         moment = self._force_side.moment(at_s)
         plate = self._force_side.skeleton.pose(self._settings.geometry.plate, values)
-        poses = tuple(self._lying_pose(moment, number) for number in self._which(moment, False))
+        lying = tuple(each for each in moment.fibres if each.where == "plate")
+        carried = tuple(each for each in moment.fibres if each.anchor)
         tips = self._force_side.tips(at_s)
         return Subject(
             plate=plate,
-            lying=lambda: tuple(self._lying(pose, plate) for pose in poses),
-            lying_key=poses,
-            held=tuple(self._held(moment, number, tips) for number in self._which(moment, True)),
-            solids=tuple(
-                Solid(link, part + slide.at(values))
-                for link, slide, parts in self._bodies
-                for part in parts
-            ),
+            lying=lambda: tuple(self._lying(state, plate) for state in lying),
+            lying_key=tuple(_pose_key(state) for state in lying),
+            held=tuple(self._carried(moment, state, tips) for state in carried),
+            solids=self._solids(values, at_s),
         )
 
-    def _which(self, moment: Moment, held: bool) -> list[int]:
-        return [n for n, state in enumerate(moment.fibres) if bool(state.held_by) is held]
+    def _solids(self, values: Mapping[str, float], at_s: float) -> tuple[Solid, ...]:
+        offsets = self._force_side.offsets
+        found = []
+        for link, slide, parts in self._bodies:
+            place = slide.at(values)
+            if not offsets.still:
+                place = added(place, offsets.at(link.partition("_")[0], at_s))
+            found += [Solid(link, part + place) for part in parts]
+        return tuple(found)
 
-    # ------------------------------------------------------------------ lying
-
-    def _lying_pose(self, moment: Moment, number: int) -> tuple[float, ...]:
-        """Return number, middle and angle of a fibre on the plate, as far as they can be seen."""
-        # The force side may be ahead of the picture by some ms, with the table turned further.
-        values = {n: each.position_then(moment.time_s) for n, each in self._stages.items()}
-        plate = self._force_side.skeleton.pose(self._settings.geometry.plate, values)
-        ends = np.column_stack([np.array(moment.fibres[number].ends_um), np.ones(2)])
-        (x0, y0), (x1, y1) = np.linalg.solve(plate, ends.T).T[:, :2].tolist()
-        angle = math.atan2(y1 - y0, x1 - x0)
-        middle = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
-        return float(number), round(middle[0], 3), round(middle[1], 3), round(angle, 6)
-
-    def _lying(self, pose: tuple[float, ...], plate: Floats) -> Strand:
-        number, x, y, angle = pose
-        fibre = self._settings.fibres[int(number)]
-        line = lying(fibre.length_um, fibre.curl_deg, fibre.kink_deg)
-        cos, sin = math.cos(angle), math.sin(angle)
-        turned = line @ np.array([[cos, sin], [-sin, cos]]) + [x, y]
-        return Strand(on_plate(turned, plate, 0.5 * fibre.thickness_um), fibre.width_um)
+    def _lying(self, state: FibreState, plate: Floats) -> Strand:
+        flat = state.shape.placed(*state.plate_pose)
+        fibre = state.settings
+        return Strand(on_plate(flat, plate, 0.5 * fibre.thickness_um), fibre.width_um)
 
     # ------------------------------------------------------------------ held
 
-    def _held(self, moment: Moment, number: int, tips: Mapping[str, Point]) -> Strand:
-        state = moment.fibres[number]
-        first = f"{state.held_by[0]}.hold"
+    def _carried(self, moment: Moment, state: FibreState, tips: Mapping[str, Point]) -> Strand:
+        width = state.settings.width_um
+        push = next((each for each in moment.pushes if each.fibre == state.number), None)
+        if state.where != "held":
+            return Strand(state.relative_um + tips[state.anchor], width)
         towards = self._forward[state.held_by[0]]
-        start, start_then = np.array(tips[first]), np.array(moment.tips_um[first])
-        ways = sorted((end[0] - start_then[0]) * towards for end in state.ends_um)
-        slopes = np.zeros(2)
+        start = np.array(tips[state.anchor])
+        line = _outwards(state.relative_um, towards)
         span: float | None = None
         if len(state.held_by) == 2:
-            other = np.array(tips[f"{state.held_by[1]}.hold"]) - start
-            span = max(float(other[0]) * towards, 1.0)
-            slopes = other[1:] / span
-        push = next((each for each in moment.pushes if each.fibre == number), None)
-        u, v = self._free(moment, push, tips, first, towards, ways[1], span)
-        u, v = np.concatenate([[ways[0]], u]), np.concatenate([[0.0], v])
-        line = np.empty((len(u), 3))
-        line[:, 0] = start[0] + towards * u
-        # The probe pushes towards -y.
-        line[:, 1] = start[1] + slopes[0] * u - v
-        line[:, 2] = start[2] + slopes[1] * u
-        return Strand(line, self._settings.fibres[number].width_um)
+            line, span = self._between(state, line, tips, towards)
+        if push is not None:
+            line = self._pushed(line, self._ahead(moment, push, tips, state.anchor, towards), span)
+        line = line * (towards, 1.0, 1.0)
+        return Strand(line + start, width)
 
-    def _free(
-        self,
-        moment: Moment,
-        push: Push | None,
-        tips: Mapping[str, Point],
-        first: str,
-        towards: int,
-        reach: float,
-        span: float | None,
-    ) -> tuple[Floats, Floats]:
-        """Return abscissa and deflection of what stands out of the first jaws."""
-        straight = np.array([0.0, reach])
-        if push is None:
-            return straight, np.zeros(2)
-        # What the probe went since the force side looked last shows in the picture too.
+    def _between(
+        self, state: FibreState, line: Floats, tips: Mapping[str, Point], towards: int
+    ) -> tuple[Floats, float]:
+        """Return a fibre between two grippers, straight, and how far they are apart."""
+        other = np.array(tips[f"{state.held_by[1]}.hold"]) - tips[state.anchor]
+        span = max(float(other[0]) * towards, 1.0)
+        u = np.array([line[0, 0], 0.0, line[-1, 0]])
+        return np.column_stack([u, other[1] / span * u, other[2] / span * u]), span
+
+    def _ahead(
+        self, moment: Moment, push: Push, tips: Mapping[str, Point], first: str, towards: int
+    ) -> tuple[float, float]:
+        """Return where the probe is along the fibre, and by how much it bends it, in the picture.
+
+        What the probe went since the force side looked last shows in the picture too.
+        """
         ahead = [
             (now[first][1] - now["probe"][1], (now["probe"][0] - now[first][0]) * towards)
             for now in (moment.tips_um, tips)
         ]
         deflection = push.deflection_um + ahead[1][0] - ahead[0][0]
-        along = push.abscissa_um + ahead[1][1] - ahead[0][1]
+        return push.abscissa_um + ahead[1][1] - ahead[0][1], deflection
+
+    def _pushed(self, line: Floats, push: tuple[float, float], span: float | None) -> Floats:
+        """Return a fibre, first the part in the jaws, as the probe bends it."""
+        along, deflection = push
+        inside, free = line[:1], line[1:]
+        reach = float(free[-1, 0])
         if not NEAREST_UM < along < (reach if span is None else span - NEAREST_UM):
-            return straight, np.zeros(2)
+            return line
         if span is None:
-            line = cantilever(along, deflection, reach)
+            bent = cantilever(along, deflection, reach)
         else:
-            line = np.concatenate([bridge(along, deflection, span), [[max(reach, span), 0.0]]])
-        return line[:, 0], line[:, 1]
+            bent = np.concatenate([bridge(along, deflection, span), [[max(reach, span), 0.0]]])
+        u = free[:, 0]
+        if len(free) > 2 and (np.diff(u) > 0.0).all():
+            # A bow of its own adds to that of the probe.
+            u = np.unique(np.concatenate([u, bent[:, 0]]))
+            bent = np.column_stack([u, np.interp(u, bent[:, 0], bent[:, 1])])
+        elif len(free) > 2:
+            return line  # it turns back, and the probe hardly gets there
+        found = np.column_stack([bent[:, 0], _at(free, bent[:, 0])])
+        # The probe pushes towards -y.
+        found[:, 1] -= bent[:, 1]
+        return np.concatenate([inside, found])
+
+
+def _pose_key(state: FibreState) -> tuple[float, ...]:
+    x, y, angle = state.plate_pose
+    return float(state.number), round(x, 3), round(y, 3), round(angle, 6), state.shape.length_um
+
+
+def _outwards(relative_um: Floats, towards: int) -> Floats:
+    """Return a fibre in a gripper's frame, x out of the jaws, from inside outwards."""
+    line = relative_um * (towards, 1.0, 1.0)
+    return line if line[0, 0] <= line[-1, 0] else line[::-1]
+
+
+def _at(line: Floats, u: Floats) -> Floats:
+    """Return y and z of a line at places along x, shape (n, 2); beyond its end as at its end."""
+    slope = (line[-1, 1:] - line[-2, 1:]) / max(float(line[-1, 0] - line[-2, 0]), 1e-9)
+    beyond = np.maximum(u - line[-1, 0], 0.0)[:, None]
+    inner = [np.interp(u, line[:, 0], column) for column in line[:, 1:].T]
+    return np.asarray(np.column_stack(inner) + beyond * slope)

@@ -1,0 +1,64 @@
+"""What the probe feels, and the truth of the force side at one moment."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from cosmic.twin.fibre_state import FibreState
+from cosmic.twin.kinematics import Point
+
+
+@dataclass(frozen=True, slots=True)
+class Push:
+    """What one fibre does to the probe.
+
+    Attributes
+    ----------
+    fibre : int
+        Its number in twin.toml.
+    abscissa_um : float
+        From the jaws' tip to the probe.
+    deflection_um : float
+        Of the fibre at the probe.
+    """
+
+    fibre: int
+    force_un: float
+    abscissa_um: float
+    deflection_um: float
+
+
+@dataclass(frozen=True, slots=True)
+class Felt:
+    """What the probe feels at one moment."""
+
+    pushes: tuple[Push, ...] = ()
+    jaw_un: float = 0.0
+
+    @property
+    def total_un(self) -> float:
+        """Force on the probe, positive when it is pushed back."""
+        return sum((push.force_un for push in self.pushes), self.jaw_un)
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """The truth of the force side at one moment.
+
+    Attributes
+    ----------
+    force_un : float
+        On the probe; positive when it is pushed back.
+    pushes : tuple of Push
+        One for each fibre that touches the probe.
+    jaw_un : float
+        The part of the force that comes from a jaw.
+    tips_um : mapping of str to point
+        See `Workplace.tips`.
+    """
+
+    time_s: float
+    force_un: float
+    pushes: tuple[Push, ...]
+    jaw_un: float
+    tips_um: Mapping[str, Point]
+    fibres: tuple[FibreState, ...]

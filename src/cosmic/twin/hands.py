@@ -1,0 +1,270 @@
+"""What grippers do to fibres: take, lift, lose, let go, and what sticks to them afterwards."""
+
+import math
+import random
+from dataclasses import replace
+
+import numpy as np
+
+from cosmic.twin.bonds import Bonds
+from cosmic.twin.centre_line import CentreLine
+from cosmic.twin.clinging import Clinging
+from cosmic.twin.falls import Falls
+from cosmic.twin.fate import Fate, draw_fate
+from cosmic.twin.fibre import Carried, Fibre, Floats
+from cosmic.twin.grasping import between_jaws
+from cosmic.twin.grip import make_hold
+from cosmic.twin.kinematics import Point
+from cosmic.twin.settings import TwinSettings
+from cosmic.twin.surroundings import Surroundings, Tell
+from cosmic.twin.tools import Tool
+from cosmic.twin.twin_faults import TwinFaults
+
+
+class Hands:
+    """The grippers' side of the workplace.
+
+    Parameters
+    ----------
+    fibres : list of Fibre
+        Shared with the workplace; pieces that break off are appended.
+    tell : callable
+        Told each event by name, with facts.
+    faults : bool
+        Whether anything goes wrong by chance.
+    """
+
+    def __init__(
+        self,
+        settings: TwinSettings,
+        fibres: list[Fibre],
+        seed: int,
+        *,
+        injected: TwinFaults,
+        tell: Tell,
+        faults: bool,
+    ) -> None:
+        self._contact, self._handling = settings.contact, settings.handling
+        self.fibres = fibres
+        self._seed = seed
+        self._injected = injected
+        self._tell = tell
+        self._faults = faults
+        self._bonds = Bonds(fibres, settings.handling.partner_un, tell)
+        self._falls = Falls(settings.handling, self._bonds, tell, scatter=faults)
+        self._in_hand: dict[str, Fibre] = {}
+        self._clinging: dict[int, Clinging] = {}
+        self._widest: dict[str, float] = {}
+        self._came_um: dict[int, tuple[Point, float]] = {}
+        self._narrowest = min((each.settings.width_um for each in fibres), default=0.0)
+        self._begun = False
+
+    @property
+    def held(self) -> list[Fibre]:
+        """The fibres in grippers, each once."""
+        return list(dict.fromkeys(self._in_hand.values()))
+
+    def look(self, around: Surroundings) -> None:
+        """Go on to where everything is now."""
+        if not self._begun:
+            self._begun = True
+            self._begin(around)
+        for name, tool in around.tools.items():
+            gap = tool.gap_um
+            self._widest[name] = max(self._widest.get(name, gap), gap)
+            held = self._in_hand.get(name)
+            if held is not None:
+                if gap > held.settings.width_um:
+                    self._open(held, tool, around)
+            elif gap < tool.before_um:
+                self._close(tool, around)
+            if gap <= self._narrowest:
+                self._widest[name] = gap
+        for name, fibre in list(self._in_hand.items()):
+            if len(fibre.holds) == 1:
+                self._carry(fibre, around.tools[name], around)
+        for number in list(self._clinging):
+            self._shake(number, around)
+
+    def _begin(self, around: Surroundings) -> None:
+        """Put each fibre where it was left, at the first look."""
+        for fibre in self.fibres:
+            name, settings = fibre.settings.held_by, fibre.settings
+            if name and around.tools[name].gap_um <= settings.width_um:
+                tool = around.tools[name]
+                inside = settings.length_um - settings.free_um
+                at = inside if tool.towards > 0 else settings.free_um
+                fate = draw_fate(self._handling, self._contact, f"{fibre.key} 0", faults=False)
+                fibre.on_plate = False
+                fibre.grip(tool, at_um=at, outwards=tool.towards, fate=fate)
+                self._in_hand[name] = fibre
+
+    # ------------------------------------------------------------------ closing
+
+    def _close(self, tool: Tool, around: Surroundings) -> None:
+        """Take the first fibre whose width the gap has just come down to."""
+        for fibre in self.fibres:
+            if fibre.gone or not tool.gap_um <= fibre.settings.width_um < tool.before_um:
+                continue
+            line = self.world_um(fibre, around)
+            found = between_jaws(tool, line, self._widest[tool.name], self._contact)
+            if found is not None:
+                self._grasp(fibre, tool, *found)
+                return
+
+    def _grasp(self, fibre: Fibre, tool: Tool, at_um: float, outwards: int) -> None:
+        fibre.grasps += 1
+        fate = self._fate(fibre, tool)
+        if fate.missed:
+            self._tell("missed", fibre=fibre.number, tool=tool.name)
+            return
+        self._clinging.pop(fibre.number, None)
+        fibre.on_plate = fibre.lies
+        fibre.grip(tool, at_um=at_um, outwards=outwards, fate=fate)
+        self._in_hand[tool.name] = fibre
+        self._came_um[fibre.number] = tool.hold, 0.0
+        self._bonds.part(fibre)
+        self._tell(
+            "grasped",
+            fibre=fibre.number,
+            tool=tool.name,
+            at_um=at_um,
+            free_um=fibre.holds[tool.name].free.length_um,
+            depth_um=fate.depth_um,
+        )
+
+    def _fate(self, fibre: Fibre, tool: Tool) -> Fate:
+        key = f"{fibre.key} {fibre.grasps}"
+        fate = draw_fate(self._handling, self._contact, key, faults=self._faults)
+        return self._injected.altered(fate, self._handling, tool.name, key)
+
+    # ------------------------------------------------------------------ carrying
+
+    def _carry(self, fibre: Fibre, tool: Tool, around: Surroundings) -> None:
+        fate = fibre.holds[tool.name].fate
+        if fibre.on_plate:
+            height = max(fibre.height_um(tool), 0.0)
+            if fibre.peeled_um(height) >= fibre.holds[tool.name].free.length_um:
+                fibre.on_plate = False
+                self._tell("lifted", fibre=fibre.number, tool=tool.name, height_um=height)
+                self._bonds.drag(fibre, tool)
+        if fate.slip_at_um < math.inf and fibre.height_um(tool) > fate.slip_at_um:
+            self._lose(fibre, tool, around, "slipped")
+        elif fate.drop_after_um < math.inf and not fibre.on_plate:
+            place, way = self._came_um[fibre.number]
+            way += math.dist(place, tool.hold)
+            self._came_um[fibre.number] = tool.hold, way
+            if way > fate.drop_after_um:
+                self._lose(fibre, tool, around, "dropped")
+
+    def loosen(self, fibre: Fibre) -> None:
+        """Have a grip give way: the fibre is held further inside the jaws."""
+        name, hold = next(iter(fibre.holds.items()))
+        hold.depth_um += hold.fate.loosen_um
+        hold.fate = replace(hold.fate, loosen_strain=math.inf)
+        self._tell("grip loosened", fibre=fibre.number, tool=name, by_um=hold.fate.loosen_um)
+
+    def snap(self, fibre: Fibre, around: Surroundings, strain: float) -> None:
+        """Break a fibre where it leaves the jaws; the outer piece falls."""
+        name, hold = next(iter(fibre.holds.items()))
+        tool = around.tools[name]
+        whole = fibre.line_um.length_um
+        low, high = (0.0, hold.at_um) if hold.outwards > 0 else (hold.at_um, whole)
+        outer = (hold.at_um, whole) if hold.outwards > 0 else (0.0, hold.at_um)
+        piece = self._piece(fibre, *outer)
+        piece.carried = Carried(f"{name}.hold", np.zeros((2, 3)), hold.angle_rad, "hanging")
+        self.fibres.append(piece)
+        self._tell("broken", fibre=fibre.number, tool=name, piece=piece.number, strain=strain)
+        # The piece keeps the frame of the whole, so it is laid where that is.
+        self._falls.fall(piece, hold.frame_um(fibre.line_um, tool.hold), tool, around)
+        fibre.line_um = _part_of(fibre.line_um, low, high)
+        fibre.settings = fibre.settings.model_copy(update={"length_um": high - low})
+        at = high if hold.outwards > 0 else low
+        fibre.holds[name] = make_hold(
+            fibre.line_um, at - low, hold.outwards, hold.towards, hold.fate
+        )
+
+    def _piece(self, fibre: Fibre, low_um: float, high_um: float) -> Fibre:
+        settings = fibre.settings.model_copy(
+            update={
+                "length_um": high_um - low_um,
+                "held_by": "",
+                "role": "debris",
+                "bonded_to": None,
+            }
+        )
+        line = _part_of(fibre.line_um, low_um, high_um)
+        number = len(self.fibres)
+        return Fibre(number, settings, self._contact, self._handling, self._seed, line)
+
+    # ------------------------------------------------------------------ letting go
+
+    def _open(self, fibre: Fibre, tool: Tool, around: Surroundings) -> None:
+        """Open the jaws around a fibre: the other gripper keeps it, or it falls, or it sticks."""
+        name = tool.name
+        self._widest[name] = tool.gap_um
+        if len(fibre.holds) > 1:
+            del self._in_hand[name], fibre.holds[name]
+            self._tell("released", fibre=fibre.number, tool=name, sticks=False)
+            (other,) = fibre.holds
+            self._came_um[fibre.number] = around.tools[other].hold, 0.0
+            return
+        sticks = fibre.holds[name].fate.sticks
+        self._tell("released", fibre=fibre.number, tool=name, sticks=sticks)
+        if not sticks:
+            self._fall(fibre, tool, around)
+            return
+        hold = fibre.holds[name]
+        key = f"{fibre.key} {fibre.grasps}"
+        side = random.Random(f"side {key}").choice("ab")
+        anchor = f"{name}.jaw_{side}"
+        origin = np.array(around.anchor(anchor))
+        relative = np.array(tool.hold) + fibre.held_um(around.tools) - origin
+        fibre.carried = Carried(anchor, relative, hold.angle_rad, "stuck")
+        fibre.holds.clear()
+        del self._in_hand[name]
+        self._clinging[fibre.number] = Clinging(self._handling, key, around.anchor(anchor))
+
+    def _lose(self, fibre: Fibre, tool: Tool, around: Surroundings, event: str) -> None:
+        self._tell(
+            event, fibre=fibre.number, tool=tool.name, height_um=max(fibre.height_um(tool), 0.0)
+        )
+        self._fall(fibre, tool, around)
+
+    def _shake(self, number: int, around: Surroundings) -> None:
+        fibre = self.fibres[number]
+        carried = fibre.carried
+        if carried is None:
+            del self._clinging[number]
+            return
+        place = around.anchor(carried.anchor)
+        how = self._clinging[number].look(place, self._contact.grasp_height_um)
+        if how:
+            del self._clinging[number]
+            tool = around.tools[carried.anchor.partition(".")[0]]
+            self._tell("came off", fibre=number, tool=tool.name, how=how)
+            self._falls.come_down(fibre, tool, around)
+
+    def _fall(self, fibre: Fibre, tool: Tool, around: Surroundings) -> None:
+        hold = fibre.holds[tool.name]
+        self._in_hand = {name: each for name, each in self._in_hand.items() if each is not fibre}
+        self._came_um.pop(fibre.number, None)
+        self._falls.fall(fibre, hold.frame_um(fibre.line_um, tool.hold), tool, around)
+
+    # ------------------------------------------------------------------ where a fibre is
+
+    def world_um(self, fibre: Fibre, around: Surroundings) -> Floats:
+        """Return the undeformed fibre in the world, shape (n, 3), um."""
+        if fibre.holds:
+            first = next(iter(fibre.holds))
+            return np.asarray(fibre.held_um(around.tools) + around.tools[first].hold)
+        if fibre.carried is not None:
+            return np.asarray(fibre.carried.line_um + around.anchor(fibre.carried.anchor))
+        flat = fibre.line_um.placed(*fibre.plate_pose)
+        height = np.full(len(flat), 0.5 * fibre.settings.thickness_um)
+        whole = np.column_stack([flat, height, np.ones(len(flat))])
+        return np.asarray((whole @ around.plate().T)[:, :3])
+
+
+def _part_of(line: CentreLine, low_um: float, high_um: float) -> CentreLine:
+    return CentreLine(line.part(low_um, high_um)[1])

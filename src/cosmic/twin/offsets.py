@@ -1,0 +1,76 @@
+"""How far tools really are from where the drawing has them: mounting, drift, bent tips."""
+
+import math
+import random
+from collections.abc import Iterable
+
+from cosmic.twin.handling_settings import HandlingSettings
+from cosmic.twin.kinematics import Point
+
+NOWHERE: Point = (0.0, 0.0, 0.0)
+
+
+class ToolOffsets:
+    """Offset of each tool at each time; any thread.
+
+    Parameters
+    ----------
+    tools : iterable of str
+        Their names.
+    wander : bool
+        They are mounted not quite right, and drift.
+
+    Notes
+    -----
+    Drift begins at zero and goes to and fro on a tilted line, more slowly for one tool than for
+    another. What controls the platform sees it in the picture only: the stages do not.
+    """
+
+    def __init__(
+        self, tools: Iterable[str], handling: HandlingSettings, seed: int, *, wander: bool
+    ) -> None:
+        self._mounted: dict[str, Point] = {}
+        self._bent: dict[str, Point] = {}
+        self._drift: dict[str, tuple[Point, float, float]] = {}
+        for name in tools:
+            chance = random.Random(f"tool {name} {seed}")
+            sigma = handling.tool_offset_um
+            mounted = tuple(chance.gauss(0.0, sigma) for _ in range(3))
+            way = tuple(chance.gauss(0.0, 1.0) for _ in range(3))
+            size = handling.drift_um / max(math.hypot(*way), 1e-9)
+            period_s = handling.drift_period_s * chance.uniform(0.8, 1.25)
+            phase = chance.uniform(0.0, 2.0 * math.pi)
+            if wander:
+                self._mounted[name] = mounted[0], mounted[1], mounted[2]
+                amplitude = way[0] * size, way[1] * size, way[2] * size
+                self._drift[name] = amplitude, 2.0 * math.pi / period_s, phase
+        self._tools = tuple(self._mounted)
+
+    @property
+    def still(self) -> bool:
+        """Whether no tool is anywhere else than drawn."""
+        return not self._mounted and not self._bent
+
+    def bend(self, tool: str, offset_um: Point) -> None:
+        """Have the tip of a tool bent by so much; zeros end it."""
+        bent = {name: each for name, each in self._bent.items() if name != tool}
+        if any(offset_um):
+            bent[tool] = offset_um
+        self._bent = bent
+
+    def at(self, tool: str, time_s: float) -> Point:
+        """Return the offset of a tool at a time, um, world."""
+        if self.still:
+            return NOWHERE
+        x, y, z = self._mounted.get(tool, NOWHERE)
+        bent = self._bent.get(tool, NOWHERE)
+        drift = self._drift.get(tool)
+        if drift is None:
+            return x + bent[0], y + bent[1], z + bent[2]
+        way, rate, phase = drift
+        part = math.sin(rate * time_s + phase) - math.sin(phase)
+        return (
+            x + bent[0] + part * way[0],
+            y + bent[1] + part * way[1],
+            z + bent[2] + part * way[2],
+        )

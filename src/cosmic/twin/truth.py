@@ -1,0 +1,198 @@
+"""What truly happened, written to a file that nothing on the platform reads back.
+
+Lines of JSON: the first tells the sample, each further one an event with its time on the
+platform's clock. Code that controls the platform has no way to it; who scores a run reads the file
+afterwards with `read_truth`.
+"""
+
+import json
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+from typing import Any, Final, Protocol, TextIO
+
+from typing_extensions import override
+
+from cosmic.frame.errors import ConfigError
+from cosmic.twin.force_settings import FibreSettings
+
+FORMAT: Final = 1
+
+
+class Truth(Protocol):
+    """Whoever is told what truly happens; any thread."""
+
+    @abstractmethod
+    def tell(self, time_s: float, event: str, **facts: object) -> None:
+        """Take note of an event."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """End; nothing is told afterwards."""
+
+
+class NoTruth(Truth):
+    """Nobody listens."""
+
+    @override
+    def tell(self, time_s: float, event: str, **facts: object) -> None:
+        """Forget it."""
+
+    @override
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+NO_TRUTH: Final = NoTruth()
+
+
+class TruthFile(Truth):
+    """Writes each event as a line, at once.
+
+    Parameters
+    ----------
+    path : Path
+        A new file; one that is there is replaced.
+
+    Raises
+    ------
+    ConfigError
+        It cannot be written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._lock = Lock()
+        try:
+            self._file: TextIO | None = path.open("w", encoding="utf-8")
+        except OSError as exc:
+            raise ConfigError(f"{path}: cannot be written: {exc.strerror or exc}") from exc
+
+    @override
+    def tell(self, time_s: float, event: str, **facts: object) -> None:
+        line = json.dumps({"time_s": round(time_s, 6), "event": event, **facts}, default=_rounded)
+        with self._lock:
+            if self._file is not None:
+                self._file.write(f"{line}\n")
+                self._file.flush()
+
+    @override
+    def close(self) -> None:
+        with self._lock:
+            if self._file is not None:
+                self._file.close()
+                self._file = None
+
+
+def _rounded(value: object) -> object:
+    return str(value)
+
+
+@dataclass(frozen=True, slots=True)
+class TruthEvent:
+    """One thing that happened.
+
+    Attributes
+    ----------
+    facts : mapping of str to value
+        What belongs to it; docs/explanation/twin.md lists them by event.
+    """
+
+    time_s: float
+    event: str
+    facts: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class TrueFibre:
+    """One fibre as it was at the start; lengths in um, on the plate."""
+
+    number: int
+    length_um: float
+    width_um: float
+    ei_n_m2: float
+    curl_deg: float
+    kink_deg: float
+    x_um: float
+    y_um: float
+    angle_deg: float
+    role: str
+
+
+@dataclass(frozen=True, slots=True)
+class TruthRecord:
+    """A whole file of truth.
+
+    Attributes
+    ----------
+    sample : str
+        Its name; "" for the fibres that twin.toml lists.
+    complete : bool
+        The platform was closed in order.
+    """
+
+    sample: str
+    seed: int
+    fibres: tuple[TrueFibre, ...]
+    events: tuple[TruthEvent, ...]
+    complete: bool
+
+    def of(self, event: str, fibre: int | None = None) -> tuple[TruthEvent, ...]:
+        """Return the events of one name, of one fibre or of all."""
+        return tuple(
+            each
+            for each in self.events
+            if each.event == event and fibre in (None, each.facts.get("fibre"))
+        )
+
+
+def tell_sample(truth: Truth, sample: str, seed: int, fibres: tuple[FibreSettings, ...]) -> None:
+    """Tell what lies on the plate at the start."""
+    names = TrueFibre.__slots__[1:]
+    table = [
+        {"number": number, **{name: getattr(each, name) for name in names}}
+        for number, each in enumerate(fibres)
+    ]
+    truth.tell(0.0, "sample", format=FORMAT, sample=sample, seed=seed, fibres=table)
+
+
+def read_truth(path: str | Path) -> TruthRecord:
+    """Read a file of truth, for scoring; a last line cut short is left out.
+
+    Raises
+    ------
+    ConfigError
+        The file is missing, or is none of these.
+    """
+    try:
+        lines = Path(path).read_text(encoding="utf-8").splitlines()
+    except OSError as exc:
+        raise ConfigError(f"{path}: cannot be read: {exc.strerror or exc}") from exc
+    found = [entry for line in lines if (entry := _entry(line)) is not None]
+    if not found or found[0].get("event") != "sample" or found[0].get("format") != FORMAT:
+        raise ConfigError(f"{path}: not a file of the twin's truth, format {FORMAT}")
+    head, *rest = found
+    events = tuple(
+        TruthEvent(
+            each["time_s"],
+            each["event"],
+            {key: value for key, value in each.items() if key not in ("time_s", "event")},
+        )
+        for each in rest
+    )
+    return TruthRecord(
+        sample=head["sample"],
+        seed=head["seed"],
+        fibres=tuple(TrueFibre(**each) for each in head["fibres"]),
+        events=events,
+        complete=bool(events) and events[-1].event == "end",
+    )
+
+
+def _entry(line: str) -> dict[str, Any] | None:
+    try:
+        entry = json.loads(line)
+    except json.JSONDecodeError:
+        return None
+    return entry if isinstance(entry, dict) and "time_s" in entry and "event" in entry else None
