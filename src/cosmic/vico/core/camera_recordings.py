@@ -121,13 +121,12 @@ class CameraRecordings:
         lapse, task = TimeLapse(plan, now_s), Task("Time-lapse")
 
         def choose(picture: Picture) -> None:
-            if not lapse.take(picture.frame.exposed_s):
-                return
-            writer.put(picture)
-            whole = plan.count or 0
-            text = f"{lapse.taken} pictures, {lapse.late} late, {lapse.missed} missed"
-            task.report(lapse.taken / whole if whole else 0.0, text)
-            if lapse.done:
+            if lapse.take(picture.frame.exposed_s):
+                writer.put(picture)
+                whole = plan.count or 0
+                text = f"{lapse.taken} pictures, {lapse.late} late, {lapse.missed} missed"
+                task.report(lapse.taken / whole if whole else 0.0, text)
+            if lapse.done:  # also where no picture came until after the end
                 self.request_stop()
 
         with self._lock:
