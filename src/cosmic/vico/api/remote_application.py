@@ -101,8 +101,9 @@ class RemoteVicoApplication(CosmicApplicationBase):
     def wait_until_known(self, timeout_s: float) -> bool:
         """Wait until it is known what the station has; False when it was not in time."""
         with self._changed:
-            self._changed.wait_for(lambda: self._known is not None, timeout_s)
-        return self._known is not None
+            return self._changed.wait_for(
+                lambda: self._known is not None and not self._away, timeout_s
+            )
 
     @override
     def custom_event_loop(self) -> bool:
@@ -235,7 +236,9 @@ class RemoteVicoApplication(CosmicApplicationBase):
     def _catch_up(self) -> None:
         self.refresh()
         if self._here:
-            self._away = ""
+            with self._changed:
+                self._away = ""
+                self._changed.notify_all()
             self._show()
 
     def _on_state(self, state: object) -> None:

@@ -100,6 +100,11 @@ class RemoteCameraHandle(CameraHandle):
 
     # Pictures
 
+    @property
+    def live(self) -> bool:
+        """Its pictures are being sent, because somebody looks."""
+        return self._pictures.live
+
     @override
     def latest(self) -> Picture | None:
         newest = self._pictures.newest()

@@ -1,0 +1,559 @@
+"""ViCo is used in the same way at home and from another station, over either transport."""
+
+import inspect
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+import numpy as np
+import pytest
+
+from contract.station_rig import connected, free_port, wait_until
+from contract.vico_rig import VicoRig, at_home, following, hosted, vico_rig, with_exposure
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import (
+    ConfigError,
+    CosmicError,
+    MoveCancelled,
+    MoveRefused,
+    NotAvailable,
+    RecordingExistsError,
+)
+from cosmic.frame.network.in_process import InProcessTransport
+from cosmic.frame.network.station import Station
+from cosmic.frame.network.transport import Rule
+from cosmic.frame.threads import declare_gui_thread
+from cosmic.frame.verdict import Reason
+from cosmic.vico.api import remote_stream
+from cosmic.vico.api.camera import CameraHandle
+from cosmic.vico.api.lens import LensHandle, LightHandle
+from cosmic.vico.api.remote_camera import RemoteCameraHandle
+from cosmic.vico.api.remote_lens import RemoteLensHandle, RemoteLightHandle
+from cosmic.vico.api.station_picture import SentPicture
+from cosmic.vico.api.station_state import pictures_topic, shown_topic
+from cosmic.vico.api.vico import Vico
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.recording.reading import open_picture_recording
+from cosmic.vico.hw.interface import Trigger
+from cosmic.vico.hw.peripherals import LensAxis
+from unit.vico.vision import drawn_fibres
+
+TRANSPORTS = ["in-process", "zenoh"]
+
+
+@pytest.fixture(params=["home", *TRANSPORTS])
+def rig(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[VicoRig]:
+    with vico_rig(request.param, tmp_path) as made:
+        yield made
+    assert not made.home.failures
+
+
+@pytest.fixture(params=TRANSPORTS)
+def away(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[VicoRig]:
+    with vico_rig(request.param, tmp_path) as made:
+        yield made
+    assert not made.home.failures
+
+
+def take_lease(rig: VicoRig) -> None:
+    if rig.client is not None:
+        rig.client.take_lease()
+
+
+def noise(seed: int, shape: tuple[int, ...] = (48, 64), kind: Any = np.uint8) -> Any:
+    return np.random.default_rng(seed).integers(0, 255, shape, kind)
+
+
+def while_waiting(rig: VicoRig, ask: Callable[[], Any], level: int) -> Any:
+    """Ask for the next picture, and give one as soon as somebody waits for it."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(1) as pool:
+        answer = pool.submit(ask)
+        assert wait_until(lambda: answer.done() or (rig.home.camera.push(noise(level)) or False))
+        return answer.result(10.0)
+
+
+# --- what there is ----------------------------------------------------------------------------
+
+
+def test_a_camera_tells_what_it_is_and_what_is_in_force(rig: VicoRig) -> None:
+    camera = rig.vico.camera()
+    assert list(rig.vico.cameras) == ["top"]
+    assert (camera.name, camera.title) == ("top", "From above")
+    assert wait_until(lambda: camera.running)
+    thread = rig.home.application.unit("top").thread
+    assert (camera.info, camera.ranges, camera.settings) == (
+        thread.info,
+        thread.ranges,
+        thread.settings,
+    )
+    assert camera.problem == ""
+    assert [each.on for each in camera.algorithms] == [False] * len(camera.algorithms)
+    assert "ffv1" in [each.name for each in camera.formats]
+    with pytest.raises(ConfigError, match="bottom"):
+        rig.vico.camera("bottom")
+
+
+def test_settings_are_in_force_when_their_task_has_ended(rig: VicoRig) -> None:
+    camera = rig.vico.camera()
+    camera.configure(with_exposure(camera.settings, 0.02)).wait(5.0)
+    assert camera.settings is not None
+    assert camera.settings.exposure_s == 0.02
+    refused = camera.configure(with_exposure(camera.settings, 9.0))
+    with pytest.raises(ConfigError, match=r"from 0\.0001 to 0\.05 s"):
+        refused.wait(5.0)
+    assert camera.settings.exposure_s == 0.02
+
+
+def test_stopping_and_starting_is_told(rig: VicoRig) -> None:
+    camera, told = rig.vico.camera(), Event()
+    forget = rig.vico.on_change(told.set)
+    camera.stop().wait(5.0)
+    assert not camera.running
+    assert told.wait(5.0)
+    forget()
+    camera.start().wait(5.0)
+    assert camera.running
+
+
+def test_algorithms_and_background_are_switched(rig: VicoRig) -> None:
+    camera = rig.vico.camera()
+    camera.switch("focus", on=True)
+    assert next(each for each in camera.algorithms if each.name == "focus").on
+    rig.home.camera.push(noise(1))
+    assert wait_until(lambda: camera.focus)
+    with pytest.raises(ConfigError, match="no algorithm 'nonsense'"):
+        camera.switch("nonsense", on=True)
+    camera.set_background()
+    rig.home.camera.push(*[rig.home.camera.grey(100 + n) for n in range(9)])
+    assert wait_until(lambda: camera.has_background)
+    camera.clear_background()
+    assert wait_until(lambda: not camera.has_background)
+
+
+def test_cameras_are_looked_for(rig: VicoRig) -> None:
+    rig.vico.rescan().wait(5.0)
+    assert [each.key for each in rig.vico.found] == ["P1"]
+    rig.vico.use("top", "P1").wait(5.0)
+
+
+# --- pictures ---------------------------------------------------------------------------------
+
+
+def test_a_snap_is_exposed_after_the_call(rig: VicoRig) -> None:
+    rig.home.camera.push(noise(1))
+    image = while_waiting(rig, rig.vico.snap, 2)
+    assert image.dtype == np.uint8
+    assert np.array_equal(image, noise(2))
+
+
+def test_no_picture_in_time_says_why(rig: VicoRig) -> None:
+    camera = rig.vico.camera()
+    with pytest.raises(NotAvailable, match=r"no picture of top in 0\.1 s: none arrived"):
+        camera.next_picture(0.1)
+    camera.stop().wait(5.0)
+    with pytest.raises(NotAvailable, match="it is stopped"):
+        camera.next_picture(0.1)
+
+
+def test_the_newest_picture_comes_with_all_that_is_known_of_it(rig: VicoRig) -> None:
+    camera = rig.vico.camera()
+    rig.home.camera.push(noise(4, kind=np.uint16))
+    thread = rig.home.application.unit("top").thread
+    assert wait_until(lambda: thread.newest is not None)
+    assert wait_until(lambda: camera.latest() is not None)
+    found, there = camera.latest(), thread.newest
+    assert found is not None and there is not None
+    assert np.array_equal(found.data, there.data)
+    assert found.data.dtype == np.uint16
+    assert not found.data.flags.writeable
+    assert (found.camera, found.lost_before) == ("top", 0)
+    assert found.circumstances == there.circumstances
+    assert (found.frame.exposed_s, found.frame.pixel_format) == (
+        there.frame.exposed_s,
+        there.frame.pixel_format,
+    )
+
+
+def test_fibres_are_found_and_placed_on_the_platform(tmp_path: Path) -> None:
+    lines = [drawn_fibres.arc((60.0, 120.0), 0.2, 300.0, 0.6)]
+    image = drawn_fibres.picture(lines, [9.0], shape=(320, 480)).astype(np.uint8)
+    with vico_rig("zenoh", tmp_path, size_px=(480, 320)) as rig:
+        found, there = [
+            while_waiting_for_fibres(rig, vico, image)
+            for vico in (rig.vico, Vico(rig.home.application))
+        ]
+    assert len(found) == len(there) == 1
+    assert found[0].length_px == there[0].length_px
+    assert found[0].ends_um == pytest.approx(there[0].ends_um, abs=1e-6)
+    assert found[0].doubts == there[0].doubts
+
+
+def while_waiting_for_fibres(rig: VicoRig, vico: Vico, image: Any) -> Any:
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(1) as pool:
+        answer = pool.submit(vico.find_fibres)
+        assert wait_until(lambda: answer.done() or (rig.home.camera.push(image) or False), 10.0)
+        return answer.result(10.0)
+
+
+def test_what_machine_vision_sees_is_shown(away: VicoRig) -> None:
+    lines = [drawn_fibres.arc((8.0, 20.0), 0.1, 40.0, 0.1)]
+    image = drawn_fibres.picture(lines, [5.0], shape=(48, 64)).astype(np.uint8)
+    camera = away.vico.camera()
+    camera.switch("fibres", on=True)
+    assert camera.analysis is None  # from now on it is received
+
+    def seen() -> bool:
+        away.home.camera.push(image.copy())
+        return camera.analysis is not None
+
+    assert wait_until(seen)
+    newest = camera.analysis
+    vision = away.home.application.unit("top").vision.newest
+    assert newest is not None and vision is not None
+    assert newest.picture.data.shape == (48, 64)
+    there = vision.results["fibres"]
+    assert isinstance(there, tuple)
+    assert [each.length_px for each in newest.fibres] == [each.length_px for each in there]
+
+
+def test_plans_trigger_it(rig: VicoRig, tmp_path: Path) -> None:
+    camera = rig.vico.camera()
+    now = camera.settings
+    assert now is not None
+    from dataclasses import replace
+
+    camera.configure(replace(now, trigger=Trigger.SOFTWARE)).wait(5.0)
+    camera.plan_pictures(tmp_path)
+    status = camera.trigger()
+    status.wait(10.0)
+    assert camera.read()["top_mean"]["value"] == 77.0
+    assert set(camera.describe()) == set(camera.read())
+    assert list(tmp_path.glob("top_*.tif"))
+
+
+# --- streams ----------------------------------------------------------------------------------
+
+
+def test_every_frame_arrives_complete_and_in_order(away: VicoRig) -> None:
+    got: list[SentPicture] = []
+
+    def receive(payload: object) -> None:
+        if isinstance(payload, SentPicture):
+            got.append(payload)
+
+    assert away.client is not None
+    topic = pictures_topic("top")
+    subscription = away.client.subscribe(topic, Rule.ALL, receive)
+    try:
+        assert wait_until(lambda: away.station.wanted(topic))
+        sent = [noise(seed, (300, 400), np.uint16) for seed in range(60)]
+        away.home.camera.push(*sent)
+        assert wait_until(lambda: len(got) == len(sent))
+        assert [each.frame_id for each in got] == list(range(60))
+        assert all(np.array_equal(a.data, b) for a, b in zip(got, sent, strict=True))
+        assert subscription.lost == 0
+    finally:
+        subscription.close()
+
+
+def test_nothing_is_drawn_while_nobody_looks(
+    away: VicoRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(remote_stream, "IDLE_S", 0.2)
+    taken: list[Picture] = []
+    away.home.application.unit("top").thread.subscribe(taken.append)
+    away.home.camera.push(*[noise(n) for n in range(20)])
+    assert wait_until(lambda: len(taken) == 20)
+    assert away.home.camera.drawn == 0
+    camera = away.vico.camera()
+
+    def looked() -> bool:
+        away.home.camera.push(noise(30))
+        return away.remote is not None and camera.latest() is not None and is_live(camera)
+
+    assert wait_until(looked)
+    assert wait_until(lambda: not away.station.wanted(shown_topic("top")))
+
+
+def is_live(camera: CameraHandle) -> bool:
+    assert isinstance(camera, RemoteCameraHandle)
+    return camera.live
+
+
+def test_a_slow_view_delays_no_call(away: VicoRig) -> None:
+    go_on, seen = Event(), []
+
+    def slow(payload: object) -> None:
+        seen.append(payload)
+        go_on.wait(0.3)
+
+    assert away.client is not None
+    subscription = away.client.subscribe(shown_topic("top"), Rule.LATEST, slow)
+    try:
+        assert wait_until(lambda: away.station.wanted(shown_topic("top")))
+        longest_s = 0.0
+        for number in range(40):
+            away.home.camera.push(noise(number % 4, (1200, 1600)))
+            began_s = WALL.now_s()
+            away.client.call("vico", "now_s")
+            longest_s = max(longest_s, WALL.now_s() - began_s)
+        assert longest_s < 1.0
+        assert wait_until(lambda: len(seen) >= 2)
+        assert len(seen) < 40
+    finally:
+        go_on.set()
+        subscription.close()
+
+
+# --- files ------------------------------------------------------------------------------------
+
+
+def test_a_recording_holds_what_was_taken(rig: VicoRig, tmp_path: Path) -> None:
+    camera = rig.vico.camera()
+    frames = [noise(n) for n in range(12)]
+    with rig.vico.record(tmp_path / "run.mkv") as path:
+        assert camera.recording.active
+        rig.home.camera.push(*frames)
+        recordings = rig.home.application.unit("top").recordings
+        assert wait_until(lambda: recordings.state.written == 12)
+    assert not camera.recording.active
+    assert (camera.recording.written, camera.recording.dropped) == (12, 0)
+    with open_picture_recording(path) as recording:
+        pairs = zip(recording, frames, strict=True)
+        assert all(np.array_equal(each.data, sent) for each, sent in pairs)
+    with pytest.raises(RecordingExistsError):
+        camera.record(path)
+
+
+def test_pictures_and_time_lapses_are_written(rig: VicoRig, tmp_path: Path) -> None:
+    camera = rig.vico.camera()
+    rig.home.camera.push(noise(5))
+    assert wait_until(lambda: camera.latest() is not None)
+    camera.snap(tmp_path / "one.tif").wait(5.0)
+    assert (tmp_path / "one.tif").exists()
+    with pytest.raises(RecordingExistsError):
+        camera.snap(tmp_path / "one.tif").wait(5.0)
+    lapse = camera.time_lapse(tmp_path / "lapse", "tiff", interval_s=4.0, count=3)
+
+    def over() -> bool:
+        rig.home.camera.push(noise(6))
+        return lapse.done
+
+    assert wait_until(over)
+    lapse.wait(1.0)
+    assert len(list((tmp_path / "lapse").glob("*.tif*"))) == 3
+
+
+def test_a_time_lapse_ends_where_no_picture_came_until_after_its_end(tmp_path: Path) -> None:
+    with vico_rig("home", tmp_path) as rig:
+        camera, clock = rig.vico.camera(), rig.home.application.clock
+        lapse = camera.time_lapse(tmp_path / "lapse", "tiff", interval_s=0.1, count=2)
+        began_s = clock.now_s()
+        assert wait_until(lambda: clock.now_s() - began_s > 1.0)
+        rig.home.camera.push(noise(6))
+        lapse.wait(5.0)
+        assert camera.recording.written == 0
+
+
+# --- lens and light ---------------------------------------------------------------------------
+
+
+def test_lens_and_light_do_as_they_are_told(rig: VicoRig) -> None:
+    take_lease(rig)
+    lens, light = rig.vico.lens, rig.vico.light
+    assert lens is not None and light is not None
+    assert [each.name for each in lens.steps] == ["0.5x", "1x", "2x"]
+    assert "generation" in lens.name
+    lens.home().wait(20.0)
+    lens.zoom_to(1.0).wait(20.0)
+    assert lens.zoom == pytest.approx(1.0, rel=0.01)
+    lens.seek_focus(1234).wait(20.0)
+    focus = lens.state(LensAxis.FOCUS)
+    assert focus is not None
+    assert abs(focus.position_counts - 1234) <= 2
+    with pytest.raises(ConfigError, match="not in the table"):
+        lens.zoom_to(7.0)
+    with pytest.raises(CosmicError, match="9999999"):
+        lens.seek_focus(9_999_999).wait(20.0)
+    light.set_percent(20.0).wait(5.0)
+    assert light.percent == 20.0
+    with pytest.raises(ConfigError, match="not between 0 and 100"):
+        light.set_percent(101.0)
+    lens.reopen().wait(5.0)
+    assert lens.problem == light.problem == ""
+
+
+def test_an_abort_stops_the_lens(rig: VicoRig) -> None:
+    take_lease(rig)
+    lens = rig.vico.lens
+    assert lens is not None
+    task = lens.seek_focus(7900)
+    lens.abort()
+    with pytest.raises(MoveCancelled, match="aborted"):
+        task.wait(10.0)
+
+
+def test_moving_the_lens_needs_the_right_to_move(away: VicoRig) -> None:
+    lens = away.vico.lens
+    assert lens is not None
+    for wish in (lens.home, lambda: lens.zoom_to(1.0), lens.autofocus):
+        with pytest.raises(MoveRefused) as caught:
+            wish()
+        assert caught.value.verdict.reason is Reason.NO_LEASE
+    lens.abort()
+    assert away.vico.light is not None
+    away.vico.light.set_percent(30.0).wait(5.0)
+
+
+def test_the_lens_stops_when_who_moves_it_is_gone(tmp_path: Path) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with at_home(tmp_path) as home, hosted(home, endpoint):
+        peripherals = home.application.peripherals
+        with connected(endpoint) as client, following(client, home.policy) as remote:
+            client.take_lease()
+            lens = Vico(remote).lens
+            assert lens is not None
+            task = lens.home()
+            assert wait_until(lambda: peripherals.state.moving)
+        assert wait_until(lambda: not peripherals.state.moving)
+        with pytest.raises(CosmicError):
+            task.wait(5.0)
+        zoom = peripherals.state.zoom
+        assert zoom is not None
+
+
+# --- places -----------------------------------------------------------------------------------
+
+
+def test_pixels_are_places_on_the_platform(rig: VicoRig) -> None:
+    take_lease(rig)
+    camera, places = rig.vico.camera(), rig.home.places
+    rig.home.camera.push(noise(1))
+    assert wait_until(lambda: camera.latest() is not None)
+    assert camera.calibration_problem == ""
+    assert camera.platform_um((10.0, 5.0)) == pytest.approx((90.0, 70.0))
+    assert list(camera.targets) == list(rig.vico.tools) == ["left", "right"]
+    assert camera.calibrated == tuple(places.calibrated)
+    assert camera.click_to_move((10.0, 5.0), "left") == "left moves"
+    assert places.moved == [((10.0, 5.0), "left")]
+    camera.calibrate_stage("left").wait(5.0)
+    with pytest.raises(NotAvailable, match="no axis turns the plate"):
+        camera.find_rotation_centre()
+    assert rig.vico.rotation_centre() is None
+
+
+def test_a_click_into_a_picture_that_has_changed_moves_nothing(away: VicoRig) -> None:
+    take_lease(away)
+    camera, places = away.vico.camera(), away.home.places
+    away.home.camera.push(noise(1))
+    assert wait_until(lambda: camera.latest() is not None)
+    shown = camera.latest()
+    assert shown is not None and away.remote is not None and away.remote.places is not None
+    places.shift_um = 130.0
+    with pytest.raises(NotAvailable, match="has changed since"):
+        away.remote.places.move_to(shown, (10.0, 5.0), "left")
+    assert places.moved == []
+
+
+# --- a window ---------------------------------------------------------------------------------
+
+
+def test_a_window_never_waits_and_hears_of_refusals(away: VicoRig, tmp_path: Path) -> None:
+    camera, lens = away.vico.camera(), away.vico.lens
+    assert lens is not None
+    take_back = declare_gui_thread()
+    try:
+        camera.latest()
+        (tmp_path / "there.mkv").write_bytes(b"kept")
+        camera.record(tmp_path / "there.mkv")
+        home = lens.home()
+        camera.software_trigger()
+        camera.stop()
+    finally:
+        take_back()
+    assert wait_until(lambda: home.done)
+    assert isinstance(home.failure, MoveRefused)
+    assert wait_until(lambda: not camera.running)
+    assert (tmp_path / "there.mkv").read_bytes() == b"kept"
+
+    take_back = declare_gui_thread()
+    try:
+        camera.record(tmp_path / "there.mkv")
+    finally:
+        take_back()
+    assert wait_until(lambda: camera.refused)
+    camera.start().wait(5.0)
+    assert camera.refused == ""
+
+
+def test_a_handle_from_elsewhere_has_no_camera_of_its_own() -> None:
+    """Whatever looks at the camera, lens or lamp in this process is done anew."""
+    for here, there in (
+        (CameraHandle, RemoteCameraHandle),
+        (LensHandle, RemoteLensHandle),
+        (LightHandle, RemoteLightHandle),
+    ):
+        for name, member in vars(here).items():
+            code = (
+                inspect.getsource(getattr(member, "fget", None) or member)
+                if callable(getattr(member, "fget", None) or member) and name != "__init__"
+                else ""
+            )
+            if "self._unit" in code or "self._thread" in code or "self._application" in code:
+                assert name in vars(there), f"{there.__name__} lacks {name}"
+
+
+# --- away and back ----------------------------------------------------------------------------
+
+
+def test_a_station_that_goes_away_says_so_and_comes_back(tmp_path: Path) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with ExitStack() as stack:
+        home = stack.enter_context(at_home(tmp_path))
+        first = stack.enter_context(ExitStack())
+        first.enter_context(hosted(home, endpoint))
+        client = stack.enter_context(connected(endpoint))
+        remote = stack.enter_context(following(client, home.policy))
+        vico = Vico(remote)
+        camera, lens = vico.camera(), vico.lens
+        assert wait_until(lambda: camera.running)
+        home.camera.push(noise(1))
+        assert wait_until(lambda: camera.latest() is not None)
+
+        first.close()
+        assert wait_until(lambda: "fibres is away" in camera.problem)
+        assert not camera.running
+        assert (camera.settings, camera.info) == (None, None)
+        assert lens is not None and vico.light is not None
+        assert "fibres is away" in lens.problem
+        assert "fibres is away" in vico.light.problem
+        with pytest.raises(NotAvailable):
+            vico.snap()
+
+        stack.enter_context(hosted(home, endpoint))
+        assert wait_until(lambda: camera.running and not camera.problem, 10.0)
+        rig = VicoRig(home, vico, Station("other", home.policy))
+        assert np.array_equal(while_waiting(rig, vico.snap, 9), noise(9))
+
+        def newest() -> bool:
+            home.camera.push(noise(10))
+            found = camera.latest()
+            return found is not None and np.array_equal(found.data, noise(10))
+
+        assert wait_until(newest)
+
+
+def test_the_stations_own_operator_needs_no_lease(tmp_path: Path) -> None:
+    with at_home(tmp_path) as home, hosted(home) as station:
+        own = InProcessTransport(station)
+        with following(own, home.policy) as remote:
+            lens = Vico(remote).lens
+            assert lens is not None
+            lens.seek_focus(3900).wait(20.0)
+        own.close()
