@@ -61,7 +61,11 @@ class DaqcoRig:
 def settings(folder: Path, channels: int = 2, rate_hz: float = 1000.0) -> DaqcoSettings:
     """Return a channel "force" in micronewtons and others in volts."""
     others = tuple(
-        ChannelSettings(name=f"channel{number}", board="Dev1", input=f"ai{number}")
+        ChannelSettings(
+            name=f"channel{number}",
+            board="Dev1" if number < 16 else "Dev2",
+            input=f"ai{number % 16}",
+        )
         for number in range(1, channels)
     )
     force = ChannelSettings(name="force", board="Dev1", input="ai0", scale="Probe")

@@ -109,11 +109,16 @@ class RemoteDaqcoApplication(TaskApplication):
         self._end_presence: Callable[[], None] = lambda: None
         self.clock = StationClock()
         self.buffer = RemoteBuffer(transport, self._tell)
-        self.guard = RemoteGuard(self.clock, self._command)
-        self.recorder = RemoteRecorder(self._command)
+        self.guard = RemoteGuard(self.clock, self.command)
+        self.recorder = RemoteRecorder(self.command)
         self.files = RemoteFiles(self._line)
 
     # What there is
+
+    @property
+    def transport(self) -> Transport:
+        """The way to the station."""
+        return self._transport
 
     @property
     def away(self) -> str:
@@ -193,6 +198,11 @@ class RemoteDaqcoApplication(TaskApplication):
         self._keeper.start()
 
     @override
+    def request_end(self) -> None:
+        super().request_end()
+        self._ready.set()  # nobody waits for it any more
+
+    @override
     def shut_down(self) -> None:
         """Use the station no more; there everything goes on. Any state."""
         self.request_end()
@@ -212,19 +222,19 @@ class RemoteDaqcoApplication(TaskApplication):
 
     def look_for_boards(self) -> None:
         """Look for boards there and open those there are; raises as at home, or `StationAway`."""
-        self._command("look_for_boards")
+        self.command("look_for_boards")
 
     def start_acquisition(self) -> None:
         """Begin to acquire there; raises as at home, or `StationAway`."""
-        self._command("start_acquisition")
+        self.command("start_acquisition")
 
     def stop_acquisition(self) -> None:
         """End acquiring there, for everybody; raises `StationAway`."""
-        self._command("stop_acquisition")
+        self.command("stop_acquisition")
 
     def apply(self, settings: DaqcoSettings) -> None:
         """Put `settings` in force there; raises as at home, or `StationAway`."""
-        self._command("apply", {"settings": plain_settings(settings)})
+        self.command("apply", {"settings": plain_settings(settings)})
 
     def set_scale(self, channel: str, scale: Scale) -> None:
         """Give a channel a scale; raises as at home, or `StationAway`."""
@@ -234,7 +244,7 @@ class RemoteDaqcoApplication(TaskApplication):
             "unit": scale.unit,
             "coefficients": scale.coefficients,
         }
-        self._command("set_scale", wanted)
+        self.command("set_scale", wanted)
 
     def on_crossing(self, listener: Callable[[Crossing], object]) -> None:
         """Call `listener(crossing)` when a limit was crossed, or nobody can say it was not.
@@ -248,7 +258,16 @@ class RemoteDaqcoApplication(TaskApplication):
         """Do what may have to wait for the line; aside where this thread must not wait."""
         self._line.carry_out(action, told)
 
-    def _command(self, function: str, arguments: Mapping[str, object] | None = None, /) -> object:
+    def command(self, function: str, arguments: Mapping[str, object] | None = None, /) -> object:
+        """Call a function of `DaqcoStationSide` and take the report it returns, if it does.
+
+        Raises
+        ------
+        StationAway, StationTimeout
+            The station cannot be reached, or did not answer in time.
+        CosmicError
+            What the function raised there.
+        """
         result = self._line.call(function, arguments)
         if isinstance(result, DaqReport):
             self._take(result)
@@ -311,17 +330,18 @@ class RemoteDaqcoApplication(TaskApplication):
         heard_s = max(self._heard_wall_s, self.buffer.heard_wall_s)
         self.guard.look_for_silence(now_s - heard_s, self._away or "nothing comes from it")
         self.buffer.tidy()
-        if not self._here or now_s - self._retry_wall_s < RETRY_S:
+        if not self._here:
             return
-        if self._away or now_s - self._heard_wall_s > RETRY_S:
+        unheard = self._away or now_s - self._heard_wall_s > RETRY_S
+        if unheard and now_s - self._retry_wall_s > RETRY_S:
             self._retry_wall_s = now_s
             self._fetch()
-        elif now_s - self._clock_wall_s > _CLOCK_S:
+        if not self._away and now_s - self._clock_wall_s > _CLOCK_S:
             self._read_clock()
 
     def _fetch(self) -> None:
         try:
-            self._command("report")
+            self.command("report")
         except CosmicError as exc:
             self._set_away(str(exc))
 

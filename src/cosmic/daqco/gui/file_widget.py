@@ -68,7 +68,8 @@ class UDaqFileWidget(QWidget):
         self.base = tipped(QLineEdit("recording"), "Base of the file name")
         self.full_name = tipped(QLineEdit(), "")
         self.full_name.setReadOnly(True)
-        self.directory = tipped(QLineEdit(str(port.directory)), "Where the file is stored")
+        self._offered = str(port.directory)
+        self.directory = tipped(QLineEdit(self._offered), "Where the file is stored")
         self.browse = push_button("Browse…", _BROWSE)
         self.start = named(push_button("Start recording", ""), "startRecording")
         self.stop = named(push_button("Stop recording", ""), "stopRecording")
@@ -175,6 +176,7 @@ class UDaqFileWidget(QWidget):
 
     def refresh(self) -> None:
         """Show what is being recorded, what may be done now and how much room there is."""
+        self._offer_directory()
         recording = self._port.recording
         wrong_name = "" if recording.active else name_problem(self.base.text(), SUFFIX)
         text = self.directory.text()
@@ -188,6 +190,12 @@ class UDaqFileWidget(QWidget):
         self._enable(wrong_name or wrong_folder)
         self._tell()
         self._show_room(wrong_folder)
+
+    def _offer_directory(self) -> None:
+        """Take over another usual directory, unless the operator typed one."""
+        before, self._offered = self._offered, str(self._port.directory)
+        if before != self._offered and self.directory.text() == before:
+            self.directory.setText(self._offered)
 
     def _show_name(self, wrong: str) -> None:
         recording = self._port.recording
