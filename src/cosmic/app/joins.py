@@ -1,13 +1,14 @@
 """Joins what one application does to another, in this process or over a line."""
 
-from typing import Any
-
 from cosmic.app.elsewhere import Elsewhere
 from cosmic.app.hosting import Hosted, Site
 from cosmic.autonomy.couplings import join_teleoperation
 from cosmic.autonomy.interlocks import join_force_limits, join_positions, join_stage_positions
 from cosmic.autonomy.places import join_places
+from cosmic.daqco.api.application import DaqcoApplication
+from cosmic.daqco.api.remote_application import RemoteDaqcoApplication
 from cosmic.frame.failure import FailurePolicy
+from cosmic.mico.api.application_base import MicoApplicationBase
 
 
 def join_here(own: Hosted, site: Site) -> None:
@@ -23,7 +24,12 @@ def join_here(own: Hosted, site: Site) -> None:
         join_places(vico, mico, site.path.parent / kept_in if kept_in else None)
 
 
-def join_stations(mico: Any, daqco: Any, elsewhere: Elsewhere, policy: FailurePolicy) -> None:
+def join_stations(
+    mico: MicoApplicationBase | None,
+    daqco: DaqcoApplication | RemoteDaqcoApplication | None,
+    elsewhere: Elsewhere,
+    policy: FailurePolicy,
+) -> None:
     """Have a force limit stop motion where the two are in different processes.
 
     What belongs to one station is joined there. A limit whose station fell silent counts as

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from cosmic.app.elsewhere import Elsewhere, open_stations
 from cosmic.app.hosting import Site, build_applications
@@ -13,17 +13,23 @@ from cosmic.app.network_settings import own_certificates
 from cosmic.app.platform_file import KNOWN_APPLICATIONS, PlatformFile, load_platform, load_twin
 from cosmic.app.serve_options import StationAddress
 from cosmic.daqco.api.application import DaqcoApplication
-from cosmic.frame.application import GuiFactory
+from cosmic.daqco.api.remote_application import RemoteDaqcoApplication
+from cosmic.frame.application import CosmicApplicationBase, GuiFactory
 from cosmic.frame.clock import Clock, RatedClock
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy
-from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.twin.sample import put_on
 from cosmic.twin.scene import Scene
 from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.api.remote_application import RemoteVicoApplication
 
 if TYPE_CHECKING:
     from cosmic.mico.hw.sim_scu3d_faults import Faults
+
+
+KNOWN_LIMIT_S: Final = 5.0
+"""How long a station may take to say what it has."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +43,10 @@ class Platform:
     path: Path
     clock: Clock
     policy: FailurePolicy
-    mico: MicoApplication | None
+    mico: MicoApplicationBase | None
     faults: "Faults | None" = None
-    daqco: DaqcoApplication | None = None
-    vico: VicoApplication | None = None
+    daqco: DaqcoApplication | RemoteDaqcoApplication | None = None
+    vico: VicoApplication | RemoteVicoApplication | None = None
     elsewhere: Elsewhere = field(default_factory=Elsewhere)
 
     @property
@@ -50,16 +56,16 @@ class Platform:
         return not real_here and all(each.facts.simulated for each in self.elsewhere.stations)
 
     @property
-    def own(self) -> "dict[str, MicoApplication | DaqcoApplication | VicoApplication]":
+    def own(self) -> dict[str, CosmicApplicationBase]:
         """The applications that run in this process, by name."""
         return {
             name: each for name, each in self._all.items() if name not in self.elsewhere.host_of
         }
 
     @property
-    def _all(self) -> "dict[str, MicoApplication | DaqcoApplication | VicoApplication]":
-        found = {"mico": self.mico, "daqco": self.daqco, "vico": self.vico}
-        return {name: each for name, each in found.items() if each is not None}
+    def _all(self) -> dict[str, CosmicApplicationBase]:
+        found = (("mico", self.mico), ("daqco", self.daqco), ("vico", self.vico))
+        return {name: each for name, each in found if each is not None}
 
     @property
     def failure(self) -> str:
@@ -71,6 +77,8 @@ class Platform:
         for name, each in self._all.items():
             if name in self.elsewhere.host_of:
                 each.initialize()
+        if isinstance(self.vico, RemoteVicoApplication):
+            self.vico.wait_until_known(KNOWN_LIMIT_S)
         join_stations(self.mico, self.daqco, self.elsewhere, self.policy)
 
     def initialize(self) -> None:

@@ -39,7 +39,7 @@ class Rig:
         self._daqco = Daqco(platform.daqco) if platform.daqco is not None else None
         self._vico = Vico(platform.vico) if platform.vico is not None else None
         self._control: Control | None = None
-        if self._mico is not None and "mico" in platform.own:
+        if self._mico is not None:
             self._control = Control(
                 self._mico,
                 self._daqco,
@@ -82,9 +82,7 @@ class Rig:
 
     @property
     def control(self) -> Control:
-        """Control loops; raises `NotAvailable` where mico is not hosted in this process."""
-        if self._control is None and self._mico is not None:
-            raise NotAvailable("mico runs at another station; run the control loop there")
+        """Control loops; raises `NotAvailable` where mico is not hosted."""
         if self._control is None:
             raise NotAvailable("mico is not hosted here; a control loop has nothing to move")
         return self._control

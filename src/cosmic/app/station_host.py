@@ -2,16 +2,18 @@
 
 import logging
 from contextlib import ExitStack
-from importlib import import_module
 from typing import Protocol, runtime_checkable
 
 import cosmic
 from cosmic.app.network_settings import Serving
 from cosmic.app.platform import Platform
 from cosmic.app.station_facts import ITSELF, StationFacts, StationSide
+from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.station import Station
+from cosmic.mico.api.application import MicoApplication
+from cosmic.vico.api.application import VicoApplication
 
 logger = logging.getLogger(__name__)
 
@@ -83,12 +85,18 @@ class StationHost:
 def _sides(platform: Platform) -> dict[str, object]:
     """Return what answers for each application that runs in this process."""
     # Imported here: whoever serves nothing loads none of it.
-    found = {"mico": platform.mico, "daqco": platform.daqco, "vico": platform.vico}
+    from cosmic.daqco.api.station_side import DaqcoStationSide
+    from cosmic.mico.api.station_side import MicoStationSide
+    from cosmic.vico.api.station_side import VicoStationSide
+
     sides: dict[str, object] = {}
-    for name, application in found.items():
-        if application is not None:
-            module = import_module(f"cosmic.{name}.api.station_side")
-            sides[name] = getattr(module, f"{name.capitalize()}StationSide")(application)
+    for name, application in platform.own.items():
+        if isinstance(application, MicoApplication):
+            sides[name] = MicoStationSide(application)
+        elif isinstance(application, DaqcoApplication):
+            sides[name] = DaqcoStationSide(application)
+        elif isinstance(application, VicoApplication):
+            sides[name] = VicoStationSide(application)
     return sides
 
 

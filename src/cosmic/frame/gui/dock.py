@@ -131,9 +131,10 @@ class PanelDock(QDockWidget):
         """Why the panel is greyed; empty when it is not."""
         return self._banner.reason.text()
 
-    def set_failed(self, reason: str) -> None:
-        """Grey the panel, say why, and offer a rescan."""
+    def set_failed(self, reason: str, *, rescan: bool = True) -> None:
+        """Grey the panel, say why, and offer a rescan where that may help."""
         self._banner.reason.setText(reason)
+        self._banner.rescan.setVisible(rescan)
         self._banner.show()
         self._panel.setEnabled(False)
 

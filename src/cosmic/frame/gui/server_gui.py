@@ -151,9 +151,9 @@ class CosmicServerGui(QMainWindow):
         """Have panels that stand in a row or a column share its length so at a first start."""
         self._shares.append((tuple(titles), tuple(shares), way))
 
-    def set_failed(self, title: str, reason: str) -> None:
-        """Grey the panel `title`, say why and offer a rescan."""
-        self._docks[title].set_failed(reason)
+    def set_failed(self, title: str, reason: str, *, rescan: bool = True) -> None:
+        """Grey the panel `title`, say why and offer a rescan where that may help."""
+        self._docks[title].set_failed(reason, rescan=rescan)
 
     def clear_failed(self, title: str) -> None:
         """Let the panel `title` be used again."""

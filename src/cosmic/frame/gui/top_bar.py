@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 from cosmic.frame.gui.build import named, push_button, tight_row
 from cosmic.frame.gui.chip import Chip, set_style_property
 from cosmic.frame.gui.clearance_meter import Clearance, ClearanceMeter
+from cosmic.frame.gui.controls_sign import ControlsSign
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.mode_selector import ModeSelector
 from cosmic.frame.gui.state_badge import StateBadge
@@ -66,7 +67,7 @@ class TopBar(QWidget):
         self._title.setFont(ui_font(LARGE_PX, bold=True))
         self._simulated = Chip("SIMULATED", "simulated", "No hardware is driven: this is the twin")
         self._modes = ModeSelector()
-        self._controls = Chip("", "quiet")
+        self._controls = ControlsSign()
         self._clearance = ClearanceMeter()
         self._no_model = Chip(f"▲ {NO_COLLISION_MODEL}", "warning")
         self._no_model.setToolTip(
@@ -88,7 +89,7 @@ class TopBar(QWidget):
         self._reset = named(reset, "resetButton")
         self._reset.setFont(ui_font(bold=True))
         self._reset.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.set_controls("this window")
+        self._controls.show_holder("this window")
         self.set_rate(1.0)
         self.set_collision_model(present=False)
         self.set_unwatched(())
@@ -96,7 +97,7 @@ class TopBar(QWidget):
 
     def _arrange(self) -> None:
         normal, row = tight_row(STEP_PX)
-        for widget in (self._modes, self._controls, self._no_model, self._rate):
+        for widget in (self._modes, self._no_model, self._rate):
             row.addWidget(widget)
         row.addWidget(self._clearance, 1)
         row.addStretch(0)
@@ -113,8 +114,9 @@ class TopBar(QWidget):
         self._first_row.setSpacing(STEP_PX)
         self._first_row.addWidget(self._message_state)
         self._first_row.addWidget(self._message, 1)
-        for chip in (self._contacts, self._unwatched):  # where they are seen while stopped, too
-            self._first_row.addWidget(chip)
+        # Where they are seen while stopped, too.
+        for sign in (self._controls, self._contacts, self._unwatched):
+            self._first_row.addWidget(sign)
         self._first_row.addWidget(self._theme)
         second = QHBoxLayout()
         second.setSpacing(2 * STEP_PX)
@@ -167,10 +169,10 @@ class TopBar(QWidget):
         """Let a mode be chosen, or say why it cannot be."""
         self._modes.set_available(name, why_not)
 
-    def set_controls(self, who: str) -> None:
-        """Say who holds the control over the movements."""
-        self._controls.setText(f"controls: {who}")
-        self._controls.setToolTip(f"Movements are commanded by {who}")
+    @property
+    def controls(self) -> ControlsSign:
+        """Who commands the movements, and what the operator can do about it."""
+        return self._controls
 
     @property
     def clearance_text(self) -> str:
