@@ -108,7 +108,7 @@ class RemoteCameraHandle(CameraHandle):
     @override
     def latest(self) -> Picture | None:
         newest = self._pictures.newest()
-        if self._pictures.live or not may_wait_here():
+        if self._pictures.live or self._remote.problem or not may_wait_here():
             return newest
         return received(self._calls.call("latest", camera=self.name))
 
