@@ -16,6 +16,7 @@ from cosmic.autonomy.procedures.operation import (
 )
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun
+from cosmic.autonomy.procedures.tree import NodeEvent, NodeState
 from cosmic.autonomy.procedures.walk import Part
 from cosmic.frame.clock import Clock, ManualClock
 from cosmic.frame.errors import DeviceTimeout, MoveCancelled, StoppedError
@@ -34,6 +35,7 @@ class Work:
     clock: Clock = field(default_factory=lambda: ManualClock(auto_advance=True))
     log: list[str] = field(default_factory=list)
     moves: list["FakeMove"] = field(default_factory=list)
+    coasts_s: float = 0.0
     points: int = 0
     at_point: Callable[[int], None] = lambda _number: None
 
@@ -48,7 +50,7 @@ class Work:
 
 
 class FakeMove:
-    """A movement that takes a second of the platform's time."""
+    """A movement that takes a second of the platform's time, and coasts when cancelled."""
 
     def __init__(self, work: Work, name: str, error: Exception | None = None) -> None:
         self._work = work
@@ -60,7 +62,7 @@ class FakeMove:
 
     @property
     def done(self) -> bool:
-        return self.cancelled or self._work.clock.now_s() >= self._until_s
+        return self._work.clock.now_s() >= self._until_s
 
     def wait(self, timeout_s: float | None = None) -> object:
         if not self.done:
@@ -75,6 +77,7 @@ class FakeMove:
         if not self.done:
             self._work.log.append(f"cancel {self.name}")
             self.cancelled = True
+            self._until_s = self._work.clock.now_s() + self._work.coasts_s
 
 
 def missed() -> OperationFailed:
@@ -186,3 +189,15 @@ def ends(run: ProcedureRun[Work]) -> Iterator[tuple[str, str]]:
     """Return name and state of each part of the tree."""
     for view in run.tree.walk():
         yield view.name, str(view.state)
+
+
+def moving_when_undone(run: ProcedureRun[Work]) -> list[list[str]]:
+    """Return the list that grows by what moves whenever something is undone."""
+    seen: list[list[str]] = []
+
+    def note(event: NodeEvent) -> None:
+        if event.state is NodeState.UNDOING:
+            seen.append(run.work.moving)
+
+    run.subscribe(note)
+    return seen

@@ -11,9 +11,18 @@ from cosmic.autonomy.procedures.combinators import (
     Sequence,
 )
 from cosmic.autonomy.procedures.failures import UndoFailed
-from cosmic.autonomy.procedures.operation import OperationFailed
+from cosmic.autonomy.procedures.operation import OperationFailed, Steps
 from cosmic.frame.errors import CosmicError, DeviceError, DeviceFault
-from unit.autonomy.procedures.parts import MOVE, Op, Work, done, ends, run_of
+from unit.autonomy.procedures.parts import (
+    MOVE,
+    Op,
+    Work,
+    done,
+    ends,
+    missed,
+    moving_when_undone,
+    run_of,
+)
 
 
 def broken() -> CosmicError:
@@ -175,10 +184,20 @@ def test_a_condition_that_cannot_answer_counts_as_broken() -> None:
 
 
 def test_a_broken_condition_stays_broken_though_it_recovers() -> None:
-    work = Work()
-    run = run_of(Guard(Op("lift"), lambda _: not 0.5 < work.clock.now_s() < 0.53, "dropped"), work)
+    answers = iter([True] * 5 + [False] + [True] * 1000)
+    run = run_of(Guard(Op("lift"), lambda _: next(answers), "dropped"))
     with pytest.raises(OperationFailed, match="dropped"):
         run.run_here()
+
+
+def test_what_a_guard_cancelled_comes_to_rest_before_the_undoing_begins() -> None:
+    work = Work(coasts_s=0.3)
+    lift = Op("lift", steps=(MOVE,), undoes=(MOVE,))
+    run = run_of(Guard(lift, lambda _: work.clock.now_s() < 0.5, "dropped"), work)
+    seen = moving_when_undone(run)
+    with pytest.raises(OperationFailed, match="dropped"):
+        run.run_here()
+    assert seen == [[]]
 
 
 def test_parts_side_by_side_overlap_their_waits() -> None:
@@ -210,6 +229,39 @@ def test_a_retry_around_parts_side_by_side_undoes_them_all() -> None:
     assert sorted(done(run)[6:]) == ["carry", "look", "see"]
 
 
+def test_what_ran_well_side_by_side_is_undone_before_another_try() -> None:
+    part = Sequence("all", Parallel("both", Op("a"), Op("b")), Op("c", fails_in="run", times=1))
+    run = run_of(Retry(part, 2))
+    run.run_here()
+    assert sorted(done(run)[3:6]) == ["undo a", "undo b", "undo c"]
+
+
+def test_what_a_failure_cancelled_beside_comes_to_rest_before_the_undoing_begins() -> None:
+    work = Work(coasts_s=0.3)
+    beside = Op("beside", steps=(MOVE, MOVE), undoes=(MOVE,))
+    run = run_of(Parallel("both", beside, Op("bad", steps=(1.5,), fails_in="run")), work)
+    seen = moving_when_undone(run)
+    with pytest.raises(OperationFailed, match="missed grasp"):
+        run.run_here()
+    assert seen == [[], []]
+
+
+@pytest.mark.defects
+def test_an_end_that_goes_wrong_leaves_nothing_moving_beside_it() -> None:
+    class Stubborn(Op):
+        def run(self, work: Work) -> Steps:
+            try:
+                yield 9.0
+            finally:
+                yield 9.0
+
+    bad = Op("bad", steps=(0.5,), fails_in="run")
+    run = run_of(Parallel("three", Stubborn("a"), Op("b", steps=(MOVE,)), bad))
+    with pytest.raises(OperationFailed, match="GeneratorExit"):
+        run.run_here()
+    assert not run.work.moving
+
+
 def test_nothing_side_by_side_is_nothing() -> None:
     run = run_of(Parallel[Work]("none"))
     run.run_here()
@@ -230,12 +282,27 @@ def test_a_repeat_goes_on_until_there_is_no_more_to_do() -> None:
 
 
 def test_a_finished_round_is_never_undone() -> None:
-    rounds = iter([False, False, True])
-    fibre = Sequence("fibre", Op("a"), Op("b", fails_in="run", times=1))
-    part = Retry(Repeat(fibre, lambda _: next(rounds)), 2)
-    run = run_of(part)
+    rounds = iter([False, False, False, True])
+
+    class Second(Op):
+        def precondition(self, work: Work) -> None:
+            if len(work.log) == 6:
+                raise missed()
+
+    fibre = Sequence("fibre", Op("a"), Second("b"))
+    run = run_of(Retry(Repeat(fibre, lambda _: next(rounds)), 2))
     run.run_here()
-    assert done(run) == ["a", "b", "undo b", "undo a", "a", "b"]
+    assert done(run) == ["a", "b", "a", "undo a", "a", "b"]
+
+
+def test_a_new_round_begins_with_all_waiting() -> None:
+    work = Work()
+    run = run_of(Repeat(Sequence("fibre", Op("a"), Op("b")), lambda _: work.points >= 4), work)
+    seen: list[dict[str, str]] = []
+    work.at_point = lambda _number: seen.append(dict(ends(run)))
+    run.run_here()
+    assert [each["b"] for each in seen] == ["waiting", "running"] * 2
+    assert [each["a"] for each in seen] == ["running", "done"] * 2
 
 
 def test_an_operation_that_yields_nothing_may_be_a_plain_function() -> None:

@@ -51,6 +51,15 @@ def begun(part: Part[Work], rate: float = 100.0) -> tuple[ProcedureRun[Work], Wa
     return run, Watcher(run)
 
 
+def wait_until(condition: Callable[[], bool]) -> None:
+    """Wait for what nobody tells of."""
+    ring = threading.Event()
+    end_s = time.monotonic() + LIMIT_S
+    while not condition():
+        assert time.monotonic() < end_s
+        ring.wait(0.005)
+
+
 # Pause, resume, step
 
 
@@ -122,22 +131,34 @@ def test_parts_side_by_side_rest_when_each_has_come_to_its_own_safe_point() -> N
 def test_a_pause_takes_no_time_of_the_operations_and_no_guard_trips_in_it() -> None:
     clock = ManualClock()
     work = Work(clock)
-    low = [False]
-    part = Guard(Op("hold", steps=(SAFE_POINT, 1.0)), lambda _work: not low[0], "low")
-    run = run_of(part, work)
+    asked, looked = [0], [0]
+
+    def high(_work: Work) -> bool:
+        asked[0] += 1
+        return run.state != "paused"
+
+    def stopped() -> None:
+        looked[0] += 1
+
+    part = Guard(Op("hold", steps=(SAFE_POINT, 1.0)), high, "low")
+    run = ProcedureRun(Procedure("trial", part), work, clock, FailurePolicy(), stopped=stopped)
     watcher = Watcher(run)
     work.at_point = lambda number: run.pause() if number == 0 else None
     run.start()
     watcher.state("paused")
-    low[0] = True
+    asked_before, looked_before = asked[0], looked[0]
     clock.advance(100.0)
+    wait_until(lambda: looked[0] > looked_before + 1)
+    assert asked[0] == asked_before
     assert run.state == "paused"
     assert run.tree.duration_s == 0.0
-    low[0] = False
     run.resume()
-    watcher.state("running")
-    while not run.over:
-        clock.advance(0.01)
+
+    def ended() -> bool:
+        clock.advance(0.1)
+        return run.over
+
+    wait_until(ended)
     run.wait(LIMIT_S)
     times = run.times.summary()[0]
     assert (times.name, times.done) == ("hold", 1)
@@ -147,6 +168,8 @@ def test_a_pause_takes_no_time_of_the_operations_and_no_guard_trips_in_it() -> N
 def test_a_step_carries_out_one_operation_and_rests() -> None:
     part = Sequence("all", Op("a", steps=(SAFE_POINT, 0.1)), Retry(Op("b"), 2), Op("c"))
     run, watcher = begun(part)
+    states: list[str] = []
+    run.subscribe(lambda _event: states.append(str(run.state)))
     for name in ("a", "b", "c"):
         run.step()
         watcher.until(lambda name=name: run.state == "paused" and f"{name} ran" in run.work.log)
@@ -154,6 +177,7 @@ def test_a_step_carries_out_one_operation_and_rests() -> None:
     run.resume()
     run.wait(LIMIT_S)
     assert watcher.states[:3] == ["pausing", "paused", "pausing"]
+    assert "paused" not in states, "while an operation runs it is on its way to the rest"
 
 
 def test_a_step_rests_after_a_failure_too_before_anything_is_undone() -> None:
@@ -205,6 +229,7 @@ def test_an_abort_in_a_pause_ends_it() -> None:
     with pytest.raises(ProcedureAborted, match="no more"):
         run.wait(LIMIT_S)
     assert done(run) == ["a", "safe"]
+    assert not run.not_safe, "the making safe does not rest in a pause that is over"
 
 
 def test_what_makes_no_sense_now_is_harmless() -> None:

@@ -111,6 +111,20 @@ def test_a_stop_while_undoing_ends_it_there() -> None:
     assert done(run) == ["down", "close", "undo"]
 
 
+def test_a_stop_that_a_guard_hears_of_undoes_nothing() -> None:
+    work = Work()
+
+    def calm(_work: Work) -> bool:
+        if work.clock.now_s() > 0.5:
+            raise stop()
+        return True
+
+    run = run_of(Retry(Guard(Op("lift", steps=(MOVE,)), calm, "dropped"), 3), work)
+    with pytest.raises(ProcedureStopped):
+        run.run_here()
+    assert done(run) == ["lift", "cancel lift"]
+
+
 def test_an_operation_may_deal_with_what_a_movement_fails_with() -> None:
     class Careful(Op):
         def run(self, work: Work) -> Steps:
