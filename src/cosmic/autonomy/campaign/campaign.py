@@ -1,0 +1,396 @@
+"""`Campaign`: fibre after fibre by one recipe, kept so that it can be gone on with."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from threading import Condition
+from typing import Final
+
+from cosmic.autonomy.campaign.keeper import Keeper, skip_known
+from cosmic.autonomy.campaign.recipe import Recipe
+from cosmic.autonomy.campaign.records import FibreRecord
+from cosmic.autonomy.campaign.resume import ResumePlan
+from cosmic.autonomy.campaign.statistics import Progress
+from cosmic.autonomy.campaign.stop_rule import StopRule
+from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.handling.survey import NONE_LEFT
+from cosmic.autonomy.handling.work import FibreWork
+from cosmic.autonomy.procedures.failures import STOPPED, ProcedureAborted
+from cosmic.autonomy.procedures.operation import OperationFailed
+from cosmic.autonomy.procedures.procedure import Procedure
+from cosmic.autonomy.procedures.run import ProcedureRun
+from cosmic.autonomy.procedures.run_state import RunState
+from cosmic.autonomy.procedures.run_thread import RunThread
+from cosmic.autonomy.procedures.times import OperationTimes
+from cosmic.autonomy.procedures.tree import OPERATION, NodeEvent, NodeState
+from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.listeners import tell
+
+logger = logging.getLogger(__name__)
+
+MOST_STUCK: Final = 3
+"""Fibres in a row that cannot be put away before a person is asked for."""
+_POLL_S: Final = 0.2
+
+
+class CampaignPhase(StrEnum):
+    """What a campaign is at; the value is the word."""
+
+    READY = "ready"
+    RUNNING = "running"
+    PAUSING = "pausing"
+    PAUSED = "paused"
+    ENDING = "ending"
+    ENDED = "ended"
+    FAILED = "failed"
+
+
+OVER: Final = frozenset({CampaignPhase.ENDED, CampaignPhase.FAILED})
+
+
+@dataclass(frozen=True, slots=True)
+class Doing:
+    """What a campaign does with each fibre.
+
+    Attributes
+    ----------
+    procedure : Procedure
+        Treats one fibre; run once for each.
+    measures : bool
+        A fibre without a result is no good one.
+    """
+
+    procedure: Procedure[FibreWork]
+    measures: bool = True
+
+
+class Campaign:
+    """Runs a procedure again and again on one platform, and keeps what comes of it; any thread.
+
+    Parameters
+    ----------
+    work : FibreWork
+        The platform with the settings of the recipe; the campaign closes it.
+    doing : Doing
+        What is done with a fibre.
+    recipe : Recipe
+        When to end, and what to keep.
+    store : CampaignStore
+        Where it is kept; stays open.
+    policy : FailurePolicy
+        Told of defects.
+    stopped : callable
+        Returns why motion is stopped, or None.
+    known : ResumePlan or None
+        What was done before the program ended.
+    """
+
+    def __init__(
+        self,
+        work: FibreWork,
+        doing: Doing,
+        recipe: Recipe,
+        store: CampaignStore,
+        *,
+        policy: FailurePolicy,
+        stopped: Callable[[], str | None],
+        known: ResumePlan | None = None,
+    ) -> None:
+        self.work = work
+        self.recipe = recipe
+        self.store = store
+        self._doing = doing
+        self._policy = policy
+        self._stopped = stopped
+        self._known = known
+        self._rule = StopRule(recipe.file.stop)
+        self._keeper = Keeper(
+            work, store, measures=doing.measures, pictures=recipe.file.output.pictures
+        )
+        self._broken: CosmicError | None = None
+        self._stuck = 0
+        self._changed = Condition()
+        self._phase = CampaignPhase.READY
+        self._run: ProcedureRun[FibreWork] | None = None
+        self._end_reason = ""
+        self._operation = ""
+        self._abort: str | None = None
+        self._listeners: tuple[Callable[[], object], ...] = ()
+        self._thread: RunThread | None = None
+
+    # What is known of it
+
+    @property
+    def phase(self) -> CampaignPhase:
+        """What it is at."""
+        return self._phase
+
+    @property
+    def over(self) -> bool:
+        """True when it has ended, well or not."""
+        return self._phase in OVER
+
+    @property
+    def end_reason(self) -> str:
+        """Why it ended; empty before."""
+        return self._end_reason
+
+    @property
+    def operation(self) -> str:
+        """The operation under way, in words."""
+        return self._operation
+
+    @property
+    def run(self) -> ProcedureRun[FibreWork] | None:
+        """The run of the procedure on the fibre in hand, for drawing; None before the first."""
+        return self._run
+
+    @property
+    def fibres(self) -> tuple[FibreRecord, ...]:
+        """All fibres so far without curves and pictures, those of earlier runs included."""
+        return self._keeper.fibres
+
+    @property
+    def times(self) -> OperationTimes:
+        """How long operations took, and what they failed with."""
+        return self._keeper.times
+
+    @property
+    def progress(self) -> Progress:
+        """How it stands."""
+        return self._keeper.progress()
+
+    @property
+    def left_s(self) -> float:
+        """Time until it ends, on the platform's clock, as far as can be told; nan: it cannot."""
+        return self._rule.left_s(self.progress)
+
+    def on_change(self, listener: Callable[[], object]) -> Callable[[], None]:
+        """Call `listener()` when anything changed, in any thread; returns what ends it."""
+        with self._changed:
+            self._listeners = (*self._listeners, listener)
+
+        def forget() -> None:
+            with self._changed:
+                self._listeners = tuple(each for each in self._listeners if each is not listener)
+
+        return forget
+
+    # What can be asked of it
+
+    def start(self) -> None:
+        """Begin, in a thread of its own; returns at once.
+
+        Raises
+        ------
+        NotAvailable
+            It was begun before.
+        """
+        self._begin()
+        self._thread = RunThread(self._carry_out, self.abort, self.recipe.name, self._policy)
+        self._thread.start()
+
+    def run_here(self) -> None:
+        """Carry it out in the calling thread, to its end.
+
+        Raises
+        ------
+        NotAvailable
+            It was begun before.
+        """
+        self._begin()
+        self._carry_out()
+
+    def pause(self) -> None:
+        """Rest at the next place where that is safe; harmless when it does not run."""
+        with self._changed:
+            if self._phase is not CampaignPhase.RUNNING:
+                return
+            self._phase = CampaignPhase.PAUSING
+            run = self._run
+        if run is not None:
+            run.pause()
+        self._tell()
+
+    def resume(self) -> None:
+        """Go on after a pause; harmless when it does not pause."""
+        with self._changed:
+            if self._phase not in (CampaignPhase.PAUSING, CampaignPhase.PAUSED):
+                return
+            self._phase = CampaignPhase.RUNNING
+            self._changed.notify_all()
+            run = self._run
+        if run is not None:
+            run.resume()
+        self._tell()
+
+    def step(self) -> None:
+        """Carry out one operation, then rest; harmless when it is over."""
+        with self._changed:
+            if self._phase in OVER or self._run is None or self._run.over:
+                return
+            self._phase = CampaignPhase.PAUSING
+            run = self._run
+        run.step()
+
+    def abort(self, reason: str = "ended by the operator") -> None:
+        """End it at once: what moves is cancelled, then it is made safe; returns at once."""
+        with self._changed:
+            if self._phase in OVER:
+                return
+            self._abort = self._abort or reason
+            self._phase = CampaignPhase.ENDING
+            self._changed.notify_all()
+            run = self._run
+        if run is not None:
+            run.abort(reason)
+        self._tell()
+
+    def join(self) -> None:
+        """Wait until its thread is gone; for whoever closes the platform, after `abort`."""
+        if self._thread is not None:
+            self._thread.join()
+
+    # The campaign's own thread
+
+    def _begin(self) -> None:
+        with self._changed:
+            if self._phase is not CampaignPhase.READY:
+                raise NotAvailable(f"campaign {self.recipe.name} was begun already")
+            self._phase = CampaignPhase.RUNNING
+        self._tell()
+
+    def _carry_out(self) -> None:
+        failed = False
+        try:
+            self._end_reason = self._treat_all()
+        except CosmicError as exc:
+            failed, self._end_reason = True, str(exc)
+        except Exception as exc:  # noqa: BLE001 - it must be said, and the store closed in order
+            self._policy.report(exc, f"campaign {self.recipe.name!r}")
+            failed, self._end_reason = True, f"a mistake in the program: {exc}"
+        finally:
+            self._leave(failed=failed)
+
+    def _leave(self, *, failed: bool) -> None:
+        self.work.close()
+        try:
+            self._keeper.close(self._end_reason)
+        except CosmicError as exc:
+            failed, self._end_reason = True, f"{self._end_reason}; {exc}"
+        told = logger.error if failed else logger.info
+        told("campaign %s: %s", self.recipe.name, self._end_reason)
+        with self._changed:
+            self._phase = CampaignPhase.FAILED if failed else CampaignPhase.ENDED
+            self._operation = ""
+            self._changed.notify_all()
+        self._tell()
+
+    def _treat_all(self) -> str:
+        if self._known is not None:
+            skip_known(self.work, self._known)
+        while True:
+            self._rest()
+            if self._abort is not None:
+                return self._abort
+            reason = self._rule.reason(self.progress) or self._treat_one()
+            if reason:
+                return reason
+
+    def _treat_one(self) -> str:
+        """Treat one fibre; returns why the campaign ends, or nothing."""
+        run = ProcedureRun(
+            self._doing.procedure,
+            self.work,
+            self.work.clock,
+            self._policy,
+            stopped=self._stopped,
+        )
+        run.subscribe(self._on_event)
+        run.on_change(self._on_run_changed)
+        self._keeper.begin_run()
+        taken = len(self.work.finished)
+        with self._changed:
+            self._run = run
+            if self._abort is not None:
+                return self._abort
+        try:
+            run.run_here()
+        except ProcedureAborted as exc:
+            if self._broken is not None:
+                raise self._broken from exc
+            self._keeper.keep(self.work.fibre, interrupted=str(exc))
+            return self._abort or str(exc)
+        except OperationFailed as exc:
+            return self._after_failure(exc, taken)
+        self._keep_last(taken)
+        return ""
+
+    def _after_failure(self, failure: OperationFailed, taken: int) -> str:
+        if failure.cause == NONE_LEFT:
+            return str(failure)
+        if failure.cause == STOPPED:
+            self._keeper.keep(self.work.fibre, interrupted=str(failure))
+            return str(failure)
+        if self._keep_last(taken):
+            return ""
+        fibre = self.work.fibre
+        if fibre is None:
+            raise failure
+        fibre.failure = fibre.failure or failure
+        self._keeper.keep(fibre)
+        self.work.fibre = None
+        self.work.surveyed = False
+        self._stuck += 1
+        if self._stuck >= MOST_STUCK:
+            return f"{self._stuck} fibres in a row could not be put away, the last: {failure}"
+        return ""
+
+    def _keep_last(self, taken: int) -> bool:
+        """Keep the fibre that was done with in this run; returns whether there was one."""
+        if len(self.work.finished) <= taken:
+            return False
+        self._keeper.keep(self.work.finished[-1])
+        self._stuck = 0
+        self._tell()
+        return True
+
+    # What happens meanwhile
+
+    def _on_event(self, event: NodeEvent) -> None:
+        if event.kind == OPERATION and event.state is NodeState.RUNNING:
+            self._operation = event.name
+        try:
+            self._keeper.note(event)
+        except CosmicError as exc:  # what cannot be written down must not be done
+            self._broken = exc
+            if self._run is not None:
+                self._run.abort(str(exc))
+
+    def _on_run_changed(self) -> None:
+        run = self._run
+        with self._changed:
+            pausing = run is not None and self._phase is CampaignPhase.PAUSING
+            if pausing and run is not None and run.state is RunState.PAUSED:
+                self._phase = CampaignPhase.PAUSED
+        if pausing and run is not None and run.state is RunState.RUNNING:
+            run.pause()  # it was wanted while the run had not begun
+        self._tell()
+
+    def _rest(self) -> None:
+        """Wait between two fibres while a pause is wanted."""
+        with self._changed:
+            if self._phase is CampaignPhase.PAUSING:
+                self._phase = CampaignPhase.PAUSED
+            resting = self._phase is CampaignPhase.PAUSED
+        if not resting:
+            return
+        self._tell()
+        with self._changed:
+            while self._phase is CampaignPhase.PAUSED and self._abort is None:
+                self._changed.wait(_POLL_S)
+
+    def _tell(self) -> None:
+        tell(self._listeners)

@@ -1,0 +1,129 @@
+"""What becomes of a fibre in hand, as the record that is kept of it."""
+
+import math
+from collections.abc import Sequence
+
+from cosmic.autonomy.campaign.records import (
+    FibreRecord,
+    OperationRecord,
+    Outcome,
+    Picture,
+    Pose,
+    Series,
+    Shape,
+)
+from cosmic.autonomy.handling.plate import Candidate
+from cosmic.autonomy.handling.work import FibreInHand
+from cosmic.autonomy.procedures.tree import ENDS, OPERATION, NodeEvent
+from cosmic.vico.core.picture import Picture as TakenPicture
+
+
+def pose_of(candidate: Candidate) -> Pose:
+    """Return where a fibre lies on the plate, turned with the line through its ends."""
+    x, y = candidate.place_um
+    (x0, y0), (x1, y1) = candidate.line_um[0].tolist(), candidate.line_um[-1].tolist()
+    return Pose(x, y, math.degrees(math.atan2(y1 - y0, x1 - x0)))
+
+
+def operations_of(events: Sequence[NodeEvent]) -> tuple[OperationRecord, ...]:
+    """Return the tries of operations that have ended, in their order."""
+    return tuple(
+        OperationRecord(
+            name=each.name,
+            began_s=each.started_s,
+            ended_s=each.ended_s,
+            attempt=each.attempt,
+            cause=each.cause,
+            text=each.text,
+        )
+        for each in events
+        if each.kind == OPERATION
+        and each.state in ENDS
+        and each.started_s is not None
+        and each.ended_s is not None
+    )
+
+
+def record_of(
+    fibre: FibreInHand,
+    number: int,
+    *,
+    ended_s: float,
+    measures: bool,
+    pictures: bool,
+    events: Sequence[NodeEvent],
+    series: tuple[Series, ...],
+    interrupted: str = "",
+) -> FibreRecord:
+    """Return the record of a fibre whose treatment has ended.
+
+    Parameters
+    ----------
+    number : int
+        As the store gave it.
+    ended_s : float
+        On the platform's clock, for a fibre that does not know.
+    measures : bool
+        The procedure measures: without a result the fibre is no good one.
+    pictures : bool
+        Keep its pictures.
+    interrupted : str
+        Why the treatment was cut off; empty when it was not.
+    """
+    outcome, cause, text = _outcome(fibre, measures=measures, interrupted=interrupted)
+    seen = fibre.seen
+    return FibreRecord(
+        number=number,
+        outcome=outcome,
+        began_s=fibre.found_s,
+        ended_s=fibre.done_s or ended_s,
+        found=pose_of(fibre.reach.candidate),
+        shape=Shape(
+            length_um=fibre.length_um,
+            length_std_um=math.nan
+            if seen is None
+            else seen.fibre.length_std_px * seen.length_um / seen.fibre.length_px,
+            width_um=fibre.width_um,
+            curl=fibre.curl,
+        ),
+        cause=cause,
+        text=text,
+        attempts=max(fibre.tries, 1),
+        peak_force_un=fibre.peak_un,
+        bending=fibre.bending,
+        spans=tuple(fibre.spans),
+        pictures=tuple(_picture(name, each) for name, each in fibre.pictures.items())
+        if pictures
+        else (),
+        operations=operations_of(events),
+        series=series,
+    )
+
+
+def _outcome(fibre: FibreInHand, *, measures: bool, interrupted: str) -> tuple[Outcome, str, str]:
+    if interrupted:
+        return Outcome.INTERRUPTED, "interrupted", interrupted
+    if fibre.failure is not None:
+        doubtful = fibre.bending is not None
+        outcome = Outcome.DOUBTFUL if doubtful else Outcome.FAILED
+        return outcome, fibre.failure.cause, fibre.failure.text
+    if measures and (fibre.bending is None or not fibre.bending.trusted):
+        reasons = "; ".join(fibre.bending.reasons) if fibre.bending is not None else "no result"
+        return Outcome.DOUBTFUL, "not trusted", reasons
+    return Outcome.GOOD, "", ""
+
+
+def _picture(name: str, taken: TakenPicture) -> Picture:
+    def known(value: float | None) -> float:
+        return math.nan if value is None else value
+
+    now = taken.circumstances
+    return Picture(
+        name=name,
+        pixels=taken.data,
+        taken_s=taken.frame.exposed_s,
+        scale_um_px=known(now.scale_um_px),
+        zoom=known(now.zoom_counts),
+        focus_um=math.nan,
+        light_percent=known(now.light_percent),
+    )

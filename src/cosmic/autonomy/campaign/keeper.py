@@ -1,0 +1,133 @@
+"""Keeps what becomes of the fibres of a campaign, while they are treated."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from cosmic.autonomy.campaign.fibre_notes import pose_of, record_of
+from cosmic.autonomy.campaign.journal import Journal
+from cosmic.autonomy.campaign.motion_log import MotionLog
+from cosmic.autonomy.campaign.records import CalibrationNote, FibreRecord
+from cosmic.autonomy.campaign.resume import Known, ResumePlan
+from cosmic.autonomy.campaign.statistics import Progress, progress
+from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.handling.plate import Candidate
+from cosmic.autonomy.handling.work import FibreInHand, FibreWork
+from cosmic.autonomy.procedures.times import OperationTimes
+from cosmic.autonomy.procedures.tree import OPERATION, NodeEvent, NodeState
+
+_POINTS: Final = 5
+
+
+class Keeper:
+    """Writes journal and records of one campaign; belongs to the campaign's thread.
+
+    Parameters
+    ----------
+    measures : bool
+        The procedure measures: a fibre without a result is no good one.
+    pictures : bool
+        Keep the pictures.
+    """
+
+    def __init__(
+        self, work: FibreWork, store: CampaignStore, *, measures: bool, pictures: bool
+    ) -> None:
+        self.store = store
+        self.times = OperationTimes()
+        self.fibres: tuple[FibreRecord, ...] = store.reader.fibres()
+        self._work = work
+        self._measures = measures
+        self._pictures = pictures
+        self._journal = Journal(store, work.clock.now_s)
+        self._motion = MotionLog(work.mico, work.daqco, work.settings.push.channel, work.clock)
+        self._before_s = store.reader.elapsed_s()
+        self._began_s = work.clock.now_s()
+        self._events: list[NodeEvent] = []
+        self._begun: FibreInHand | None = None
+        self._number: int | None = None
+
+    def progress(self) -> Progress:
+        """Return how the campaign stands; any thread."""
+        elapsed_s = self._before_s + self._work.clock.now_s() - self._began_s
+        return progress(self.fibres, elapsed_s)
+
+    def begin_run(self) -> None:
+        """Forget the events of the fibre before."""
+        self._events = []
+
+    def note(self, event: NodeEvent) -> None:
+        """Take what happened to a part of the procedure; in the run's thread.
+
+        Raises
+        ------
+        CampaignError
+            It cannot be written: then nothing more may be done.
+        """
+        self._events.append(event)
+        self.times.note(event)
+        self._begin_fibre()
+        if event.kind == OPERATION and event.state is NodeState.RUNNING:
+            self._journal.note(event.name, "begins", attempt=event.attempt)
+
+    def _begin_fibre(self) -> None:
+        fibre = self._work.fibre
+        if fibre is None or fibre is self._begun:
+            return
+        self._begun = fibre
+        self._motion.begin()
+        found = pose_of(fibre.reach.candidate)
+        self._number = self.store.begin_fibre(found, time_s=fibre.found_s)
+        self._journal.fibre = self._number
+
+    def keep(self, fibre: FibreInHand | None, interrupted: str = "") -> None:
+        """Write the record of a fibre; without effect for one that was not begun, or is kept."""
+        if fibre is None or self._number is None:
+            return
+        self.store.finish_fibre(
+            record_of(
+                fibre,
+                self._number,
+                ended_s=self._work.clock.now_s(),
+                measures=self._measures,
+                pictures=self._pictures,
+                events=self._events,
+                series=self._motion.series(),
+                interrupted=interrupted,
+            )
+        )
+        self._number = self._journal.fibre = None
+        fibre.pictures.clear()
+        self.fibres = self.store.reader.fibres()
+
+    def close(self, reason: str) -> None:
+        """Write the calibrations and why the campaign ended.
+
+        Raises
+        ------
+        CampaignError
+            It cannot be written.
+        """
+        self._motion.close()
+        began = self.store.reader.info().started
+        self.store.keep_calibrations(
+            [
+                CalibrationNote(name, each.residual, each.unit, f"{began} + {each.time_s:.0f} s")
+                for name, each in self._work.calibration.made.items()
+            ]
+        )
+        self.store.end(reason, time_s=self._work.clock.now_s())
+
+
+def skip_known(work: FibreWork, plan: ResumePlan) -> None:
+    """Have the fibres that were treated before left alone where they are found again."""
+    work.given_up += [_as_candidate(each) for each in plan.known]
+
+
+def _as_candidate(known: Known) -> Candidate:
+    angle = np.radians(known.pose.angle_deg)
+    along: Sequence[float] = np.linspace(-0.5, 0.5, _POINTS).tolist()
+    middle = np.array([known.pose.x_plate_um, known.pose.y_plate_um])
+    line = middle + np.outer(along, known.length_um * np.array([np.cos(angle), np.sin(angle)]))
+    return Candidate(line, known.length_um, 0.0, 0.0, 0.0)
