@@ -87,8 +87,6 @@ class Rig:
     def force(self, way_um: np.ndarray, span_um: float) -> np.ndarray:
         """Return the force at ways of the probe's axis since the contact, odd in the way."""
         deflections, forces = curve(round(self.radius_um / span_um / 0.005) * 0.005)
-        force = self.ei_n_m2 * UN_UM2 * forces / span_um**2
-        way = deflections * span_um + force / self.sensor_un_um
         fine = np.linspace(0.0, deflections[-1], 800)
         smooth = _smooth(deflections, forces, fine) * self.ei_n_m2 * UN_UM2 / span_um**2
         way = fine * span_um + smooth / self.sensor_un_um

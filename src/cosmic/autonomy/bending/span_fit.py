@@ -8,7 +8,14 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import chi2 as chi2_distribution
 
-from cosmic.autonomy.bending.branch import CLEAR_SIGMAS, Points, free_force_un, points_of, rough
+from cosmic.autonomy.bending.branch import (
+    CLEAR_SIGMAS,
+    Mask,
+    Points,
+    free_force_un,
+    points_of,
+    rough,
+)
 from cosmic.autonomy.bending.branch import stuck as clings
 from cosmic.autonomy.bending.elastica import force_un
 from cosmic.autonomy.bending.result import Floats, Quality, SpanFit
@@ -18,10 +25,15 @@ from cosmic.autonomy.bending.symptoms import (
     back_and_forth_percent,
     lost_while_pushing,
     saturated,
+    touched,
 )
 
 ROUNDS: Final = 2
 CLOSE_SIGMAS: Final = 2.5
+TINY: Final = 1e-4
+HIGHEST_LOG: Final = 20.0
+"""Of a stiffness: beyond any fibre, and short of an overflow."""
+
 POOR_PROBABILITY: Final = 1e-4
 POOR_PART: Final = 0.02
 """Of the highest force: what is left unexplained below this does no harm."""
@@ -50,18 +62,36 @@ class _Model:
     def contact(self, values: Floats) -> Floats:
         force = np.zeros(len(self._points.way_um))
         for number, branch in enumerate(self.branches):
-            force[branch] = force_un(
-                self._points.way_um[branch] - values[2 * number + 1],
-                k_un_um=math.exp(min(values[2 * number], 20.0)),
-                span_um=self._length_um,
-                radius_um=self._settings.radius_um,
-                sensor_un_um=self._settings.sensor_un_um,
-            )
+            force[branch] = self._branch(branch, values[2 * number], values[2 * number + 1])
         return force
 
+    def _branch(self, branch: Mask, log_k: float, hinge_um: float) -> Floats:
+        return force_un(
+            self._points.way_um[branch] - hinge_um,
+            k_un_um=math.exp(min(log_k, HIGHEST_LOG)),
+            span_um=self._length_um,
+            radius_um=self._settings.radius_um,
+            sensor_un_um=self._settings.sensor_un_um,
+        )
+
+    def slopes(self, values: Floats) -> Floats:
+        """Return the derivatives of the force to each value, shape (points, values)."""
+        found = np.zeros((len(self._points.way_um), len(values)))
+        for number, branch in enumerate(self.branches):
+            log_k, hinge = values[2 * number], values[2 * number + 1]
+            here = self._branch(branch, log_k, hinge)
+            stiffer = self._branch(branch, log_k + TINY, hinge)
+            later = self._branch(branch, log_k, hinge + TINY)
+            found[branch, 2 * number] = (stiffer - here) / TINY
+            found[branch, 2 * number + 1] = (later - here) / TINY
+        found[:, -2], found[:, -1] = 1.0, self._elapsed_s
+        return found
+
     def total(self, values: Floats) -> Floats:
-        total = self.contact(values) + values[-2] + values[-1] * self._elapsed_s
-        return np.asarray(total, dtype=np.float64)
+        return np.asarray(self.contact(values) + self.baseline(values), dtype=np.float64)
+
+    def baseline(self, values: Floats) -> Floats:
+        return np.asarray(values[-2] + values[-1] * self._elapsed_s, dtype=np.float64)
 
     def covariance(self, values: Floats) -> Floats:
         """Return the noise foreseen: readings, stage times slope, and the zero's random walk."""
@@ -69,8 +99,8 @@ class _Model:
         for number, branch in enumerate(self.branches):
             # Just before the hinge too: there, a stage a little ahead has touched already.
             ahead = self._points.way_um - values[2 * number + 1]
-            touched = ahead > -CLOSE_SIGMAS * self._settings.way_std_um
-            slope[branch & touched] = math.exp(min(values[2 * number], 20.0))
+            pressed = ahead > -CLOSE_SIGMAS * self._settings.way_std_um
+            slope[branch & pressed] = math.exp(min(values[2 * number], HIGHEST_LOG))
         single = self._points.std_un**2 + (slope * self._settings.way_std_um) ** 2
         walk = np.minimum(self._elapsed_s[:, None], self._elapsed_s[None, :])
         walked = self._settings.drift_un_sqrt_s**2 * np.maximum(walk, 0.0)
@@ -92,7 +122,12 @@ class _Model:
             def misfit(tried: Floats, whiten: Floats = whiten) -> Floats:
                 return np.asarray(whiten @ (points.force_un - self.total(tried)))
 
-            found = least_squares(misfit, values, method="lm", x_scale="jac", max_nfev=400)
+            def slopes(tried: Floats, whiten: Floats = whiten) -> Floats:
+                return np.asarray(-whiten @ self.slopes(tried))
+
+            found = least_squares(
+                misfit, values, jac=slopes, method="lm", x_scale="jac", max_nfev=400
+            )
             values, chi2, jacobian = found.x, 2.0 * float(found.cost), found.jac
         covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian), dtype=np.float64)
         return _Found(values, covariance, chi2, len(points.way_um) - len(values))
@@ -115,9 +150,8 @@ def fit_span(span: Span, *, settings: FitSettings, place_um: float, length_um: f
     """
     points = points_of(span)
     points = points.but(clings(points, settings.drift_un_sqrt_s))
-    height = points.force_un - free_force_un(points)
-    peak = float(np.max(height))
-    if not peak > CLEAR_SIGMAS * float(np.median(points.std_un)) / math.sqrt(3.0):
+    if not touched(points, settings.drift_un_sqrt_s):
+        peak = float(np.max(points.force_un - free_force_un(points)))
         return _without_contact(span, place_um, peak)
     model = _Model(points, settings, length_um)
     found = model.fit()
@@ -160,7 +194,8 @@ def _told(span: Span, points: Points, model: _Model, found: _Found, place_um: fl
     spread = found.covariance[np.ix_([0, 2], [0, 2])] if both else found.covariance[:1, :1]
     weights = np.linalg.pinv(spread) @ np.ones(len(logs))
     std = math.sqrt(1.0 / weights.sum()) if weights.sum() > 0.0 else math.inf
-    k = math.exp(min(float(weights @ logs / weights.sum()), 20.0))
+    k = math.exp(min(float(weights @ logs / weights.sum()), HIGHEST_LOG))
+    baseline = model.baseline(values)
     fitted = np.full(len(span.way_um), math.nan)
     fitted[points.kept] = model.total(values)
     out, back = (values[:2], values[2:4]) if both else (values[:2], values[:2])
@@ -168,14 +203,14 @@ def _told(span: Span, points: Points, model: _Model, found: _Found, place_um: fl
         place_um=place_um,
         k_un_um=k,
         k_std_un_um=k * std,
-        k_loading_un_um=math.exp(min(out[0], 20.0)),
-        k_unloading_un_um=math.exp(min(back[0], 20.0)),
+        k_loading_un_um=math.exp(min(out[0], HIGHEST_LOG)),
+        k_unloading_un_um=math.exp(min(back[0], HIGHEST_LOG)),
         hinge_um=float(out[1]),
         hinge_back_um=float(back[1]),
         baseline_un=float(values[-2]),
         drift_un_s=float(values[-1]),
-        hysteresis_percent=back_and_forth_percent(points),
-        peak_un=float(np.max(points.force_un - free_force_un(points))),
+        hysteresis_percent=back_and_forth_percent(points, baseline),
+        peak_un=float(np.max(points.force_un - baseline)),
         chi2=found.chi2,
         freedom=found.freedom,
         fitted_un=fitted,

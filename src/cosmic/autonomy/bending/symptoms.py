@@ -6,14 +6,29 @@ from typing import Final
 import numpy as np
 
 from cosmic.autonomy.bending.branch import CLEAR_SIGMAS, Points, free_force_un
+from cosmic.autonomy.bending.result import Floats
 from cosmic.autonomy.bending.span import Span
 
 NEAR_RANGE: Final = 0.98
+NEIGHBOURS: Final = 3
 LOST_PART: Final = 0.4
 """Of the highest force so far: less than this farther out is a force that was lost."""
 
 COMPARED_FROM: Final = 0.2
 """Of the highest force: the lowest at which the ways out and back are compared."""
+
+
+def touched(points: Points, drift_un_sqrt_s: float) -> bool:
+    """Return whether neighbouring points rise clearly above the baseline on the way out."""
+    out = points.loading if points.loading.sum() >= NEIGHBOURS else np.ones_like(points.loading)
+    order = np.argsort(points.way_um[out], kind="stable")
+    height = (points.force_un - free_force_un(points))[out][order]
+    mean = np.convolve(height, np.full(NEIGHBOURS, 1.0 / NEIGHBOURS), mode="valid")
+    took_s = float(np.ptp(points.time_s[out]))
+    noise = math.hypot(
+        float(np.median(points.std_un)) / math.sqrt(NEIGHBOURS), drift_un_sqrt_s * math.sqrt(took_s)
+    )
+    return bool(np.max(mean) > CLEAR_SIGMAS * noise)
 
 
 def saturated(span: Span, range_un: float) -> bool:
@@ -35,9 +50,9 @@ def lost_while_pushing(points: Points) -> bool:
     return bool(np.any(clear & (height[order] < LOST_PART * highest)))
 
 
-def back_and_forth_percent(points: Points) -> float:
+def back_and_forth_percent(points: Points, baseline_un: Floats) -> float:
     """Return the mean force that the way out has more than the way back, of the highest."""
-    height = points.force_un - free_force_un(points)
+    height = points.force_un - baseline_un
     out, back = points.loading, ~points.loading
     if out.sum() < 3 or back.sum() < 3:
         return math.nan

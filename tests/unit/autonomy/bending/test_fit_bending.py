@@ -1,16 +1,256 @@
-"""Bending stiffness from simulated pushes, against an independent model."""
+"""Bending stiffness from simulated pushes, against a model integrated independently."""
+
+import dataclasses
+import math
+from itertools import pairwise
 
 import numpy as np
+import pytest
 
-from cosmic.autonomy.bending.fit import fit_bending
+from cosmic.autonomy.bending.elastica import cantilever
+from cosmic.autonomy.bending.fit import fit_bending, places_um
 from cosmic.autonomy.bending.plan import plan_spans
-from oracles.bent_fibre import Rig
+from cosmic.autonomy.bending.result import BendingError, BendingResult, Quality
+from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.autonomy.bending.span import Span
+from oracles.bent_fibre import Rig, curve
+
+DRY = 5e-11
+DRAWS = 50
 
 
-def test_a_dry_fibre_is_measured_within_a_few_percent() -> None:
-    rig = Rig(5e-11, np.random.default_rng(3))
-    spans = [rig.push(p.span_um, p.stroke_um) for p in plan_spans(1200.0, 5e-11)]
+def pushed(rig: Rig) -> list[Span]:
+    """Return the spans that a procedure would measure."""
+    plan = plan_spans(1200.0, rig.ei_n_m2)
+    return [rig.push(each.span_um, each.stroke_um) for each in plan]
+
+
+def rig(seed: int = 3, **more: float) -> Rig:
+    return Rig(DRY, np.random.default_rng(seed), **more)
+
+
+def width_percent(found: BendingResult) -> float:
+    return 50.0 * (found.ei_high_n_m2 - found.ei_low_n_m2) / found.ei_n_m2
+
+
+# ---------------------------------------------------------------------- the model
+
+
+@pytest.mark.parametrize("radius_part", [0.0, 0.05, 0.1])
+def test_a_bent_cantilever_pushes_as_integration_says(radius_part: float) -> None:
+    deflection, force = cantilever(radius_part)
+    there, same = curve(radius_part)
+    near = there < 0.25
+    np.testing.assert_allclose(
+        3.0 * np.interp(there[near], deflection, force), same[near], rtol=2e-4, atol=1e-7
+    )
+
+
+def test_a_small_push_is_that_of_a_straight_beam() -> None:
+    deflection, force = cantilever(0.05)
+    assert force[3] / deflection[3] == pytest.approx(1.0, abs=1e-3)
+
+
+# ---------------------------------------------------------------------- how good it is
+
+
+@pytest.mark.parametrize("ei_n_m2", [1e-12, 5e-12, 5e-11, 2e-10])
+def test_stiffness_is_found_with_an_honest_interval(ei_n_m2: float) -> None:
+    rng, errors, covered, trusted = np.random.default_rng(11), [], 0, 0
+    for _ in range(DRAWS):
+        drawn = Rig.drawn(ei_n_m2, rng)
+        plan = plan_spans(1200.0, ei_n_m2 * float(np.exp(0.2 * rng.standard_normal())))
+        found = fit_bending([drawn.push(each.span_um, each.stroke_um) for each in plan])
+        errors.append(abs(found.ei_n_m2 / ei_n_m2 - 1.0))
+        covered += found.ei_low_n_m2 <= ei_n_m2 <= found.ei_high_n_m2
+        trusted += found.trusted
+    assert np.quantile(errors, 0.5) <= 0.05
+    assert np.quantile(errors, 0.9) <= 0.10
+    # 44 of 50 is what chance leaves of 95 % once in two hundred; benchmarks/bending.py has 1500.
+    assert covered >= 44
+    assert trusted >= DRAWS - 2
+
+
+def test_the_clamp_is_found_behind_the_tip_of_the_jaws() -> None:
+    found = fit_bending(pushed(rig(clamp_um=15.0, contact_std_um=0.1)))
+    assert abs(found.clamp_offset_um - 15.0) < 3.0 * found.clamp_offset_std_um
+    assert found.clamp_offset_std_um < 5.0
+
+
+def test_the_slope_does_not_care_about_an_offset_of_the_nominal_places() -> None:
+    spans = pushed(rig())
+    moved = [dataclasses.replace(span, nominal_um=span.nominal_um + 6.0) for span in spans]
+    one, other = fit_bending(spans), fit_bending(moved)
+    assert other.ei_n_m2 == pytest.approx(one.ei_n_m2, rel=0.02)
+    assert other.clamp_offset_um == pytest.approx(one.clamp_offset_um - 6.0, abs=1.5)
+
+
+@pytest.mark.parametrize("towards", [1.0, -1.0])
+def test_places_follow_the_encoders_whichever_way_the_fibre_points(towards: float) -> None:
+    spans = pushed(rig(towards=towards))
+    wrong = [dataclasses.replace(spans[0], nominal_um=spans[0].nominal_um + 9.0), *spans[1:]]
+    places = places_um(wrong)
+    for (one, other), (span, after) in zip(pairwise(places), pairwise(spans), strict=True):
+        assert one - other == pytest.approx(span.nominal_um - after.nominal_um)
+
+
+def test_the_order_of_the_spans_does_not_matter() -> None:
+    spans = pushed(rig())
+    assert fit_bending(spans).ei_n_m2 == pytest.approx(fit_bending(spans[::-1]).ei_n_m2, rel=1e-6)
+
+
+def test_the_sensor_giving_way_is_taken_out() -> None:
+    spans = pushed(rig(sensor_un_um=120.0, contact_std_um=0.1))
+    right = fit_bending(spans, settings=FitSettings(sensor_un_um=120.0))
+    wrong = fit_bending(spans, settings=FitSettings(sensor_un_um=1e6))
+    assert right.ei_n_m2 == pytest.approx(DRY, rel=0.04)
+    # Without, stiff short spans seem softer, and the line over the places too flat.
+    assert wrong.ei_n_m2 > 1.03 * right.ei_n_m2
+
+
+def test_a_less_certain_instrument_makes_a_wider_interval() -> None:
+    spans = pushed(rig())
+    sure = width_percent(fit_bending(spans))
+    for name, value in {
+        "gain_std_part": 0.1,
+        "way_scale_std_part": 0.1,
+        "sensor_std_part": 1.0,
+    }.items():
+        unsure = fit_bending(spans, settings=FitSettings(**{name: value}))
+        assert width_percent(unsure) > 1.02 * sure, name
+
+
+# ---------------------------------------------------------------------- few and soft
+
+
+def test_one_span_alone_has_a_wide_interval_and_is_not_trusted() -> None:
+    covered = 0
+    for seed in range(20):
+        drawn = Rig.drawn(DRY, np.random.default_rng(seed))
+        found = fit_bending([drawn.push(300.0, 12.0)])
+        covered += found.ei_low_n_m2 <= DRY <= found.ei_high_n_m2
+        assert width_percent(found) > 10.0
+        assert Quality.TOO_FEW_SPANS in found.flags
+        assert not found.trusted
+        assert "are needed to find the clamp" in found.reasons[-1]
+    assert covered >= 18
+
+
+def test_a_fibre_too_soft_for_the_sensor_is_not_trusted() -> None:
+    soft = Rig(1e-14, np.random.default_rng(2))
+    found = fit_bending(
+        [soft.push(each.span_um, each.stroke_um) for each in plan_spans(1200, 1e-14)]
+    )
+    assert not found.trusted
+    assert found.flags & {Quality.TOO_SOFT, Quality.NO_CONTACT, Quality.TOO_FEW_SPANS}
+
+
+def test_no_span_at_all_is_refused() -> None:
+    with pytest.raises(BendingError, match="there is no span"):
+        fit_bending([])
+
+
+# ---------------------------------------------------------------------- what goes wrong
+
+
+def test_a_push_past_the_fibre_has_no_contact_and_no_stiffness() -> None:
+    found = fit_bending([Rig(1e-20, np.random.default_rng(1)).push(300.0, 12.0)])
+    assert Quality.NO_CONTACT in found.flags
+    assert math.isnan(found.ei_n_m2)
+    assert not found.trusted
+
+
+def test_a_slip_in_the_jaws_is_seen_and_that_span_left_out() -> None:
+    bench = rig()
+    good = pushed(bench)
+    bench.slipped_um = 3.0
+    found = fit_bending([*good, bench.push(300.0, 12.0)])
+    assert Quality.SLIPPED in found.spans[3].flags
+    assert found.used == (0, 1, 2)
+    assert found.trusted
+    assert found.reasons[0].startswith("span 4 at 300 um: ")
+
+
+def test_a_fibre_that_breaks_is_seen() -> None:
+    bench = rig(breaks_at=0.6)
+    found = fit_bending(pushed(bench))
+    assert all(Quality.BROKEN in fit.flags for fit in found.spans)
+    assert Quality.BROKEN in found.flags
+    assert not found.trusted
+
+
+def test_loading_and_unloading_that_differ_are_told_apart() -> None:
+    spans = []
+    for span in pushed(rig()):
+        force = np.where(span.loading, span.force_un, 0.4 + 0.85 * (span.force_un - 0.4))
+        spans.append(dataclasses.replace(span, force_un=force))
     found = fit_bending(spans)
-    assert abs(found.ei_n_m2 / 5e-11 - 1.0) < 0.05
-    assert found.ei_low_n_m2 < 5e-11 < found.ei_high_n_m2
-    assert found.trusted, found.reasons
+    assert all(Quality.HYSTERESIS in fit.flags for fit in found.spans)
+    for fit in found.spans:
+        assert fit.hysteresis_percent == pytest.approx(15.0 * 0.6, abs=4.0)
+        assert fit.k_unloading_un_um == pytest.approx(0.85 * fit.k_loading_un_um, rel=0.05)
+    assert not found.trusted
+
+
+def test_a_saturated_sensor_is_told() -> None:
+    spans = [
+        dataclasses.replace(each, force_un=np.minimum(each.force_un, 20.0))
+        for each in pushed(rig())
+    ]
+    found = fit_bending(spans, settings=FitSettings(range_un=20.0))
+    assert Quality.SATURATED in found.flags
+    assert not found.trusted
+
+
+def test_a_force_that_follows_no_beam_is_a_poor_fit() -> None:
+    spans = []
+    for span in pushed(rig()):
+        way = np.maximum(span.way_um - 100.0, 0.0)
+        spans.append(dataclasses.replace(span, force_un=0.4 + 40.0 * (way / way.max()) ** 3))
+    found = fit_bending(spans)
+    assert all(Quality.POOR_FIT in fit.flags for fit in found.spans)
+    assert not found.trusted
+
+
+def test_a_grip_that_slips_between_spans_is_seen_on_the_line() -> None:
+    bench = rig()
+    spans = pushed(bench)
+    bench.clamp_um += 40.0
+    found = fit_bending([*spans, bench.push(310.0, 12.0)])
+    assert Quality.POOR_FIT in found.flags
+    assert "do not lie on one line" in found.reasons[-1]
+
+
+def test_a_fibre_that_clings_to_the_probe_is_measured_all_the_same() -> None:
+    soft = Rig(5e-13, np.random.default_rng(4), cling_un=1.0, contact_std_um=0.3)
+    found = fit_bending(
+        [soft.push(each.span_um, each.stroke_um) for each in plan_spans(1200, 5e-13)]
+    )
+    assert found.ei_n_m2 == pytest.approx(5e-13, rel=0.15)
+    assert not any(Quality.SLIPPED in fit.flags for fit in found.spans)
+
+
+def test_points_that_are_no_numbers_are_left_out() -> None:
+    spans = pushed(rig())
+    holed = spans[0].force_un.copy()
+    holed[[3, 20, 40]] = math.nan
+    found = fit_bending([dataclasses.replace(spans[0], force_un=holed), *spans[1:]])
+    assert found.ei_n_m2 == pytest.approx(fit_bending(spans).ei_n_m2, rel=0.02)
+    assert np.isnan(found.spans[0].fitted_un[[3, 20, 40]]).all()
+    assert np.isfinite(found.spans[0].fitted_un).sum() >= len(holed) - 12
+
+
+def test_a_span_that_is_not_whole_is_refused_with_what_is_wrong() -> None:
+    (span, *_) = pushed(rig())
+    with pytest.raises(BendingError, match="has 48 positions, but 47"):
+        fit_bending([dataclasses.replace(span, force_un=span.force_un[1:])])
+    with pytest.raises(BendingError, match="has 0 usable points"):
+        fit_bending([dataclasses.replace(span, force_std_un=np.zeros(48))])
+
+
+def test_the_fitted_curve_runs_through_the_points() -> None:
+    spans = pushed(rig())
+    for span, fit in zip(spans, fit_bending(spans).spans, strict=True):
+        away = span.force_un - fit.fitted_un
+        assert float(np.nanstd(away)) < 0.02 * fit.peak_un + 0.1
+        assert fit.chi2 / fit.freedom < 2.0
