@@ -1,0 +1,125 @@
+"""Beginning a campaign in a folder, or going on with the one that is there."""
+
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+
+from cosmic.autonomy.campaign.campaign import Campaign, Doing
+from cosmic.autonomy.campaign.recipe import Recipe, load_recipe
+from cosmic.autonomy.campaign.records import CampaignError, CampaignInfo
+from cosmic.autonomy.campaign.resume import ResumePlan, resume
+from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.campaign.store_files import DATABASE
+from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.handling.work import FibreWork, Handles
+from cosmic.autonomy.shipped.registry import PARAMETERS, PROCEDURES
+from cosmic.frame.failure import FailurePolicy
+
+
+@dataclass(frozen=True)
+class Host:
+    """The platform that a campaign runs on.
+
+    Attributes
+    ----------
+    rig : Handles
+        Its applications.
+    policy : FailurePolicy
+        Told of defects.
+    stopped : callable
+        Returns why motion is stopped, or None.
+    hardware : str
+        "digital twin", or the platform's name.
+    """
+
+    rig: Handles
+    policy: FailurePolicy
+    stopped: Callable[[], str | None]
+    hardware: str
+    rate: float = 1.0
+    seed: int = 0
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+
+def read_recipe(path: Path) -> Recipe:
+    """Read a recipe with the parameters of a procedure that ships with CoSMic.
+
+    Raises
+    ------
+    ConfigError
+        One line per fault, each with file, key and reason.
+    """
+    return load_recipe(path, procedures=PARAMETERS)
+
+
+def open_campaign(recipe: Recipe, folder: Path, host: Host) -> Campaign:
+    """Return a campaign that is ready to start; close its store at the end.
+
+    In a folder that holds a campaign by the same recipe it goes on with that one: what is finished
+    is not done again, and no position of before is trusted.
+
+    Raises
+    ------
+    CampaignError
+        The folder holds another campaign, is in use, or cannot be written.
+    ConfigError
+        The platform has not what the recipe names.
+    NotAvailable
+        An application is not hosted here.
+    """
+    parameters = recipe.parameters
+    settings = parameters if isinstance(parameters, HandlingSettings) else HandlingSettings()
+    shipped = PROCEDURES[recipe.file.procedure]
+    with ExitStack() as undo:
+        work = FibreWork.on(host.rig, settings)
+        undo.callback(work.close)
+        store, known = _store(recipe, folder, host, work.clock.now_s())
+        undo.callback(store.close)
+        campaign = Campaign(
+            work,
+            Doing(shipped.build(settings), measures=shipped.measures),
+            recipe,
+            store,
+            policy=host.policy,
+            stopped=host.stopped,
+            known=known,
+        )
+        undo.pop_all()
+    return campaign
+
+
+def _store(
+    recipe: Recipe, folder: Path, host: Host, now_s: float
+) -> tuple[CampaignStore, ResumePlan | None]:
+    if not (folder / DATABASE).exists():
+        return CampaignStore.create(folder, _info(recipe, host), time_s=now_s), None
+    store = CampaignStore.open(folder, time_s=now_s, versions=host.versions)
+    try:
+        if store.reader.info().recipe_text != recipe.text:
+            raise CampaignError(
+                f"{folder} holds a campaign by another recipe than {recipe.path}: "
+                "go on with that one, or name another folder"
+            )
+        return store, resume(store)
+    except BaseException:
+        store.close()
+        raise
+
+
+def _info(recipe: Recipe, host: Host) -> CampaignInfo:
+    file = recipe.file
+    return CampaignInfo(
+        name=recipe.name,
+        procedure=file.procedure,
+        sample=file.sample.description or file.sample.name,
+        recipe_text=recipe.text,
+        started=datetime.now().astimezone().isoformat(timespec="seconds"),
+        description=file.description,
+        operator=file.operator,
+        hardware=host.hardware,
+        seed=host.seed,
+        rate=host.rate,
+        versions=host.versions,
+    )
