@@ -156,9 +156,15 @@ class UDaqPlotter(QWidget):
             if key != self._key:
                 self.chart.feed(pending)
                 pending = []
+                if not self._knows(chunk):
+                    continue
                 self._begin(key)
             pending.append(chunk)
         self.chart.feed(pending)
+
+    def _knows(self, chunk: DataChunk) -> bool:
+        """Return whether the settings have its channels: another station may tell of them later."""
+        return {each.name for each in self._port.settings.channel}.issuperset(chunk.channels)
 
     def read_out(self) -> None:
         """Show values, counters and, with Auto, fitting axes."""
