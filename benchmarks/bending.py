@@ -53,7 +53,7 @@ def _of(ei_n_m2: float, draws: int) -> list[Figure]:
     return [
         Figure(NAME, f"{of}: error, p50", middle, "%", MEDIAN_PERCENT if goal else None),
         Figure(NAME, f"{of}: error, p90", worst, "%", P90_PERCENT if goal else None),
-        # A figure is met by being small, so the share of intervals stands as its way from the middle.
+        # A figure is met by being small: the share stands as its way from the middle.
         Figure(NAME, f"{of}: 95 % intervals that hold the truth", cover, "%"),
         Figure(NAME, f"{of}: that share beside {beside:g} %", abs(cover - beside), "%", 4.5),
         Figure(NAME, f"{of}: trusted", 100.0 * trusted / draws, "%"),
