@@ -114,6 +114,8 @@ def test_the_panels_are_grey_while_the_station_is_away(qtbot, own, window, tmp_p
         first.close()
         qtbot.waitUntil(lambda: "fibres is away" in view.note.text)
         assert not view.recorder.record.isEnabled()
+        assert not view.recorder.snap.isEnabled()
+        assert "fibres is away" in view.recorder.snap.toolTip()
         qtbot.waitUntil(lambda: not lens.home.isEnabled())
         assert "fibres is away" in lens.home.toolTip()
         stack.enter_context(hosted(home, endpoint))

@@ -115,7 +115,8 @@ class RecordBar(QWidget):
         recording, wrong = self._port.recording, self.files.problem
         self.files.setEnabled(not recording.active)
         self.format.setEnabled(not recording.active)
-        still_wrong = wrong or ("" if self._port.latest() else "There is no picture yet")
+        away = self._port.problem if self._port.elsewhere else ""
+        still_wrong = wrong or away or ("" if self._port.latest() else "There is no picture yet")
         chosen = self.chosen
         wrong = wrong or (chosen.problem if chosen is not None else "There is no format")
         wrong = wrong or ("" if self._port.running else "No pictures are taken: start the camera")
