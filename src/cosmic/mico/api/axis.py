@@ -367,7 +367,7 @@ class Axis(AxisShape):
 
     def halt(self) -> None:
         """Stop this axis; nothing is latched and other axes go on."""
-        self.commander.stop(self._channel)
+        self._manager.device(self._name).halt(self._channel, "stopped")
 
     @staticmethod
     def _result(movement: Movement, *, wait: bool) -> float | Movement | None:
@@ -415,4 +415,4 @@ class Axis(AxisShape):
             raise refusal(
                 refuse(Reason.LIMIT, text, axis=self._name, value=hertz, limit=limit, unit="Hz")
             )
-        self.commander.set_frequency(self._channel, hertz)
+        self._manager.device(self._name).set_frequency(self._channel, hertz)

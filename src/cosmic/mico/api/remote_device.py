@@ -4,7 +4,7 @@ import logging
 from collections.abc import Callable, Mapping
 from threading import Lock
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, Signal, SignalInstance
 
 from cosmic.frame.errors import CosmicError, MoveCancelled, MoveRefused, ProtocolError
 from cosmic.frame.network.ongoing import Ongoing
@@ -68,6 +68,7 @@ class RemoteDevice(QObject):
         self._lock = Lock()
         self._newest: dict[int, int] = {}
         self._void: dict[int, int] = {}
+        self.slots = CommanderSlots(self)
 
     def submit(self, order: Order) -> None:
         """Send `order`; how it goes is told by its movement and by signals."""
@@ -119,11 +120,17 @@ class RemoteDevice(QObject):
         self._line.renew("steer", name, order.number, velocity=velocity)
 
     def halt(self, channel: int, why: str) -> None:
-        """Stop one channel past every queue, here and there."""
+        """Stop one channel past every queue, here and there; raises as `CommandLine.at_once`."""
+        self._line.at_once("halt", self._halt_arguments(channel, why))
+
+    def halt_loudly(self, channel: int, why: str) -> None:
+        """Stop one channel without waiting; the policy is told where that fails."""
+        self._line.at_once_later("halt", self._halt_arguments(channel, why))
+
+    def _halt_arguments(self, channel: int, why: str) -> dict[str, object]:
         with self._lock:
             up_to = self._void[channel] = self._newest.get(channel, 0)
-        name = self.container.name(channel)
-        self._line.at_once("halt", {"axis": name, "up_to": up_to, "why": why})
+        return {"axis": self.container.name(channel), "up_to": up_to, "why": why}
 
     def set_frequency(self, channel: int, frequency_hz: int) -> None:
         """Limit the closed-loop speed of one channel, 1 to 18500 Hz."""
@@ -136,6 +143,41 @@ class RemoteDevice(QObject):
     def set_zero(self, channel: int, zero: float) -> None:
         """Show the positions of one channel relative to `zero`, in gate coordinates."""
         self._line.do("set_zero", {"axis": self.container.name(channel), "zero": zero})
+
+
+class CommanderSlots(QObject):
+    """A device as commanders are joined to it: out of a slot no exception may come."""
+
+    def __init__(self, device: RemoteDevice) -> None:
+        super().__init__(device)
+        self._device = device
+        self.position_changed: SignalInstance = device.position_changed
+        self.state_changed: SignalInstance = device.state_changed
+        self.movement_ended: SignalInstance = device.movement_ended
+        self.movement_refused: SignalInstance = device.movement_refused
+
+    def submit(self, order: Order) -> None:
+        """Send `order`."""
+        self._device.submit(order)
+
+    def renew_jog(self, order: Order) -> None:
+        """Keep the jog started by `order` alive."""
+        self._device.renew_jog(order)
+
+    def steer_jog(self, order: Order, velocity: float) -> None:
+        """Keep the movement started by `order` alive at a signed speed."""
+        self._device.steer_jog(order, velocity)
+
+    def halt(self, channel: int, why: str) -> None:
+        """Stop one channel; the policy is told where that fails."""
+        self._device.halt_loudly(channel, why)
+
+    def set_frequency(self, channel: int, frequency_hz: int) -> None:
+        """Limit the closed-loop speed of one channel; the log says where that fails."""
+        try:
+            self._device.set_frequency(channel, frequency_hz)
+        except CosmicError as exc:
+            logger.warning("%s: %s", self._device.container.name(channel), exc)
 
 
 def follow(

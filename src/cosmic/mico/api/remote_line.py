@@ -25,6 +25,7 @@ APPLICATION: Final = "mico"
 RENEW_LIMIT_S: Final = 0.2
 """A sign that a key is still held is worth nothing later than this."""
 STOP_LIMIT_S: Final = 1.0
+_CLOSED: Final = "the connection to MiCo is closed"
 
 
 def may_wait_here() -> bool:
@@ -193,26 +194,29 @@ class CommandLine:
     def at_once(self, function: str, arguments: Arguments) -> None:
         """Call what overtakes everything.
 
-        Waits where this thread may, and raises; otherwise a failure goes to the policy, loudly.
+        Waits where this thread may, and raises; elsewhere as `at_once_later`.
         """
+        if not may_wait_here():
+            self.at_once_later(function, arguments)
+            return
         self._check_open()
-        waits = may_wait_here()
+        waited = Waited(lambda: self.heed(self.call(function, arguments, STOP_LIMIT_S)))
+        self._stops.put(waited.run)
+        waited.wait(2 * STOP_LIMIT_S)
 
-        def job() -> None:
-            self.heed(self.call(function, arguments, STOP_LIMIT_S))
+    def at_once_later(self, function: str, arguments: Arguments) -> None:
+        """Call what overtakes everything, without waiting; a failure goes to the policy, loudly."""
 
         def loud() -> None:
             try:
-                job()
+                self.heed(self.call(function, arguments, STOP_LIMIT_S))
             except CosmicError as exc:
                 self._policy.report(exc, f"{function} was NOT carried out at the station")
 
-        if waits:
-            waited = Waited(job)
-            self._stops.put(waited.run)
-            waited.wait(2 * STOP_LIMIT_S)
-        else:
+        if self._open:
             self._stops.put(loud)
+        else:
+            logger.warning("%s: %s", function, _CLOSED)
 
     def withdraw(self, number: int) -> None:
         """Give an order up; returns at once, from any thread."""
@@ -236,7 +240,7 @@ class CommandLine:
 
     def _check_open(self) -> None:
         if not self._open:
-            raise StationAway("the connection to MiCo is closed")
+            raise StationAway(_CLOSED)
 
 
 def when_over(ongoing: Ongoing, callback: Callable[[], None]) -> None:

@@ -185,7 +185,7 @@ class RemoteManager(QObject):
         device = self._devices.get(index)
         if device is None:
             raise NotAvailable(f"there is no device {index}")
-        join(device, commander, kind)
+        join(device.slots, commander, kind)
 
     # Commanding
 

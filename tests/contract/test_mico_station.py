@@ -1,0 +1,457 @@
+"""MiCo is the same for a program in its own process and for one at the end of a line."""
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from contract.mico_rig import (
+    HostedMico,
+    hosted_mico,
+    reachable,
+    remote_mico,
+    transport_to,
+    wait_for,
+)
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import (
+    LimitError,
+    MoveCancelled,
+    MoveRefused,
+    NotAvailable,
+    StoppedError,
+    UnknownAxisError,
+)
+from cosmic.frame.network.caller import Access
+from cosmic.frame.network.errors import CallRefused, StationAway
+from cosmic.frame.network.in_process import InProcessTransport
+from cosmic.frame.network.transport import Rule
+from cosmic.frame.task import Progress
+from cosmic.frame.verdict import Reason
+from cosmic.mico.api.mico import Mico
+from cosmic.mico.api.remote_application import RemoteMicoApplication
+from cosmic.mico.api.stepwise import StepwiseMove
+from cosmic.mico.core.orders import Jog, MoveTo
+from cosmic.mico.core.positioner import Confidence, Status
+
+SLOW_HZ = 10
+
+
+@pytest.fixture(scope="module")
+def station() -> Iterator[HostedMico]:
+    with hosted_mico() as made:
+        yield made
+
+
+@pytest.fixture
+def hosted(station: HostedMico, request: pytest.FixtureRequest) -> Iterator[HostedMico]:
+    station.begin_anew()
+    if "zenoh" in request.node.name:
+        with reachable(station) as listening:
+            yield listening
+    else:
+        yield station
+
+
+@pytest.fixture(params=["local", "in-process", "zenoh"])
+def mico(hosted: HostedMico, request: pytest.FixtureRequest) -> Iterator[Mico]:
+    """The same thing for a script, wherever it runs."""
+    if request.param == "local":
+        yield hosted.mico
+    else:
+        with remote_mico(hosted, request.param) as (mico, _, _):
+            yield mico
+
+
+@pytest.fixture(params=["in-process", "zenoh"])
+def how(request: pytest.FixtureRequest) -> str:
+    kind: str = request.param
+    return kind
+
+
+# --- a script neither knows nor cares where MiCo runs ------------------------------------------
+
+
+def test_axes_say_what_they_are(mico: Mico) -> None:
+    assert mico.names[:3] == ["left.x", "left.y", "left.z"]
+    assert len(mico) == 11
+    assert mico.simulated
+    assert not mico.missing
+    axis = mico["left.x"]
+    assert (axis.unit, axis.kind, axis.confidence) == ("um", "linear", Confidence.KNOWN)
+    assert axis.limits == (-5500.0, 5500.0)
+    assert axis.state is Status.OK
+    assert mico["table.rotation"].angle_deg is not None
+    assert mico["left.gripper"].confidence is Confidence.ESTIMATED
+    with pytest.raises(UnknownAxisError, match=r"left\.q"):
+        mico["left.q"]
+
+
+def test_a_move_returns_where_the_axis_stands_and_the_axis_says_the_same(mico: Mico) -> None:
+    axis = mico["left.x"]
+    assert axis.move_to(120.0) == pytest.approx(120.0, abs=1.0)
+    assert axis.position_um == pytest.approx(120.0, abs=1.0)
+    assert not axis.details.in_motion
+    assert axis.move_by("-0.02 mm") == pytest.approx(100.0, abs=1.0)
+    movement = axis.move_to(0.0, wait=False)
+    assert movement.wait(10.0) == pytest.approx(0.0, abs=1.0)
+    assert movement.success
+    assert axis.locate()["readback"] == pytest.approx(0.0, abs=1.0)
+
+
+def test_axes_move_together_or_not_at_all(mico: Mico) -> None:
+    reached = mico.move({"left.x": 30.0, "right.x": -30.0})
+    assert reached == pytest.approx({"left.x": 30.0, "right.x": -30.0}, abs=1.0)
+    with pytest.raises(LimitError):
+        mico.move({"left.x": 40.0, "right.x": 90_000.0})
+    assert mico["left.x"].position_um == pytest.approx(30.0, abs=1.0)
+    group = mico.move_by({"left.x": 10.0, "right.x": 10.0}, wait=False)
+    assert group.wait(10.0) == pytest.approx({"left.x": 40.0, "right.x": -20.0}, abs=1.0)
+    assert group.start_skew_ms is not None
+
+
+def test_a_refusal_has_its_verdict(mico: Mico) -> None:
+    with pytest.raises(LimitError) as caught:
+        mico["left.x"].move_to(9_000.0)
+    verdict = caught.value.verdict
+    assert (verdict.reason, verdict.axis, verdict.limit) == (Reason.LIMIT, "left.x", 5500.0)
+    assert mico.check({"left.x": 9_000.0}).reason is Reason.LIMIT
+    assert mico.check({"left.x": 100.0}).allowed
+    with pytest.raises(MoveRefused) as senseless:
+        mico["left.x"].move_to(float("nan"))
+    assert senseless.value.verdict.reason is Reason.NOT_FINITE
+    with pytest.raises(MoveRefused):
+        mico["left.gripper"].move_to(10.0)
+
+
+def test_a_cancelled_movement_ends_where_it_is(mico: Mico) -> None:
+    axis = mico["left.x"]
+    axis.set_closed_loop_frequency(SLOW_HZ)
+    movement = axis.move_to(5_000.0, wait=False)
+    wait_for(lambda: axis.details.in_motion)
+    movement.cancel()
+    with pytest.raises(MoveCancelled):
+        movement.wait(5.0)
+    assert axis.position_um is not None
+    assert axis.position_um < 4_000.0
+
+
+def test_a_jog_goes_on_while_it_is_renewed_and_ends_at_once(mico: Mico) -> None:
+    axis = mico["left.x"]
+    with axis.jog(1) as jog:
+        until_s = WALL.now_s() + 0.6  # longer than the dead-man time
+        while WALL.now_s() < until_s:
+            jog.renew()
+            WALL.sleep(0.02)
+        assert not jog.done
+        assert axis.details.in_motion
+    jog.movement.exception(5.0)
+    assert axis.position_um is not None
+    assert axis.position_um > 20.0
+
+
+def test_a_jog_that_nobody_renews_ends_by_itself(mico: Mico) -> None:
+    jog = mico["left.x"].jog(1)
+    wait_for(lambda: jog.done, 3.0)
+
+
+def test_a_stop_stays_until_it_is_reset(mico: Mico) -> None:
+    axis, manager = mico["left.x"], mico.application.manager
+    axis.set_closed_loop_frequency(SLOW_HZ)
+    movement = axis.move_to(5_000.0, wait=False)
+    wait_for(lambda: axis.details.in_motion)
+    manager.stop("stop from a script")
+    assert "stop from a script" in (manager.latch.state.reason or "")
+    with pytest.raises(StoppedError):
+        movement.wait(5.0)
+    with pytest.raises(StoppedError):
+        axis.move_to(0.0)
+    manager.reset_stop()
+    assert not manager.latch.state.latched
+    axis.set_closed_loop_frequency(5000)
+    axis.move_to(0.0)
+
+
+def test_steps_zero_links_and_undo(mico: Mico) -> None:
+    gripper, left = mico["left.gripper"], mico["left.x"]
+    before = gripper.position_um or 0.0
+    assert (gripper.steps(100) or 0.0) > before
+    left.move_to(50.0)
+    left.set_zero()
+    assert left.position_um == pytest.approx(0.0, abs=1.0)
+    left.clear_zero()
+    assert left.position_um == pytest.approx(50.0, abs=1.0)
+    mico.link("left.x", "right.x")
+    assert left.linked_to == {"right.x": 1.0}
+    left.move_by(10.0)
+    assert mico["right.x"].position_um == pytest.approx(10.0, abs=1.0)
+    assert mico.unlink("right.x")
+    assert not mico.links
+    assert {entry.group for entry in mico.undo_entries[:2]} == {"Left assembly", "Right assembly"}
+    mico.undo("Left assembly")
+    assert left.position_um == pytest.approx(50.0, abs=1.0)
+
+
+def test_poses_ways_and_collisions(mico: Mico) -> None:
+    mico.poses.teach("there", ["left.x"])
+    assert "there" in mico.poses
+    mico["left.x"].move_to(80.0)
+    mico.poses.go("there")
+    assert mico["left.x"].position_um == pytest.approx(0.0, abs=1.0)
+    mico.poses.remove("there")
+    assert "there" not in mico.poses
+    way = mico.find_way({"left.x": 60.0})
+    mico.follow(way)
+    assert mico["left.x"].position_um == pytest.approx(60.0, abs=1.0)
+    assert mico.clearance().distance_um > 0.0
+    mico.collision.take_out("left.x")
+    assert mico.collision.unwatched == {"left.x"}
+    assert not mico["left.x"].collision_detection
+    mico.collision.take_in("left.x")
+    assert not mico.collision.unwatched
+
+
+def test_the_initialisation_tells_how_far_it_is(mico: Mico) -> None:
+    told: list[Progress] = []
+    mico.initialise(told.append, skip_known=True)
+    assert told[-1].done
+    assert not told[-1].error
+
+
+def test_a_trajectory_runs_pauses_and_goes_on(mico: Mico, tmp_path: Path) -> None:
+    path = tmp_path / "way.traj"
+    with mico.trajectories.record(path, timed=False):
+        mico["left.x"].move_to(40.0)
+        mico["left.x"].move_to(20.0)
+    mico["left.x"].move_to(0.0)
+    player = mico.trajectories.run(path, start="straight")
+    assert player.state == "ended"
+    assert mico["left.x"].position_um == pytest.approx(20.0, abs=1.0)
+
+
+def test_a_long_move_is_made_in_parts(mico: Mico) -> None:
+    series = StepwiseMove(mico["left.x"], 80.0, 30.0)
+    assert series.planned == 3
+    series.movement.wait(10.0)
+    assert mico["left.x"].position_um == pytest.approx(80.0, abs=1.0)
+
+
+# --- who may move ------------------------------------------------------------------------------
+
+
+def test_without_the_lease_nothing_moves_from_elsewhere(hosted: HostedMico, how: str) -> None:
+    with remote_mico(hosted, how, takes_lease=False) as (mico, application, _):
+        for move in (
+            lambda: mico["left.x"].move_to(50.0),
+            lambda: mico.move({"left.x": 50.0}),
+            lambda: mico["left.x"].steps(10),
+            lambda: mico["left.x"].jog(1).movement.wait(5.0),
+            lambda: mico["left.x"].set_zero(),
+            lambda: mico["left.x"].set_closed_loop_frequency(100),
+            lambda: mico.link("left.x", "right.x"),
+            lambda: mico.collision.take_out("left.x"),
+            lambda: mico.poses.go("there"),
+            application.manager.reset_stop,
+        ):
+            with pytest.raises((MoveRefused, NotAvailable)) as caught:
+                move()
+            if isinstance(caught.value, MoveRefused):
+                assert caught.value.verdict.reason is Reason.NO_LEASE
+        assert mico.check({"left.x": 50.0}).reason is Reason.NO_LEASE
+        assert mico["left.x"].position_um == pytest.approx(0.0, abs=1.0)
+    assert hosted.mico.check({"left.x": 50.0}).allowed
+
+
+def test_while_another_holds_the_lease_the_station_itself_does_not_move(
+    hosted: HostedMico, how: str
+) -> None:
+    with remote_mico(hosted, how) as (mico, _, _):
+        for move in (
+            lambda: hosted.mico["left.x"].move_to(50.0),
+            lambda: hosted.mico.move({"left.x": 50.0}),
+        ):
+            with pytest.raises(MoveRefused, match="vision controls the platform now") as caught:
+                move()
+            assert caught.value.verdict.reason is Reason.NO_LEASE
+        mico["left.x"].move_to(20.0)
+    wait_for(lambda: hosted.station.lease.state.local)
+    hosted.mico["left.x"].move_to(0.0)
+
+
+def test_the_operator_takes_over_and_what_moved_from_elsewhere_stops(
+    hosted: HostedMico, how: str
+) -> None:
+    with remote_mico(hosted, how) as (mico, _, transport):
+        mico["left.x"].set_closed_loop_frequency(SLOW_HZ)
+        movement = mico["left.x"].move_to(5_000.0, wait=False)
+        wait_for(lambda: hosted.mico["left.x"].details.in_motion)
+        hosted.station.lease.take_over()
+        with pytest.raises((MoveCancelled, MoveRefused)):
+            movement.wait(5.0)
+        wait_for(lambda: not hosted.mico["left.x"].details.in_motion)
+        assert (hosted.mico["left.x"].position_um or 0.0) < 4_000.0
+        with pytest.raises(MoveRefused):
+            mico["left.x"].move_to(0.0)
+        with pytest.raises(MoveRefused):
+            transport.take_lease()
+        hosted.mico["left.x"].set_closed_loop_frequency(5000)
+        hosted.mico["left.x"].move_to(0.0)
+
+
+def test_the_station_stops_what_moves_from_elsewhere_by_itself(hosted: HostedMico) -> None:
+    """The thread that moves looks at the dead man; nobody has to tell it."""
+    client = InProcessTransport(hosted.station, "vision")
+    client.take_lease()
+    motion = MoveTo(5_000.0, "um")
+    hosted.mico["left.x"]
+    hosted.application.manager.device("left.x").set_frequency(0, SLOW_HZ)
+    client.call("mico", "order", {"axis": "left.x", "number": 1, "motion": motion})
+    wait_for(lambda: hosted.mico["left.x"].details.in_motion)
+    client.release_lease()  # the in-process transport cancels nothing
+    wait_for(lambda: not hosted.mico["left.x"].details.in_motion)
+    assert (hosted.mico["left.x"].position_um or 0.0) < 4_000.0
+    client.close()
+
+
+def test_a_stop_and_a_halt_need_no_lease(hosted: HostedMico, how: str) -> None:
+    with (
+        remote_mico(hosted, how) as (holder, _, _),
+        remote_mico(hosted, how, "viewer", takes_lease=False) as (_, viewer, transport),
+    ):
+        holder["left.x"].set_closed_loop_frequency(SLOW_HZ)
+        movement = holder["left.x"].move_to(5_000.0, wait=False)
+        wait_for(lambda: hosted.mico["left.x"].details.in_motion)
+        viewer.manager.device("left.x").halt(0, "seen from elsewhere")
+        with pytest.raises(MoveCancelled, match="seen from elsewhere"):
+            movement.wait(5.0)
+        movement = holder["left.x"].move_to(5_000.0, wait=False)
+        wait_for(lambda: hosted.mico["left.x"].details.in_motion)
+        viewer.manager.stop("smoke")
+        with pytest.raises(StoppedError, match="smoke"):
+            movement.wait(5.0)
+        assert hosted.application.manager.latch.state.reason == "smoke (from viewer)"
+        with pytest.raises(MoveRefused):
+            viewer.manager.reset_stop()
+        holder.application.manager.reset_stop()
+        with pytest.raises(CallRefused):
+            transport.call("mico", "manager")
+
+
+def test_somebody_who_may_only_look_sees_and_stops_and_moves_nothing(hosted: HostedMico) -> None:
+    viewer = InProcessTransport(hosted.station, "viewer", Access.VIEW)
+    application = RemoteMicoApplication(viewer, hosted.application.trajectories.policy)
+    try:
+        application.initialize()
+        assert Mico(application)["left.x"].position_um is not None
+        with pytest.raises((MoveRefused, CallRefused)):
+            Mico(application)["left.x"].move_to(10.0)
+        application.manager.stop("seen")
+        assert hosted.application.manager.latch.state.latched
+    finally:
+        application.shut_down()
+        viewer.close()
+
+
+# --- what overtakes what -----------------------------------------------------------------------
+
+
+def test_a_halt_that_overtakes_an_order_keeps_it_from_beginning(
+    hosted: HostedMico, how: str
+) -> None:
+    with transport_to(hosted, how) as client:
+        client.take_lease()
+        client.call("mico", "halt", {"axis": "left.x", "up_to": 7})
+        order = {"axis": "left.x", "number": 7, "motion": MoveTo(50.0, "um")}
+        with pytest.raises(MoveCancelled, match="halted before it started"):
+            client.call("mico", "order", order)
+        client.call("mico", "withdraw", {"numbers": [8]})
+        with pytest.raises(MoveCancelled):
+            client.call("mico", "order", order | {"number": 8})
+        follows = order | {"number": 9, "follows": 3}
+        with pytest.raises(MoveCancelled, match="newer command"):
+            client.call("mico", "order", follows)
+    assert hosted.mico["left.x"].position_um == pytest.approx(0.0, abs=1.0)
+
+
+BAD_ORDERS: list[dict[str, object]] = [
+    {"motion": Jog(1, 100.0)},
+    {"motion": MoveTo(50.0, "um"), "axis": 5},
+    {"motion": "everything"},
+    {"motion": MoveTo(50.0, "um"), "number": 1.0},
+    {"motion": MoveTo(50.0, "um"), "token": "x"},
+]
+
+
+@pytest.mark.parametrize("bad", BAD_ORDERS)
+def test_an_ill_typed_order_moves_nothing(
+    hosted: HostedMico, how: str, bad: dict[str, object]
+) -> None:
+    with transport_to(hosted, how) as client:
+        client.take_lease()
+        with pytest.raises(CallRefused):
+            client.call("mico", "order", {"axis": "left.x", "number": 1} | bad)
+        senseless = {"axis": "left.x", "number": 2, "motion": Jog(5, float("nan"))}
+        ended: Any = client.call("mico", "jog", senseless)
+        assert ended.wait(5.0).of["left.x"].error is not None
+    assert hosted.mico["left.x"].position_um == pytest.approx(0.0, abs=1.0)
+
+
+# --- what is told ------------------------------------------------------------------------------
+
+
+def test_who_commands_is_told_and_positions_are_told_seldom(hosted: HostedMico, how: str) -> None:
+    commands: list[object] = []
+    positions: list[float] = []
+    with remote_mico(hosted, how) as (mico, _, transport):
+        heard = transport.subscribe("mico/commands", Rule.ALL, commands.append)
+        seen = transport.subscribe(
+            "mico/positions", Rule.ALL, lambda _: positions.append(WALL.now_s())
+        )
+        began_s = WALL.now_s()
+        mico["left.x"].set_closed_loop_frequency(100)
+        mico["left.x"].move_to(1_500.0)
+        took_s = WALL.now_s() - began_s
+        wait_for(lambda: commands)
+        heard.close()
+        seen.close()
+    assert any("vision script: left.x: MoveTo" in str(each) for each in commands)
+    assert 1 <= len(positions) <= 31 * took_s + 2
+
+
+def test_what_is_done_at_the_station_is_seen_from_elsewhere(hosted: HostedMico, how: str) -> None:
+    with remote_mico(hosted, how, takes_lease=False) as (mico, application, _):
+        hosted.mico["left.x"].move_to(70.0)
+        wait_for(lambda: abs((mico["left.x"].position_um or 0.0) - 70.0) < 1.0)
+        hosted.mico.link("left.x", "right.x")
+        wait_for(lambda: mico.links)
+        refused: list[object] = []
+        mico["left.x"].commander.movement_refused.connect(refused.append)
+        with pytest.raises(MoveRefused):
+            hosted.mico["left.y"].move_to(99_000.0)
+        hosted.application.manager.stop("smoke")
+        wait_for(lambda: application.manager.latch.state.reason == "smoke")
+        with ThreadPoolExecutor(1) as pool:
+            assert pool.submit(lambda: mico["left.x"].details).result(5.0).present
+
+
+def test_a_station_that_is_away_leaves_axes_absent_and_moves_refused(hosted: HostedMico) -> None:
+    with transport_to(hosted, "in-process") as transport:
+        application = RemoteMicoApplication(transport, hosted.application.trajectories.policy)
+        try:
+            application.initialize()
+            mico = Mico(application)
+            transport.close()
+            wait_for(lambda: application.failure)
+            assert mico["left.x"].state is Status.UNKNOWN
+            assert "closed" in mico["left.x"].error
+            with pytest.raises(StationAway):
+                mico["left.x"].move_to(10.0)
+            with pytest.raises(StationAway):
+                mico.move({"left.x": 10.0})
+            with pytest.raises(StationAway):
+                application.manager.stop("x")
+            assert mico.check({"left.x": 10.0}).reason is Reason.NO_ANSWER
+        finally:
+            application.shut_down()
