@@ -8,7 +8,7 @@ import pytest
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.limits import STALE_S, Crossing, Limit, LimitGuard
 from cosmic.daqco.core.scale import VOLTS, Scale
-from cosmic.frame.clock import WALL, ManualClock
+from cosmic.frame.clock import WALL, ManualClock, RatedClock
 from cosmic.frame.errors import ConfigError, NotAvailable
 from unit.mico.rigs import wait_until
 
@@ -173,3 +173,14 @@ def test_a_crossing_is_told_until_it_is_acknowledged_which_needs_the_value_back(
     limit = rig.guard.limits["force"]
     assert limit.armed
     assert not limit.tripped
+
+
+def test_a_simulation_that_runs_faster_may_be_silent_longer():
+    stops: list[str] = []
+    guard = LimitGuard(RatedClock(10.0), stops.append)
+    guard.set_rate(1000.0)
+    guard.set_limit(Limit("force", high=100.0, armed=True))
+    until_s = WALL.now_s() + 1.5 * STALE_S
+    wait_until(lambda: WALL.now_s() > until_s)
+    guard.look_for_silence()
+    assert not stops

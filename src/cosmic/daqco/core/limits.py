@@ -18,6 +18,9 @@ logger = logging.getLogger(__name__)
 
 LOWEST_RATE_HZ: Final = 200.0
 STALE_S: Final = 0.1
+"""How long data may stay away while a limit is armed, wall time."""
+LAXEST: Final = 10.0
+"""A simulation that runs faster than the wall may be silent so much longer: nothing can break."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +89,7 @@ class LimitGuard:
     def __init__(self, clock: Clock, trip: Callable[[str], None] | None = None) -> None:
         self._clock = clock
         self.trip = trip
+        self._stale_s = STALE_S * min(max(clock.rate, 1.0), LAXEST)
         self._lock = Lock()
         self._limits: dict[str, Limit] = {}
         self._listeners: tuple[Callable[[Crossing], None], ...] = ()
@@ -186,11 +190,13 @@ class LimitGuard:
 
     def look_for_silence(self) -> None:
         """Trip when data has stayed away for too long; called again and again by a watcher."""
-        if not self.armed or WALL.now_s() - self._last_wall_s <= STALE_S:
+        if not self.armed or WALL.now_s() - self._last_wall_s <= self._stale_s:
             return
         for limit in list(self._limits.values()):
             if limit.armed and not limit.beyond:
-                text = f"no data of {limit.channel} for {STALE_S:g} s while its limit is armed"
+                text = (
+                    f"no data of {limit.channel} for {self._stale_s:g} s while its limit is armed"
+                )
                 now_s = self._clock.now_s()
                 self._trip(Crossing(limit.channel, -1, now_s, math.nan, math.nan, "", text), limit)
 
