@@ -78,7 +78,7 @@ TREES: st.SearchStrategy[Part[Work]] = st.recursive(OPERATIONS, several, max_lea
 
 
 @given(tree=TREES, abort_at=st.none() | st.integers(0, 30))
-@hypothesis_settings(max_examples=300)
+@hypothesis_settings(max_examples=120)
 def test_what_began_has_ended_once_and_nothing_begins_after_the_end(
     tree: Part[Work], abort_at: int | None
 ) -> None:

@@ -1,0 +1,250 @@
+"""The panel "Procedure": its tree, what it is at, and how to start, pause, step and end it."""
+
+from collections.abc import Callable
+from typing import Final
+
+from PySide6.QtCore import QTimer
+from PySide6.QtGui import QCloseEvent, QHideEvent, QShowEvent
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from cosmic.app.procedure_tree_port import ChangeBridge, ProcedurePort
+from cosmic.app.procedure_tree_sign import StateSign
+from cosmic.app.procedure_tree_view import ProcedureTree
+from cosmic.autonomy.procedures.run_state import OVER, RunState
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.build import named, push_button
+from cosmic.frame.gui.chip import Chip
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.flow_layout import FlowLayout
+from cosmic.frame.gui.theme import STEP_PX, State
+from cosmic.frame.overrides import override
+
+PERIOD_MS: Final = 50
+"""No more than so often is what changed drawn."""
+TICK_MS: Final = 200
+"""So often the times are drawn where nothing else changes."""
+_BEGUN: Final = (RunState.RUNNING, RunState.PAUSING, RunState.PAUSED, RunState.ABORTING)
+_LOOKS: Final[dict[RunState, State | None]] = {
+    RunState.READY: None,
+    RunState.RUNNING: State.BUSY,
+    RunState.PAUSING: State.BUSY,
+    RunState.PAUSED: State.REFUSED,
+    RunState.ABORTING: State.REFUSED,
+    RunState.DONE: State.OK,
+    RunState.FAILED: State.ERROR,
+    RunState.ABORTED: State.REFUSED,
+}
+
+
+class ProcedureTreePanel(QWidget):
+    """Shows a run and lets the operator steer it; GUI thread.
+
+    A run begun elsewhere can be shown as well. Closing the panel aborts the one begun here.
+
+    Parameters
+    ----------
+    make_run : callable or None
+        Returns a run that is ready to begin; called when Start is pressed and none is at hand.
+    """
+
+    def __init__(
+        self,
+        make_run: Callable[[], ProcedurePort] | None = None,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("ProcedureTreePanel")
+        self._make_run = make_run
+        self._run: ProcedurePort | None = None
+        self._mine: ProcedurePort | None = None
+        self._bridge = ChangeBridge(self)
+        self.sign = StateSign()
+        self.state = Chip("no procedure", tip="What the procedure is at")
+        self.title = named(ElidedLabel(), "procedureTitle")
+        self.reason = named(ElidedLabel(), "procedureReason")
+        self.tree = ProcedureTree()
+        self.start = named(push_button("Start", "Begin the procedure"), "procedureStart")
+        self.pause = named(
+            push_button("Pause", "Rest at the next place where nothing moves and nothing is lost"),
+            "procedurePause",
+        )
+        self.step = named(
+            push_button("Step", "Carry out one operation, then rest"), "procedureStep"
+        )
+        self.resume = named(push_button("Resume", "Go on"), "procedureResume")
+        self.abort = named(
+            push_button(
+                "Abort", "End it at once: what moves is cancelled, then the tools are made safe"
+            ),
+            "procedureAbort",
+        )
+        self._build()
+        self._connect()
+        self._redraw = QTimer(self, interval=PERIOD_MS, singleShot=True)
+        self._redraw.timeout.connect(self.refresh)
+        self._tick = QTimer(self, interval=TICK_MS)
+        self._tick.timeout.connect(self.refresh)
+        self._bridge.changed.connect(self._on_changed)
+        self.refresh()
+
+    def _build(self) -> None:
+        head = QHBoxLayout()
+        head.setSpacing(STEP_PX)
+        head.addWidget(self.sign)
+        head.addWidget(self.state)
+        head.addWidget(self.title, 1)
+        buttons = QWidget()
+        flow = FlowLayout(STEP_PX, buttons)
+        for button in (self.start, self.pause, self.step, self.resume, self.abort):
+            flow.addWidget(button)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
+        column.setSpacing(STEP_PX)
+        column.addLayout(head)
+        column.addWidget(self.reason)
+        column.addWidget(self.tree, 1)
+        column.addWidget(buttons)
+
+    def _connect(self) -> None:
+        self.start.clicked.connect(self._on_start)
+        self.pause.clicked.connect(self._on_pause)
+        self.step.clicked.connect(self._on_step)
+        self.resume.clicked.connect(self._on_resume)
+        self.abort.clicked.connect(self._on_abort)
+
+    @property
+    def run(self) -> ProcedurePort | None:
+        """What is shown."""
+        return self._run
+
+    def follow(self, run: ProcedurePort) -> None:
+        """Show `run`, begun or not."""
+        self._run = run
+        self._bridge.follow(run)
+        self.tree.lay_out(run.tree)
+        self.refresh()
+
+    # What the operator does
+
+    def _on_start(self) -> None:
+        def begin() -> None:
+            self._ready_run().start()
+
+        self._attempt(begin)
+
+    def _on_step(self) -> None:
+        def begin() -> None:
+            run = self._run
+            if run is None or run.state in OVER or run.state is RunState.READY:
+                run = self._ready_run()
+            run.step()
+
+        self._attempt(begin)
+
+    def _ready_run(self) -> ProcedurePort:
+        """Return a run that can be begun, and be answerable for it."""
+        run = self._run
+        if self._make_run is not None and (run is None or run.state in OVER):
+            run = self._make_run()
+            self.follow(run)
+        if run is None:
+            raise CosmicError("there is no procedure to begin; choose one")
+        self._mine = run
+        return run
+
+    def _on_pause(self) -> None:
+        if self._run is not None:
+            self._run.pause()
+        self.refresh()
+
+    def _on_resume(self) -> None:
+        if self._run is not None:
+            self._run.resume()
+        self.refresh()
+
+    def _on_abort(self) -> None:
+        if self._run is not None:
+            self._run.abort("aborted by the operator")
+        self.refresh()
+
+    def _attempt(self, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except CosmicError as exc:
+            self.sign.set_state(State.REFUSED)
+            self.state.setText("refused")
+            self.reason.set_text(str(exc))
+            return
+        self.refresh()
+
+    # Showing
+
+    def _on_changed(self) -> None:
+        if self.isVisible() and not self._redraw.isActive():
+            self._redraw.start()
+
+    def refresh(self) -> None:
+        """Show the run as it is now."""
+        self._bridge.take()
+        run = self._run
+        self._enable(None if run is None else run.state)
+        if run is None:
+            return
+        state = run.state
+        self.sign.set_state(_LOOKS[state])
+        self.state.setText(state.value)
+        self.tree.show_view(run.tree)
+        front = self.tree.front if state in _BEGUN else ""
+        self.title.set_text(f"{run.name}: {front}" if front else run.name)
+        self.reason.set_text(_reason(run))
+        ticking = state in _BEGUN and self.isVisible()
+        if ticking != self._tick.isActive():
+            if ticking:
+                self._tick.start()
+            else:
+                self._tick.stop()
+
+    def _enable(self, state: RunState | None) -> None:
+        fresh = state is RunState.READY or (
+            self._make_run is not None and (state is None or state in OVER)
+        )
+        self.start.setEnabled(fresh)
+        self.pause.setEnabled(state is RunState.RUNNING)
+        self.step.setEnabled(fresh or state is RunState.PAUSED)
+        self.resume.setEnabled(state in (RunState.PAUSED, RunState.PAUSING))
+        self.abort.setEnabled(state in _BEGUN)
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self.refresh()
+
+    @override
+    def hideEvent(self, event: QHideEvent) -> None:
+        super().hideEvent(event)
+        self._redraw.stop()
+        self._tick.stop()
+
+    @override
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self.end_mine()
+        super().closeEvent(event)
+
+    def end_mine(self) -> None:
+        """Abort the run that was begun here; for whoever closes the window."""
+        if self._mine is not None:
+            self._mine.abort("the window was closed")
+
+    def shut_down(self) -> None:
+        """Abort the run that was begun here, and wait until its thread is gone."""
+        self.end_mine()
+        self._bridge.end()
+        if self._mine is not None:
+            self._mine.join()
+
+
+def _reason(run: ProcedurePort) -> str:
+    text = "" if run.failure is None else str(run.failure)
+    if run.not_safe:
+        text = f"{text}; not made safe: {run.not_safe}" if text else run.not_safe
+    return text
