@@ -78,7 +78,7 @@ class Campaign:
     recipe : Recipe
         When to end, and what to keep.
     store : CampaignStore
-        Where it is kept; stays open.
+        Where it is kept; closed at the end.
     policy : FailurePolicy
         Told of defects.
     stopped : callable
@@ -240,12 +240,16 @@ class Campaign:
         with self._changed:
             if self._phase in OVER:
                 return
+            begun = self._phase is not CampaignPhase.READY
             self._abort = self._abort or reason
             self._phase = CampaignPhase.ENDING
             self._changed.notify_all()
             run = self._run
         if run is not None:
             run.abort(reason)
+        if not begun:
+            self._end_reason = reason
+            self._leave(failed=False)
         self._tell()
 
     def join(self) -> None:
@@ -280,6 +284,8 @@ class Campaign:
             self._keeper.close(self._end_reason)
         except CosmicError as exc:
             failed, self._end_reason = True, f"{self._end_reason}; {exc}"
+        finally:
+            self.store.close()
         told = logger.error if failed else logger.info
         told("campaign %s: %s", self.recipe.name, self._end_reason)
         with self._changed:

@@ -1,0 +1,33 @@
+"""Campaigns on a platform, for scripts, the command and the window."""
+
+import platform as computer
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import cosmic
+from cosmic.app.platform import Platform
+from cosmic.autonomy.campaign.campaign import Campaign
+from cosmic.autonomy.campaign.opening import Host, open_campaign, read_recipe
+from cosmic.autonomy.campaign.recipe import Recipe
+
+if TYPE_CHECKING:
+    from cosmic.app.rig import Rig
+
+TWIN: Final = "digital twin"
+
+
+def campaign_on(
+    rig: "Rig", platform: Platform, recipe: Recipe | str | Path, folder: str | Path
+) -> Campaign:
+    """Return a campaign that is ready to start; see `Rig.campaign`."""
+    read = recipe if isinstance(recipe, Recipe) else read_recipe(Path(recipe))
+    host = Host(
+        rig=rig,
+        policy=platform.policy,
+        stopped=lambda: rig.stopped,
+        hardware=TWIN if rig.simulated else platform.file.platform.name,
+        rate=platform.clock.rate,
+        seed=read.file.twin.seed,
+        versions={"CoSMic": cosmic.__version__, "Python": computer.python_version()},
+    )
+    return open_campaign(read, Path(folder), host)
