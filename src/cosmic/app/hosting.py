@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import cosmic
+from cosmic.app.faults import SimulationFaults
 from cosmic.app.platform_file import PlatformFile
 from cosmic.app.scene_fit import load_checker
 from cosmic.daqco.api.application import DaqcoApplication
@@ -27,10 +27,6 @@ from cosmic.vico.hw.peripheral_factory import make_lens, make_light
 from cosmic.vico.hw.peripherals import Lens
 from cosmic.vico.hw.sim_peripherals import SimPeripherals
 
-if TYPE_CHECKING:
-    from cosmic.mico.hw.sim_scu3d_faults import Faults
-
-
 @dataclass(frozen=True)
 class Site:
     """What the applications of one process share while they are built."""
@@ -45,39 +41,42 @@ class Site:
 
 @dataclass(frozen=True)
 class Hosted:
-    """The applications of one process, and what injects faults into its simulated controller."""
+    """The applications of one process, and what injects faults into what it simulates."""
 
     mico: MicoApplication | None = None
     daqco: DaqcoApplication | None = None
     vico: VicoApplication | None = None
-    faults: "Faults | None" = None
+    faults: SimulationFaults | None = None
 
 
 def build_applications(
     site: Site, names: Sequence[str], guis: Mapping[str, GuiFactory | None]
 ) -> Hosted:
     """Make the applications of those names that the platform file describes."""
-    mico, faults, daqco, vico = None, None, None, None
+    mico, daqco, vico = None, None, None
+    faults = SimulationFaults()
+    if site.scene is not None:
+        faults.join("scene", site.scene.faults)
     if "mico" in names:
-        mico, faults = _build_mico(site, guis.get("mico"))
+        mico = _build_mico(site, faults, guis.get("mico"))
     if "daqco" in names and site.file.daqco is not None:
-        daqco = _build_daqco(site, site.file.daqco, guis.get("daqco"))
+        daqco = _build_daqco(site, faults, site.file.daqco, guis.get("daqco"))
     if "vico" in names and site.file.vico is not None:
-        vico = _build_vico(site, site.file.vico, guis.get("vico"))
-    return Hosted(mico, daqco, vico, faults)
+        vico = _build_vico(site, faults, site.file.vico, guis.get("vico"))
+    return Hosted(mico, daqco, vico, None if site.scene is None else faults)
 
 
 def _build_mico(
-    site: Site, gui_factory: GuiFactory | None
-) -> "tuple[MicoApplication, Faults | None]":
+    site: Site, faults: SimulationFaults, gui_factory: GuiFactory | None
+) -> MicoApplication:
     settings = site.file.mico
     controller: Controller
-    faults: Faults | None = None
     if site.scene is not None:
-        controller, faults = make_simulated(site.scene)
+        controller, injected = make_simulated(site.scene)
+        faults.join("controller", injected)
     else:
         controller = make_controller(settings.backend, library_path=settings.library)
-    application = MicoApplication(
+    return MicoApplication(
         controller,
         settings,
         clock=site.clock,
@@ -87,11 +86,10 @@ def _build_mico(
         folder=site.path.parent,
         gui_factory=gui_factory,
     )
-    return application, faults
 
 
 def _build_daqco(
-    site: Site, settings: DaqcoSettings, gui_factory: GuiFactory | None
+    site: Site, faults: SimulationFaults, settings: DaqcoSettings, gui_factory: GuiFactory | None
 ) -> DaqcoApplication:
     library = make_library(
         settings.backend,
@@ -100,6 +98,7 @@ def _build_daqco(
         clock_sources=settings.clock_sources,
         seed=site.seed,
     )
+    faults.join_simulated("board", library)
     return DaqcoApplication(
         library,
         settings,
@@ -112,14 +111,17 @@ def _build_daqco(
 
 
 def _build_vico(
-    site: Site, settings: VicoSettings, gui_factory: GuiFactory | None
+    site: Site, faults: SimulationFaults, settings: VicoSettings, gui_factory: GuiFactory | None
 ) -> VicoApplication:
     scene, simulation = site.scene, None
     if scene is not None and scene.lens is not None and scene.light is not None:
         simulation = SimPeripherals(scene.lens, scene.light, site.clock, site.seed)
 
+    if scene is not None:
+        faults.expect("camera")
+
     def make_library(backend: Backend) -> CameraLibrary:
-        return make_camera_library(
+        library = make_camera_library(
             backend,
             clock=site.clock,
             scene=scene,
@@ -127,6 +129,8 @@ def _build_vico(
             producers=settings.producers,
             seed=site.seed,
         )
+        faults.join_simulated("camera", library)
+        return library
 
     def open_lens() -> Lens | None:
         lens = settings.lens

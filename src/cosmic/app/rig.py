@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from typing_extensions import override
 
+from cosmic.app.faults import SimulationFaults
 from cosmic.app.platform import Platform, Uses, build_platform
 from cosmic.app.platform_file import KNOWN_APPLICATIONS, check_applications
 from cosmic.app.remote_station import StationControl
@@ -19,9 +20,6 @@ from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.errors import NotAvailable, NotConnectedError
 from cosmic.mico.api.mico import Mico
 from cosmic.vico.api.vico import Vico
-
-if TYPE_CHECKING:
-    from cosmic.mico.hw.sim_scu3d_faults import Faults
 
 logger = logging.getLogger(__name__)
 
@@ -138,11 +136,10 @@ class Rig:
             self._platform.mico.manager.reset_stop()
 
     @property
-    def faults(self) -> "Faults":
+    def faults(self) -> SimulationFaults:
         """Trouble that can be injected into the simulated platform, by name.
 
-        ``rig.faults.inject("unplugged", device=1)``; docs/explanation/simulated-controller.md
-        lists the names.
+        ``rig.faults.inject("missed_grasp", times=2)``; docs/explanation/twin.md lists the names.
 
         Raises
         ------
@@ -185,6 +182,7 @@ def connect(
     cold: bool = False,
     seed: int = 0,
     sample: str | None = None,
+    truth: str | Path | None = None,
     certificates: str | Path | None = None,
 ) -> Rig:
     """Start the platform in this process and return it; no window and no event loop needed.
@@ -210,6 +208,9 @@ def connect(
     sample : str or None
         What lies on the simulated plate, as twin.toml names it, such as "forty-dry"; None: the
         fibres that twin.toml lists.
+    truth : path or None
+        A new file for what truly happens on the simulated platform, for whoever scores a run; see
+        `cosmic.twin.truth.read_truth`.
 
     Raises
     ------
@@ -236,6 +237,7 @@ def connect(
         cold=cold,
         seed=seed,
         sample=sample,
+        truth=truth,
         uses=uses,
     )
     rig = Rig(platform)

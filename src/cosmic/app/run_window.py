@@ -46,6 +46,8 @@ class WindowOptions:
         Where to save a picture of the window before it closes.
     sample : str or None
         What lies on the simulated plate, as twin.toml names it.
+    truth : Path or None
+        Where to write what truly happens on the simulated platform.
     size : tuple of int or None
         Width and height of the window; None leaves it as it was.
     """
@@ -55,6 +57,7 @@ class WindowOptions:
     rate: float = 1.0
     cold: bool = False
     sample: str | None = None
+    truth: Path | None = None
     offscreen_s: float | None = None
     screenshot: Path | None = None
     size: tuple[int, int] | None = None
@@ -135,6 +138,7 @@ def _build(options: WindowOptions) -> Platform:
         rate=options.rate,
         cold=options.cold,
         sample=options.sample,
+        truth=options.truth,
         mico_gui=make_mico_gui,
         daqco_gui=make_daqco_gui,
         vico_gui=make_vico_gui,

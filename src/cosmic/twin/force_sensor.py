@@ -30,6 +30,13 @@ class ForceSensor:
     seed : int
         Of noise, drift, and how far it is from its data sheet.
 
+    Attributes
+    ----------
+    saturated : bool
+        The output stands at the end of the range, whatever it feels.
+    running_un_s : float
+        By how much the zero runs away.
+
     Notes
     -----
     Any thread may ask, for times that rise from call to call. The same times in other portions
@@ -54,6 +61,8 @@ class ForceSensor:
         self.true_zero_v = settings.zero_v + settings.zero_error_v * float(
             mounting.standard_normal()
         )
+        self.saturated = False
+        self.running_un_s = 0.0
         self._lock = Lock()
         self._time_s = -math.inf
         self._state_un = 0.0
@@ -82,6 +91,8 @@ class ForceSensor:
             felt += self._wandered(steps_s)
             self._time_s = max(self._time_s, float(times_s[-1]))
         half_v = self.settings.gain_v_un * self.settings.range_un
+        if self.saturated:
+            return np.full_like(times_s, self.settings.zero_v + half_v)
         out = self.true_zero_v + self.true_gain_v_un * felt
         return np.clip(out, self.settings.zero_v - half_v, self.settings.zero_v + half_v)
 
@@ -131,6 +142,8 @@ class ForceSensor:
             steps_s[0] = 0.0  # it was zeroed just before
         steps = self.settings.drift_un_sqrt_s * np.sqrt(steps_s)
         steps *= self._drift.standard_normal(steps.size)
+        if self.running_un_s:
+            steps += self.running_un_s * steps_s
         walk = self._walk_un + np.cumsum(steps)
         self._walk_un = float(walk[-1])
         return np.asarray(walk)

@@ -66,7 +66,13 @@ class ForceSide:
         on_probe = [each for each in settings.force_sensors.values() if each.mounted_on]
         stiffness = on_probe[0].stiffness_un_um if on_probe else RIGID_UN_UM
         self._workplace = Workplace(
-            settings, self.skeleton, sensor_un_um=stiffness, seed=seed, faults=faults, truth=truth
+            settings,
+            self.skeleton,
+            sensor_un_um=stiffness,
+            seed=seed,
+            faults=faults,
+            truth=truth,
+            folder=None if truth is NO_TRUTH else folder,
         )
         self.offsets = self._workplace.offsets
         self._timeline = Timeline(self._workplace, stages, settings.contact.step_s)
@@ -88,6 +94,10 @@ class ForceSide:
     def moment(self, now_s: float) -> Moment:
         """Return the whole truth now: force, what touches where, each fibre's state."""
         return self._timeline.moment(now_s)
+
+    def finish(self, now_s: float) -> None:
+        """Tell the truth what lasts until the end, which is now."""
+        self._timeline.finish(now_s)
 
     def tips(self, now_s: float) -> dict[str, Point]:
         """Return where the tips of the tools are, um, world; see `Workplace.tips`."""

@@ -112,6 +112,19 @@ class Skeleton:
             pose = pose @ joint.parent_from_child(values)
         return pose
 
+    def fixed(self, link: str) -> bool:
+        """Whether a link is the one that all joints start from."""
+        return link not in self._joint_of
+
+    @property
+    def turning(self) -> frozenset[str]:
+        """The links that a stage turns."""
+        return frozenset(
+            link
+            for link in self._joint_of
+            if any(each.drive and each.kind != "prismatic" for each in self._chain(link))
+        )
+
     def slide(self, link: str, point_um: Point = (0.0, 0.0, 0.0)) -> Slide:
         """Return how the point `point_um` of `link` follows the stages.
 

@@ -18,6 +18,7 @@ class TwinLight:
 
     def __init__(self, settings: LightSettings) -> None:
         self.settings = settings
+        self._gives = 1.0
         self._changes: tuple[tuple[float, float], ...] = ((0.0, settings.start_percent),)
 
     def percent(self, now_s: float) -> float:
@@ -26,6 +27,14 @@ class TwinLight:
             if since_s <= now_s:
                 return percent
         return self._changes[0][1]
+
+    def given_percent(self, now_s: float) -> float:
+        """Return how bright it really is: less than it is told when its LED is worn."""
+        return self._gives * self.percent(now_s)
+
+    def dim(self, part: float) -> None:
+        """Have it give only a part of its light; its controller does not notice."""
+        self._gives = part
 
     def set_percent(self, percent: float, now_s: float) -> None:
         """Make it so bright from `now_s` on."""

@@ -20,6 +20,10 @@ class ToolOffsets:
     wander : bool
         They are mounted not quite right, and drift.
 
+    Attributes
+    ----------
+    tools : tuple of str
+
     Notes
     -----
     Drift begins at zero and goes to and fro on a tilted line, more slowly for one tool than for
@@ -29,6 +33,7 @@ class ToolOffsets:
     def __init__(
         self, tools: Iterable[str], handling: HandlingSettings, seed: int, *, wander: bool
     ) -> None:
+        tools = tuple(tools)
         self._mounted: dict[str, Point] = {}
         self._bent: dict[str, Point] = {}
         self._drift: dict[str, tuple[Point, float, float]] = {}
@@ -44,7 +49,7 @@ class ToolOffsets:
                 self._mounted[name] = mounted[0], mounted[1], mounted[2]
                 amplitude = way[0] * size, way[1] * size, way[2] * size
                 self._drift[name] = amplitude, 2.0 * math.pi / period_s, phase
-        self._tools = tuple(self._mounted)
+        self.tools = tuple(tools)
 
     @property
     def still(self) -> bool:

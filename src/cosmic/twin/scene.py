@@ -11,11 +11,14 @@ from cosmic.frame.clock import Clock
 from cosmic.frame.config import shipped_config_dir
 from cosmic.twin.force_side import ForceSide
 from cosmic.twin.kinematics import Point
+from cosmic.twin.lasting_faults import LastingFaults
 from cosmic.twin.lens import TwinLens
 from cosmic.twin.light import TwinLight
 from cosmic.twin.optics.optics import Optics
 from cosmic.twin.settings import StageKind, TwinSettings
 from cosmic.twin.stage import Stage
+from cosmic.twin.truth import NO_TRUTH, Truth, tell_sample
+from cosmic.twin.twin_faults import TwinFaults
 
 Wiring = tuple[tuple[str | None, ...], ...]
 
@@ -71,6 +74,10 @@ class Scene:
         The lamp; None in a scene of bare stages.
     optics : Optics or None
         What cameras see; None in a scene of bare stages.
+    faults : TwinFaults or None
+        Trouble with fibres, tips, lamp, lens and sensors, by name.
+    truth : Truth
+        Told what happens.
     """
 
     def __init__(
@@ -86,6 +93,8 @@ class Scene:
         lens: TwinLens | None = None,
         light: TwinLight | None = None,
         optics: Optics | None = None,
+        faults: TwinFaults | None = None,
+        truth: Truth = NO_TRUTH,
     ) -> None:
         self.settings = settings
         self.clock = clock
@@ -97,6 +106,8 @@ class Scene:
         self.lens = lens
         self.light = light
         self.optics = optics
+        self.faults = faults or TwinFaults()
+        self._truth = truth
 
     @classmethod
     def from_settings(
@@ -107,6 +118,8 @@ class Scene:
         *,
         cold: bool = False,
         folder: Path | None = None,
+        sample: str = "",
+        truth: Truth = NO_TRUTH,
     ) -> Self:
         """Make the platform that `settings` describes.
 
@@ -118,6 +131,10 @@ class Scene:
             positions read zero; a reference run brings the true positions back.
         folder : Path or None
             Where twin.toml was read, for the files it names; None: what ships with CoSMic.
+        sample : str
+            Name of what lies on the plate, for the truth.
+        truth : Truth
+            Told what happens; `close` ends it.
 
         Raises
         ------
@@ -140,8 +157,11 @@ class Scene:
             )
         wiring = tuple(tuple(name or None for name in d.channels) for d in settings.devices)
         files = folder or shipped_config_dir()
-        force_side = ForceSide(settings, files, stages, seed)
         lens, light = TwinLens(settings.lens, seed, cold=cold), TwinLight(settings.light)
+        faults = TwinFaults()
+        tell_sample(truth, sample, seed, settings.fibres)
+        force_side = ForceSide(settings, files, stages, seed, faults=faults, truth=truth)
+        faults.begin = LastingFaults(clock, stages, force_side, lens, light)
         return cls(
             settings,
             clock,
@@ -153,6 +173,8 @@ class Scene:
             lens=lens,
             light=light,
             optics=Optics(settings, files, stages, force_side, lens, light, seed),
+            faults=faults,
+            truth=truth,
         )
 
     @classmethod
@@ -204,6 +226,13 @@ class Scene:
             wiring=tuple(wiring),
             at_power_up=at_power_up,
         )
+
+    def close(self) -> None:
+        """End the truth; harmless the second time."""
+        if self.force_side is not None:
+            self.force_side.finish(self.clock.now_s())
+        self._truth.tell(self.clock.now_s(), "end")
+        self._truth.close()
 
     def truth(self) -> dict[str, float]:
         """Return where every stage truly is now, in its unit: for views and logs, not control."""

@@ -7,6 +7,7 @@ stage.
 
 import math
 import random
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -89,6 +90,14 @@ class Stage:
     seed : int
         Of its randomness.
 
+    Attributes
+    ----------
+    remember : callable or None
+        Called with the time when many movements were planned since `seen`, before the oldest is
+        forgotten.
+    step_share : float
+        How much of each step it makes; less than 1 when something is worn.
+
     Notes
     -----
     Any thread may read; one at a time may move it. A path is never changed, only replaced.
@@ -102,8 +111,15 @@ class Stage:
         self.random = random.Random(f"stage {name} {seed}")
         self._paths: tuple[Path, ...] = (Path((0.0,), (start,)),)
         self._wall: tuple[float, int] | None = None
+        self.step_share = 1.0
+        self.remember: Callable[[float], None] | None = None
+        self._unseen = 0
         creep_per_min = self.random.uniform(kind.drift_per_min_low, kind.drift_per_min_high)
         self._creep_per_s = creep_per_min * self.random.choice((-1, 1)) / 60.0
+
+    def seen(self) -> None:
+        """Have somebody know of all movements so far."""
+        self._unseen = 0
 
     @property
     def unit(self) -> AxisUnit:
@@ -160,8 +176,15 @@ class Stage:
         if steps == 0:
             return 0.0
         count, direction = abs(steps), (1 if steps > 0 else -1)
+        share = self.step_share
         noise = self.kind.step_noise * self.random.gauss(0.0, 1.0) / math.sqrt(count)
-        return direction * count * self.step_size(amplitude_v, direction) * max(1.0 + noise, 0.0)
+        return (
+            share
+            * direction
+            * count
+            * self.step_size(amplitude_v, direction)
+            * max(1.0 + noise, 0.0)
+        )
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -214,6 +237,9 @@ class Stage:
 
     def _plan(self, path: Path) -> None:
         path = replace(path, creep_per_s=self._creep_per_s)
+        self._unseen += 1
+        if self._unseen > PATHS_KEPT // 2 and self.remember is not None:
+            self.remember(path.times_s[0])
         self._paths = (*self._paths[1 - PATHS_KEPT :], path)
 
 

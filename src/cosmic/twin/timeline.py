@@ -47,6 +47,13 @@ class Timeline:
         self._at = -1
         self._times_s: deque[float] = deque(maxlen=KEPT)
         self._forces_un: deque[float] = deque(maxlen=KEPT)
+        for stage in self._stages:
+            stage.remember = self.catch_up
+
+    def catch_up(self, time_s: float) -> None:
+        """Go on to `time_s` though nobody asked: a stage is about to forget where it was."""
+        with self._lock:
+            self._advance(time_s)
 
     def force_un(self, times_s: Floats) -> Floats:
         """Return the force on the probe, uN, positive when it is pushed back.
@@ -68,6 +75,12 @@ class Timeline:
         with self._lock:
             self._advance(time_s)
             return self._workplace.moment(self._times_s[-1], self._values, self._felt)
+
+    def finish(self, time_s: float) -> None:
+        """Go on to the end, and have the workplace tell what lasts until then."""
+        with self._lock:
+            self._advance(time_s)
+            self._workplace.finish()
 
     def _looks_since(self, time_s: float) -> tuple[list[float], list[float]]:
         """Return times and forces from the last look before `time_s` on."""
@@ -100,6 +113,7 @@ class Timeline:
             self._creep_from_s = time_s + LONGEST_REST_S
         for stage in self._stages:
             path = stage.path
+            stage.seen()
             if self._resting.get(stage.name) is not path:
                 self._values[stage.name] = stage.position_then(time_s)
                 if path.end_s <= time_s:

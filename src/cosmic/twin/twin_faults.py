@@ -71,14 +71,14 @@ class TwinFaults:
     - `sensor_drift`: the zero of a force sensor wanders by `amount` (5) uN each second.
     - `sensor_saturated`: a force sensor stands at the end of its range.
 
-    Parameters
+    Attributes
     ----------
-    changed : callable
+    begin : callable or None
         Called with the fault and whether it begins, whenever one of those that last does.
     """
 
-    def __init__(self, changed: Callable[[TwinFault, bool], None] | None = None) -> None:
-        self._changed = changed
+    def __init__(self) -> None:
+        self.begin: Callable[[TwinFault, bool], None] | None = None
         self._lock = Lock()
         self._active: tuple[TwinFault, ...] = ()
 
@@ -103,8 +103,8 @@ class TwinFaults:
         if amount is not None and not math.isfinite(amount):
             raise ValueError(f"fault {name!r}: amount must be a finite number, got {amount!r}")
         fault = TwinFault(name, tool, times, amount)
-        if self._changed is not None and name in LASTING_NAMES:
-            self._changed(fault, True)
+        if self.begin is not None and name in LASTING_NAMES:
+            self.begin(fault, True)
         with self._lock:
             self._active = (*self._active, fault)
 
@@ -126,8 +126,8 @@ class TwinFaults:
             ]
             self._active = tuple(each for each in self._active if each not in ended)
         for fault in ended:
-            if self._changed is not None and fault.name in LASTING_NAMES:
-                self._changed(fault, False)
+            if self.begin is not None and fault.name in LASTING_NAMES:
+                self.begin(fault, False)
 
     def take(self, name: str, tool: str) -> bool:
         """Return whether a grasp of `tool` is spoilt so, and count it."""

@@ -1,8 +1,10 @@
 """Where grippers, fibres and probe meet: who holds what, and what the probe feels."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Final
 
+from cosmic.twin.contacts import Contacts
 from cosmic.twin.felt import Felt, Moment, Push
 from cosmic.twin.fibre import Fibre, Floats, Line
 from cosmic.twin.fibre_state import state_of
@@ -55,6 +57,8 @@ class Workplace:
         Stiffness of the sensor behind the probe.
     truth : Truth
         Told what happens.
+    folder : Path or None
+        Of twin.toml, when bodies that run into each other are to be told of too.
 
     Attributes
     ----------
@@ -75,6 +79,7 @@ class Workplace:
         seed: int,
         faults: TwinFaults | None = None,
         truth: Truth = NO_TRUTH,
+        folder: Path | None = None,
     ) -> None:
         self._geometry = settings.geometry
         self._contact = settings.contact
@@ -101,6 +106,9 @@ class Workplace:
         self._peaks_un: dict[int, float] = {}
         self._jaw_touches = {name: Touch() for name in self._grippers}
         self._gaps: dict[str, float] = {}
+        self._contacts: Contacts | None = None
+        if folder is not None:
+            self._contacts = Contacts(settings, folder, skeleton, self._tell)
 
     @property
     def stages(self) -> frozenset[str]:
@@ -155,6 +163,8 @@ class Workplace:
             if (push := self._push(fibre, tools, probe, around)) is not None
         )
         self._note(pushes)
+        if self._contacts is not None:
+            self._contacts.look(values, time_s, self.offsets)
         jaw_un = sum(self._jaw(name, tool, probe) for name, tool in tools.items())
         return Felt(pushes, jaw_un)
 
@@ -163,6 +173,12 @@ class Workplace:
             name: each.tool(name, values, self.offsets.at(name, time_s), self._gaps.get(name))
             for name, each in self._grippers.items()
         }
+
+    def finish(self) -> None:
+        """Tell what lasts until the end."""
+        self._note(())
+        if self._contacts is not None:
+            self._contacts.finish()
 
     def _tell(self, event: str, **facts: object) -> None:
         self._truth.tell(self._time_s, event, **facts)

@@ -229,7 +229,7 @@ class Optics:
                 noise,
                 zoom=self._zoom(name),
                 focus=self._focus(name),
-                percent=self._light.percent,
+                percent=self._light.given_percent,
             )
             for name, view in self.settings.views.items()
         }

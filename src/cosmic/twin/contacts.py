@@ -1,0 +1,180 @@
+"""Which bodies of the platform run into each other, found by the twin's own geometry.
+
+Written apart from the collision gate, to score it: bodies are convex and only slide, so for each
+pair the set of places where they overlap is a polytope that is computed once.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.twin.kinematics import Floats, Skeleton, Slide
+from cosmic.twin.offsets import ToolOffsets
+from cosmic.twin.optics.solids import read_solids
+from cosmic.twin.settings import TwinSettings
+from cosmic.twin.surroundings import Tell
+
+CHECK_S: Final = 0.005
+"""So often bodies are compared while something moves."""
+
+Faces = tuple[Floats, Floats]
+Numbers = npt.NDArray[np.intp]
+
+
+class Contacts:
+    """Watches for contact; asked at each look of the workplace.
+
+    Parameters
+    ----------
+    tell : callable
+        Told "contact" when two bodies meet and "contact over" when they have parted, with the
+        names of both, the greatest depth, and whether it was meant: jaws land on the plate.
+
+    Raises
+    ------
+    ConfigError
+        The URDF or a mesh is missing or broken.
+    """
+
+    def __init__(
+        self, settings: TwinSettings, folder: Path, skeleton: Skeleton, tell: Tell
+    ) -> None:
+        self._settings = settings
+        self._skeleton = skeleton
+        self._tell = tell
+        self._plate = settings.geometry.plate
+        self._jaws = {jaw for each in settings.geometry.grippers.values() for jaw in each.jaws}
+        self._links: list[str] = []
+        self._slides: list[Slide] = []
+        self._corners: list[Floats] = []
+        self._boxes: list[Floats] = []
+        self._read(folder / settings.geometry.urdf)
+        self._low = np.array([each.min(axis=0) for each in self._corners])
+        self._high = np.array([each.max(axis=0) for each in self._corners])
+        self._first, self._second = self._pairs()
+        self._moving = [n for n, slide in enumerate(self._slides) if slide.ways]
+        self._faces: dict[tuple[int, int], Faces] = {}
+        self._now: dict[tuple[str, str], float] = {}
+        self._by_design: frozenset[tuple[str, str]] | None = None
+        self._next_s = 0.0
+
+    def look(self, values: Mapping[str, float], time_s: float, offsets: ToolOffsets) -> None:
+        """Compare all bodies, unless that was done just now."""
+        if self._by_design is not None and time_s < self._next_s:
+            return
+        self._next_s = time_s + CHECK_S
+        depths = self._depths(values, time_s, offsets)
+        if self._by_design is None:
+            self._by_design = frozenset(depths)
+        for pair, depth in depths.items():
+            if pair in self._by_design:
+                continue
+            if pair not in self._now:
+                self._tell("contact", bodies=pair, depth_um=depth)
+            self._now[pair] = max(self._now.get(pair, 0.0), depth)
+        for pair in [each for each in self._now if each not in depths]:
+            self._over(pair)
+
+    def finish(self) -> None:
+        """Tell of contacts that still last."""
+        for pair in list(self._now):
+            self._over(pair)
+
+    def _over(self, pair: tuple[str, str]) -> None:
+        depth = self._now.pop(pair)
+        landed = self._plate in pair and bool(self._jaws & set(pair))
+        meant = landed and depth <= self._settings.handling.landing_um
+        self._tell("contact over", bodies=pair, depth_um=depth, meant=meant)
+
+    # ------------------------------------------------------------------ bodies
+
+    def _read(self, path: Path) -> None:
+        skeleton = self._skeleton
+        turning = skeleton.turning
+        for link, parts in read_solids(path, ()).items():
+            if link == self._plate:
+                self._boxes = [np.array([each.min(axis=0), each.max(axis=0)]) for each in parts]
+            elif link not in turning:
+                fixed = skeleton.fixed(link)
+                slide = Slide((0.0, 0.0, 0.0), ()) if fixed else skeleton.slide(link)
+                turn = np.eye(3) if fixed else skeleton.turn(link)
+                self._links += [link] * len(parts)
+                self._slides += [slide] * len(parts)
+                self._corners += [part @ turn.T for part in parts]
+
+    def _pairs(self) -> tuple[Numbers, Numbers]:
+        """Return the numbers of bodies that could meet: those that different stages carry."""
+        found = [
+            (one, two)
+            for two in range(len(self._links))
+            for one in range(two)
+            if self._apart(one, two)
+        ]
+        pairs = np.array(found, dtype=np.intp).reshape(-1, 2)
+        return pairs[:, 0], pairs[:, 1]
+
+    def _apart(self, one: int, two: int) -> bool:
+        ways = [{stage for stage, _ in self._slides[each].ways} for each in (one, two)]
+        if not (ways[0] or ways[1]):
+            return False
+        names = [self._links[each].partition("_")[0] for each in (one, two)]
+        return names[0] != names[1]
+
+    # ------------------------------------------------------------------ depth
+
+    def _depths(
+        self, values: Mapping[str, float], time_s: float, offsets: ToolOffsets
+    ) -> dict[tuple[str, str], float]:
+        places = np.array([slide.at(values) for slide in self._slides])
+        if not offsets.still:
+            for number in self._moving:
+                places[number] += offsets.at(self._links[number].partition("_")[0], time_s)
+        low, high = self._low + places, self._high + places
+        first, second = self._first, self._second
+        near = ((low[first] < high[second]) & (low[second] < high[first])).all(axis=1)
+        found: dict[tuple[str, str], float] = {}
+        for one, two in zip(first[near].tolist(), second[near].tolist(), strict=True):
+            normals, reach = self._overlap(one, two)
+            depth = float((reach - normals @ (places[two] - places[one])).min())
+            self._keep(found, (self._links[one], self._links[two]), depth)
+        self._on_plate(found, values, places, low)
+        return found
+
+    def _keep(
+        self, found: dict[tuple[str, str], float], pair: tuple[str, str], depth: float
+    ) -> None:
+        if depth > 0.0:
+            found[pair] = max(found.get(pair, 0.0), depth)
+
+    def _overlap(self, one: int, two: int) -> Faces:
+        """Return the faces of the set of ways from body one to body two at which they overlap."""
+        if (one, two) not in self._faces:
+            # Imported here: it takes time, and only who scores a run needs it.
+            from scipy.spatial import ConvexHull
+
+            ways = self._corners[one][:, None, :] - self._corners[two][None, :, :]
+            faces = np.unique(ConvexHull(ways.reshape(-1, 3)).equations.round(9), axis=0)
+            self._faces[one, two] = faces[:, :3], -faces[:, 3]
+        return self._faces[one, two]
+
+    def _on_plate(
+        self,
+        found: dict[tuple[str, str], float],
+        values: Mapping[str, float],
+        places: Floats,
+        low: Floats,
+    ) -> None:
+        """Add what stands in the plate or its clip: corners of one in the other."""
+        plate = self._skeleton.pose(self._plate, values)
+        top = max(float(box[1, 2]) for box in self._boxes) + float(plate[2, 3])
+        for number in self._moving:
+            if low[number, 2] >= top:
+                continue
+            corners = (self._corners[number] + places[number] - plate[:3, 3]) @ plate[:3, :3]
+            for box in self._boxes:
+                inside = np.minimum(corners - box[0], box[1] - corners).min(axis=1)
+                depth = float(inside.max())
+                self._keep(found, (self._plate, self._links[number]), depth)
