@@ -2,7 +2,9 @@
 
 import inspect
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -21,6 +23,8 @@ from cosmic.frame.errors import (
     NotAvailable,
     RecordingExistsError,
 )
+from cosmic.frame.network.caller import Access
+from cosmic.frame.network.errors import CallRefused
 from cosmic.frame.network.in_process import InProcessTransport
 from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Rule
@@ -68,8 +72,6 @@ def noise(seed: int, shape: tuple[int, ...] = (48, 64), kind: Any = np.uint8) ->
 
 def while_waiting(rig: VicoRig, ask: Callable[[], Any], level: int) -> Any:
     """Ask for the next picture, and give one as soon as somebody waits for it."""
-    from concurrent.futures import ThreadPoolExecutor
-
     with ThreadPoolExecutor(1) as pool:
         answer = pool.submit(ask)
         assert wait_until(lambda: answer.done() or (rig.home.camera.push(noise(level)) or False))
@@ -193,8 +195,6 @@ def test_fibres_are_found_and_placed_on_the_platform(tmp_path: Path) -> None:
 
 
 def while_waiting_for_fibres(rig: VicoRig, vico: Vico, image: Any) -> Any:
-    from concurrent.futures import ThreadPoolExecutor
-
     with ThreadPoolExecutor(1) as pool:
         answer = pool.submit(vico.find_fibres)
         assert wait_until(lambda: answer.done() or (rig.home.camera.push(image) or False), 10.0)
@@ -226,8 +226,6 @@ def test_plans_trigger_it(rig: VicoRig, tmp_path: Path) -> None:
     camera = rig.vico.camera()
     now = camera.settings
     assert now is not None
-    from dataclasses import replace
-
     camera.configure(replace(now, trigger=Trigger.SOFTWARE)).wait(5.0)
     camera.plan_pictures(tmp_path)
     status = camera.trigger()
@@ -329,6 +327,31 @@ def test_a_recording_holds_what_was_taken(rig: VicoRig, tmp_path: Path) -> None:
         assert all(np.array_equal(each.data, sent) for each, sent in pairs)
     with pytest.raises(RecordingExistsError):
         camera.record(path)
+
+
+def test_a_path_without_a_root_begins_on_the_stations_disk(away: VicoRig, tmp_path: Path) -> None:
+    camera = away.vico.camera()
+    with away.vico.record("run.mkv"):
+        away.home.camera.push(noise(1))
+        assert wait_until(lambda: away.home.application.unit("top").recordings.state.written)
+    assert (tmp_path / "run.mkv").exists()
+    assert camera.directory == tmp_path
+    assert camera.elsewhere
+
+
+def test_who_may_only_look_sees_all_and_changes_nothing(tmp_path: Path) -> None:
+    with at_home(tmp_path) as home, hosted(home) as station:
+        client = InProcessTransport(station, "guest", Access.VIEW)
+        with following(client, home.policy) as remote:
+            vico = Vico(remote)
+            rig = VicoRig(home, vico, station)
+            assert np.array_equal(while_waiting(rig, vico.snap, 3), noise(3))
+            assert vico.camera().latest() is not None
+            with pytest.raises(CallRefused, match="may not call"):
+                vico.camera().stop()
+            assert vico.lens is not None
+            vico.lens.abort()
+        client.close()
 
 
 def test_pictures_and_time_lapses_are_written(rig: VicoRig, tmp_path: Path) -> None:
@@ -499,14 +522,19 @@ def test_a_handle_from_elsewhere_has_no_camera_of_its_own() -> None:
         (LensHandle, RemoteLensHandle),
         (LightHandle, RemoteLightHandle),
     ):
-        for name, member in vars(here).items():
-            code = (
-                inspect.getsource(getattr(member, "fget", None) or member)
-                if callable(getattr(member, "fget", None) or member) and name != "__init__"
-                else ""
-            )
-            if "self._unit" in code or "self._thread" in code or "self._application" in code:
-                assert name in vars(there), f"{there.__name__} lacks {name}"
+        own = [name for name, member in vars(here).items() if looks_at_home(member)]
+        assert len(own) > 2
+        assert set(own) <= set(vars(there))
+
+
+def looks_at_home(member: object) -> bool:
+    function = member.fget if isinstance(member, property) else member
+    if not inspect.isfunction(function):
+        return False
+    return any(
+        f"self.{name}" in inspect.getsource(function)
+        for name in ("_unit", "_thread", "_application")
+    )
 
 
 # --- away and back ----------------------------------------------------------------------------

@@ -72,7 +72,7 @@ def test_what_is_set_in_the_window_is_set_there(qtbot, own, rig, window, tmp_pat
     view.form.exposure.committed.emit(20.0)
     qtbot.waitUntil(lambda: thread.settings.exposure_s == pytest.approx(0.02))
     view.row.live.click()
-    qtbot.waitUntil(lambda: not thread.running)
+    qtbot.waitUntil(lambda: not view.row.live.isChecked() and not thread.running)
     view.row.live.click()
     qtbot.waitUntil(lambda: thread.running)
     qtbot.waitUntil(lambda: view.recorder.record.isEnabled())

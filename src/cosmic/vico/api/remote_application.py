@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject
 from typing_extensions import override
 
 from cosmic.frame.application import CosmicApplicationBase, GuiFactory
-from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.transport import Presence, Rule, Subscription, Transport
 from cosmic.frame.task import Task
@@ -111,7 +111,7 @@ class RemoteVicoApplication(CosmicApplicationBase):
             self._end_requested.wait(LOOK_S)
             for stream in list(self._streams):
                 stream.close_if_idle()
-            if self._known is None and self._here:
+            if self._away and self._here:
                 self.calls.later(self._catch_up)
         return True
 
@@ -234,7 +234,13 @@ class RemoteVicoApplication(CosmicApplicationBase):
         self._show()
 
     def _catch_up(self) -> None:
-        self.refresh()
+        try:
+            self.refresh()
+        except CosmicError as exc:
+            if self._away != str(exc):
+                self._away = str(exc)
+                self._show()
+            return
         if self._here:
             with self._changed:
                 self._away = ""
@@ -255,9 +261,11 @@ class RemoteVicoApplication(CosmicApplicationBase):
         self._pulse = pulse
 
     def _show(self) -> None:
-        known, away = self._known, self._away
+        known, away, before = self._known, self._away, self._shown
         if known is not None:
-            self._shown = known.greyed(away) if away else known
+            now = self._shown = known.greyed(away) if away else known
+            if before is not None and now.says_the_same_as(before):
+                return
         self.status_changed.emit()
 
     def _rate(self) -> float:

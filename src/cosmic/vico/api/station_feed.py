@@ -174,18 +174,18 @@ class StateFeed(WorkerThread):
         last: VicoState | None = None
         pulsed_s = -PULSE_S
         while not self.end_requested:
-            last = self._tell(last)
-            if WALL.now_s() - pulsed_s >= PULSE_S:
+            last = self._tell(last) if self._station.wanted(STATE) else None
+            if WALL.now_s() - pulsed_s >= PULSE_S and self._station.wanted(PULSE):
                 pulsed_s = WALL.now_s()
                 self._station.publish(PULSE, self._reader.pulse())
             self._rest()
 
     def _tell(self, last: VicoState | None) -> VicoState:
         now = self._reader.state()
-        if last is None or replace(now, number=last.number) != last:
-            self._station.publish(STATE, now)
-            return now
-        return last
+        if last is not None and now.says_the_same_as(last):
+            return last
+        self._station.publish(STATE, now)
+        return now
 
     def _rest(self) -> None:
         self._end_requested.wait(LEAST_S)
@@ -227,9 +227,10 @@ class VicoFeed:
 
     def _on_client(self, client: Presence) -> None:
         if client.here:
+            for topic in (STATE, PULSE):
+                self._station.publish(topic, None)
             for each in self._cameras:
                 each.prepare()
-            self._state.wake()
 
 
 def _nothing() -> None:

@@ -60,7 +60,7 @@ class VicoStationSide:
         newest = self._reader.handle(camera).latest()
         return None if newest is None else SentPicture.of(newest, self._application.places)
 
-    @remote
+    @remote(reads=True)
     def next_picture(self, camera: str, since_s: float | None = None) -> PictureWait:
         """Begin to wait for a whole picture exposed from `since_s` on; None is now."""
         application = self._application

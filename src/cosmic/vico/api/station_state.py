@@ -200,6 +200,17 @@ class VicoState:
         """Return what is known of a camera."""
         return next((each for each in self.cameras if each.name == name), None)
 
+    def says_the_same_as(self, other: "VicoState") -> bool:
+        """Return whether nothing differs but when it was looked."""
+        return self.timeless == other.timeless
+
+    @property
+    def timeless(self) -> "VicoState":
+        """The same without number and time."""
+        return replace(
+            self, number=0, peripherals=replace(self.peripherals, time_s=0.0, wall_s=0.0)
+        )
+
     def greyed(self, why: str) -> "VicoState":
         """Return it as it is shown while the station is away."""
         now = self.peripherals

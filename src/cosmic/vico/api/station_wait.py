@@ -24,7 +24,8 @@ class PictureWait:
         self._picture: SentPicture | None = None
         self._over = False
         self._callbacks: list[Callable[[PictureWait], None]] = []
-        self._unsubscribe = thread.subscribe(self._on_picture)
+        with self._changed:  # a picture that comes at once waits until this is known
+            self._unsubscribe = thread.subscribe(self._on_picture)
         newest = thread.newest
         if newest is not None:
             self._on_picture(newest)

@@ -70,9 +70,8 @@ class CameraView(QWidget):
         self._newest: Picture | None = None
         self._came, self._came_s, self._drawn_s = "", WALL.now_s(), 0.0
         self._histogram: Histogram | None = None
-        self._readouts, self._was_running = 0, False
+        self._readouts, self._was_running, self._refused = 0, False, ""
         self._pointed: Pixel | None = None
-        self._refused = ""
         self.view = PictureView()
         self.cross, self.scale_bar = Crosshair(), ScaleBar()
         self.seen, self.note = SeenLayer(), Note()
@@ -171,6 +170,7 @@ class CameraView(QWidget):
         self._readout.start()
         self.look()
         self.read_out()
+        self.recorder.refresh()
 
     @override
     def hideEvent(self, event: QHideEvent) -> None:
@@ -244,8 +244,6 @@ class CameraView(QWidget):
         self.view.set_greyed(bool(text))
         self.view.redraw()
 
-    # Following the application
-
     def refresh(self) -> None:
         """Show what is in force."""
         camera = self._camera
@@ -255,7 +253,8 @@ class CameraView(QWidget):
         self.calibrate.fill()
         self.row.show_targets(tuple(camera.targets), camera.calibration_problem)
         self.tools.refresh()
-        self.recorder.refresh()
+        if self.isVisible():
+            self.recorder.refresh()
         self._show_state()
         if camera.refused != self._refused:
             self._refused = camera.refused
