@@ -1,0 +1,88 @@
+"""What a report shows of one fibre."""
+
+from html import escape
+from typing import Any, Final
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.autonomy.campaign.records import FibreRecord, Picture
+from cosmic.autonomy.campaign.report_figures import EI_LABEL, force_figure, stiffness_figure
+from cosmic.autonomy.campaign.report_markup import ShowPng, ShowSvg, table
+from cosmic.autonomy.campaign.report_words import interval, number, outcome_words, stiffness
+
+PICTURE_PX: Final = 360
+
+
+def card(record: FibreRecord, svg: ShowSvg, png: ShowPng) -> str:
+    """Return the card of a fibre that was read whole."""
+    kind = "short" if record.bending is None else "long"
+    parts = [
+        f'<h3 class="{kind}" id="fibre-{record.number}">Fibre {record.number}: '
+        f"{escape(outcome_words(record))}</h3>"
+    ]
+    if record.text:
+        parts.append(f"<p>{escape(record.text)}</p>")
+    figures = [_shown(each, png) for each in record.pictures[:2]]
+    figures += [svg(each, 430) for each in (force_figure(record), stiffness_figure(record)) if each]
+    cells = "".join(f'<td valign="top">{each}</td>' for each in figures[:2])
+    more = "".join(f'<td valign="top">{each}</td>' for each in figures[2:])
+    if cells:
+        parts.append(
+            f'<table class="plain"><tr>{cells}</tr>{f"<tr>{more}</tr>" if more else ""}</table>'
+        )
+    parts.append(_numbers(record))
+    return "\n".join(parts)
+
+
+def _numbers(record: FibreRecord) -> str:
+    result = record.bending
+    if result is None:
+        return ""
+    rows = [
+        (
+            f"{fit.place_um:.1f}",
+            f"{number(fit.k_un_um, 3)} ± {number(1.96 * fit.k_std_un_um, 3)}",
+            number(fit.k_loading_un_um, 3),
+            number(fit.k_unloading_un_um, 3),
+            number(fit.hysteresis_percent, 1),
+            number(fit.drift_un_s, 3),
+            number(fit.peak_un, 1),
+            f"{fit.chi2:.0f} / {fit.freedom}",
+            ", ".join(sorted(fit.flags)) or ("" if place in result.used else "not used"),
+        )
+        for place, fit in enumerate(result.spans)
+    ]
+    head = (
+        "place, µm",
+        "k, µN/µm (95 %)",
+        "out",
+        "back",
+        "hysteresis, %",
+        "drift, µN/s",
+        "peak, µN",
+        "chi²/dof",
+        "notes",
+    )
+    told = (
+        f"EI {stiffness(result.ei_n_m2)} ({interval(result.ei_low_n_m2, result.ei_high_n_m2)}) "
+        f"{EI_LABEL}; clamp {result.clamp_offset_um:.1f} ± {1.96 * result.clamp_offset_std_um:.1f} "
+        "µm behind the tip of the jaws."
+    )
+    doubts = "".join(f"<li>{escape(each)}</li>" for each in result.reasons)
+    return f"<p>{escape(told)}</p>{f'<ul>{doubts}</ul>' if doubts else ''}{table(head, rows)}"
+
+
+def _shown(picture: Picture, png: ShowPng) -> str:
+    pixels: npt.NDArray[Any] = picture.pixels
+    if pixels.dtype == np.uint16:
+        pixels = (pixels >> 8).astype(np.uint8)
+    height, width = pixels.shape[:2]
+    if width > PICTURE_PX:
+        size = PICTURE_PX, max(1, round(height * PICTURE_PX / width))
+        pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    _, data = cv2.imencode(".png", pixels)
+    scale = f", {picture.scale_um_px * width:.0f} µm wide" if picture.scale_um_px > 0.0 else ""
+    words = f"{picture.name}{scale}"
+    return f"{png(data.tobytes(), pixels.shape[1], words)}<br><small>{escape(words)}</small>"

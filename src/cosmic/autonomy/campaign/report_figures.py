@@ -1,0 +1,138 @@
+"""The figures of a report."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.autonomy.campaign.records import FibreRecord, Floats
+from cosmic.autonomy.campaign.report_svg import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    Axis,
+    Plot,
+    around,
+)
+from cosmic.autonomy.campaign.statistics import MeanEi
+
+Mask = npt.NDArray[np.bool_]
+
+EI_UNIT: Final = 1e-12
+EI_LABEL: Final = "10⁻¹² N m²"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Curve:
+    """One span with its baseline taken out, counted from the first contact."""
+
+    way_um: Floats
+    force_un: Floats
+    fitted_un: Floats
+    loading: Mask
+    place_um: float
+
+
+def force_figure(record: FibreRecord) -> str:
+    """Return force over push of all spans of a fibre: measured out and back, and fitted."""
+    curves = [curve for number in range(len(record.spans)) if (curve := _curve(record, number))]
+    if not curves:
+        return ""
+    ways = np.concatenate([each.way_um for each in curves])
+    forces = np.concatenate([each.force_un for each in curves])
+    x = Axis("push beyond the first contact, µm", *around(float(ways.min()), float(ways.max())))
+    y = Axis("force, µN", *around(float(forces.min()), float(forces.max())))
+    plot = Plot(x, y, f"Force over push of fibre {record.number}")
+    for curve in curves:
+        _draw(plot, curve)
+    return plot.svg()
+
+
+def _draw(plot: Plot, curve: _Curve) -> None:
+    way, force, fitted = curve.way_um, curve.force_un, curve.fitted_un
+    for branch in (curve.loading, ~curve.loading):
+        shown = branch & np.isfinite(fitted)
+        order = np.argsort(way[shown])
+        if shown.any():
+            plot.line(way[shown][order].tolist(), fitted[shown][order].tolist(), GREY)
+    back = ~curve.loading
+    plot.points(way[back].tolist(), force[back].tolist(), ORANGE, hollow=True)
+    plot.points(way[curve.loading].tolist(), force[curve.loading].tolist(), BLUE)
+    last = int(np.argmax(way))
+    plot.note(float(way[last]), float(force[last]), f"{curve.place_um:.0f} µm", end=True)
+
+
+def _curve(record: FibreRecord, number: int) -> _Curve | None:
+    span = record.spans[number]
+    kept = np.isfinite(span.way_um) & np.isfinite(span.force_un)
+    if not kept.any():
+        return None
+    fits = record.bending.spans if record.bending is not None else ()
+    fit = fits[number] if number < len(fits) else None
+    if fit is None or not math.isfinite(fit.hinge_um):
+        level = np.full(len(kept), float(np.median(span.force_un[kept][:3])))
+        hinge, fitted = float(np.min(span.way_um[kept])), np.full(len(kept), np.nan)
+    else:
+        level = fit.baseline_un + fit.drift_un_s * (span.time_s - span.time_s[0])
+        hinge, fitted = fit.hinge_um, fit.fitted_un
+    return _Curve(
+        way_um=(span.way_um - hinge)[kept],
+        force_un=(span.force_un - level)[kept],
+        fitted_un=(fitted - level)[kept],
+        loading=span.loading[kept],
+        place_um=span.nominal_um if fit is None else fit.place_um,
+    )
+
+
+def stiffness_figure(record: FibreRecord) -> str:
+    """Return k^(-1/3) over the place, with the line whose slope is the bending stiffness."""
+    result = record.bending
+    if result is None:
+        return ""
+    fits = [each for each in result.spans if each.k_un_um > 0.0]
+    if not fits or not result.ei_n_m2 > 0.0:
+        return ""
+    places = [each.place_um for each in fits]
+    roots = [each.k_un_um ** (-1.0 / 3.0) for each in fits]
+    slope = (3.0 * result.ei_n_m2 * 1e18) ** (-1.0 / 3.0)
+    begin, end = -result.clamp_offset_um, max(places) * 1.05
+    x = Axis("place of the probe from the tip of the jaws, µm", *around(min(begin, 0.0), end))
+    y = Axis("k^(-1/3), (µN/µm)^(-1/3)", 0.0, 1.1 * max(*roots, slope * (end - begin)))
+    plot = Plot(x, y, f"Stiffness of the spans of fibre {record.number}")
+    plot.line([begin, end], [0.0, slope * (end - begin)], GREY)
+    for number, (place, root) in enumerate(zip(places, roots, strict=True)):
+        plot.points([place], [root], BLUE, hollow=number not in result.used)
+    plot.note(begin, 0.05 * y.high, "clamp")
+    return plot.svg()
+
+
+def distribution_figure(values_n_m2: Sequence[float], mean: MeanEi) -> str:
+    """Return the distribution of stiffnesses on a logarithmic axis, with the mean's interval."""
+    values = np.array([each for each in values_n_m2 if each > 0.0]) / EI_UNIT
+    logs = np.log(values)
+    bins = max(4, min(16, round(1.5 * math.sqrt(len(values)))))
+    room = max(0.08, 0.5 * float(np.ptp(logs)) / bins)
+    edges = np.linspace(logs.min() - room, logs.max() + room, bins + 1)
+    counts, _ = np.histogram(logs, edges)
+    x = Axis(f"bending stiffness, {EI_LABEL}", math.exp(edges[0]), math.exp(edges[-1]), log=True)
+    y = Axis("fibres", 0.0, 1.15 * float(counts.max()))
+    plot = Plot(x, y, "Distribution of bending stiffness", width=640.0, height=280.0)
+    for count, low, high in zip(counts, edges[:-1], edges[1:], strict=True):
+        if count:
+            plot.box(math.exp(low + 0.01), math.exp(high - 0.01), 0.0, float(count), "#9dbfdc")
+    if mean.count >= 2 and mean.spread_ln > 0.0:
+        at = np.linspace(edges[0], edges[-1], 120)
+        middle = math.log(mean.ei_n_m2 / EI_UNIT)
+        bell = np.exp(-0.5 * ((at - middle) / mean.spread_ln) ** 2)
+        scale = len(values) * (edges[1] - edges[0]) / (mean.spread_ln * math.sqrt(2.0 * math.pi))
+        high = np.minimum(bell * scale, y.high)
+        plot.line(np.exp(at).tolist(), high.tolist(), INK)
+        ends = [max(mean.ei_low_n_m2 / EI_UNIT, x.low), min(mean.ei_high_n_m2 / EI_UNIT, x.high)]
+        plot.line(ends, [0.96 * y.high] * 2, ORANGE)
+        plot.note(ends[1], 0.96 * y.high, "95 % interval of the mean")
+    plot.points(values.tolist(), [0.02 * y.high] * len(values), BLUE)
+    return plot.svg()
