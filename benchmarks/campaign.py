@@ -1,0 +1,177 @@
+"""Campaigns of one simulated hour, scored from the twin's own truth.
+
+Each seed is a program of its own, as an operator would start it: `cosmic campaign` with the sample
+`forty-dry`, its default faults, and the speeds of the real axes. It ends before the hour where no
+fibre is left that can be taken up. The records are compared with what the twin wrote to its file of
+truth, which the campaign cannot read.
+
+    python -m benchmarks.campaign                 # 10 seeds, about 20 minutes on two quiet cores
+    python -m benchmarks.campaign --quick         # one seed, eight fibres
+"""
+
+import math
+import statistics
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.figures import Figure, main, percentile
+from cosmic.autonomy.campaign.records import FibreRecord, Outcome
+from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.twin.truth import TrueFibre, TruthRecord, read_truth
+
+NAME = "campaign"
+SEEDS = 10
+RATE = 20.0
+LIMIT_S = 1800.0
+SAME_UM, SAME_LENGTH = 250.0, 0.1
+"""How far a record and a true fibre may lie apart to be the same."""
+GOAL_FROM_N_M2 = 1e-12
+SENSOR_UN = 180.0
+PEAK_PART = 0.8
+MUST_PER_HOUR, MUST_SUCCESS = 60.0, 90.0
+MEDIAN_PERCENT, P90_PERCENT = 5.0, 10.0
+LEAST_COVER, MOST_COVER = 90.0, 99.0
+
+RECIPE = """
+procedure = "bend test"
+[sample]
+name = "forty-dry"
+[stop]
+{stop}
+[output]
+pictures = false
+html = false
+pdf = false
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One campaign with what truly happened."""
+
+    fibres: tuple[FibreRecord, ...]
+    elapsed_s: float
+    truth: TruthRecord
+    end: str
+
+    @property
+    def good(self) -> list[FibreRecord]:
+        """Fibres that were measured, and trusted."""
+        return [each for each in self.fibres if each.outcome is Outcome.GOOD]
+
+    @property
+    def tried(self) -> list[FibreRecord]:
+        """Fibres whose treatment has an end."""
+        return [each for each in self.fibres if each.outcome is not Outcome.RUNNING]
+
+    def true_of(self, record: FibreRecord) -> TrueFibre | None:
+        """Return the fibre that a record is of; None where none lay there."""
+        if record.found is None:
+            return None
+        x, y, length = record.found.x_plate_um, record.found.y_plate_um, record.shape.length_um
+        near = [
+            each
+            for each in self.truth.fibres
+            if math.hypot(each.x_um - x, each.y_um - y) < SAME_UM
+            and abs(each.length_um - length) < SAME_LENGTH * each.length_um
+        ]
+        return min(near, key=lambda each: math.hypot(each.x_um - x, each.y_um - y), default=None)
+
+
+def carry_out(seed: int, stop: str, folder: Path) -> Run:
+    """Run one campaign to its end; raises `RuntimeError` where the program failed."""
+    recipe, out, truth = folder / "hour.toml", folder / f"out-{seed}", folder / f"truth-{seed}"
+    recipe.write_text(RECIPE.format(stop=stop), encoding="utf-8")
+    command = [sys.executable, "-m", "cosmic", "campaign", str(recipe), "--out", str(out)]
+    command += ["--seed", str(seed), "--rate", str(RATE), "--truth", str(truth)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S, check=False)
+    reader = CampaignReader(out)
+    _, end = reader.ended()
+    if not end:
+        raise RuntimeError(f"seed {seed}: {done.stderr[-2000:]}")
+    return Run(reader.fibres(), reader.elapsed_s(), read_truth(truth), end)
+
+
+def measure(quick: bool = False) -> list[Figure]:
+    """Return the figures of all seeds together."""
+    stop = "count = 8" if quick else "time_s = 3600.0"
+    with tempfile.TemporaryDirectory() as folder:
+        runs = [carry_out(seed, stop, Path(folder)) for seed in range(1, 2 if quick else SEEDS + 1)]
+    return [*throughput(runs), *stiffness(runs), *safety(runs)]
+
+
+def throughput(runs: list[Run]) -> list[Figure]:
+    """Return how many fibres were treated, and how well."""
+    rates = [3600.0 * len(each.good) / each.elapsed_s for each in runs if each.elapsed_s > 0.0]
+    good, tried = sum(len(each.good) for each in runs), sum(len(each.tried) for each in runs)
+    cycles = [fibre.duration_s for each in runs for fibre in each.good]
+    success = 100.0 * good / tried if tried else math.nan
+    return [
+        Figure(NAME, "fibres tried", tried, "fibres"),
+        Figure(NAME, "good fibres", good, "fibres"),
+        Figure(NAME, "good fibres an hour, mean of the seeds", statistics.mean(rates), "1/h"),
+        Figure(NAME, "the same, least of a seed", min(rates), "1/h"),
+        _short(f"good an hour below {MUST_PER_HOUR:g}", statistics.mean(rates), MUST_PER_HOUR),
+        Figure(NAME, "success of the fibres tried", success, "%"),
+        _short(f"success below {MUST_SUCCESS:g} %", success, MUST_SUCCESS),
+        Figure(NAME, "time of a good fibre, median", statistics.median(cycles), "s"),
+    ]
+
+
+def _short(name: str, value: float, wanted: float) -> Figure:
+    """Return by how much a value falls short of what it must be, which may be nothing."""
+    return Figure(NAME, name, max(0.0, wanted - value), "", 0.0)
+
+
+def stiffness(runs: list[Run]) -> list[Figure]:
+    """Return how far off the stiffness of good fibres is, and whether the interval says so."""
+    errors, covered, lengths, widths, strangers = [], [], [], [], 0
+    for run in runs:
+        for record in run.good:
+            true, found = run.true_of(record), record.bending
+            if true is None or found is None:
+                strangers += 1
+                continue
+            lengths.append(100.0 * abs(record.shape.length_um / true.length_um - 1.0))
+            widths.append(100.0 * abs(record.shape.width_um / true.width_um - 1.0))
+            if true.ei_n_m2 >= GOAL_FROM_N_M2:
+                errors.append(100.0 * abs(found.ei_n_m2 / true.ei_n_m2 - 1.0))
+                covered.append(found.ei_low_n_m2 <= true.ei_n_m2 <= found.ei_high_n_m2)
+    cover = 100.0 * statistics.mean(covered)
+    outside = max(LEAST_COVER - cover, cover - MOST_COVER, 0.0)
+    return [
+        Figure(NAME, "error of EI, median", statistics.median(errors), "%", MEDIAN_PERCENT),
+        Figure(NAME, "error of EI, 90 %", percentile(errors, 90), "%", P90_PERCENT),
+        Figure(NAME, "95 % intervals that hold the truth", cover, "%"),
+        Figure(NAME, "the same, outside of 90 to 99 %", outside, "%", 0.0),
+        Figure(NAME, "error of length, median", statistics.median(lengths), "%"),
+        Figure(NAME, "error of width, median", statistics.median(widths), "%"),
+        Figure(NAME, "good records of no single fibre", strangers, "fibres", 0.0),
+    ]
+
+
+def safety(runs: list[Run]) -> list[Figure]:
+    """Return what touched what, and how hard."""
+    contacts = sum(
+        not event.facts["meant"] for each in runs for event in each.truth.of("contact over")
+    )
+    peaks = [
+        float(event.facts["peak_un"])
+        for each in runs
+        for event in each.truth.of("left")
+        if "peak_un" in event.facts
+    ]
+    limit = 100.0 * PEAK_PART
+    ended = sum(each.end.startswith("a mistake") for each in runs)
+    return [
+        Figure(NAME, "contacts that were not intended", contacts, "", 0.0),
+        Figure(NAME, "peak force, of the range", 100.0 * max(peaks) / SENSOR_UN, "%", limit),
+        Figure(NAME, "ended by a mistake in the program", ended, "", 0.0),
+    ]
+
+
+if __name__ == "__main__":
+    main(__doc__, measure)
