@@ -28,7 +28,6 @@ class CollisionBar(QObject):
         self._bar = bar
         self._panel = panel
         self._application = panel.mico.application
-        bar.set_collision_model(present=panel.collision.has_model)
         panel.collision.changed.connect(self._on_collision_changed)
         watch = self._application.clearance_watch
         if watch is not None:
@@ -38,6 +37,7 @@ class CollisionBar(QObject):
         self._on_refreshed()
 
     def _on_collision_changed(self) -> None:
+        self._bar.set_collision_model(present=self._panel.collision.has_model)
         self._bar.set_unwatched(self._panel.collision.unwatched)
         self._bar.set_contacts(self._panel.collision.contacts)
 

@@ -45,6 +45,7 @@ _BY_FAULT: Final = {
 }
 _BY_REASON: Final = {
     Reason.STOPPED: "reset the stop",
+    Reason.NO_LEASE: "take control of the platform",
     Reason.COLLISION: "move aside what is in its way",
     Reason.LIMIT: "correct the step in the platform file",
     Reason.DEVICE: "connect it, rescan",

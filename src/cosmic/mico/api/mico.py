@@ -453,7 +453,7 @@ class Mico:
     def collision(self) -> Collision:
         """What is watched for collisions; raises `NotAvailable` without a collision model."""
         model = self._application.collision
-        if model is None:
+        if model is None or not model.available:
             raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the platform file")
         return Collision(self._manager, model, self._source)
 

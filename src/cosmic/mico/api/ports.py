@@ -19,6 +19,11 @@ class CollisionPort(Protocol):
 
     @property
     @abstractmethod
+    def available(self) -> bool:
+        """False while nothing is checked for collisions."""
+
+    @property
+    @abstractmethod
     def model(self) -> SceneModel | None:
         """The scene; None where it is not known in this process."""
 

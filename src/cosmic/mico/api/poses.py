@@ -127,7 +127,8 @@ class Poses:
         manager = self._site.manager
         try:
             parts = [pose.positions]
-            if way and self._site.worker.collision is not None:
+            model = self._site.worker.collision
+            if way and model is not None and model.available:
                 task.report(0.0, "looking for a way")
                 parts = list(self._site.worker.find_way(pose.positions, WAY_BUDGET_S).waypoints)
             for number, targets in enumerate(parts):

@@ -17,6 +17,7 @@ from cosmic.frame.task import Progress, Task
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.remote_line import CommandLine, may_wait_here
 from cosmic.mico.api.remote_manager import RemoteManager
+from cosmic.mico.api.remote_mirrors import RemoteCollision
 from cosmic.mico.api.station_words import EVENTS, POSITIONS, MicoFacts, MicoPicture
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.ways import Way
@@ -43,6 +44,10 @@ class RemoteMicoApplication(MicoApplicationBase):
         The station, which hosts a `MicoStationSide` under the name "mico". Who made it closes it.
     """
 
+    manager: RemoteManager
+    collision: RemoteCollision
+    clearance_watch: ClearanceWatch
+
     def __init__(
         self,
         transport: Transport,
@@ -57,10 +62,10 @@ class RemoteMicoApplication(MicoApplicationBase):
         self._subscriptions: list[Subscription] = []
         self._told = Event()
         self._here = False
-        self._closed = False
-        self.manager: RemoteManager = RemoteManager(self._line)
-        self.collision = None
-        self.clearance_watch = None
+        self._closed = self._watching = False
+        self.manager = RemoteManager(self._line)
+        self.collision = self.manager.collision
+        self.clearance_watch = ClearanceWatch(self.collision, self.manager.positions, policy)
         self.undo = self.manager.undo
         self.teleoperation = Teleoperation(self.manager, policy)
         self.trajectories = TrajectorySite(self, policy)
@@ -133,11 +138,8 @@ class RemoteMicoApplication(MicoApplicationBase):
         if self.teleoperation.settings != self.manager.settings.teleoperation:
             self.teleoperation.close()
             self.teleoperation = Teleoperation(self.manager, self._policy)
-        if self.collision is None and self.manager.collision is not None:
-            self.collision = self.manager.collision
-            self.clearance_watch = ClearanceWatch(
-                self.collision, self.manager.positions, self._policy
-            )
+        if self.collision.available and not self._watching:
+            self._watching = True
             self.clearance_watch.start()
 
     def _on_safe_stop(self, reason: str) -> None:
@@ -156,9 +158,8 @@ class RemoteMicoApplication(MicoApplicationBase):
         self.request_end()
         self.teleoperation.close()
         self.trajectories.close()
-        if self.clearance_watch is not None:
-            self.clearance_watch.request_end()
-            self.clearance_watch.join()
+        self.clearance_watch.request_end()
+        self.clearance_watch.join()
         self.join()
         for each in self._subscriptions:
             each.close()

@@ -20,6 +20,7 @@ from cosmic.frame.errors import (
 from cosmic.frame.network.travelling_errors import from_plain
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.api.remote_device import RemoteDevice, follow
+from cosmic.mico.api.remote_foresight import foreseen
 from cosmic.mico.api.remote_line import CommandLine, may_wait_here
 from cosmic.mico.api.remote_mirrors import (
     RemoteCollision,
@@ -104,7 +105,7 @@ class RemoteManager(QObject):
         self.lease = Lease()
         self.links = RemoteLinks(line)
         self.links.subscribe(self.links_changed.emit)
-        self.collision: RemoteCollision | None = None
+        self.collision = RemoteCollision(line)
         self.poses = RemotePoses(line)
         self.undo = RemoteUndo(self._order_undo)
         line.heed = self.take_event
@@ -114,7 +115,7 @@ class RemoteManager(QObject):
     @property
     def exemptions(self) -> RemoteCollision | None:
         """What is left out of the collision check; None without a collision model."""
-        return self.collision
+        return self.collision if self.collision.available else None
 
     @property
     def failure(self) -> str:
@@ -205,6 +206,15 @@ class RemoteManager(QObject):
         if not isinstance(said, MoveVerdict):
             return refuse(Reason.NO_ANSWER, f"the station answers {said!r:.80}")
         return said
+
+    def foresee(self, motions: Mapping[str, Motion], *, consent: bool = False) -> MoveVerdict:
+        """Return what can be said here and now; the station decides each movement in any case.
+
+        Where this thread must not wait, collisions are left out.
+        """
+        if may_wait_here():
+            return self.check(motions, consent=consent)
+        return foreseen(motions, self, consent=consent)
 
     def order_together(
         self,
@@ -318,8 +328,7 @@ class RemoteManager(QObject):
             self._others = {each.name: each for each in (*settings.positioner, *others)}
             self.clock = RatedClock(facts.rate)
             self.controller = RemoteController(facts.controller, facts.simulated)
-            if facts.contacts is not None and self.collision is None:
-                self.collision = RemoteCollision(self._line, facts.contacts, self._others)
+        self.collision.learn(facts.contacts)
 
     def take_picture(self, picture: MicoPicture) -> None:
         """Begin anew with everything as it is at the station now."""
@@ -427,13 +436,11 @@ class RemoteManager(QObject):
             if before is not None and status.stamp < before.stamp:
                 return
             self._status = status
-            collision = self.collision
         self.latch.show(status.stop)
         self.links.show(status.links)
         self.poses.show(status.poses)
         self.undo.show(status.undo)
-        if collision is not None:
-            collision.show(status.taken_out, status.contacts)
+        self.collision.show(status.taken_out, status.contacts)
         if before is None or _shape(before) != _shape(status):
             self.changed.emit()
 

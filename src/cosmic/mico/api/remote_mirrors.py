@@ -12,7 +12,7 @@ from cosmic.mico.api.remote_line import CommandLine
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.callback import CollisionCallbackBase
 from cosmic.mico.core.collision.exemptions import Exemptions
-from cosmic.mico.core.collision.model import BodyPair, Contact, SceneModel
+from cosmic.mico.core.collision.model import BodyPair, SceneModel
 from cosmic.mico.core.links import Link, LinkTable
 from cosmic.mico.core.orders import Order
 from cosmic.mico.core.poses import Pose, PoseBook
@@ -61,12 +61,22 @@ class RemoteLinks(LinkTable):
 class RemoteCollision(Exemptions):
     """The collision model of a station: what is left out of it, and how close things are."""
 
-    def __init__(self, line: CommandLine, contacts: Iterable[str], axes: Iterable[str]) -> None:
-        super().__init__(
-            [Contact(name=name, pairs=(), reason="") for name in contacts], tuple(axes)
-        )
+    def __init__(self, line: CommandLine) -> None:
+        super().__init__((), ())
         self._line = line
+        self._contact_names: tuple[str, ...] | None = None
         self.model: SceneModel | None = None
+
+    @property
+    def available(self) -> bool:
+        """False while nothing is checked for collisions, as far as is known here."""
+        return self._contact_names is not None
+
+    def learn(self, contacts: tuple[str, ...] | None) -> None:
+        """Take note of the operations that the scene describes; None: there is no model."""
+        if contacts != self._contact_names:
+            self._contact_names = contacts
+            tell(self._listeners)
 
     @override
     def take_out(self, axis: str, *, source: str = "script") -> None:

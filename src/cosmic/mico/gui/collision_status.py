@@ -30,7 +30,7 @@ class CollisionStatus(QObject):
     @property
     def has_model(self) -> bool:
         """Whether movements are checked for collisions at all."""
-        return self._model is not None
+        return self._model is not None and self._model.available
 
     @property
     def unwatched(self) -> tuple[str, ...]:

@@ -1,0 +1,37 @@
+"""What can be said of a movement here, before the station decides it."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final
+
+from cosmic.frame.clock import WALL
+from cosmic.frame.verdict import MoveVerdict
+from cosmic.mico.core.collision.checker import NoCollisionModel
+from cosmic.mico.core.gate import Picture, Request, judge
+from cosmic.mico.core.orders import Motion
+from cosmic.mico.core.rules import Limits
+
+if TYPE_CHECKING:
+    from cosmic.mico.api.remote_manager import RemoteManager
+
+_HERE: Final = "here"
+
+
+def foreseen(
+    motions: Mapping[str, Motion], manager: "RemoteManager", *, consent: bool
+) -> MoveVerdict:
+    """Judge `motions` by all but collisions and the lease, with what the station told last."""
+    defaults, watch = manager.settings.defaults, manager.settings.watch
+    picture = Picture(
+        stop_reason=manager.latch.state.reason,
+        token=_HERE,
+        states=manager.states(),
+        held={},
+        targets={},
+        now_wall_s=WALL.now_s(),
+        rules=Limits(
+            largest_step={"um": defaults.largest_step_um, "deg": defaults.largest_step_deg},
+            stale_s=watch.stale_s,
+        ),
+    )
+    requests = [Request(name, motion, _HERE, consent) for name, motion in motions.items()]
+    return judge(requests, picture, NoCollisionModel(), advice=False).verdict
