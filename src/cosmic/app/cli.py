@@ -14,6 +14,7 @@ from cosmic.app.cli_stations import (
     line_options,
     make_certificates,
     serve_station,
+    stations_of,
 )
 from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.errors import CosmicError
@@ -144,11 +145,15 @@ def _options(chosen: argparse.Namespace) -> "WindowOptions":
         rate=chosen.rate,
         cold=chosen.cold,
         sample=chosen.sample,
-        truth=chosen.truth,
         offscreen_s=chosen.offscreen,
         screenshot=chosen.screenshot,
         size=size,
         theme=chosen.theme,
+        serve=chosen.serve,
+        listen=chosen.listen,
+        name=chosen.name,
+        certificates=chosen.certificates,
+        stations=stations_of(chosen),
     )
 
 
@@ -176,7 +181,6 @@ def _parser() -> argparse.ArgumentParser:
         rate=1.0,
         cold=False,
         sample=None,
-        truth=None,
         offscreen=None,
         screenshot=None,
         size=None,
@@ -219,7 +223,6 @@ def _platform_options() -> argparse.ArgumentParser:
     add("--rate", type=float, help="how many times faster than the wall the simulation runs")
     add("--cold", action="store_true", help="start the simulation at power-up, nothing referenced")
     add("--sample", metavar="NAME", help="what lies on the simulated plate, such as forty-dry")
-    add("--truth", type=Path, metavar="FILE", help="write what truly happens in the simulation")
     return options
 
 

@@ -6,14 +6,28 @@ from typing import Final
 
 from PySide6.QtCore import QObject, QSettings, Signal
 
-from cosmic.frame.gui.top_bar import TopBar
+from cosmic.frame.gui.top_bar import NO_COLLISION_MODEL, TopBar
 
 logger = logging.getLogger(__name__)
 
 MCM: Final = "MCM"
 SCM: Final = "SCM"
 ECM: Final = "ECM"
+NO_MICO: Final = "nothing here moves"
+NO_ECM: Final = f"{NO_COLLISION_MODEL}; name a scene in the platform file"
 _KEY: Final = "window/mode"
+
+
+def blocked_modes(*, mico: bool, model: bool) -> dict[str, str]:
+    """Return which modes cannot be chosen, and why.
+
+    Parameters
+    ----------
+    mico, model : bool
+        The window has axes, and a model of what they may collide with.
+    """
+    blocked = {} if mico else {SCM: NO_MICO}
+    return blocked if model else blocked | {ECM: NO_ECM}
 
 
 class ControlMode(QObject):

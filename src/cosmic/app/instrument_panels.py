@@ -1,9 +1,11 @@
 """Where the panels of vision and acquisition stand at a first start."""
 
+from dataclasses import dataclass
 from typing import Final
 
 from PySide6.QtCore import Qt
 
+from cosmic.app.platform import Platform
 from cosmic.daqco.gui.main_widget import UDaqMainWidget
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.vico.gui.vico_gui import VicoGui
@@ -11,12 +13,62 @@ from cosmic.vico.gui.vico_gui import VicoGui
 DAQCO: Final = "DAQCo"
 LENS: Final = "Lens and light"
 NARROW_SCREEN_PX: Final = 1600
+LOW_SCREEN_PX: Final = 1000
+_WITH_PICTURE: Final = [5, 5, 4]
+_WITH_SCENE: Final = [3, 2]
+"""How panels beside each other share the width at a first start."""
 _SHARES: Final = [1, 1]
 """How scene and force share their column."""
 _ABOVE_LENS: Final = [3, 1]
 """How picture and lens share theirs."""
 _WITH_LENS: Final = [3, 1]
 """How picture and lens share the width where they stand alone."""
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """The panels of vision and acquisition, as far as there are any."""
+
+    pictures: VicoGui | None
+    force: UDaqMainWidget | None
+
+    @property
+    def panels(self) -> dict[str, list[str]]:
+        """The titles of the panels, by application."""
+        found: dict[str, list[str]] = {}
+        if self.force is not None:
+            found["daqco"] = [DAQCO]
+        if self.pictures is not None and self.pictures.cameras:
+            titles = [view.windowTitle() for view in self.pictures.cameras.values()]
+            found["vico"] = [*titles, LENS]
+        return found
+
+    def place(self, window: CosmicServerGui, scene: str, left: str) -> str:
+        """Add them to the window, and share its width out; return the first picture's title.
+
+        Parameters
+        ----------
+        scene, left : str
+            Titles of the panel with the scene and of the one at the left; "" where there is none.
+        """
+        low = window.screen().availableGeometry().height() < LOW_SCREEN_PX
+        first = add_instruments(window, self.pictures, self.force, scene, low=low)
+        behind = window.tabifiedDockWidgets(window.dock(first)) if first else []
+        aside = scene if scene and window.dock(scene) not in behind else ""
+        columns = [title for title in (left, first, aside) if title]
+        shares = _WITH_PICTURE if first else _WITH_SCENE
+        window.share_out(columns, shares[: len(columns)], Qt.Orientation.Horizontal)
+        return first
+
+
+def instruments_of(platform: Platform) -> Instruments:
+    """Return the panels of a platform's instruments; they are made now."""
+    vision = platform.vico.get_gui() if platform.vico is not None else None
+    force = platform.daqco.get_gui() if platform.daqco is not None else None
+    return Instruments(
+        vision if isinstance(vision, VicoGui) else None,
+        force if isinstance(force, UDaqMainWidget) else None,
+    )
 
 
 def add_instruments(

@@ -3,21 +3,23 @@
 import logging
 from typing import Final
 
-from PySide6.QtCore import QObject, QSettings, Qt, Signal
+from PySide6.QtCore import QSettings, Qt
 from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
 import cosmic
 from cosmic.app.collision_bar import CollisionBar
-from cosmic.app.control_mode import ECM, SCM, ControlMode
+from cosmic.app.control_mode import ECM, SCM, ControlMode, blocked_modes
 from cosmic.app.hint_bar import HintBar, first_steps
-from cosmic.app.instrument_panels import add_instruments
+from cosmic.app.instrument_panels import instruments_of
 from cosmic.app.platform import Platform
 from cosmic.app.procedure_panels import TRAJECTORIES, ProcedurePanels
 from cosmic.app.rig import Rig
 from cosmic.app.scene_panel import ScenePanel
+from cosmic.app.station_host import StationHost
 from cosmic.app.way_bar import Stage, WayBar
 from cosmic.app.way_guide import WayGuide
-from cosmic.daqco.gui.main_widget import UDaqMainWidget
+from cosmic.app.window_bridge import WindowBridge
+from cosmic.app.window_stations import WindowStations
 from cosmic.frame.failure import Failure
 from cosmic.frame.gui.console_panel import ConsolePanel
 from cosmic.frame.gui.log_panel import LogPanel
@@ -25,38 +27,18 @@ from cosmic.frame.gui.palette import ThemeName
 from cosmic.frame.gui.server_gui import LOG_TITLE, CosmicServerGui
 from cosmic.frame.gui.stop_key import StopKeyFilter
 from cosmic.frame.gui.theme import State
-from cosmic.frame.gui.top_bar import NO_COLLISION_MODEL
 from cosmic.frame.log import RingBufferHandler
 from cosmic.mico.core.stop_latch import StopState
 from cosmic.mico.gui.mico_widget import MicoWidget
-from cosmic.vico.gui.vico_gui import VicoGui
 
 logger = logging.getLogger(__name__)
 
 MICO: Final = "MiCo"
-LOW_SCREEN_PX: Final = 1000
 CONSOLE: Final = "Console"
 SCENE: Final = "Scene"
 
-NO_MICO: Final = "nothing here moves"
-NO_ECM: Final = f"{NO_COLLISION_MODEL}; name a scene in the platform file"
-
-_WITH_PICTURE: Final = [5, 5, 4]
 _SHARES: Final = [3, 2]
-"""How panels beside each other share the width at a first start."""
-
-
-class _Bridge(QObject):
-    """Brings what happens in any thread to the window; outlives it, so no late call is lost."""
-
-    failure_reported = Signal(object)
-    latch_changed = Signal(object)
-
-    def tell_failure(self, failure: Failure) -> None:
-        self.failure_reported.emit(failure)
-
-    def tell_latch(self, state: StopState) -> None:
-        self.latch_changed.emit(state)
+"""How log and console share the width at a first start."""
 
 
 class OperatorWindow(CosmicServerGui):
@@ -74,6 +56,8 @@ class OperatorWindow(CosmicServerGui):
         Where the log panel takes its records from.
     console : bool
         Have a Python console.
+    host : StationHost or None
+        What serves the platform to others; closed with the window.
     """
 
     def __init__(
@@ -84,18 +68,20 @@ class OperatorWindow(CosmicServerGui):
         *,
         console: bool = True,
         theme: ThemeName = "dark",
+        host: StationHost | None = None,
     ) -> None:
         stop_key = platform.file.platform.stop_key
         super().__init__(settings, stop_key=stop_key, theme=theme)
         self.setWindowTitle(f"CoSMic: {platform.file.platform.name}")
         self._platform = platform
+        self._host = host
         self._rig = Rig(platform, source="console")
         self._console: ConsolePanel | None = None
         self._procedures: ProcedurePanels | None = None
         self._mico_gui: MicoWidget | None = None
         self._scene: ScenePanel | None = None
         self._guide: WayGuide | None = None
-        self._bridge = _Bridge()
+        self._bridge = WindowBridge()
         self._forget_policy = platform.policy.subscribe(self._bridge.tell_failure)
         self._stop_filter = StopKeyFilter(_application(), stop_key, self)
         self._add_mico(settings)
@@ -106,7 +92,12 @@ class OperatorWindow(CosmicServerGui):
             )
         if pictures:
             self.dock(pictures).raise_()
-        self._mode = self._make_mode(settings)
+        self._stations = WindowStations(self, platform, host, self._instruments.panels)
+        model = self._mico_gui is not None and self._mico_gui.collision.has_model
+        blocked = blocked_modes(mico=self._mico_gui is not None, model=model)
+        self._mode = ControlMode(self.top_bar, settings, blocked, self)
+        self._mode.changed.connect(self._on_mode_changed)
+        self._mode.restore()
         self._add_log(ring, console=console)
         self._connect_all()
         self._show_platform()
@@ -137,38 +128,13 @@ class OperatorWindow(CosmicServerGui):
         self._guide = WayGuide(gui, self._scene, way_bar, self)
         self._guide.offered.connect(self._on_way_offered)
 
-    def _make_mode(self, settings: QSettings) -> ControlMode:
-        blocked = {}
-        if self._mico_gui is None:
-            blocked[SCM] = NO_MICO
-        if self._mico_gui is None or not self._mico_gui.collision.has_model:
-            blocked[ECM] = NO_ECM
-        mode = ControlMode(self.top_bar, settings, blocked, self)
-        mode.changed.connect(self._on_mode_changed)
-        mode.restore()
-        return mode
-
     def _add_instruments(self) -> str:
         """Put picture and lens in the middle, force below the scene; return the picture's title."""
-        platform, low = self._platform, self.screen().availableGeometry().height() < LOW_SCREEN_PX
-        if platform.mico is None:
+        if self._platform.mico is None:
             self.top_bar.set_collision_model(present=True)  # nothing moves that could collide
         scene = SCENE if self._scene is not None else ""
-        vision = platform.vico.get_gui() if platform.vico is not None else None
-        force = platform.daqco.get_gui() if platform.daqco is not None else None
-        pictures = add_instruments(
-            self,
-            vision if isinstance(vision, VicoGui) else None,
-            force if isinstance(force, UDaqMainWidget) else None,
-            scene,
-            low=low,
-        )
-        behind = self.tabifiedDockWidgets(self.dock(pictures)) if pictures else []
-        aside = scene if scene and self.dock(scene) not in behind else ""
-        columns = [title for title in (MICO if scene else "", pictures, aside) if title]
-        shares = _WITH_PICTURE if pictures else _SHARES
-        self.share_out(columns, shares[: len(columns)], Qt.Orientation.Horizontal)
-        return pictures
+        self._instruments = instruments_of(self._platform)
+        return self._instruments.place(self, scene, MICO if scene else "")
 
     def _add_log(self, ring: RingBufferHandler, *, console: bool) -> None:
         below = Qt.DockWidgetArea.BottomDockWidgetArea
@@ -209,7 +175,7 @@ class OperatorWindow(CosmicServerGui):
         self.set_keys(keys)
         self.set_about(
             f"CoSMic {cosmic.__version__}\nControl software for a microrobotic platform.\n"
-            f"Platform file: {platform.path}"
+            f"Platform file: {platform.path}" + (f"\n{self._host.address}" if self._host else "")
         )
 
     @property
@@ -247,12 +213,7 @@ class OperatorWindow(CosmicServerGui):
     def open_hardware(self) -> None:
         """Begin to open the hardware; the panels show how it goes."""
         self.setFocus()  # else the first button has it, and Space would press that
-        if self._platform.mico is not None:
-            self._platform.mico.initialize_later()
-        if self._platform.daqco is not None:
-            self._platform.daqco.initialize_later()
-        if self._platform.vico is not None:
-            self._platform.vico.initialize()
+        self._platform.initialize_later()
 
     def stop(self, reason: str) -> None:
         """Stop everything and keep it stopped."""
@@ -316,6 +277,9 @@ class OperatorWindow(CosmicServerGui):
 
     def _on_closing(self) -> None:
         """Leave everything safe; motion ends first, the console with what it waits for next."""
+        if self._host is not None:
+            self._host.close()
+        self._stations.end()
         self._forget_policy()
         if self._scene is not None:
             self._scene.save()

@@ -15,9 +15,12 @@ from PySide6.QtCore import QCoreApplication, QObject, QSettings, QStandardPaths,
 from PySide6.QtWidgets import QApplication
 
 from cosmic.app.check import key_mistakes
+from cosmic.app.network_settings import serving
 from cosmic.app.operator_window import OperatorWindow
-from cosmic.app.platform import Platform, build_platform
+from cosmic.app.platform import Platform, Uses, build_platform
 from cosmic.app.platform_file import KNOWN_APPLICATIONS
+from cosmic.app.serve_options import StationAddress
+from cosmic.app.station_host import StationHost
 from cosmic.daqco.gui.main_widget import make_daqco_gui
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.gui.palette import ThemeName
@@ -46,10 +49,13 @@ class WindowOptions:
         Where to save a picture of the window before it closes.
     sample : str or None
         What lies on the simulated plate, as twin.toml names it.
-    truth : Path or None
-        Where to write what truly happens on the simulated platform.
     size : tuple of int or None
         Width and height of the window; None leaves it as it was.
+    serve, listen, name, certificates
+        Whether the window serves what it hosts to others, and in place of what the platform file
+        says of that.
+    stations : tuple of StationAddress
+        Others, whose applications it shows.
     """
 
     config: Path | None = None
@@ -57,11 +63,15 @@ class WindowOptions:
     rate: float = 1.0
     cold: bool = False
     sample: str | None = None
-    truth: Path | None = None
     offscreen_s: float | None = None
     screenshot: Path | None = None
     size: tuple[int, int] | None = None
     theme: ThemeName | None = None
+    serve: bool = False
+    listen: str | None = None
+    name: str | None = None
+    certificates: Path | None = None
+    stations: tuple[StationAddress, ...] = ()
 
 
 def run_window(options: WindowOptions) -> int:
@@ -74,19 +84,22 @@ def run_window(options: WindowOptions) -> int:
     NotConnectedError
         The vendor library is not there.
     """
-    platform = _build(options)
     if options.offscreen_s is not None:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"  # Qt reads nothing else
         logging.getLogger("cosmic.qt").addFilter(_says_something)
-    app = _application()
+    app = _application()  # stays until all else is gone
     with ExitStack() as at_end:
         settings = at_end.enter_context(_settings(offscreen=options.offscreen_s is not None))
         ring = RingBufferHandler()
         at_end.callback(_log_to(ring))
-        at_end.callback(declare_gui_thread())
+        platform = _build(options)  # before this is the thread of a window, for it may wait
         at_end.callback(platform.shut_down)
+        host = _host(options, platform)
+        if host is not None:
+            at_end.callback(host.close)
+        at_end.callback(declare_gui_thread())
         at_end.callback(install_hooks(platform.policy))
-        window = OperatorWindow(platform, settings, ring, console=not options.only)
+        window = OperatorWindow(platform, settings, ring, console=not options.only, host=host)
         at_end.callback(window.deleteLater)
         at_end.enter_context(_closed_by_signals(window.close))
         return _run(app, window, options)
@@ -138,7 +151,7 @@ def _build(options: WindowOptions) -> Platform:
         rate=options.rate,
         cold=options.cold,
         sample=options.sample,
-        truth=options.truth,
+        uses=Uses(options.stations, "window", options.certificates, every=not options.only),
         mico_gui=make_mico_gui,
         daqco_gui=make_daqco_gui,
         vico_gui=make_vico_gui,
@@ -147,6 +160,22 @@ def _build(options: WindowOptions) -> Platform:
     if mistakes:
         raise ConfigError("\n".join(mistakes))
     return platform
+
+
+def _host(options: WindowOptions, platform: Platform) -> StationHost | None:
+    """Return what serves the platform to others, if it is to be served."""
+    network = platform.file.network
+    if not (options.serve or network.serve):
+        return None
+    how = serving(
+        network,
+        platform.file.platform.name,
+        platform.path.parent,
+        listen=options.listen,
+        name=options.name,
+        certificates=options.certificates,
+    )
+    return StationHost(platform, how)
 
 
 @contextmanager

@@ -98,8 +98,8 @@ class StationControls(QObject):
             words.append(who)
             tips.append(f"Movements at {control.station} are commanded by {who}")
             actions += [action] if action is not None else []
-            warn = warn or not control.here
-        self._sign.show_holder(", ".join(words), warn=warn, tip="\n".join(tips))
+            warn = warn or (alone and not control.here)
+        self._sign.show_holder("; ".join(words), warn=warn, tip="\n".join(tips))
         self._sign.set_actions(actions)
 
     # What is asked for
