@@ -145,6 +145,7 @@ def _options(chosen: argparse.Namespace) -> "WindowOptions":
         rate=chosen.rate,
         cold=chosen.cold,
         sample=chosen.sample,
+        truth=chosen.truth,
         offscreen_s=chosen.offscreen,
         screenshot=chosen.screenshot,
         size=size,
@@ -181,6 +182,7 @@ def _parser() -> argparse.ArgumentParser:
         rate=1.0,
         cold=False,
         sample=None,
+        truth=None,
         offscreen=None,
         screenshot=None,
         size=None,
@@ -223,6 +225,7 @@ def _platform_options() -> argparse.ArgumentParser:
     add("--rate", type=float, help="how many times faster than the wall the simulation runs")
     add("--cold", action="store_true", help="start the simulation at power-up, nothing referenced")
     add("--sample", metavar="NAME", help="what lies on the simulated plate, such as forty-dry")
+    add("--truth", type=Path, metavar="FILE", help="write what truly happens in the simulation")
     return options
 
 

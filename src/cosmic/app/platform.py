@@ -1,17 +1,19 @@
 """A platform as its files describe it: configuration in, running applications out."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from cosmic.app.elsewhere import Elsewhere, open_stations
+from cosmic.app.faults import SimulationFaults
 from cosmic.app.hosting import Site, build_applications
 from cosmic.app.joins import join_here, join_stations
 from cosmic.app.network_settings import own_certificates
-from cosmic.app.platform_file import KNOWN_APPLICATIONS, PlatformFile, load_platform, load_twin
+from cosmic.app.platform_file import KNOWN_APPLICATIONS, PlatformFile, load_platform
 from cosmic.app.serve_options import StationAddress
+from cosmic.app.simulation import make_scene
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.remote_application import RemoteDaqcoApplication
 from cosmic.frame.application import CosmicApplicationBase, GuiFactory
@@ -19,14 +21,9 @@ from cosmic.frame.clock import Clock, RatedClock
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.api.application_base import MicoApplicationBase
-from cosmic.twin.sample import put_on
 from cosmic.twin.scene import Scene
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.remote_application import RemoteVicoApplication
-
-if TYPE_CHECKING:
-    from cosmic.mico.hw.sim_scu3d_faults import Faults
-
 
 KNOWN_LIMIT_S: Final = 5.0
 """How long a station may take to say what it has."""
@@ -44,10 +41,11 @@ class Platform:
     clock: Clock
     policy: FailurePolicy
     mico: MicoApplicationBase | None
-    faults: "Faults | None" = None
+    faults: SimulationFaults | None = None
     daqco: DaqcoApplication | RemoteDaqcoApplication | None = None
     vico: VicoApplication | RemoteVicoApplication | None = None
     elsewhere: Elsewhere = field(default_factory=Elsewhere)
+    end: Callable[[], None] | None = None
 
     @property
     def simulated(self) -> bool:
@@ -99,6 +97,8 @@ class Platform:
     def shut_down(self) -> None:
         """Stop and close every application; any state. Motion ends first."""
         with ExitStack() as at_end:  # from the last line to the first, whatever fails
+            if self.end is not None:
+                at_end.callback(self.end)
             at_end.callback(self.elsewhere.close)
             for each in (self.vico, self.daqco, self.mico):
                 if each is not None:
@@ -135,6 +135,7 @@ def build_platform(
     cold: bool = False,
     seed: int = 0,
     sample: str | None = None,
+    truth: str | Path | None = None,
     uses: Uses = Uses(),
     mico_gui: GuiFactory | None = None,
     daqco_gui: GuiFactory | None = None,
@@ -148,7 +149,7 @@ def build_platform(
         A platform.toml or its folder; None is the one that ships with CoSMic.
     applications : tuple of str
         Which to make, as far as the platform file names them and no station hosts them.
-    rate, cold, seed, sample
+    rate, cold, seed, sample, truth
         Of the simulated platform; see `cosmic.connect`.
     uses : Uses
         Stations to connect to; the lines stand when this returns.
@@ -165,7 +166,7 @@ def build_platform(
         A station does not answer.
     """
     file, path = load_platform(config)
-    _check_simulation(file, path, rate=rate, only_simulated=cold or sample is not None)
+    _check_simulation(file, path, rate=rate, only_simulated=cold or bool(sample or truth))
     try:
         clock = RatedClock(rate)
     except (TypeError, ValueError) as exc:
@@ -180,11 +181,10 @@ def build_platform(
             for name in applications
             if name in file.platform.applications and name not in elsewhere.host_of
         ]
-        scene = None
+        scene: Scene | None = None
         if file.mico.backend == "simulated" and hosted:
-            twin = load_twin(file, path)
-            twin = twin if sample is None else put_on(twin, sample, seed)
-            scene = Scene.from_settings(twin, clock, seed=seed, cold=cold, folder=path.parent)
+            scene = make_scene(file, path, clock, seed=seed, cold=cold, sample=sample, truth=truth)
+            undo.callback(scene.close)
         site = Site(file, path, clock, policy, scene, seed)
         own = build_applications(site, hosted, guis)
         join_here(own, site)
@@ -199,6 +199,7 @@ def build_platform(
             daqco=own.daqco or used["daqco"],
             vico=own.vico or used["vico"],
             elsewhere=elsewhere,
+            end=None if scene is None else scene.close,
         )
         platform.begin_elsewhere()
         undo.pop_all()
@@ -208,7 +209,8 @@ def build_platform(
 def _check_simulation(file: PlatformFile, path: Path, *, rate: float, only_simulated: bool) -> None:
     if file.mico.backend != "simulated" and (rate != 1.0 or only_simulated):
         raise ConfigError(
-            f"{path}: mico.backend: only the simulated platform has a rate, --cold or --sample"
+            f"{path}: mico.backend: only the simulated platform has a rate, --cold, --sample or "
+            "--truth"
         )
     if rate != 1.0 and file.daqco is not None and file.daqco.backend != "simulated":
         raise ConfigError(f"{path}: daqco.backend: real boards have no rate; leave --rate out")

@@ -49,6 +49,8 @@ class WindowOptions:
         Where to save a picture of the window before it closes.
     sample : str or None
         What lies on the simulated plate, as twin.toml names it.
+    truth : Path or None
+        Where to write what truly happens on the simulated platform.
     size : tuple of int or None
         Width and height of the window; None leaves it as it was.
     serve, listen, name, certificates
@@ -63,6 +65,7 @@ class WindowOptions:
     rate: float = 1.0
     cold: bool = False
     sample: str | None = None
+    truth: Path | None = None
     offscreen_s: float | None = None
     screenshot: Path | None = None
     size: tuple[int, int] | None = None
@@ -151,6 +154,7 @@ def _build(options: WindowOptions) -> Platform:
         rate=options.rate,
         cold=options.cold,
         sample=options.sample,
+        truth=options.truth,
         uses=Uses(options.stations, "window", options.certificates, every=not options.only),
         mico_gui=make_mico_gui,
         daqco_gui=make_daqco_gui,
