@@ -4,8 +4,9 @@ from html import escape
 from pathlib import Path
 from typing import Final
 
-from PySide6.QtCore import QByteArray, QMarginsF, QRectF, QSizeF, Qt, QUrl
+from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QMarginsF, QRectF, QSizeF, Qt, QUrl
 from PySide6.QtGui import (
+    QFont,
     QGuiApplication,
     QImage,
     QPageLayout,
@@ -20,6 +21,7 @@ from cosmic.autonomy.campaign.records import CampaignError
 from cosmic.autonomy.campaign.report_data import report_data
 from cosmic.autonomy.campaign.report_html import body
 from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.campaign.store_files import write_whole
 from cosmic.autonomy.campaign.store_read import CampaignReader
 
 FINE: Final = 3
@@ -28,6 +30,7 @@ FINE: Final = 3
 FIGURE_PX: Final = 330
 """Widest of two beside each other."""
 
+NUMBER_PX: Final = 10
 MARGINS_MM: Final = (15.0, 15.0, 15.0, 15.0)
 WIDTH_PX: Final = 680.0
 HEIGHT_PX: Final = 976.0
@@ -96,23 +99,26 @@ def write_pdf(campaign: CampaignStore | CampaignReader, path: str | Path) -> Non
     figures = _Figures(document)
     document.setDefaultStyleSheet(STYLE)
     document.setHtml(f"<body>{body(data, svg=figures.svg, png=figures.png)}</body>")
-    writer = QPdfWriter(str(path))
+    held = QBuffer()
+    held.open(QIODevice.OpenModeFlag.WriteOnly)
+    writer = QPdfWriter(held)
     writer.setPageSize(QPageSize(QPageSize.PageSizeId.A4))
     writer.setPageMargins(QMarginsF(*MARGINS_MM), QPageLayout.Unit.Millimeter)
     writer.setTitle(f"{data.info.name}: {data.info.procedure}")
     writer.setCreator("CoSMic")
-    if not _print(document, writer):
-        raise CampaignError(f"{path} cannot be written: is the folder there, and is there room?")
+    _print(document, writer)
+    write_whole(Path(path), bytes(held.data().data()))
 
 
-def _print(document: QTextDocument, writer: QPdfWriter) -> bool:
-    """Print page by page, with their numbers; False if nothing can be written."""
+def _print(document: QTextDocument, writer: QPdfWriter) -> None:
+    """Print page by page, with their numbers."""
     document.setDocumentMargin(0.0)
     document.setPageSize(QSizeF(WIDTH_PX, HEIGHT_PX))
-    painter = QPainter()
-    if not painter.begin(writer):
-        return False
+    painter = QPainter(writer)
     scale = writer.width() / WIDTH_PX
+    font = QFont(document.defaultFont())
+    font.setPixelSize(NUMBER_PX)  # a size in points would be scaled twice
+    painter.setFont(font)
     count = document.pageCount()
     for page in range(count):
         if page:
@@ -127,4 +133,4 @@ def _print(document: QTextDocument, writer: QPdfWriter) -> bool:
         painter.translate(0.0, -page * HEIGHT_PX)
         document.drawContents(painter, QRectF(0.0, page * HEIGHT_PX, WIDTH_PX, HEIGHT_PX))
         painter.restore()
-    return painter.end()
+    painter.end()

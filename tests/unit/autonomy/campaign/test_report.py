@@ -1,0 +1,173 @@
+"""The report of a campaign: one page that says everything, and a table."""
+
+import math
+import re
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from cosmic.autonomy.campaign.records import CalibrationNote, CampaignError, Outcome
+from cosmic.autonomy.campaign.report import write_report
+from cosmic.autonomy.campaign.report_svg import Axis
+from cosmic.autonomy.campaign.report_table import COLUMNS, read_campaign, write_table
+from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.campaign.store_read import CampaignReader
+from unit.autonomy.campaign.sample_records import INFO, failed, good
+
+STIFFNESSES = (3e-11, 5e-11, 9e-11)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a campaign of five fibres, of which one failed and one is not trusted."""
+    folder = tmp_path_factory.mktemp("campaign")
+    info = replace(INFO, recipe_text='procedure = "bend test" # <b>bold</b>\n')
+    with CampaignStore.create(folder, info) as store:
+        store.keep_calibrations([CalibrationNote("plate", 0.42, "um", "2026-03-02T09:00:00")])
+        now = 0.0
+        for seed, ei in enumerate(STIFFNESSES):
+            record = good(store.begin_fibre(time_s=now), ei_n_m2=ei, seed=seed, began_s=now)
+            store.finish_fibre(record)
+            now = record.ended_s
+        store.finish_fibre(failed(store.begin_fibre(time_s=now), "jaw adhesion", began_s=now))
+        doubtful = good(store.begin_fibre(time_s=now), began_s=now)
+        assert doubtful.bending is not None
+        alone = replace(
+            doubtful.bending, trusted=False, reasons=("1 good spans, and 2 are needed",)
+        )
+        store.finish_fibre(
+            replace(doubtful, outcome=Outcome.DOUBTFUL, cause="not trusted", bending=alone)
+        )
+        store.end("5 fibres done", time_s=now + 30.0)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def page(folder: Path) -> str:
+    write_report(CampaignReader(folder), folder / "report.html")
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_page_needs_no_other_file(page: str) -> None:
+    assert page.startswith("<!doctype html>")
+    for address in re.findall(r'(?:src|href)="([^"]*)"', page):
+        assert address.startswith("data:image/png;base64,")
+    assert "<script" not in page
+    assert "@import" not in page
+    assert "url(" not in page
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "quick: bend test",
+        "A quick look",
+        "three-dry",
+        "digital twin",
+        "2026-03-02 09:30:00+01:00",
+        "5 fibres done",
+        "5: 3 good, 1 measured but not trusted, 1 failed",
+        "<td>60 %</td>",
+        "These fibres were simulated.",
+        "It does not show how often real jaws miss",
+        "failed: jaw adhesion",
+        "measured, not trusted: not trusted",
+        "1 good spans, and 2 are needed",
+        "the fibre did not follow the jaws in 4 tries",
+        "0.42 µm",
+        "before grasp, 2432 µm wide",
+        "&lt;b&gt;bold&lt;/b&gt;",
+        "numpy",
+        "µm behind the tip of the jaws",
+    ],
+)
+def test_the_page_tells(page: str, words: str) -> None:
+    assert words in page
+
+
+def test_every_figure_is_a_drawing_with_units_on_its_axes(page: str) -> None:
+    drawings = re.findall(r"<svg.*?</svg>", page, flags=re.DOTALL)
+    labels = []
+    for each in drawings:
+        root = ET.fromstring(each)
+        assert root.get("aria-label")
+        labels += [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert labels.count("force, µN") == 4
+    assert labels.count("push beyond the first contact, µm") == 4
+    assert labels.count("bending stiffness, 10⁻¹² N m²") == 1
+    assert "jaw adhesion" in labels
+    assert "push" in labels, "time of the operations"
+
+
+def test_a_report_can_be_written_while_the_campaign_runs(tmp_path: Path) -> None:
+    with CampaignStore.create(tmp_path / "run", INFO) as store:
+        write_report(store, tmp_path / "empty.html")
+        store.begin_fibre(time_s=0.0)
+        write_report(store, tmp_path / "first.html")
+    for name in ("empty", "first"):
+        text = (tmp_path / f"{name}.html").read_text(encoding="utf-8")
+        assert "not ended" in text
+        assert "0: 0 good" in text
+
+
+def test_a_real_platform_gets_other_words_than_the_twin(tmp_path: Path) -> None:
+    with CampaignStore.create(tmp_path / "run", replace(INFO, hardware="FiberStation")) as store:
+        write_report(store, tmp_path / "report.html")
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "simulated" not in text
+    assert "graspable part of the sample" in text
+
+
+def test_a_report_that_cannot_be_written_says_so(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(CampaignError, match="cannot be written"):
+        write_report(CampaignReader(folder), tmp_path / "nowhere" / "report.html")
+    with pytest.raises(CampaignError, match="holds no campaign"):
+        write_report(CampaignReader(tmp_path), tmp_path / "report.html")
+
+
+# ---------------------------------------------------------------------- table
+
+
+def test_the_table_is_one_for_pandas(folder: Path) -> None:
+    frame = pd.DataFrame(read_campaign(folder))
+    assert list(frame.columns) == list(COLUMNS)
+    assert len(frame) == 5
+    assert frame["ei_n_m2"].dtype == float
+    best = frame[frame["trusted"]]
+    assert (best["ei_low_n_m2"] < best["ei_n_m2"]).all()
+    assert (best["ei_n_m2"] < best["ei_high_n_m2"]).all()
+    for ei, found in zip(STIFFNESSES, best["ei_n_m2"], strict=True):
+        assert found == pytest.approx(ei, rel=0.15)
+    assert list(frame["cause"]) == ["", "", "", "jaw adhesion", "not trusted"]
+    assert math.isnan(frame["ei_n_m2"][3])
+
+
+def test_the_written_table_is_read_back_the_same(folder: Path, tmp_path: Path) -> None:
+    write_table(folder, tmp_path / "fibres.csv")
+    frame = pd.read_csv(tmp_path / "fibres.csv")
+    assert list(frame.columns) == list(COLUMNS)
+    written = pd.DataFrame(read_campaign(folder))
+    assert frame["ei_n_m2"].to_numpy() == pytest.approx(
+        written["ei_n_m2"].to_numpy(), rel=1e-6, nan_ok=True
+    )
+
+
+# ---------------------------------------------------------------------- axes
+
+
+@pytest.mark.parametrize(
+    ("axis", "ticks"),
+    [
+        (Axis("", 0.0, 10.0), [0, 2, 4, 6, 8, 10]),
+        (Axis("", -3.0, 44.0), [0, 10, 20, 30, 40]),
+        (Axis("", 0.0, 1.1), [0, 0.5, 1]),
+        (Axis("", 25.0, 110.0, log=True), [30, 50, 70, 100]),
+        (Axis("", 1.0, 100.0, log=True), [1, 2, 5, 10, 20, 50, 100]),
+        (Axis("", 1.0, 1e6, log=True), [1, 10, 100, 1e3, 1e4, 1e5, 1e6]),
+    ],
+)
+def test_ticks_are_round_values(axis: Axis, ticks: list[float]) -> None:
+    assert axis.ticks() == pytest.approx(ticks)
