@@ -106,7 +106,7 @@ def stiffness_figure(record: FibreRecord) -> str:
     plot.line([begin, end], [0.0, slope * (end - begin)], GREY)
     for number, (place, root) in enumerate(zip(places, roots, strict=True)):
         plot.points([place], [root], BLUE, hollow=number not in result.used)
-    plot.note(begin + 0.1 * (end - begin), 0.03 * y.high, "clamp, where the line begins")
+    plot.note(begin + 0.16 * (end - begin), 0.06 * y.high, "clamp, where the line begins")
     return plot.svg()
 
 

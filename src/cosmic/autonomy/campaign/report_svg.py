@@ -113,7 +113,7 @@ class Plot:
 
     def note(self, x: float, y: float, text: str, *, end: bool = False) -> None:
         """Write a text beside a place."""
-        shift = -5.0 if end else 5.0
+        shift = -8.0 if end else 6.0
         self._parts.append(
             _text(self._px(x) + shift, self._py(y) + 4.0, text, anchor="end" if end else "start")
         )
