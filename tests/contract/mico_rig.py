@@ -44,9 +44,9 @@ class HostedMico:
 
 
 @contextmanager
-def hosted_mico(rate: float = 20.0) -> Iterator[HostedMico]:
+def hosted_mico(rate: float = 20.0, *, cold: bool = False) -> Iterator[HostedMico]:
     """Host the shipped platform as the station "fibres", which does not listen yet."""
-    platform = build_platform(applications=("mico",), rate=rate)
+    platform = build_platform(applications=("mico",), rate=rate, cold=cold)
     application = platform.mico
     assert application is not None
     with ExitStack() as stack:
@@ -62,7 +62,7 @@ def hosted_mico(rate: float = 20.0) -> Iterator[HostedMico]:
 @contextmanager
 def reachable(hosted: HostedMico) -> Iterator[HostedMico]:
     """Let clients in over a line."""
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    endpoint = hosted.endpoint or f"tcp/127.0.0.1:{free_port()}"
     with listening(hosted.station, Line(endpoint, listens=True, station="fibres")):
         yield replace(hosted, endpoint=endpoint)
 

@@ -92,6 +92,8 @@ class Mico:
         address = self._manager.address(name)
         axis = self._axes.get(name)
         if axis is None:
+            if address.device not in self._commanders:
+                self._connect()  # it was told of just now, and `changed` is on its way
             axis = Axis(name, self._manager, self._commanders[address.device])
             self._axes[name] = axis
         return axis

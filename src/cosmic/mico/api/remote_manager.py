@@ -49,7 +49,7 @@ from cosmic.mico.core.orders import Motion, MoveTo, Order
 from cosmic.mico.core.positioner import Confidence, PositionerState
 from cosmic.mico.core.settings import MicoSettings, PositionerSettings
 from cosmic.mico.core.undo import UndoEntry
-from cosmic.mico.hw.interface import Channel
+from cosmic.mico.hw.interface import Channel, PositionerKind
 
 logger = logging.getLogger(__name__)
 
@@ -344,10 +344,7 @@ class RemoteManager(QObject):
         """Show that nobody knows how the axes are any more."""
         with self._lock:
             self._away = why
-            lost = [
-                replace(each.state, present=False, in_motion=False, error=why)
-                for each in self._states.values()
-            ]
+            lost = [_lost(each.state, why) for each in self._states.values()]
             for state in lost:
                 self._states[state.name] = replace(self._states[state.name], state=state)
         for state in lost:
@@ -460,6 +457,12 @@ class RemoteManager(QObject):
 
 def _alike(one: PositionerState, other: PositionerState) -> bool:
     return replace(one, read_wall_s=other.read_wall_s) == other
+
+
+def _lost(state: PositionerState, why: str) -> PositionerState:
+    sensed = state.kind is not PositionerKind.OPEN_LOOP
+    confidence = Confidence.UNKNOWN if sensed else state.confidence
+    return replace(state, present=False, in_motion=False, error=why, confidence=confidence)
 
 
 def _shape(status: MicoStatus) -> tuple[object, ...]:

@@ -1,0 +1,145 @@
+"""The panel over the axes of another station: the same widgets, and nothing freezes it."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QPushButton
+from pytestqt.qtbot import QtBot
+
+from contract.mico_rig import HostedMico, hosted_mico, reachable
+from contract.station_rig import connected, free_port
+from cosmic.frame.clock import WALL
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.gui.theme import State
+from cosmic.frame.network.client_side_connection import ClientSideConnection
+from cosmic.frame.threads import declare_gui_thread
+from cosmic.mico.api.remote_application import RemoteMicoApplication
+from cosmic.mico.api.stepwise import StepwiseMove
+from cosmic.mico.gui.mico_widget import MicoWidget, make_mico_gui
+from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
+from gui.mico.panels import click, enter, field, show, wait_for_position
+
+LONG_MS = 10_000
+
+
+@contextmanager
+def hosting(*, cold: bool = False) -> Iterator[HostedMico]:
+    with hosted_mico(rate=50.0, cold=cold) as hosted:
+        yield replace(hosted, endpoint=f"tcp/127.0.0.1:{free_port()}")
+
+
+@contextmanager
+def remote_panel(
+    qtbot: QtBot, hosted: HostedMico
+) -> Iterator[tuple[MicoWidget, ClientSideConnection]]:
+    """A window that holds the lease of the station; its thread may wait for nobody."""
+    with ExitStack() as stack:
+        client = stack.enter_context(connected(hosted.endpoint))
+        client.take_lease()
+        application = RemoteMicoApplication(client, FailurePolicy(), gui_factory=make_mico_gui)
+        stack.callback(application.shut_down)
+        stack.callback(declare_gui_thread())
+        application.initialize()
+        panel = application.get_gui()
+        assert isinstance(panel, MicoWidget)
+        qtbot.addWidget(panel)
+        show(qtbot, panel)
+        qtbot.waitUntil(lambda: len(panel.cards) == 11, timeout=LONG_MS)
+        yield panel, client
+        panel.close()
+
+
+def line(card: PositionerBaseGUI) -> str:
+    found = card.findChild(QLabel, "status")
+    assert found is not None
+    return found.text() + found.toolTip()
+
+
+def test_the_panel_of_another_station_moves_jogs_steps_undoes_and_stops(qtbot: QtBot) -> None:
+    with (
+        hosting() as hosted,
+        reachable(hosted),
+        remote_panel(qtbot, hosted) as (panel, _),
+    ):
+        assert [group.title for group in panel.groups][:2] == ["Left assembly", "Right assembly"]
+        card, gripper = panel.cards["left.x"], panel.cards["left.gripper"]
+        qtbot.waitUntil(lambda: panel.collision.has_model, timeout=LONG_MS)
+
+        enter(qtbot, field(card, "MiCoCL_8"), "80")
+        click(qtbot, card, "MiCoCL_6")
+        wait_for_position(qtbot, card, 80.0)
+
+        enter(qtbot, field(card, "MiCoCL_8"), "9000")
+        click(qtbot, card, "MiCoCL_6")
+        qtbot.waitUntil(lambda: "outside its limit" in line(card), timeout=LONG_MS)
+
+        before = gripper.axis.position_um or 0.0
+        click(qtbot, gripper, gripper.forward_name)
+        qtbot.waitUntil(lambda: (gripper.axis.position_um or 0.0) > before, timeout=LONG_MS)
+
+        panel.setFocus()
+        qtbot.keyPress(panel, Qt.Key.Key_D)
+        qtbot.waitUntil(lambda: (card.axis.position_um or 0.0) > 200.0, timeout=LONG_MS)
+        qtbot.keyRelease(panel, Qt.Key.Key_D)
+        qtbot.waitUntil(lambda: not card.axis.details.in_motion, timeout=LONG_MS)
+
+        undo = panel.findChild(QPushButton, "undo")
+        assert undo is not None
+        qtbot.waitUntil(undo.isEnabled, timeout=LONG_MS)
+        qtbot.mouseClick(undo, Qt.MouseButton.LeftButton)
+        wait_for_position(qtbot, card, 80.0)
+
+        series = StepwiseMove(card.axis, 160.0, 30.0)
+        qtbot.waitUntil(lambda: series.done, timeout=LONG_MS)
+        assert series.movement.success
+        assert series.begun == 3
+
+        panel.mico.application.manager.stop("the button")
+        qtbot.waitUntil(lambda: hosted.application.manager.latch.state.latched, timeout=LONG_MS)
+
+
+def test_nobody_moves_an_unknown_axis_of_another_station_without_consent(qtbot: QtBot) -> None:
+    with (
+        hosting(cold=True) as hosted,
+        reachable(hosted),
+        remote_panel(qtbot, hosted) as (panel, _),
+    ):
+        card = panel.cards["probe.x"]
+        click(qtbot, card, "MiCoCL_6")
+        qtbot.waitUntil(lambda: panel.dialog is not None, timeout=LONG_MS)
+        assert not hosted.mico["probe.x"].details.in_motion
+
+
+def test_a_window_that_lost_the_lease_says_who_holds_it(qtbot: QtBot) -> None:
+    with (
+        hosting() as hosted,
+        reachable(hosted),
+        remote_panel(qtbot, hosted) as (panel, _),
+    ):
+        card = panel.cards["left.x"]
+        hosted.station.lease.take_over()
+        click(qtbot, card, "MiCoCL_6")
+        qtbot.waitUntil(lambda: "held by the operator at fibres" in line(card), timeout=LONG_MS)
+
+
+def test_a_station_that_goes_away_greys_the_panel_and_comes_back_by_itself(qtbot: QtBot) -> None:
+    with hosting() as hosted, ExitStack() as stack:
+        with reachable(hosted):
+            panel, _ = stack.enter_context(remote_panel(qtbot, hosted))
+            card = panel.cards["left.x"]
+        qtbot.waitUntil(lambda: not card.axis.details.present, timeout=LONG_MS)
+        began_s = WALL.now_s()
+        card.move_once(1)
+        card.axis.halt()
+        assert WALL.now_s() - began_s < 0.5, "the window waited for a station that is away"
+        missing = panel.findChild(QLabel, "missing")
+        assert missing is not None
+        qtbot.waitUntil(lambda: "fibres is away" in missing.text(), timeout=LONG_MS)
+        qtbot.waitUntil(lambda: panel.groups[0].state is State.UNKNOWN, timeout=LONG_MS)
+        with reachable(hosted):
+            qtbot.waitUntil(lambda: card.axis.details.present, timeout=LONG_MS)
+            hosted.mico["left.x"].move_to(40.0, wait=False)
+            wait_for_position(qtbot, card, 40.0)
+            qtbot.waitUntil(lambda: not missing.isVisible(), timeout=LONG_MS)
