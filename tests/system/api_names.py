@@ -15,6 +15,12 @@ from cosmic.autonomy.control.loop import ControlEnding, ControlReading, ControlS
 from cosmic.autonomy.control.pace import PaceStatistics
 from cosmic.autonomy.control.pid import PidGains
 from cosmic.autonomy.control.trace import ControlTrace
+from cosmic.autonomy.procedures.failures import ProcedureAborted, ProcedureStopped, UndoFailed
+from cosmic.autonomy.procedures.operation import OperationFailed, UnitOperation
+from cosmic.autonomy.procedures.run import ProcedureRun
+from cosmic.autonomy.procedures.run_state import RunState
+from cosmic.autonomy.procedures.times import OperationStatistics, OperationTimes
+from cosmic.autonomy.procedures.tree import NodeEvent, NodeState, NodeView
 from cosmic.daqco.api.channel_shape import ChannelHandle
 from cosmic.daqco.api.daqco import Daqco, DaqCounters, DaqLimit
 from cosmic.daqco.api.recorder import RecordingState
@@ -141,6 +147,12 @@ CLASSES: Final[dict[str, type]] = {
     "PaceStatistics": PaceStatistics,
     "ControlTrace": ControlTrace,
     "PidGains": PidGains,
+    "UnitOperation": UnitOperation,
+    "ProcedureRun": ProcedureRun,
+    "NodeEvent": NodeEvent,
+    "NodeView": NodeView,
+    "OperationTimes": OperationTimes,
+    "OperationStatistics": OperationStatistics,
 }
 ENUMS: Final[dict[str, type[Enum]]] = {
     "Reason": cosmic.Reason,
@@ -156,6 +168,8 @@ ENUMS: Final[dict[str, type[Enum]]] = {
     "Feedback": Feedback,
     "ControlState": ControlState,
     "ControlEnding": ControlEnding,
+    "RunState": RunState,
+    "NodeState": NodeState,
 }
 # Exceptions that a script may want to name and that `cosmic` does not export.
 FURTHER_EXCEPTIONS: Final = (
@@ -163,6 +177,10 @@ FURTHER_EXCEPTIONS: Final = (
     ExportCancelled,
     TrajectoryError,
     AwayFromStartError,
+    OperationFailed,
+    ProcedureStopped,
+    UndoFailed,
+    ProcedureAborted,
     StationAway,
     StationTimeout,
     Busy,
@@ -175,6 +193,7 @@ MADE_LATER: Final = {
     "Vico": ("lens", "light"),
     "CameraHandle": ("name",),
     "Control": ("settings",),
+    "ProcedureRun": ("procedure", "work", "times"),
     "Axis": ("commander",),
     "Approach": ("bodies", "distance_um", "places_um", "pose"),
     "Link": ("first", "second", "ratio"),

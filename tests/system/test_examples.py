@@ -115,6 +115,16 @@ def test_a_force_is_held_changed_and_let_go(said: str) -> None:
     assert "travel" in limit
 
 
+@example("write_a_procedure.py")
+def test_a_procedure_of_ones_own_goes_from_place_to_place(said: str) -> None:
+    lines = said.splitlines()
+    assert lines[:4] == ["bring near: done", "touch: done", "push: done", "draw back: done"]
+    found = [float(line.split()[3]) for line in lines if line.startswith("at ")]
+    assert len(found) == 3
+    assert found == sorted(found, reverse=True), "further out a fibre gives way more easily"
+    assert "touch: 3 times" in said
+
+
 @example("initialise.py")
 def test_a_cold_platform_is_initialised_step_by_step(said: str) -> None:
     lines = said.splitlines()

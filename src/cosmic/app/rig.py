@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeVar, cast
+from weakref import WeakSet
 
 from typing_extensions import override
 
@@ -16,12 +17,16 @@ from cosmic.app.platform_file import KNOWN_APPLICATIONS, check_applications
 from cosmic.app.remote_station import StationControl
 from cosmic.app.serve_options import StationAddress
 from cosmic.autonomy.control.control import Control
+from cosmic.autonomy.procedures.procedure import Procedure
+from cosmic.autonomy.procedures.run import ProcedureRun
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.errors import NotAvailable, NotConnectedError
 from cosmic.mico.api.mico import Mico
 from cosmic.vico.api.vico import Vico
 
 logger = logging.getLogger(__name__)
+
+W = TypeVar("W")
 
 
 class Rig:
@@ -45,6 +50,7 @@ class Rig:
                 platform.policy,
                 rate=platform.clock.rate,
             )
+        self._runs: WeakSet[ProcedureRun[object]] = WeakSet()
         self._closed = False
 
     @override
@@ -84,6 +90,28 @@ class Rig:
         if self._control is None:
             raise NotAvailable("mico is not hosted here; a control loop has nothing to move")
         return self._control
+
+    def procedure(self, procedure: Procedure[W], work: W) -> ProcedureRun[W]:
+        """Return a run of `procedure` that is ready to begin, in the platform's time.
+
+        It ends when motion is stopped or the platform closed, even where it only waits.
+
+        Parameters
+        ----------
+        procedure : Procedure
+            What to do, put together from operations.
+        work : object
+            What its operations share, such as this rig and what they find.
+        """
+        run = ProcedureRun(
+            procedure,
+            work,
+            self._platform.clock,
+            self._platform.policy,
+            stopped=lambda: self.stopped,
+        )
+        self._runs.add(cast("ProcedureRun[object]", run))
+        return run
 
     @property
     def stations(self) -> dict[str, StationControl]:
@@ -157,6 +185,9 @@ class Rig:
         if not self._closed:
             self._closed = True
             atexit.unregister(self.close)
+            for run in list(self._runs):
+                run.abort("the platform is closed")
+                run.join()
             if self._control is not None:
                 self._control.close()
             self._platform.shut_down()
