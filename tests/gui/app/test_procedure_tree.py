@@ -207,7 +207,7 @@ def test_many_changes_are_drawn_a_few_times(
 
 
 def test_closing_the_panel_aborts_the_run_begun_there_and_no_other(qtbot: QtBot) -> None:
-    mine, other = (timed(Op("a", steps=(9999.0,)), 1.0) for _ in range(2))
+    mine, other = (timed(Op("a", steps=(9999.0,)), 10.0) for _ in range(2))
     panel = shown(qtbot, ProcedureTreePanel())
     panel.follow(mine)
     click(qtbot, panel.start)
