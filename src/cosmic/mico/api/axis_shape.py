@@ -1,8 +1,8 @@
 """The shape that bluesky expects of an axis: what `Axis` and `AxisMovable` share."""
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Final, Protocol
+from collections.abc import Callable
+from typing import Final
 
 from typing_extensions import override
 
@@ -20,16 +20,12 @@ from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.entry import Number, as_number
 from cosmic.mico.api.move_status import MoveStatus, refused
 from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import Motion, MoveTo
+from cosmic.mico.core.orders import MoveTo
 from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.positioner import PositionerState
 
 # How far from a target an axis still counts as standing at it: more than the noise of any sensor.
 STANDS_AT: Final = {"um": 1.0, "deg": 0.1}
-
-
-class _Judge(Protocol):
-    def __call__(self, motions: Mapping[str, Motion], *, consent: bool = ...) -> MoveVerdict: ...
 
 
 class AxisShape:
@@ -53,19 +49,12 @@ class AxisShape:
 
     def check(self, position: Number, *, consent: bool = False) -> MoveVerdict:
         """Return the gate's answer to `move_to(position)`, without moving."""
-        return self._asked_of(self._manager.check, position, consent=consent)
-
-    def foresee(self, position: Number, *, consent: bool = False) -> MoveVerdict:
-        """Return what `check` does, or in a window what can be said without waiting."""
-        return self._asked_of(self._manager.foresee, position, consent=consent)
-
-    def _asked_of(self, whom: _Judge, position: Number, *, consent: bool) -> MoveVerdict:
         state = self._now
         try:
             target = as_number(position, state.unit, self._name) + state.zero
         except MoveRefused as exc:
             return exc.verdict
-        return whom({self._name: MoveTo(target, state.unit)}, consent=consent)
+        return self._manager.check({self._name: MoveTo(target, state.unit)}, consent=consent)
 
     def check_value(self, value: Number) -> None:
         """Raise `MoveRefused` where `move_to(value)` would; for bluesky's check_limits."""

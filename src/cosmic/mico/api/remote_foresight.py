@@ -1,6 +1,7 @@
 """What can be said of a movement here, before the station decides it."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from cosmic.frame.clock import WALL
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from cosmic.mico.api.remote_manager import RemoteManager
 
 _HERE: Final = "here"
+_TEXT: Final = "nothing known here is in the way; the gate of the station decides"
 
 
 def foreseen(
@@ -34,4 +36,5 @@ def foreseen(
         ),
     )
     requests = [Request(name, motion, _HERE, consent) for name, motion in motions.items()]
-    return judge(requests, picture, NoCollisionModel(), advice=False).verdict
+    verdict = judge(requests, picture, NoCollisionModel(), advice=False).verdict
+    return replace(verdict, text=_TEXT) if verdict.allowed else verdict

@@ -191,12 +191,15 @@ class RemoteManager(QObject):
     # Commanding
 
     def check(self, motions: Mapping[str, Motion], *, consent: bool = False) -> MoveVerdict:
-        """Return what the gate of the station says, without moving anything."""
+        """Return what the gate of the station says, without moving anything.
+
+        Where this thread must not wait (a window), return what can be said without collisions;
+        the gate of the station decides each movement in any case.
+        """
         for name in motions:
             self.address(name)
         if not may_wait_here():
-            text = "the gate is at another station, and a window cannot wait for it"
-            return refuse(Reason.NO_ANSWER, text)
+            return foreseen(motions, self, consent=consent)
         try:
             said = self._line.call("check", {"motions": dict(motions), "consent": consent})
         except MoveRefused as exc:
@@ -206,15 +209,6 @@ class RemoteManager(QObject):
         if not isinstance(said, MoveVerdict):
             return refuse(Reason.NO_ANSWER, f"the station answers {said!r:.80}")
         return said
-
-    def foresee(self, motions: Mapping[str, Motion], *, consent: bool = False) -> MoveVerdict:
-        """Return what can be said here and now; the station decides each movement in any case.
-
-        Where this thread must not wait, collisions are left out.
-        """
-        if may_wait_here():
-            return self.check(motions, consent=consent)
-        return foreseen(motions, self, consent=consent)
 
     def order_together(
         self,

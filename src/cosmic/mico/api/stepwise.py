@@ -138,7 +138,7 @@ def _way(axis: Axis, target: Number, *, consent: bool) -> tuple[float, float]:
 
     The gate has then seen the whole of it.
     """
-    verdict = axis.foresee(target, consent=consent)
+    verdict = axis.check(target, consent=consent)
     if not verdict.allowed:
         raise refusal(verdict)
     start = _position(axis)

@@ -402,10 +402,6 @@ class DeviceManager(QObject):
         together = with_linked(motions, self.links, self)
         return self.gate.check(self._requests(together, consent=consent))
 
-    def foresee(self, motions: Mapping[str, Motion], *, consent: bool = False) -> MoveVerdict:
-        """Return what `check` does, which waits for no other process but the gate's."""
-        return self.check(motions, consent=consent)
-
     def order_together(
         self,
         motions: Mapping[str, Motion],

@@ -176,10 +176,6 @@ class ManagerPort(Protocol):
         """Return what the gate says to all of `motions` together, without moving anything."""
 
     @abstractmethod
-    def foresee(self, motions: Mapping[str, Motion], *, consent: bool = False) -> MoveVerdict:
-        """Return what can be said of `motions` without waiting for anybody; see `check`."""
-
-    @abstractmethod
     def order_together(
         self,
         motions: Mapping[str, Motion],
