@@ -47,6 +47,14 @@ from cosmic.vico.hw.interface import (
 from cosmic.vico.hw.peripheral_factory import make_lens, make_light
 from cosmic.vico.hw.sim_peripherals import SimPeripherals
 
+LIMIT_S = 30.0
+
+
+def soon(condition: Callable[[], object]) -> bool:
+    """Wait until `condition` holds, however busy the computer is; False when it never did."""
+    return wait_until(condition, LIMIT_S)
+
+
 RANGES = CameraRanges(
     exposure_s=Range(1e-4, 0.05),
     gain_db=Range(0.0, 20.0),
@@ -59,16 +67,16 @@ RANGES = CameraRanges(
 
 
 class PushedCamera(Camera):
-    """A camera whose frames come when the test says so; `drawn` counts those that were looked at.
+    """A camera whose frames come when the test says so; with the software trigger each gives one.
 
-    With the software trigger, each one gives a frame.
+    `given` counts the frames, `drawn` those that were looked at.
     """
 
     def __init__(self, clock: Clock, size_px: tuple[int, int]) -> None:
         self._clock = clock
         self._there = Condition()
         self._waiting: deque[Frame] = deque()
-        self._given = 0
+        self.given = 0
         self._info = CameraInfo("P1", "Test", "Pushed", "7", simulated=True, sensor_px=size_px)
         self._settings = CameraSettings(0.01, 0.0, 30.0, Roi(0, 0, *size_px))
         self.plugged = True
@@ -82,10 +90,15 @@ class PushedCamera(Camera):
                 now_s = self._clock.now_s()
                 fmt = PixelFormat.MONO8 if data.dtype == np.uint8 else PixelFormat.MONO16
                 self._waiting.append(
-                    DrawnFrame(self._drawing(data), self._given, now_s, now_s, pixel_format=fmt)
+                    DrawnFrame(self._drawing(data), self.given, now_s, now_s, pixel_format=fmt)
                 )
-                self._given += 1
+                self.given += 1
             self._there.notify_all()
+
+    def keep_coming(self, data: Pixels) -> None:
+        """Give a frame where the one before was taken."""
+        if not self._waiting:
+            self.push(data)
 
     def _drawing(self, data: Pixels) -> Callable[[], Pixels]:
         def draw() -> Pixels:
@@ -117,7 +130,7 @@ class PushedCamera(Camera):
     @property
     @override
     def counters(self) -> CameraCounters:
-        return CameraCounters(completed=self._given)
+        return CameraCounters(completed=self.given)
 
     @override
     def configure(self, settings: CameraSettings) -> CameraSettings:
@@ -284,7 +297,7 @@ def at_home(folder: Path, size_px: tuple[int, int] = (64, 48)) -> Iterator[Home]
     application.initialize()
     try:
         unit, peripherals = application.unit("top"), application.peripherals
-        assert wait_until(lambda: unit.thread.running and peripherals.state.light_percent)
+        assert soon(lambda: unit.thread.running and peripherals.state.light_percent)
         yield home
     finally:
         application.shut_down()
@@ -308,7 +321,7 @@ def following(transport: Transport, policy: FailurePolicy) -> Iterator[RemoteVic
     remote = RemoteVicoApplication(transport, policy)
     try:
         remote.initialize()
-        assert remote.wait_until_known(10.0), remote.problem
+        assert remote.wait_until_known(LIMIT_S), remote.problem
         yield remote
     finally:
         remote.shut_down()

@@ -34,6 +34,11 @@ def window() -> Iterator[None]:
     take_back()
 
 
+def soon(qtbot, condition: Callable[[], object]) -> None:
+    """Wait until `condition` holds, however busy the computer is."""
+    qtbot.waitUntil(lambda: bool(condition()), timeout=30_000)
+
+
 def ramp() -> np.ndarray:
     across = np.linspace(30, 220, SIZE_PX[0], dtype=np.uint8)
     return np.tile(across, (SIZE_PX[1], 1))
@@ -54,10 +59,10 @@ def test_the_live_view_shows_the_pictures_of_another_station(qtbot, own, rig, wi
     assert view.windowTitle() == "From above"
 
     def shown() -> bool:
-        rig.home.camera.push(ramp())
+        rig.home.camera.keep_coming(ramp())
         return view.view.picture is not None
 
-    qtbot.waitUntil(shown)
+    soon(qtbot, shown)
     assert np.array_equal(view.view.picture.data, ramp())
     view.read_out()
     assert view.status.badge.state is State.OK
@@ -70,27 +75,27 @@ def test_what_is_set_in_the_window_is_set_there(qtbot, own, rig, window, tmp_pat
     gui = made_gui(rig.remote, own)
     view, thread = gui.cameras["top"], rig.home.application.unit("top").thread
     view.form.exposure.committed.emit(20.0)
-    qtbot.waitUntil(lambda: thread.settings.exposure_s == pytest.approx(0.02))
+    soon(qtbot, lambda: thread.settings.exposure_s == pytest.approx(0.02))
     view.row.live.click()
-    qtbot.waitUntil(lambda: not view.row.live.isChecked() and not thread.running)
+    soon(qtbot, lambda: not view.row.live.isChecked() and not thread.running)
     view.row.live.click()
-    qtbot.waitUntil(lambda: thread.running)
-    qtbot.waitUntil(lambda: view.recorder.record.isEnabled())
+    soon(qtbot, lambda: thread.running)
+    soon(qtbot, lambda: view.recorder.record.isEnabled())
     view.recorder.record.click()
     recordings = rig.home.application.unit("top").recordings
-    qtbot.waitUntil(lambda: recordings.state.active)
-    qtbot.waitUntil(lambda: view.recorder.record.text() == "■ Stop")
+    soon(qtbot, lambda: recordings.state.active)
+    soon(qtbot, lambda: view.recorder.record.text() == "■ Stop")
     view.recorder.record.click()
-    qtbot.waitUntil(lambda: not recordings.state.active)
+    soon(qtbot, lambda: not recordings.state.active)
     gui.lens.light.committed.emit(33.0)
-    qtbot.waitUntil(lambda: rig.home.application.peripherals.state.light_percent == 33.0)
+    soon(qtbot, lambda: rig.home.application.peripherals.state.light_percent == 33.0)
 
 
 def test_a_movement_that_is_refused_is_told_in_the_panel(qtbot, own, rig, window) -> None:
     lens = made_gui(rig.remote, own).lens
-    qtbot.waitUntil(lambda: lens.home.isEnabled())
+    soon(qtbot, lambda: lens.home.isEnabled())
     lens.home.click()
-    qtbot.waitUntil(lambda: "the right to move" in lens.tasks.text.text())
+    soon(qtbot, lambda: "the right to move" in lens.tasks.text.text())
     lens.abort.click()
 
 
@@ -106,23 +111,23 @@ def test_the_panels_are_grey_while_the_station_is_away(qtbot, own, window, tmp_p
         view, lens = gui.cameras["top"], gui.lens
 
         def shown() -> bool:
-            home.camera.push(ramp())
+            home.camera.keep_coming(ramp())
             return view.view.picture is not None
 
-        qtbot.waitUntil(shown)
-        qtbot.waitUntil(lambda: lens.home.isEnabled())
+        soon(qtbot, shown)
+        soon(qtbot, lambda: lens.home.isEnabled())
         first.close()
-        qtbot.waitUntil(lambda: "fibres is away" in view.note.text)
+        soon(qtbot, lambda: "fibres is away" in view.note.text)
         assert not view.recorder.record.isEnabled()
         assert not view.recorder.snap.isEnabled()
         assert "fibres is away" in view.recorder.snap.toolTip()
-        qtbot.waitUntil(lambda: not lens.home.isEnabled())
+        soon(qtbot, lambda: not lens.home.isEnabled())
         assert "fibres is away" in lens.home.toolTip()
         stack.enter_context(hosted(home, endpoint))
-        qtbot.waitUntil(lambda: lens.home.isEnabled(), timeout=10_000)
+        soon(qtbot, lambda: lens.home.isEnabled())
 
         def live() -> bool:
-            home.camera.push(ramp())
+            home.camera.keep_coming(ramp())
             return not view.note.text and view.recorder.record.isEnabled()
 
-        qtbot.waitUntil(live, timeout=10_000)
+        soon(qtbot, live)
