@@ -8,6 +8,7 @@ from typing_extensions import override
 from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.plate import along
 from cosmic.autonomy.handling.reach import LOST, line_of
+from cosmic.autonomy.handling.shape import HeldShape, held_shape
 from cosmic.autonomy.handling.sight import trace_along
 from cosmic.autonomy.handling.work import FibreInHand, FibreWork
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps
@@ -39,8 +40,7 @@ class TestGrasp(FibreOperation):
         yield work.go(work.at(work.gripper, x, y + places.test_aside_um))
         picture = yield work.picture()
         assert isinstance(picture, Picture)
-        moved = before + np.array([0.0, places.test_aside_um])
-        if seen_at(work, fibre, picture, moved, places.test_um):
+        if seen_at(work, fibre, picture, in_jaws(work, fibre), places.test_um):
             fibre.held = True
             return
         if seen_at(work, fibre, picture, before, 0.0):
@@ -58,18 +58,25 @@ def ahead_of_jaws(fibre: FibreInHand) -> Floats:
     return np.array([along(line_of(fibre), float(way)) for way in at])
 
 
+def shape_of(work: FibreWork, fibre: FibreInHand) -> HeldShape:
+    """Return the shape that the fibre should have in the jaws."""
+    return held_shape(line_of(fibre), fibre.inside_um, work.jaws.forward)
+
+
 def in_jaws(work: FibreWork, fibre: FibreInHand) -> Floats:
     """Return where the begin of its free part should be while the jaws hold it."""
     x, y = work.tip_now(work.gripper)
-    at = np.linspace(BEGIN_UM, min(BEGIN_UM + LENGTH_UM, max(fibre.free_um, 2 * BEGIN_UM)), 40)
-    return np.column_stack([x + work.jaws.forward * at, np.full(at.size, y)])
+    shape = shape_of(work, fibre)
+    at = np.linspace(BEGIN_UM, max(min(BEGIN_UM + LENGTH_UM, shape.reach_um), 2.0 * BEGIN_UM), 40)
+    bows = np.array([shape.bow_um(float(each)) for each in at])
+    return np.column_stack([x + work.jaws.forward * at, y + bows])
 
 
 def seen_at(
     work: FibreWork, fibre: FibreInHand, picture: Picture, line_um: Floats, height_um: float
 ) -> bool:
     """Return whether something as dark as the fibre lies along a line, or next to it."""
-    mapped = work.mapped(picture, height_um)
+    mapped = work.mapped_near(picture, height_um)
     trace = trace_along(picture, mapped.to_px(line_um), REACH_UM / mapped.scale_um_px)
     contrast = fibre.reach.candidate.contrast
     return trace.contrast > SEEN_PART * contrast

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -46,6 +46,10 @@ class Candidate:
     contrast: float
     problem: str = ""
 
+    def moved(self, line_um: Floats) -> "Candidate":
+        """Return the same fibre on another line."""
+        return replace(self, line_um=line_um)
+
     @property
     def place_um(self) -> tuple[float, float]:
         """Its middle on the plate."""
@@ -65,12 +69,15 @@ class Reach:
         Where the fibre will be on the platform, from the end that is grasped.
     tip_um : (float, float)
         Where the middle between the jaws' tips goes.
+    under : int
+        How many other fibres lie under the jaws.
     """
 
     candidate: Candidate
     angle_deg: float
     line_um: Floats
     tip_um: tuple[float, float]
+    under: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +112,7 @@ def reaches(
     others: Neighbours,
     angle_now_deg: float,
 ) -> list[Reach]:
-    """Return the ways to take a candidate, the one with the smallest turn first."""
+    """Return the ways to take a candidate, the best first: nothing under the jaws, a small turn."""
     found = []
     for line in (candidate.line_um, candidate.line_um[::-1]):
         wanted = 0.0 if jaws.forward > 0.0 else 180.0
@@ -113,9 +120,12 @@ def reaches(
         turned = frame.on_platform(line, angle)
         tip = along(turned, settings.inside_um)
         reach = Reach(candidate, angle, turned, (float(tip[0]), float(tip[1])))
-        if _in_reach(reach, jaws, settings) and _clear(reach, frame, jaws, settings, others):
-            found.append(reach)
-    return sorted(found, key=lambda each: abs(each.angle_deg - angle_now_deg))
+        if not _in_reach(reach, jaws, settings):
+            continue
+        under = _under(reach, frame, jaws, settings, others)
+        if under is not None:
+            found.append(replace(reach, under=under))
+    return sorted(found, key=lambda each: (each.under, abs(each.angle_deg - angle_now_deg)))
 
 
 def along(line: Floats, way_um: float) -> Floats:
@@ -133,11 +143,7 @@ def ways(line: Floats) -> Floats:
 def _direction_deg(line: Floats, inside_um: float) -> float:
     """Return where a fibre points to from where it is grasped: there it must lie along the jaws."""
     tip, near = along(line, 0.0), along(line, 2.0 * inside_um)
-    local = math.atan2(near[1] - tip[1], near[0] - tip[0])
-    chord = math.atan2(line[-1, 1] - line[0, 1], line[-1, 0] - line[0, 0])
-    # A strongly curled one lies between both, so that its free end is not far aside.
-    apart = math.remainder(chord - local, math.tau)
-    return math.degrees(local + 0.3 * apart)
+    return math.degrees(math.atan2(near[1] - tip[1], near[0] - tip[0]))
 
 
 def _in_reach(reach: Reach, jaws: Jaws, settings: GraspSettings) -> bool:
@@ -149,19 +155,21 @@ def _in_reach(reach: Reach, jaws: Jaws, settings: GraspSettings) -> bool:
     )
 
 
-def _clear(
+def _under(
     reach: Reach, frame: PlateFrame, jaws: Jaws, settings: GraspSettings, others: Neighbours
-) -> bool:
-    """Return whether nothing else lies where the jaws come down."""
+) -> int | None:
+    """Return how many others lie where the jaws come down; None: one would be grasped as well."""
     x, y = reach.tip_um
+    count = 0
     for line in others.lines_um:
         turned = frame.on_platform(line, reach.angle_deg)
         behind = (x - turned[:, 0]) * jaws.forward
         beside = np.abs(turned[:, 1] - y)
-        under = (behind > -settings.clear_um) & (behind < jaws.length_um)
-        if (under & (beside < jaws.half_um + settings.clear_um)).any():
-            return False
-    return True
+        across = beside < jaws.half_um + settings.clear_um
+        if (across & (np.abs(behind) < settings.inside_um + settings.clear_um)).any():
+            return None
+        count += bool((across & (behind > 0.0) & (behind < jaws.length_um)).any())
+    return count
 
 
 def distance_um(line: Floats, other: Floats) -> float:

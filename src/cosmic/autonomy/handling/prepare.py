@@ -6,13 +6,13 @@ from dataclasses import replace
 from typing_extensions import override
 
 from cosmic.autonomy.handling.operation import FibreOperation
-from cosmic.autonomy.handling.plate import PlateFrame
 from cosmic.autonomy.handling.sight import map_at
 from cosmic.autonomy.handling.work import FibreWork, Measured
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Wish
 from cosmic.autonomy.tools import expected, tip_um
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.mico.core.positioner import Confidence
+from cosmic.vico.core.calibration_fit import CalibrationRefused
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.tool_settings import ToolSettings
 from cosmic.vico.core.vision.algorithms import grey
@@ -20,6 +20,8 @@ from cosmic.vico.core.vision.tips import find_gripper, find_probe
 from cosmic.vico.core.vision.tool_types import GripperTips, NotSeen, ToolEnd
 
 REACH_PX = 40.0
+COUNT_UM = 30.0
+TURN_ON_DEG = 41.0
 POOR = "calibration poor"
 PLATE = "map of the plate"
 HELD = "map where fibres are held"
@@ -28,7 +30,7 @@ PROBE = "probe against gripper"
 
 
 class MakeReady(FibreOperation):
-    """Tools out of the way, speeds set, the force limit armed, the jaws closed and opened."""
+    """Tools out of the way, speeds set, the jaws closed and opened."""
 
     name = "make ready"
 
@@ -50,9 +52,6 @@ class MakeReady(FibreOperation):
         for tool in self._tools(work):
             for name in (tool.x_axis, tool.y_axis, *filter(None, [tool.z_axis])):
                 work.mico[name].set_closed_loop_frequency(settings.frequency_hz)
-        if settings.push.stop_un > 0.0:
-            limit = settings.push.stop_un
-            work.daqco.arm_limit(settings.push.channel, low=-limit, high=limit, hysteresis=5.0)
         heights = {}
         if settings.other:
             other = work.tool(settings.other)
@@ -86,10 +85,24 @@ def retract_probe(work: FibreWork) -> Steps:
 
 
 def zero_jaws(work: FibreWork) -> Steps:
-    """Close the jaws to their stop, so that steps count from there, and open them."""
-    yield from move_jaws(work, -1100.0)
+    """Bring the opening counted in step with the true one, and open the jaws as for a grasp.
+
+    Steps against a stop are counted and move nothing: closed to one stop, then opened against the
+    other until the count says so.
+    """
+    full, count = work.settings.grasp.full_um, work.mico[work.gripper.gap_axis]
+    yield from move_jaws(work, -1.1 * full)
     work.gap_um = 0.0
-    yield from move_jaws(work, work.settings.grasp.gap_um)
+    yield from move_jaws(work, max(0.0, full - (count.position_um or 0.0)))
+    work.gap_um = full
+    yield from move_jaws(work, work.settings.grasp.gap_um - full)
+
+
+def in_step(work: FibreWork) -> bool:
+    """Return whether the opening counted is about the true one."""
+    counted = work.mico[work.gripper.gap_axis].position_um
+    known = work.gap_um is not None and counted is not None
+    return known and abs((counted or 0.0) - (work.gap_um or 0.0)) < COUNT_UM
 
 
 def move_jaws(work: FibreWork, by_um: float) -> Steps:
@@ -124,7 +137,7 @@ class Calibrated(FibreOperation):
             return
         try:
             yield from self.measure(work)
-        except NotAvailable as exc:
+        except (NotAvailable, CalibrationRefused) as exc:
             raise OperationFailed(POOR, f"{self.key}: {exc}") from exc
         yield SAFE_POINT
 
@@ -179,6 +192,8 @@ def calibrate_at(
     tool, travel = work.gripper, work.settings.places.travel_um
     yield work.go_up(max(travel, work.height_now()))
     yield work.go(work.at(tool, x_um * work.jaws.forward, y_um))
+    if not in_step(work):
+        yield from zero_jaws(work)
     begun = work.vico.calibrated
     with work.mico.collision.contact("grasp"):
         yield work.go_up(z_um)
@@ -188,41 +203,15 @@ def calibrate_at(
     return max((each.residual_px for each in new), default=0.0)
 
 
-class FindRotationCentre(Calibrated):
-    """About which place the plate turns, by a fibre that lies on it."""
-
-    name = "find the rotation centre"
-    key = TABLE
-
-    @override
-    def precondition(self, work: FibreWork) -> None:
-        if work.settings.calibration.rotation_centre and not work.lines_um:
-            raise OperationFailed("no fibre", "nothing lies on the plate to turn with it")
-
-    @override
-    def measure(self, work: FibreWork) -> Steps:
-        settings = work.settings.calibration
-        if not settings.rotation_centre:
-            work.calibration.frame = PlateFrame()
-            self.kept(work, 0.0, "um", settings.rotation_std_um)
-            return
-        yield from clear_picture(work)
-        yield work.vico.find_rotation_centre(work.settings.camera)
-        found = work.vico.rotation_centre(work.settings.camera)
-        if found is None:
-            raise NotAvailable("no rotation centre was found")
-        work.calibration.frame = PlateFrame(found.centre_um)
-        work.surveyed = False  # what was seen on the plate lies elsewhere in the new frame
-        self.kept(work, found.std_um, "um", settings.rotation_std_um)
-
-
 def clear_picture(work: FibreWork) -> Steps:
     """Take gripper and probe out of the picture."""
     places = work.settings.places
     yield work.go_up(max(places.travel_um, work.height_now()))
     yield from retract_probe(work)
     x, y = places.away_x_um * work.jaws.forward, places.bin_y_um
-    yield work.go(work.at(work.gripper, x, y) | work.at(work.probe, places.hold_x_um, 4900.0))
+    yield work.go(
+        work.at(work.gripper, x, y) | work.at(work.probe, places.hold_x_um, places.probe_away_y_um)
+    )
 
 
 class ComparePlaces(Calibrated):
@@ -244,7 +233,7 @@ class ComparePlaces(Calibrated):
     def _compare(self, work: FibreWork) -> Steps:
         places, settings = work.settings.places, work.settings.calibration
         hold = places.hold_x_um, places.hold_y_um, work.hold_tip_um
-        residual = yield from calibrate_at(work, places.hold_x_um * work.jaws.forward, *hold[1:])
+        residual = yield from calibrate_at(work, settings.compare_x_um, *hold[1:])
         yield work.go(work.at(work.gripper, *hold[:2]))
         yield work.go_up(hold[2])
         beside = places.hold_x_um + settings.compare_beside_um * work.jaws.forward
@@ -257,6 +246,21 @@ class ComparePlaces(Calibrated):
         work.calibration.probe_off_um = probe_off_um(work, picture)
         yield from retract_probe(work)
         self.kept(work, residual, "px", settings.residual_px)
+
+
+class TurnOn(FibreOperation):
+    """The table turns, so that other fibres lie under the tools when they are looked for again."""
+
+    name = "turn the table on"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        places = work.settings.places
+        yield from retract_probe(work)
+        yield work.go_up(max(places.travel_um, work.height_now()))
+        largest = work.settings.grasp.largest_turn_deg
+        angle = work.table_deg + TURN_ON_DEG
+        yield work.go({work.table: angle if angle <= largest else angle - 2.0 * largest})
 
 
 def zoom_to(work: FibreWork, zoom: float) -> Steps:

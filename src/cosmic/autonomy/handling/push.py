@@ -8,16 +8,19 @@ import numpy as np
 from typing_extensions import override
 
 from cosmic.autonomy.bending.fit import fit_bending
-from cosmic.autonomy.bending.plan import DRY_EI_N_M2, PlannedSpan, guess_ei, plan_spans
+from cosmic.autonomy.bending.plan import DRY_EI_N_M2, PlannedSpan, SpanLimits, guess_ei, plan_spans
 from cosmic.autonomy.bending.result import BendingError
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.handling.force import ForceMean
+from cosmic.autonomy.handling.grasp import shape_of
 from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.work import FibreInHand, FibreWork
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Wish
+from cosmic.daqco.core.settings import LimitSettings
 
 NO_CONTACT: Final = "no contact"
 TOO_HIGH: Final = "force too high"
+IN_THE_WAY: Final = "probe in contact"
 TOO_SHORT: Final = "too short"
 NOT_TRUSTED: Final = "not trusted"
 UN_UM2: Final = 1e18
@@ -55,16 +58,27 @@ class PushSpans(FibreOperation):
 
     @override
     def steps(self, work: FibreWork) -> Steps:
-        fibre, push = work.in_hand(), work.settings.push
+        fibre = work.in_hand()
         fibre.spans.clear()
-        fibre.contact_um = None
+        fibre.contacts.clear()
+        fibre.zero_un = None
+        fibre.free_um = min(fibre.free_um, shape_of(work, fibre).reach_um)
         try:
-            plan_spans(fibre.free_um, limits=push.spans)
+            plan_spans(fibre.free_um, limits=span_limits(work))
         except BendingError as exc:
             raise OperationFailed(TOO_SHORT, str(exc)) from exc
+        arm(work, armed=True)
+        try:
+            yield from self._spans(work, fibre)
+        finally:
+            arm(work, armed=False)
+
+    @staticmethod
+    def _spans(work: FibreWork, fibre: FibreInHand) -> Steps:
+        push = work.settings.push
         while True:
             guess = fibre.ei_guess_n_m2 or DRY_EI_N_M2
-            plan = plan_spans(fibre.free_um, guess, push.spans, done=fibre.spans)
+            plan = plan_spans(fibre.free_um, guess, span_limits(work), done=fibre.spans)
             if not plan:
                 break
             yield from _Span(work, fibre, plan[0]).steps()
@@ -72,6 +86,34 @@ class PushSpans(FibreOperation):
             fibre.ei_guess_n_m2 = guess_ei(fibre.spans, settings=width) or fibre.ei_guess_n_m2
             yield SAFE_POINT
         fibre.peak_un = work.forces.take_peak_un()
+
+
+def span_limits(work: FibreWork) -> SpanLimits:
+    """Return what spans there may be; shorter ones for a fibre that points up or down."""
+    push = work.settings.push
+    if not work.in_hand().tilts:
+        return push.spans
+    longest = min(push.spans.longest_um, push.tilt_longest_um)
+    return push.spans.model_copy(update={"longest_um": longest})
+
+
+def arm(work: FibreWork, *, armed: bool) -> None:
+    """Arm the force limit that stops everything, or disarm it.
+
+    It is armed while the probe pushes and not longer: while pictures are searched, samples may
+    come later than its dead man allows.
+    """
+    push = work.settings.push
+    if push.stop_un > 0.0:
+        work.daqco.set_limit(
+            LimitSettings(
+                channel=push.channel,
+                low=-push.stop_un,
+                high=push.stop_un,
+                hysteresis=5.0,
+                armed=armed,
+            )
+        )
 
 
 class _Span:
@@ -85,6 +127,7 @@ class _Span:
         self._probe = work.probe
         self._axis = work.mico[work.probe.y_axis]
         self._points = _Points()
+        self._shape = shape_of(work, fibre)
         # The probe pushes along its own direction; way grows as it does.
         self._sign = 1.0 if work.probe.forward[1] > 0.0 else -1.0
 
@@ -104,25 +147,53 @@ class _Span:
         return self._sign * way_um - self._probe.tip_um[1]
 
     def _surface_um(self) -> float:
-        """Return the way at which the probe should meet the fibre."""
-        if self._fibre.contact_um is not None:
-            return self._fibre.contact_um
+        """Return the way at which the probe should meet the fibre: as it bows, as it was met."""
+        if not self._fibre.contacts:
+            return self._foreseen_um()
+        along, off = self._fibre.contacts[-1]
+        return self._foreseen_um() + off * self._plan.span_um / along
+
+    def _foreseen_um(self) -> float:
         _, hold_y = self._work.tip_now(self._work.gripper)
         _, off_y = self._work.calibration.probe_off_um
-        return self._way(hold_y - self._sign * self._fibre.width_um / 2.0 - off_y)
+        bow = self._shape.bow_um(self._plan.span_um)
+        return self._way(hold_y + bow - off_y) - self._fibre.width_um / 2.0
 
     def _go_in_front(self) -> Steps:
         work, push = self._work, self._push
         hold_x, _ = work.tip_now(work.gripper)
         off_x, _ = work.calibration.probe_off_um
         x = hold_x + work.jaws.forward * self._plan.span_um - off_x
-        room = push.stand_off_um if self._fibre.contact_um is None else push.retreat_um
-        begin = self._surface_um() - room
+        surface, known = self._surface_um(), bool(self._fibre.contacts)
+        bow = abs(self._shape.bow_um(self._plan.span_um))
+        aside = surface - push.stand_off_um - push.bow_part * bow
         _, y = work.tip_now(self._probe)
-        if self._way(y) > begin:
-            yield self._axis.move_to(self._axis_at(begin), wait=False)
+        if self._way(y) > aside:
+            yield self._axis.move_to(self._axis_at(aside), wait=False)
+        if self._fibre.zero_un is None:
+            self._fibre.zero_un = yield from self._mean_un(push.average_s)
         yield work.go({self._probe.x_axis: x - self._probe.tip_um[0]})
-        yield work.go({self._probe.y_axis: self._axis_at(begin)})
+        for way in (aside, surface - push.retreat_um) if known else (aside,):
+            yield from self._come_to(way)
+
+    def _come_to(self, way_um: float) -> Steps:
+        """Go there, and back again as long as something is felt that should not be there."""
+        push, back = self._push, 0.0
+        while True:
+            yield self._axis.move_to(self._axis_at(way_um - back), wait=False)
+            force = yield from self._mean_un(push.search_average_s)
+            if abs(force - (self._fibre.zero_un or 0.0)) <= 2.0 * push.contact_un:
+                return
+            back += push.stand_off_um
+            if back > push.search_um + push.stand_off_um:
+                raise OperationFailed(
+                    IN_THE_WAY, f"the probe feels {force:.0f} uN where nothing should be"
+                )
+
+    def _mean_un(self, seconds: float) -> Generator[Wish, object, float]:
+        mean = yield self._work.forces.wanted(seconds, settle_s=self._push.settle_s)
+        assert isinstance(mean, ForceMean)
+        return mean.mean_un
 
     def _measure(self, seconds: float, *, loading: bool) -> Reading:
         mean = yield self._work.forces.wanted(seconds, settle_s=self._push.settle_s)
@@ -133,6 +204,7 @@ class _Span:
 
     def _baseline(self) -> Generator[Wish, object, float]:
         _, mean = yield from self._measure(self._push.average_s, loading=True)
+        self._fibre.zero_un = mean.mean_un
         return mean.mean_un
 
     def _to(self, way_um: float, seconds: float, *, loading: bool) -> Reading:
@@ -155,7 +227,7 @@ class _Span:
             before = way
             way, mean = yield from self._to(way + step, push.search_average_s, loading=True)
             if mean.mean_un - base_un > push.contact_un:
-                self._fibre.contact_um = before
+                self._fibre.contacts.append((self._plan.span_um, before - self._foreseen_um()))
                 return before
         raise OperationFailed(
             NO_CONTACT,
@@ -190,10 +262,14 @@ class _Span:
         probe_x, _ = work.tip_now(self._probe)
         hold_x, _ = work.tip_now(work.gripper)
         off_x, _ = work.calibration.probe_off_um
+        ahead = (probe_x + off_x - hold_x) * work.jaws.forward
+        # A bowed fibre gives way as a straight one that is a little longer: the fit knows only
+        # straight ones.
+        longer = self._shape.lever_um(ahead) - ahead
         self._fibre.spans.append(
             Span(
-                nominal_um=(probe_x + off_x - hold_x) * work.jaws.forward,
-                probe_x_um=probe_x - self._probe.tip_um[0],
+                nominal_um=ahead + longer,
+                probe_x_um=probe_x - self._probe.tip_um[0] + longer * work.jaws.forward,
                 hold_x_um=hold_x - work.gripper.tip_um[0],
                 way_um=np.array(points.way_um),
                 force_un=np.array(points.force_un),
@@ -217,6 +293,27 @@ class FitSpans(FibreOperation):
         if not fibre.bending.trusted:
             raise OperationFailed(NOT_TRUSTED, "; ".join(fibre.bending.reasons))
         yield SAFE_POINT
+
+
+class Tilt(FibreOperation):
+    """A fibre that was not met is held lower, then higher: it may point up or down."""
+
+    name = "hold it higher or lower"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        fibre, push = work.in_hand(), work.settings.push
+        _, failure = work.failures[-1]
+        if failure.cause == NO_CONTACT:
+            fibre.tilts += 1
+        side = -1.0 if fibre.tilts % 2 else 1.0
+        x, y = work.tip_now(work.probe)
+        yield work.go(work.at(work.probe, x, y - 3.0 * push.stand_off_um * _ahead(work)))
+        yield work.go_up(work.hold_tip_um + (side * push.tilt_um if fibre.tilts else 0.0))
+
+
+def _ahead(work: FibreWork) -> float:
+    return 1.0 if work.probe.forward[1] > 0.0 else -1.0
 
 
 class Retract(FibreOperation):

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+import numpy as np
 from typing_extensions import override
 
 from cosmic.autonomy.handling.grasp import in_jaws, seen_at
@@ -14,8 +15,8 @@ from cosmic.vico.core.picture import Picture
 ADHESION: Final = "jaw adhesion"
 GIVEN_UP: Final = "given up"
 WIPE_UM: Final = 250.0
-SHAKES: Final = 4
-SHAKE_UM: Final = 60.0
+SHAKES: Final = 12
+SHAKE_UM: Final = 12.0
 
 
 class ToBin(FibreOperation):
@@ -63,7 +64,11 @@ def see_released(work: FibreWork) -> Steps:
     fibre = work.in_hand()
     picture = yield work.picture()
     assert isinstance(picture, Picture)
-    if seen_at(work, fibre, picture, in_jaws(work, fibre), 0.0):
+    # What sticks goes with one of the jaws: it hangs in the middle, or at either side.
+    line, aside = in_jaws(work, fibre), 0.5 * (work.gap_um or 0.0)
+    places = (line + np.array([0.0, y]) for y in (0.0, aside, -aside))
+    height = work.height_now()
+    if any(seen_at(work, fibre, picture, place, height) for place in places):
         failure = OperationFailed(ADHESION, f"fibre {fibre.number} still hangs at the jaws")
         work.failures.append((Release.name, failure))
         raise failure

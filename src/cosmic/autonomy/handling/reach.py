@@ -8,7 +8,7 @@ from typing_extensions import override
 from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.plate import along, ways
 from cosmic.autonomy.handling.prepare import move_jaws, see_tip
-from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen
+from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen, trace_along
 from cosmic.autonomy.handling.work import FibreInHand, FibreWork
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.vico.core.picture import Picture
@@ -21,6 +21,8 @@ STAND_BACK_UM: Final = 900.0
 MARGIN_UM: Final = 250.0
 SAME_LENGTH: Final = 0.05
 LOOKS: Final = 2
+FORETOLD_UM: Final = 25.0
+FORETOLD_PART: Final = 0.6
 
 
 class Turn(FibreOperation):
@@ -50,21 +52,38 @@ class FindAgain(FibreOperation):
             x, y = work.tip_now(work.gripper)
             yield work.go_up(work.settings.places.travel_um)
             yield work.go(work.at(work.gripper, x - STAND_BACK_UM * work.jaws.forward, y))
-        for look in range(LOOKS):
-            picture = yield work.picture()
-            assert isinstance(picture, Picture)
-            mapped = work.mapped(picture)
-            line_px = mapped.to_px(fibre.reach.line_um)
-            margin_px = MARGIN_UM * (1.0 + look) / mapped.scale_um_px
-            box = box_around(line_px, margin_px, picture)
+        picture = yield work.picture()
+        assert isinstance(picture, Picture)
+        if not fibre.tries and _where_foretold(work, fibre, picture):
+            return
+        mapped = work.mapped(picture)
+        line_px = mapped.to_px(fibre.reach.line_um)
+        margins = [MARGIN_UM * (1.0 + look) / mapped.scale_um_px for look in range(LOOKS)]
+        boxes = [box_around(line_px, margin_px, picture) for margin_px in margins]
+        for box in boxes:
             seen = _matching(find_seen(picture, mapped, box), fibre)
             if seen is not None:
                 _take_note(work, fibre, seen, picture)
                 return
-        work.surveyed = False
+        # One that was grasped, and is gone, lies somewhere else now.
+        work.surveyed = work.surveyed and not fibre.tries
         raise OperationFailed(
             LOST, f"fibre {fibre.number} was not found again where the table has turned it"
         )
+
+
+def _where_foretold(work: FibreWork, fibre: FibreInHand, picture: Picture) -> bool:
+    """Take note of a fibre that lies where the turn should have brought it."""
+    mapped, candidate = work.mapped(picture), fibre.reach.candidate
+    line_px = mapped.to_px(fibre.reach.line_um)
+    trace = trace_along(picture, line_px, FORETOLD_UM / mapped.scale_um_px)
+    if not trace.contrast > FORETOLD_PART * candidate.contrast:
+        return False
+    fibre.line_um, fibre.line_px = fibre.reach.line_um, line_px
+    fibre.inside_um = work.settings.grasp.inside_um
+    fibre.free_um = candidate.length_um - fibre.inside_um
+    fibre.pictures["geometry"] = picture
+    return True
 
 
 def _matching(found: list[SeenFibre], fibre: FibreInHand) -> SeenFibre | None:
@@ -159,7 +178,9 @@ def _off_um(work: FibreWork, fibre: FibreInHand, picture: Picture) -> float | No
     found = see_tip(work, picture, work.gripper)
     if not isinstance(found, GripperTips):
         return None
-    hold = work.mapped(picture).to_um(found.hold_px)
+    mapped = work.mapped(picture)
+    hold = mapped.to_um(found.hold_px)
+    work.gap_um = found.gap_px * mapped.scale_um_px
     line = line_of(fibre)
     order = np.argsort(line[:, 0])
     beside = float(np.interp(hold[0], line[order, 0], line[order, 1]))

@@ -47,7 +47,7 @@ class PlaceSettings(StrictModel):
     view_x_um: float = -5000.0
     view_y_um: float = 0.0
     away_x_um: float = -9000.0
-    probe_away_y_um: float = 4000.0
+    probe_away_y_um: float = 6000.0
 
 
 class GraspSettings(StrictModel):
@@ -57,6 +57,8 @@ class GraspSettings(StrictModel):
     ----------
     shortest_um, longest_um : float
         Length of fibres that are taken.
+    curliest : float
+        Largest curl of fibres that are taken: length over projected length, less one.
     inside_um : float
         Length of fibre between the jaws.
     clear_um : float
@@ -65,6 +67,8 @@ class GraspSettings(StrictModel):
         Opening of the jaws when they come down.
     closing_um : float
         How much further than that they close, so that they are closed whatever a step is worth.
+    full_um : float
+        Opening of the jaws at the end of their travel.
     gripper_hz : float
         Frequency of the gripper's steps.
     close_enough_um : float
@@ -83,10 +87,12 @@ class GraspSettings(StrictModel):
 
     shortest_um: float = Field(500.0, gt=0.0)
     longest_um: float = Field(4000.0, gt=0.0)
+    curliest: float = Field(0.12, gt=0.0)
     inside_um: float = Field(250.0, gt=0.0)
     clear_um: float = Field(70.0, gt=0.0)
     gap_um: float = Field(300.0, gt=0.0, le=1000.0)
     closing_um: float = Field(60.0, gt=0.0)
+    full_um: float = Field(1000.0, gt=0.0)
     gripper_hz: float = Field(5000.0, gt=0.0, le=18500.0)
     close_enough_um: float = Field(25.0, gt=0.0)
     corrections: int = Field(3, ge=1, le=10)
@@ -104,8 +110,9 @@ class PushSettings(StrictModel):
     ----------
     channel : str
         Which force is felt.
-    stand_off_um : float
-        How far from where the fibre should be the probe begins to look for it.
+    stand_off_um, bow_part : float
+        How far from where the fibre should be the probe begins to look for it; and a part of how
+        far the fibre is foreseen to bow on top.
     search_um : float
         How far beyond that it looks.
     search_step_um : float
@@ -126,6 +133,9 @@ class PushSettings(StrictModel):
         Steps of one push.
     retreat_um : float
         How far the probe goes back from the fibre between spans.
+    tilt_um, tilt_longest_um : float
+        How much lower, then higher, a fibre is held that was not met, for it may point up or down;
+        and the longest span then.
     spans : SpanLimits
         What spans there may be.
     fit : FitSettings
@@ -134,6 +144,7 @@ class PushSettings(StrictModel):
 
     channel: str = "force"
     stand_off_um: float = Field(40.0, gt=0.0)
+    bow_part: float = Field(0.4, ge=0.0)
     search_um: float = Field(120.0, gt=0.0)
     search_step_um: float = Field(5.0, gt=0.0)
     stiffest_ei_n_m2: float = Field(4e-10, gt=0.0)
@@ -146,6 +157,8 @@ class PushSettings(StrictModel):
     steps_out: int = Field(9, ge=4)
     steps_back: int = Field(6, ge=3)
     retreat_um: float = Field(12.0, gt=0.0)
+    tilt_um: float = Field(55.0, ge=0.0)
+    tilt_longest_um: float = Field(330.0, gt=0.0)
     spans: SpanLimits = Field(default_factory=SpanLimits)
     fit: FitSettings = Field(default_factory=FitSettings)
 
@@ -167,8 +180,13 @@ class CalibrationSettings(StrictModel):
         The rotation centre is measured; otherwise it is taken to be the platform's origin.
     compare_zoom : float
         Magnification at which probe and gripper are seen together.
+    compare_x_um : float
+        Where the gripper is looked at there.
     compare_beside_um, compare_before_um : float
         How far ahead of the jaws, and how far in front of where a fibre is held, the probe stands.
+    tries : int
+        How often each is tried; between two tries the table turns, for what lies below may hide
+        the tools.
     """
 
     place_x_um: float = -1900.0
@@ -178,9 +196,11 @@ class CalibrationSettings(StrictModel):
     rotation_std_um: float = Field(3.0, gt=0.0)
     age_s: float = Field(7200.0, gt=0.0)
     rotation_centre: bool = True
-    compare_zoom: float = Field(2.0, gt=0.0)
+    compare_zoom: float = Field(1.0, gt=0.0)
+    compare_x_um: float = -500.0
     compare_beside_um: float = 700.0
     compare_before_um: float = 250.0
+    tries: int = Field(5, ge=1, le=20)
 
 
 class HandlingSettings(StrictModel):

@@ -1,11 +1,13 @@
 """Operations that look at the whole sample and choose a fibre."""
 
 from collections import Counter
+from dataclasses import replace
 
+import numpy as np
 from typing_extensions import override
 
 from cosmic.autonomy.handling.operation import FibreOperation
-from cosmic.autonomy.handling.plate import Candidate, Neighbours, distance_um, reaches
+from cosmic.autonomy.handling.plate import Candidate, Neighbours, Reach, distance_um, reaches
 from cosmic.autonomy.handling.prepare import clear_picture
 from cosmic.autonomy.handling.sight import SeenFibre, find_seen
 from cosmic.autonomy.handling.work import FibreInHand, FibreWork
@@ -17,6 +19,7 @@ CROSSING = "crossing"
 NOT_CERTAIN = "not certain"
 TOO_SHORT = "too short"
 TOO_LONG = "too long"
+TOO_CURLED = "too curled"
 TOO_NEAR = "too near to another"
 OUT_OF_FIELD = "out of the field"
 GIVEN_UP = "given up before"
@@ -24,6 +27,7 @@ OUT_OF_REACH = "out of reach"
 NONE_LEFT = "no fibre"
 SAME_UM = 120.0
 SAME_LENGTH = 0.05
+OWN_UM = 1.0
 
 
 class Survey(FibreOperation):
@@ -49,17 +53,10 @@ def look(work: FibreWork, seen: list[SeenFibre]) -> None:
     angle, frame = work.table_deg, work.calibration.frame
     found = [_candidate(work, each, frame.on_plate(each.line_um, angle)) for each in seen]
     work.lines_um = [each.line_um for each in found]
-    judged = []
-    for each in found:
-        problem = each.problem or _lonely(work, each)
-        judged.append(
-            Candidate(
-                each.line_um, each.length_um, each.width_um, each.curl, each.contrast, problem
-            )
-        )
+    judged = [replace(each, problem=each.problem or _lonely(work, each)) for each in found]
     work.candidates = [each for each in judged if not each.problem]
     work.skipped = Counter(each.problem for each in judged if each.problem)
-    work.surveyed, work.since_survey = True, 0
+    work.surveyed, work.since_survey, work.survey_deg = True, 0, angle
 
 
 def _candidate(work: FibreWork, seen: SeenFibre, line_um: Floats) -> Candidate:
@@ -75,6 +72,8 @@ def _candidate(work: FibreWork, seen: SeenFibre, line_um: Floats) -> Candidate:
         problem = TOO_SHORT
     elif seen.length_um > settings.longest_um:
         problem = TOO_LONG
+    elif seen.fibre.curl > settings.curliest:
+        problem = TOO_CURLED
     return Candidate(
         line_um,
         seen.length_um,
@@ -111,24 +110,35 @@ class Choose(FibreOperation):
     @override
     def steps(self, work: FibreWork) -> Steps:
         angle = work.table_deg
-        best = None
-        for candidate in work.candidates:
-            others = Neighbours([line for line in work.lines_um if line is not candidate.line_um])
-            ways = reaches(
-                candidate, work.calibration.frame, work.jaws, work.settings.grasp, others, angle
-            )
-            if ways and (
-                best is None or abs(ways[0].angle_deg - angle) < abs(best.angle_deg - angle)
-            ):
-                best = ways[0]
+        ways = [way for each in work.candidates for way in self._ways(work, each, angle)]
+        best = min(ways, key=lambda each: (each.under, abs(each.angle_deg - angle)), default=None)
         if best is None:
             work.skipped[OUT_OF_REACH] += len(work.candidates)
             work.candidates = []
             told = ", ".join(f"{count} {why}" for why, count in sorted(work.skipped.items()))
             raise OperationFailed(NONE_LEFT, f"none that can be taken up ({told or 'plate empty'})")
         work.candidates = [each for each in work.candidates if each is not best.candidate]
+        gone = best.candidate.line_um.mean(axis=0)
+        work.lines_um = [
+            line for line in work.lines_um if np.linalg.norm(line.mean(axis=0) - gone) > OWN_UM
+        ]
         work.numbers += 1
         work.since_survey += 1
         work.forces.take_peak_un()
         work.fibre = FibreInHand(work.numbers, best, found_s=work.clock.now_s())
         yield SAFE_POINT
+
+    @staticmethod
+    def _ways(work: FibreWork, candidate: Candidate, angle_deg: float) -> list[Reach]:
+        own = candidate.line_um.mean(axis=0)
+        others = [
+            line for line in work.lines_um if np.linalg.norm(line.mean(axis=0) - own) > OWN_UM
+        ]
+        return reaches(
+            candidate,
+            work.calibration.frame,
+            work.jaws,
+            work.settings.grasp,
+            Neighbours(others),
+            angle_deg,
+        )

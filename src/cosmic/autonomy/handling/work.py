@@ -95,8 +95,12 @@ class FibreInHand:
         Length between the jaws and beyond them.
     shift_um : float
         How far aside of the middle this try grasps.
-    contact_um : float or None
-        Place of the probe's tip across the fibre when they last met.
+    zero_un : float or None
+        The force without contact.
+    tilts : int
+        How often it was held at another height because it was not met.
+    contacts : list of (float, float)
+        Where along it, from the jaws, the probe has met it, and how far from where foreseen.
     """
 
     number: int
@@ -109,7 +113,9 @@ class FibreInHand:
     tries: int = 0
     shift_um: float = 0.0
     held: bool = False
-    contact_um: float | None = None
+    contacts: list[tuple[float, float]] = field(default_factory=list)
+    zero_un: float | None = None
+    tilts: int = 0
     ei_guess_n_m2: float | None = None
     spans: list[Span] = field(default_factory=list)
     pictures: dict[str, Picture] = field(default_factory=dict)
@@ -173,6 +179,7 @@ class FibreWork:
     zoomed: float | None = None
     surveyed: bool = False
     since_survey: int = 0
+    survey_deg: float = 0.0
     fibre: FibreInHand | None = None
     finished: list[FibreInHand] = field(default_factory=list)
     numbers: int = 0
@@ -296,6 +303,11 @@ class FibreWork:
         """Return the map of a picture for things at a height above the plate."""
         plate_um = self.vision.settings.plate_um
         return map_at(self.vision.places, picture, plate_um + height_um)
+
+    def mapped_near(self, picture: Picture, height_um: float) -> PixelMap:
+        """Return the map of whichever of the two heights measured is nearer."""
+        held = height_um > 0.5 * self.hold_tip_um
+        return self.mapped(picture, self.hold_tip_um if held else 0.0)
 
     def in_hand(self) -> FibreInHand:
         """Return the fibre in hand."""

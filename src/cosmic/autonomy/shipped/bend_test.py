@@ -2,13 +2,14 @@
 
 from cosmic.autonomy.handling.grasp import MISSED, Carry, TestGrasp
 from cosmic.autonomy.handling.prepare import (
+    POOR,
     CalibrateHeld,
     CalibratePlate,
     ComparePlaces,
-    FindRotationCentre,
     MakeReady,
+    TurnOn,
 )
-from cosmic.autonomy.handling.push import NO_CONTACT, NOT_TRUSTED, FitSpans, PushSpans
+from cosmic.autonomy.handling.push import NO_CONTACT, NOT_TRUSTED, FitSpans, PushSpans, Tilt
 from cosmic.autonomy.handling.put_away import (
     ADHESION,
     Finish,
@@ -30,13 +31,14 @@ from cosmic.autonomy.handling.reach import (
 from cosmic.autonomy.handling.safe import make_safe
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.survey import Choose, Survey
+from cosmic.autonomy.handling.turning import FindRotationCentre
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.combinators import Fallback, Retry, Sequence
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.walk import Part
 
 RELEASES = 4
-PUSHES = 2
+PUSHES = 3
 
 
 def build_bend_test(settings: HandlingSettings | None = None) -> Procedure[FibreWork]:
@@ -46,23 +48,25 @@ def build_bend_test(settings: HandlingSettings | None = None) -> Procedure[Fibre
         Sequence[FibreWork]("measure", PushSpans(), FitSpans()),
         PUSHES,
         only={NO_CONTACT, NOT_TRUSTED},
+        between=Tilt(),
     )
     return Procedure(
         "bend test",
-        Sequence("bend test", *beginning(), one_fibre(settings, measured)),
+        Sequence("bend test", *beginning(settings), one_fibre(settings, measured)),
         make_safe=make_safe,
     )
 
 
-def beginning() -> tuple[Part[FibreWork], ...]:
+def beginning(settings: HandlingSettings) -> tuple[Part[FibreWork], ...]:
     """Return what comes before a fibre; little of it where all is fresh."""
     return (
         Sequence(
             "prepare",
             MakeReady(),
-            CalibratePlate(),
-            CalibrateHeld(),
-            ComparePlaces(),
+            *(
+                Retry(each, settings.calibration.tries, only={POOR}, between=TurnOn())
+                for each in (CalibratePlate(), CalibrateHeld(), ComparePlaces())
+            ),
             Survey(),
             FindRotationCentre(),
         ),

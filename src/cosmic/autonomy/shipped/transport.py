@@ -14,6 +14,6 @@ def build_transport(settings: HandlingSettings | None = None) -> Procedure[Fibre
     nothing = Sequence[FibreWork]("nothing is measured")
     return Procedure(
         "transport",
-        Sequence("transport", *beginning(), one_fibre(settings, nothing)),
+        Sequence("transport", *beginning(settings), one_fibre(settings, nothing)),
         make_safe=make_safe,
     )

@@ -1,0 +1,134 @@
+"""About which place the plate turns, by a fibre that is followed from angle to angle."""
+
+from collections.abc import Generator
+from typing import Final
+
+import numpy as np
+from typing_extensions import override
+
+from cosmic.autonomy.handling.plate import Candidate, PlateFrame
+from cosmic.autonomy.handling.prepare import TABLE, Calibrated, clear_picture
+from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen
+from cosmic.autonomy.handling.work import FibreWork
+from cosmic.autonomy.procedures.operation import OperationFailed, Steps, Wish
+from cosmic.frame.errors import NotAvailable
+from cosmic.vico.core.calibration_fit import CalibrationRefused, RotationFit, fit_rotation
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.pixel_map import Floats
+
+AWAY_DEG: Final = (-40.0, -20.0, 0.0, 20.0, 40.0, 60.0)
+MARGIN_UM: Final = 200.0
+SAME_LENGTH: Final = 0.03
+MOST_FIBRES: Final = 3
+"""How many fibres are followed, one after the other, until one has led to a centre."""
+
+
+class FindRotationCentre(Calibrated):
+    """One fibre is followed while the table turns: only where it should be is looked at."""
+
+    name = "find the rotation centre"
+    key = TABLE
+
+    @override
+    def measure(self, work: FibreWork) -> Steps:
+        settings = work.settings.calibration
+        if not settings.rotation_centre:
+            self.kept(work, 0.0, "um", settings.rotation_std_um)
+            return
+        if not work.candidates:
+            raise OperationFailed("no fibre", "no clear fibre lies on the plate to be followed")
+        yield from clear_picture(work)
+        begun = work.table_deg
+        nearest = sorted(work.candidates, key=lambda each: float(np.hypot(*each.place_um)))
+        why = ""
+        for candidate in nearest[:MOST_FIBRES]:
+            try:
+                fit = yield from _followed(work, candidate, begun)
+            except (NotAvailable, CalibrationRefused) as exc:
+                why = str(exc)
+                continue
+            _put_in_force(work, PlateFrame(fit.centre_um))
+            self.kept(work, fit.std_um, "um", settings.rotation_std_um)
+            return
+        raise NotAvailable(why)
+
+
+def _followed(
+    work: FibreWork, candidate: Candidate, begun_deg: float
+) -> Generator[Wish, object, RotationFit]:
+    angles: list[float] = []
+    places: list[Floats] = []
+    for away in AWAY_DEG:
+        yield work.go({work.table: begun_deg + away})
+        picture = yield work.picture()
+        assert isinstance(picture, Picture)
+        angle = work.table_deg
+        wanted = work.calibration.frame.on_platform(candidate.line_um, angle)
+        seen = _nearest(work, picture, wanted, candidate.length_um)
+        if seen is None:
+            raise NotAvailable(f"the fibre was not followed to {angle:.0f} degrees")
+        angles.append(angle)
+        places.append(_in_order(seen.line_um, wanted))
+    return best_circle(angles, places)
+
+
+def _nearest(
+    work: FibreWork, picture: Picture, wanted: Floats, length_um: float
+) -> SeenFibre | None:
+    mapped = work.mapped(picture)
+    box = box_around(mapped.to_px(wanted), MARGIN_UM / mapped.scale_um_px, picture)
+    fitting = [
+        each
+        for each in find_seen(picture, mapped, box)
+        if abs(each.length_um - length_um) <= SAME_LENGTH * length_um
+    ]
+    middle = wanted.mean(axis=0)
+    return min(
+        fitting,
+        key=lambda each: float(np.linalg.norm(each.line_um.mean(axis=0) - middle)),
+        default=None,
+    )
+
+
+def _in_order(line: Floats, wanted: Floats) -> Floats:
+    """Return both ends and the middle of a line, the end first that should be first."""
+    points = line[[0, -1, len(line) // 2]]
+    turned = points[[1, 0, 2]]
+    ends = wanted[[0, -1]]
+    nearer = np.linalg.norm(points[:2] - ends) <= np.linalg.norm(turned[:2] - ends)
+    return points if nearer else turned
+
+
+def best_circle(angles_deg: list[float], places: list[Floats]) -> RotationFit:
+    """Return the surest circle of those that both ends and the middle go round.
+
+    Raises
+    ------
+    CalibrationRefused
+        None of them is good enough.
+    """
+    fits: list[RotationFit] = []
+    refusal = CalibrationRefused("rotation centre: nothing was followed")
+    for index in range(3):
+        way = [(float(each[index][0]), float(each[index][1])) for each in places]
+        try:
+            fits.append(fit_rotation(angles_deg, way))
+        except CalibrationRefused as exc:
+            refusal = exc
+    if not fits:
+        raise refusal
+    return min(fits, key=lambda each: each.std_um)
+
+
+def _put_in_force(work: FibreWork, frame: PlateFrame) -> None:
+    """Take a new centre; what was seen on the plate before lies a little elsewhere in its frame."""
+    # Seen at the angle of the survey, places were right on the platform, whatever the centre.
+    old, angle = work.calibration.frame, work.survey_deg
+
+    def again(line: Floats) -> Floats:
+        return frame.on_plate(old.on_platform(line, angle), angle)
+
+    work.calibration.frame = frame
+    work.lines_um = [again(each) for each in work.lines_um]
+    work.candidates = [each.moved(again(each.line_um)) for each in work.candidates]
+    work.given_up = [each.moved(again(each.line_um)) for each in work.given_up]
