@@ -61,7 +61,7 @@ class CampaignStore:
 
     @classmethod
     def create(
-        cls, folder: Path, info: CampaignInfo, *, time_s: float = 0.0, now: Now = _now
+        cls, folder: str | Path, info: CampaignInfo, *, time_s: float = 0.0, now: Now = _now
     ) -> Self:
         """Begin a campaign in a folder, which is made.
 
@@ -70,6 +70,7 @@ class CampaignStore:
         CampaignError
             There is a campaign in it, or it cannot be written.
         """
+        folder = Path(folder)
         if CampaignReader(folder).version() != 0:
             raise CampaignError(
                 f"{folder} holds a campaign already: go on with it, or name another folder"
@@ -86,7 +87,7 @@ class CampaignStore:
     @classmethod
     def open(
         cls,
-        folder: Path,
+        folder: str | Path,
         *,
         time_s: float = 0.0,
         versions: Mapping[str, str] | None = None,
@@ -99,6 +100,7 @@ class CampaignStore:
         CampaignError
             There is none, it is of another version, or somebody is writing it.
         """
+        folder = Path(folder)
         if not (folder / DATABASE).exists():
             raise CampaignError(f"{folder} holds no campaign: there is no {DATABASE} in it")
         store = cls._opened(folder, now)

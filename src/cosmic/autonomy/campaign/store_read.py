@@ -29,8 +29,8 @@ from cosmic.autonomy.campaign.store_schema import SCHEMA_VERSION
 class CampaignReader:
     """What a campaign's folder holds; each call reads anew; any thread."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
 
     def check(self) -> None:
         """See that this is a campaign that can be read.
