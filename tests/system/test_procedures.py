@@ -1,0 +1,149 @@
+"""Procedures on the simulated platform: real movements are waited for, cancelled and stopped."""
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+from typing_extensions import override
+
+import cosmic
+from cosmic.autonomy.procedures.failures import ProcedureAborted, ProcedureStopped
+from cosmic.autonomy.procedures.parts import (
+    Guard,
+    NodeEvent,
+    OperationFailed,
+    Parallel,
+    Procedure,
+    Retry,
+    Sequence,
+    Steps,
+    UnitOperation,
+)
+from cosmic.autonomy.procedures.run import ProcedureRun
+from cosmic.autonomy.procedures.walk import Part
+from cosmic.mico.api.axis import Axis
+
+LIMIT_S = 30.0
+AXES = ("left.x", "right.x")
+
+
+class Go(UnitOperation[cosmic.Rig]):
+    """Moves an axis to a place."""
+
+    def __init__(self, axis: str, target_um: float) -> None:
+        self.name = f"{axis} to {target_um:g}"
+        self.axis, self.target_um = axis, target_um
+
+    @override
+    def run(self, work: cosmic.Rig) -> Steps:
+        reached = yield work.mico[self.axis].move_to(self.target_um, wait=False)
+        assert reached == pytest.approx(self.target_um, abs=1.0)
+
+    @override
+    def undo(self, work: cosmic.Rig) -> Steps:
+        yield work.mico[self.axis].move_to(0.0, wait=False)
+
+
+class Wait(UnitOperation[cosmic.Rig]):
+    name = "wait"
+
+    @override
+    def run(self, work: cosmic.Rig) -> Steps:
+        yield 1e6
+
+
+@pytest.fixture(scope="module")
+def rig() -> Iterator[cosmic.Rig]:
+    with cosmic.connect(rate=20.0, applications=("mico",)) as rig:
+        yield rig
+
+
+@pytest.fixture(autouse=True)
+def at_zero(rig: cosmic.Rig) -> None:
+    rig.reset_stop()
+    rig.mico.move(dict.fromkeys(AXES, 0.0))
+
+
+def started(rig: cosmic.Rig, part: Part[cosmic.Rig], event: str) -> ProcedureRun[cosmic.Rig]:
+    """Start a run and wait for the begin of an operation."""
+    begun = threading.Event()
+
+    def note(told: NodeEvent) -> None:
+        if told.name == event:
+            begun.set()
+
+    run = rig.procedure(Procedure("trial", part), rig)
+    run.subscribe(note)
+    run.start()
+    assert begun.wait(LIMIT_S)
+    return run
+
+
+def wait_for(axis: Axis, beyond_um: float) -> None:
+    """Wait until an axis is on its way."""
+    pause = threading.Event()
+    for _ in range(int(LIMIT_S / 0.002)):
+        if abs(axis.position_um) > beyond_um:
+            return
+        pause.wait(0.002)
+    raise AssertionError(f"{axis.name} does not move")
+
+
+def standing(rig: cosmic.Rig) -> bool:
+    """Tell whether the axes stand where they may have got, short of their targets."""
+    places = [rig.mico[axis].position_um for axis in AXES]
+    return all(-4000.0 < place < 4000.0 for place in places)
+
+
+def test_movements_side_by_side_are_made_and_undone(rig: cosmic.Rig) -> None:
+    both = Parallel("both", Go("left.x", 300.0), Go("right.x", -300.0))
+    rig.procedure(Procedure("trial", both), rig).run_here()
+    reached = [rig.mico[axis].position_um for axis in AXES]
+    assert reached == pytest.approx([300.0, -300.0], abs=1.0)
+    whole = Sequence("all", both, Guard(Wait(), lambda _rig: False, "not now"))
+    with pytest.raises(OperationFailed, match="not now"):
+        rig.procedure(Procedure("trial", Retry(whole, 2)), rig).run_here()
+    reached = [rig.mico[axis].position_um for axis in AXES]
+    assert reached == pytest.approx([300.0, -300.0], abs=1.0), "the last try is not undone"
+
+
+def test_a_refusal_of_the_gate_is_a_failure_that_is_counted(rig: cosmic.Rig) -> None:
+    run = rig.procedure(Procedure("trial", Go("left.x", 9000.0)), rig)
+    with pytest.raises(OperationFailed) as caught:
+        run.run_here()
+    assert caught.value.cause == "refused: limit"
+    assert isinstance(caught.value.__cause__, cosmic.LimitError)
+    assert run.times.causes == {"refused: limit": 1}
+
+
+def test_an_abort_stops_the_axes(rig: cosmic.Rig) -> None:
+    both = Parallel("both", Go("left.x", 4900.0), Go("right.x", -4900.0))
+    run = started(rig, both, "right.x to -4900")
+    for name in AXES:
+        wait_for(rig.mico[name], 50.0)
+    run.abort("enough")
+    with pytest.raises(ProcedureAborted, match="enough"):
+        run.wait(LIMIT_S)
+    assert standing(rig)
+    rig.mico["left.x"].move_by(5.0)  # nothing else moves it any more
+
+
+def test_a_stop_ends_a_procedure_whatever_it_does(rig: cosmic.Rig) -> None:
+    go = Go("left.x", 4900.0)
+    for part, name in ((Retry(go, 5), go.name), (Retry(Wait(), 5), "wait")):
+        run = started(rig, part, name)
+        if name == go.name:
+            wait_for(rig.mico["left.x"], 50.0)
+        rig.stop("pressed")
+        with pytest.raises(ProcedureStopped, match="pressed"):
+            run.wait(LIMIT_S)
+        assert run.tree.children[0].attempt == 1
+        rig.reset_stop()
+    assert standing(rig)
+
+
+def test_closing_the_platform_ends_what_runs() -> None:
+    with cosmic.connect(rate=20.0, applications=("mico",)) as rig:
+        run = started(rig, Wait(), "wait")
+    with pytest.raises(ProcedureAborted, match="the platform is closed"):
+        run.wait(LIMIT_S)
