@@ -1,6 +1,6 @@
 """A first session with the simulated platform: initialise, move, ask the gate, stop.
 
-Needs no window and no hardware; `./run` starts it where there is no display.
+Needs no window and no hardware.
 """
 
 from threading import Event

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from cosmic.app.cli_campaign import add_campaign_command
 from cosmic.app.cli_stations import (
     add_station_commands,
     line_options,
@@ -48,6 +49,10 @@ def _carry_out(chosen: argparse.Namespace, parser: argparse.ArgumentParser) -> i
         return _export(chosen)
     if chosen.command == "certificates":
         return make_certificates(chosen)
+    if chosen.command == "campaign":
+        return _campaign(chosen)
+    if chosen.rate is None:
+        chosen.rate = 1.0
     if chosen.command == "serve":
         return serve_station(chosen)
     return _window(chosen, parser)
@@ -105,6 +110,12 @@ def _export(chosen: argparse.Namespace) -> int:
         told.write("\n")
     sys.stdout.write(f"{written}\n")
     return 0
+
+
+def _campaign(chosen: argparse.Namespace) -> int:
+    from cosmic.app.campaign_command import run_campaign
+
+    return run_campaign(chosen)
 
 
 def _init(folder: Path) -> int:
@@ -179,7 +190,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.set_defaults(
         config=None,
-        rate=1.0,
+        rate=None,
         cold=False,
         sample=None,
         truth=None,
@@ -214,6 +225,7 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--output", type=Path, metavar="FILE", help="beside the recording if none")
     export.add_argument("--overwrite", action="store_true", help="replace a file that exists")
     add_station_commands(commands, platform)
+    add_campaign_command(commands, platform)
     return parser
 
 
