@@ -123,6 +123,11 @@ class Campaign:
     # What is known of it
 
     @property
+    def procedure(self) -> Procedure[FibreWork]:
+        """What is done with each fibre."""
+        return self._doing.procedure
+
+    @property
     def phase(self) -> CampaignPhase:
         """What it is at."""
         return self._phase
