@@ -211,7 +211,7 @@ class CardData:
     cause: str = ""
     text: str = ""
     ei: MeasuredEi | None = None
-    shape: Shape = Shape()
+    shape: Shape = field(default_factory=Shape)
     clamp_offset_um: float = math.nan
     clamp_offset_std_um: float = math.nan
     peak_force_un: float = math.nan
