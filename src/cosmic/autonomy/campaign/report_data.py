@@ -1,11 +1,16 @@
 """What a report tells, taken from a campaign."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cosmic.autonomy.campaign.records import CalibrationNote, CampaignInfo, FibreRecord
+from cosmic.autonomy.campaign.records import (
+    CalibrationNote,
+    CampaignError,
+    CampaignInfo,
+    FibreRecord,
+)
 from cosmic.autonomy.campaign.statistics import Progress, progress
 from cosmic.autonomy.campaign.store_read import CampaignReader
 
@@ -60,8 +65,17 @@ def report_data(reader: CampaignReader) -> ReportData:
         finished=finished,
         calibrations=reader.calibrations(),
         operations=operation_times(finished),
-        whole=reader.fibre,
+        whole=lambda number: _whole(reader, number, finished),
     )
+
+
+def _whole(reader: CampaignReader, number: int, finished: Sequence[FibreRecord]) -> FibreRecord:
+    """Return a fibre with what can be read of it: a lost file costs no report."""
+    try:
+        return reader.fibre(number)
+    except CampaignError as exc:
+        record = next(each for each in finished if each.number == number)
+        return replace(record, text=f"{record.text} {exc}".strip())
 
 
 def operation_times(fibres: Sequence[FibreRecord]) -> tuple[OperationTime, ...]:

@@ -23,7 +23,13 @@ from cosmic.autonomy.campaign.records import (
     Value,
 )
 from cosmic.autonomy.campaign.store_curves import curves_file
-from cosmic.autonomy.campaign.store_files import DATABASE, FIBRES, remove_parts, write_whole
+from cosmic.autonomy.campaign.store_files import (
+    DATABASE,
+    FIBRES,
+    remove_parts,
+    write_through,
+    write_whole,
+)
 from cosmic.autonomy.campaign.store_line import WriteLine, last_number
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.campaign.store_rows import (
@@ -50,11 +56,11 @@ class CampaignStore:
     run. Make one with `create` or `open`.
     """
 
-    def __init__(self, folder: Path, *, now: Now = _now) -> None:
+    def __init__(self, folder: Path, info: CampaignInfo | None = None, *, now: Now = _now) -> None:
         self.folder = folder
         self.reader = CampaignReader(folder)
         self._now = now
-        self._line = WriteLine(folder)
+        self._line = WriteLine(folder, info)
         self._run = 0
 
     # ------------------------------------------------------------------ opening and closing
@@ -75,9 +81,8 @@ class CampaignStore:
             raise CampaignError(
                 f"{folder} holds a campaign already: go on with it, or name another folder"
             )
-        store = cls._opened(folder, now)
+        store = cls._opened(folder, now, info)
         try:
-            store._line.lay_out(info)  # noqa: SLF001 - its own class
             store._begin_run(time_s, info.versions)  # noqa: SLF001 - its own class
         except BaseException:
             store.close()
@@ -114,14 +119,14 @@ class CampaignStore:
         return store
 
     @classmethod
-    def _opened(cls, folder: Path, now: Now) -> Self:
+    def _opened(cls, folder: Path, now: Now, info: CampaignInfo | None = None) -> Self:
         try:
             (folder / FIBRES).mkdir(parents=True, exist_ok=True)
         except OSError as exc:
             raise CampaignError(
                 f"{folder} cannot be made: {exc.strerror or exc}; name another folder"
             ) from exc
-        return cls(folder, now=now)
+        return cls(folder, info, now=now)
 
     def _begin_run(self, time_s: float, versions: Mapping[str, str]) -> None:
         row: Row = {
@@ -210,6 +215,7 @@ class CampaignStore:
                 self._write_picture(picture, PurePosixPath(FIBRES, f"{name}-{order:02d}.png"))
                 for order, picture in enumerate(record.pictures)
             ]
+            write_through(self.folder / FIBRES)
             with self._line.transaction() as line:
                 self._refuse_unless_running(line, record.number)
                 update(line, "fibre", fibre_row(record, str(curves)), key=record.number)

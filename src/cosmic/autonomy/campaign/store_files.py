@@ -38,6 +38,17 @@ def write_whole(path: Path, data: bytes) -> None:
         ) from exc
 
 
+def write_through(folder: Path) -> None:
+    """See that the names in a folder are on the disk too, where a folder can be opened."""
+    if os.name != "posix":
+        return
+    opened = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(opened)
+    finally:
+        os.close(opened)
+
+
 def remove_parts(folder: Path) -> None:
     """Remove what an end without warning left half written."""
     for part in folder.glob(f"*{PART}"):

@@ -10,7 +10,7 @@ from threading import RLock
 from typing import Final
 
 from cosmic.autonomy.campaign.records import CampaignError, CampaignInfo
-from cosmic.autonomy.campaign.store_files import DATABASE, FolderLock
+from cosmic.autonomy.campaign.store_files import DATABASE, PART, FolderLock
 from cosmic.autonomy.campaign.store_rows import Row, insert
 from cosmic.autonomy.campaign.store_schema import SCHEMA_VERSION, TABLES
 
@@ -24,46 +24,25 @@ class WriteLine:
     ----------
     guard : RLock
         Held during a transaction, and by who needs several to be one.
+
+    Parameters
+    ----------
+    info : CampaignInfo, optional
+        What is begun; None: it is there already.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, info: CampaignInfo | None = None) -> None:
         self.guard = RLock()
         self._file = folder / DATABASE
         self._lock = FolderLock(folder)
         self._closed = False
         try:
-            self._line = sqlite3.connect(
-                self._file, timeout=BUSY_S, isolation_level=None, check_same_thread=False
-            )
-            self._line.execute("PRAGMA foreign_keys = ON")
-            self._line.execute("PRAGMA journal_mode = WAL")
-        except sqlite3.Error as exc:
+            if info is not None:
+                _lay_out(self._file, info)
+            self._line = _opened(self._file)
+        except BaseException:
             self._lock.release()
-            raise self._failure(exc) from exc
-
-    def lay_out(self, info: CampaignInfo) -> None:
-        """Make the tables, and say what the campaign is."""
-        row: Row = {
-            "one": 1,
-            "name": info.name,
-            "procedure": info.procedure,
-            "sample": info.sample,
-            "recipe_text": info.recipe_text,
-            "recipe_sha256": hashlib.sha256(info.recipe_text.encode()).hexdigest(),
-            "started": info.started,
-            "description": info.description,
-            "operator": info.operator,
-            "hardware": info.hardware,
-            "seed": info.seed,
-            "rate": info.rate,
-            "versions_json": json.dumps(dict(info.versions)),
-        }
-        with self.transaction() as line:
-            for statement in TABLES.split(";"):
-                if statement.strip():
-                    line.execute(statement)
-            insert(line, "campaign", row)
-            line.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+            raise
 
     @contextmanager
     def transaction(self, *, durable: bool = True) -> Generator[sqlite3.Connection]:
@@ -87,13 +66,7 @@ class WriteLine:
                     if self._line.in_transaction:
                         self._line.execute("ROLLBACK")
             except sqlite3.Error as exc:
-                raise self._failure(exc) from exc
-
-    def _failure(self, error: sqlite3.Error) -> CampaignError:
-        return CampaignError(
-            f"{self._file} cannot be written: {error}; what was finished before is kept: make "
-            "room, and start the campaign again in the same folder"
-        )
+                raise _failure(self._file, exc) from exc
 
     def close(self) -> None:
         """Let go of the folder; without effect after the first time."""
@@ -102,6 +75,58 @@ class WriteLine:
                 self._closed = True
                 self._line.close()
                 self._lock.release()
+
+
+def _opened(file: Path) -> sqlite3.Connection:
+    try:
+        line = sqlite3.connect(file, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
+        line.execute("PRAGMA foreign_keys = ON")
+        line.execute("PRAGMA journal_mode = WAL")
+    except sqlite3.Error as exc:
+        raise _failure(file, exc) from exc
+    return line
+
+
+def _lay_out(file: Path, info: CampaignInfo) -> None:
+    """Make the tables under another name, so that there is a whole database or none."""
+    part = file.with_name(file.name + PART)
+    part.unlink(missing_ok=True)
+    row: Row = {
+        "one": 1,
+        "name": info.name,
+        "procedure": info.procedure,
+        "sample": info.sample,
+        "recipe_text": info.recipe_text,
+        "recipe_sha256": hashlib.sha256(info.recipe_text.encode()).hexdigest(),
+        "started": info.started,
+        "description": info.description,
+        "operator": info.operator,
+        "hardware": info.hardware,
+        "seed": info.seed,
+        "rate": info.rate,
+        "versions_json": json.dumps(dict(info.versions)),
+    }
+    line = sqlite3.connect(part, isolation_level=None)
+    try:
+        line.execute("BEGIN")
+        for statement in TABLES.split(";"):
+            if statement.strip():
+                line.execute(statement)
+        insert(line, "campaign", row)
+        line.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+        line.execute("COMMIT")
+    except sqlite3.Error as exc:
+        raise _failure(file, exc) from exc
+    finally:
+        line.close()
+    part.replace(file)
+
+
+def _failure(file: Path, error: sqlite3.Error) -> CampaignError:
+    return CampaignError(
+        f"{file} cannot be written: {error}; what was finished before is kept: make room, and "
+        "start the campaign again in the same folder"
+    )
 
 
 def last_number(line: sqlite3.Connection) -> int:

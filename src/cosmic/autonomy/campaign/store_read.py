@@ -1,6 +1,7 @@
 """Reading a campaign, also while it is written, and by another process."""
 
 import json
+import os
 import sqlite3
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -178,7 +179,7 @@ class CampaignReader:
         if not file.exists():
             raise CampaignError(f"{self.folder} holds no campaign: there is no {DATABASE} in it")
         try:
-            line = sqlite3.connect(f"{file.resolve().as_uri()}?mode=ro", uri=True, timeout=10.0)
+            line = sqlite3.connect(_address(file), uri=True, timeout=10.0)
             try:
                 line.row_factory = sqlite3.Row
                 yield line
@@ -196,6 +197,12 @@ class CampaignReader:
         for row in self._rows(query):
             found.setdefault(row["fibre"], []).append(row)
         return found
+
+
+def _address(file: Path) -> str:
+    """Return what to open for reading; a folder that cannot be written is one that stays."""
+    written = os.access(file.parent, os.W_OK) or file.with_name(f"{file.name}-wal").exists()
+    return f"{file.resolve().as_uri()}?mode=ro{'' if written else '&immutable=1'}"
 
 
 def _pixels(file: Path) -> Image:

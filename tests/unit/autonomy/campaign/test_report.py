@@ -113,6 +113,19 @@ def test_a_report_can_be_written_while_the_campaign_runs(tmp_path: Path) -> None
         assert "0: 0 good" in text
 
 
+def test_a_lost_file_costs_its_fibre_the_figures_and_no_more(tmp_path: Path) -> None:
+    with CampaignStore.create(tmp_path / "run", INFO) as store:
+        for _ in range(2):
+            store.finish_fibre(good(store.begin_fibre(time_s=0.0)))
+        (tmp_path / "run" / "fibres" / "00001.h5").unlink()
+        (tmp_path / "run" / "fibres" / "00002-00.png").write_bytes(b"no picture")
+        write_report(store, tmp_path / "report.html")
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "00001.h5 cannot be read" in text
+    assert "00002-00.png is no picture any more" in text
+    assert "2: 2 good" in text
+
+
 def test_a_real_platform_gets_other_words_than_the_twin(tmp_path: Path) -> None:
     with CampaignStore.create(tmp_path / "run", replace(INFO, hardware="FiberStation")) as store:
         write_report(store, tmp_path / "report.html")
