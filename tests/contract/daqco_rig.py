@@ -56,6 +56,7 @@ class DaqcoRig:
     home: Home
     daqco: Daqco
     remote: RemoteDaqcoApplication | None = None
+    station: Station | None = None
 
 
 def settings(folder: Path, channels: int = 2, rate_hz: float = 1000.0) -> DaqcoSettings:
@@ -131,7 +132,7 @@ def daqco_rig(where: str, wanted: DaqcoSettings) -> Iterator[DaqcoRig]:
             transport = InProcessTransport(station, "vision")
             stack.callback(transport.close)
         remote = stack.enter_context(elsewhere(transport))
-        yield DaqcoRig(home, Daqco(remote), remote)
+        yield DaqcoRig(home, Daqco(remote), remote, station)
 
 
 def gather(daqco: Daqco) -> tuple[list[int], list[int], Callable[[], None]]:
