@@ -150,8 +150,10 @@ class _Span:
         """Return the way at which the probe should meet the fibre: as it bows, as it was met."""
         if not self._fibre.contacts:
             return self._foreseen_um()
+        # It lies elsewhere than foreseen because of where it is held, or of how it bows: the
+        # probe comes up as if to the nearer of both.
         along, off = self._fibre.contacts[-1]
-        return self._foreseen_um() + off * self._plan.span_um / along
+        return self._foreseen_um() + min(off, off * (self._plan.span_um / along) ** 2)
 
     def _foreseen_um(self) -> float:
         _, hold_y = self._work.tip_now(self._work.gripper)

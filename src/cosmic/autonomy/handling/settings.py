@@ -159,7 +159,7 @@ class PushSettings(StrictModel):
     retreat_um: float = Field(12.0, gt=0.0)
     tilt_um: float = Field(55.0, ge=0.0)
     tilt_longest_um: float = Field(330.0, gt=0.0)
-    spans: SpanLimits = Field(default_factory=SpanLimits)
+    spans: SpanLimits = Field(default_factory=lambda: SpanLimits(longest_um=600.0))
     fit: FitSettings = Field(default_factory=FitSettings)
 
 

@@ -1,0 +1,103 @@
+"""Means of the force over times to come."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cosmic.autonomy.handling import force
+from cosmic.autonomy.handling.force import ForceWatch
+from cosmic.daqco.core.chunk import DataChunk
+from cosmic.daqco.core.scale import Scale
+from cosmic.frame.clock import ManualClock
+from cosmic.frame.errors import ConfigError, DeviceTimeout, NotAvailable
+
+
+class Daqco:
+    """As much of `rig.daqco` as a watch uses."""
+
+    channels = ("aux", "force")
+
+    def __init__(self) -> None:
+        self.receiver: Any = None
+
+    def subscribe(self, receiver: Any) -> Any:
+        self.receiver = receiver
+        return lambda: setattr(self, "receiver", None)
+
+
+def chunk(first: int, values: np.ndarray) -> DataChunk:
+    scale = Scale("as it is", "uN", (0.0, 1.0))
+    volts = np.vstack([np.zeros(values.size), values])
+    return DataChunk(first, first / 1000.0, 1000.0, ("aux", "force"), volts, (scale, scale))
+
+
+@pytest.fixture
+def watched() -> tuple[Daqco, ManualClock, ForceWatch]:
+    daqco, clock = Daqco(), ManualClock()
+    watch = ForceWatch(daqco, "force", clock)  # type: ignore[arg-type]
+    watch.open()
+    return daqco, clock, watch
+
+
+def test_a_mean_holds_the_samples_of_its_time_and_no_others(
+    watched: tuple[Daqco, ManualClock, ForceWatch],
+):
+    daqco, clock, watch = watched
+    clock.advance(0.1)
+    wanted = watch.wanted(0.05, settle_s=0.02)
+    values = np.where((np.arange(300) >= 120) & (np.arange(300) <= 170), 7.0, -100.0)
+    daqco.receiver(chunk(0, values[:150]))
+    assert not wanted.done, "the last samples of its time are missing"
+    daqco.receiver(chunk(150, values[150:]))
+    assert wanted.done
+    mean = wanted.wait(0.0)
+    assert (mean.mean_un, mean.std_un) == (7.0, 0.0)
+    assert mean.time_s == pytest.approx(0.145)
+    assert mean.samples == pytest.approx(50, abs=1)
+
+
+def test_whoever_waits_is_told_when_the_samples_are_there(
+    watched: tuple[Daqco, ManualClock, ForceWatch],
+):
+    daqco, _, watch = watched
+    wanted, told = watch.wanted(0.05), []
+    wanted.add_callback(told.append)
+    daqco.receiver(chunk(0, np.zeros(20)))
+    assert told == []
+    daqco.receiver(chunk(20, np.zeros(80)))
+    daqco.receiver(chunk(100, np.zeros(80)))
+    assert told == [wanted], "once"
+
+
+def test_a_wait_ends_when_no_samples_come(
+    watched: tuple[Daqco, ManualClock, ForceWatch], monkeypatch: pytest.MonkeyPatch
+):
+    _, _, watch = watched
+    with pytest.raises(DeviceTimeout):
+        watch.wanted(0.05).wait(0.01)
+    monkeypatch.setattr(force, "LIMIT_WALL_S", -1.0)
+    with pytest.raises(NotAvailable, match="no samples"):
+        watch.wanted(0.05).wait(1.0)
+
+
+def test_the_peak_counts_either_sign_and_begins_anew_when_it_was_taken(
+    watched: tuple[Daqco, ManualClock, ForceWatch],
+):
+    daqco, _, watch = watched
+    daqco.receiver(chunk(0, np.array([3.0, -9.0, 4.0])))
+    assert watch.take_peak_un() == 9.0
+    daqco.receiver(chunk(3, np.array([1.0, 2.0])))
+    assert watch.take_peak_un() == 2.0
+
+
+def test_a_watch_names_the_channels_there_are():
+    with pytest.raises(ConfigError, match="aux, force"):
+        ForceWatch(Daqco(), "farce", ManualClock())  # type: ignore[arg-type]
+
+
+def test_a_closed_watch_takes_no_more(watched: tuple[Daqco, ManualClock, ForceWatch]):
+    daqco, _, watch = watched
+    watch.close()
+    watch.close()
+    assert daqco.receiver is None

@@ -1,0 +1,198 @@
+"""The probe finds a held fibre and pushes it, however stiff it is and wherever it is."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from typing_extensions import override
+
+from cosmic.autonomy.bending.fit import fit_bending
+from cosmic.autonomy.handling.force import ForceMean
+from cosmic.autonomy.handling.plate import Candidate, Reach
+from cosmic.autonomy.handling.push import NO_CONTACT, PushSpans
+from cosmic.autonomy.handling.settings import HandlingSettings, PushSettings
+from cosmic.autonomy.handling.work import FibreInHand, FibreWork
+from cosmic.autonomy.procedures.operation import OperationFailed, Steps
+from cosmic.frame.clock import ManualClock
+from cosmic.vico.core.tool_settings import ToolSettings
+
+GRIPPER = ToolSettings(
+    name="left",
+    x_axis="left.x",
+    y_axis="left.y",
+    z_axis="left.z",
+    gap_axis="left.gripper",
+    tip_um=(-4000.0, 0.0, 1500.0),
+    forward=(1.0, 0.0),
+    width_um=100.0,
+)
+PROBE = ToolSettings(
+    name="probe",
+    x_axis="probe.x",
+    y_axis="probe.y",
+    tip_um=(0.0, 5000.0, 700.0),
+    forward=(0.0, -1.0),
+    width_um=50.0,
+)
+CLAMP_UM, SENSOR_UN_UM, WIDTH_UM, ZERO_UN = 9.0, 800.0, 30.0, 1.3
+
+
+class Done:
+    """Something waited for that has ended."""
+
+    done = True
+
+    def __init__(self, result: object = None) -> None:
+        self.result = result
+
+    def wait(self, timeout_s: float | None = None) -> object:
+        return self.result
+
+    def cancel(self) -> None:
+        """Nothing is under way."""
+
+
+class Axis:
+    """One of the bench's axes: it is where it was sent."""
+
+    def __init__(self, bench: "Bench", name: str) -> None:
+        self.bench, self.name = bench, name
+
+    @property
+    def position_um(self) -> float:
+        return round(self.bench.at_um[self.name], 1)
+
+    def move_to(self, target: float, *, wait: bool) -> Done:
+        return self.bench.go({self.name: target})  # type: ignore[return-value]
+
+
+class Daqco:
+    """Notes whether the limit was armed."""
+
+    def __init__(self) -> None:
+        self.armed: list[bool] = []
+
+    def set_limit(self, limit: Any) -> None:
+        self.armed.append(limit.armed)
+
+
+class Bench(FibreWork):
+    """A fibre in the jaws, a probe, and the force of one on the other; no platform."""
+
+    def __init__(self, ei_n_m2: float, *, off_um: float = 0.0, there: bool = True) -> None:
+        clock = ManualClock(auto_advance=True)
+        settings = HandlingSettings(push=PushSettings(stop_un=140.0))
+        bench: Any = self
+        super().__init__(bench, Daqco(), bench, settings, clock, bench)  # type: ignore[arg-type]
+        places = settings.places
+        self.at_um = {
+            "left.x": 4000.0,
+            "left.y": places.hold_y_um,
+            "left.z": -810.0,
+            "probe.x": 0.0,
+            "probe.y": 1000.0,
+        }
+        self.ei, self.off_um, self.there = ei_n_m2 * 1e18, off_um, there
+        self.peak_un, self.random = 0.0, np.random.default_rng(3)
+        line = np.column_stack([np.linspace(0.0, 1200.0, 61), np.zeros(61)])
+        reach = Reach(Candidate(line, 1200.0, WIDTH_UM, 0.0, 60.0), 0.0, line, (250.0, 0.0))
+        self.fibre = FibreInHand(1, reach, inside_um=250.0, free_um=950.0, held=True)
+
+    def __getitem__(self, name: str) -> Axis:
+        return Axis(self, name)
+
+    @override
+    def tool(self, name: str) -> ToolSettings:
+        return PROBE if name == "probe" else GRIPPER
+
+    @override
+    def go(self, targets: Any) -> Any:
+        self.at_um |= targets
+        self.force_un()
+        return Done()
+
+    def wanted(self, seconds: float, *, settle_s: float = 0.0) -> Done:
+        self.clock.sleep(seconds + settle_s)
+        std = 0.3 / math.sqrt(1000.0 * seconds)
+        force = ZERO_UN + self.force_un() + self.random.normal(0.0, std)
+        return Done(ForceMean(float(force), std, self.clock.now_s(), 40))
+
+    def take_peak_un(self) -> float:
+        return self.peak_un
+
+    def force_un(self) -> float:
+        """Return what the fibre pushes back with."""
+        ahead = self.at_um["probe.x"] - 0.0
+        surface = self.at_um["left.y"] + WIDTH_UM / 2.0 + self.off_um
+        way = surface - (5000.0 + self.at_um["probe.y"])
+        if not (self.there and way > 0.0 and 0.0 < ahead < 950.0):
+            return 0.0
+        fibre = 3.0 * self.ei / (ahead + CLAMP_UM) ** 3
+        force = way / (1.0 / fibre + 1.0 / SENSOR_UN_UM)
+        self.peak_un = max(self.peak_un, force)
+        return force
+
+
+def carried_out(steps: Steps) -> None:
+    result: object = None
+    while True:
+        try:
+            wish = steps.send(result)
+        except StopIteration:
+            return
+        result = wish.wait(0.0) if hasattr(wish, "wait") else None
+
+
+@pytest.mark.parametrize("off_um", [-30.0, 45.0])
+@pytest.mark.parametrize("ei_n_m2", [1e-12, 5e-11, 4e-10])
+def test_the_stiffness_is_found_and_the_sensor_spared(ei_n_m2: float, off_um: float):
+    bench = Bench(ei_n_m2, off_um=off_um)
+    carried_out(PushSpans().run(bench))
+    fibre = bench.in_hand()
+    assert len(fibre.spans) == 3
+    assert bench.peak_un <= 0.8 * 180.0
+    fit = bench.settings.push.fit.model_copy(update={"fibre_width_um": 0.0, "edge_radius_um": 0.0})
+    found = fit_bending(fibre.spans, settings=fit)
+    assert found.ei_n_m2 == pytest.approx(ei_n_m2, rel=0.06 if ei_n_m2 < 2e-10 else 0.15)
+    assert found.ei_low_n_m2 < ei_n_m2 < found.ei_high_n_m2
+
+
+def test_a_fibre_nearer_than_foreseen_is_come_up_to_again_from_further_back():
+    bench = Bench(5e-11, off_um=60.0)
+    carried_out(PushSpans().run(bench))
+    assert bench.peak_un <= 0.8 * 180.0
+    for span in bench.in_hand().spans:
+        assert span.force_un[0] == pytest.approx(ZERO_UN, abs=0.6), "each begins without contact"
+
+
+def test_a_fibre_that_is_not_there_is_told_with_the_place():
+    bench = Bench(5e-11, there=False)
+    with pytest.raises(OperationFailed, match="600 um from the jaws") as told:
+        carried_out(PushSpans().run(bench))
+    assert told.value.cause == NO_CONTACT
+
+
+def test_the_limit_is_armed_while_the_probe_pushes_and_not_longer():
+    for bench in (Bench(5e-11), Bench(5e-11, there=False)):
+        steps = PushSpans().run(bench)
+        try:
+            carried_out(steps)
+        except OperationFailed as failure:
+            assert failure.cause == NO_CONTACT
+        assert bench.daqco.armed == [True, False]  # type: ignore[attr-defined]
+
+
+def test_an_abort_in_the_middle_of_a_push_disarms_it_too():
+    bench = Bench(5e-11)
+    steps = PushSpans().run(bench)
+    next(steps)
+    steps.close()
+    assert bench.daqco.armed == [True, False]  # type: ignore[attr-defined]
+
+
+def test_a_soft_fibre_gets_shorter_spans_once_the_first_has_shown_it():
+    bench = Bench(1e-12)
+    carried_out(PushSpans().run(bench))
+    nominal = [span.nominal_um for span in bench.in_hand().spans]
+    assert nominal[0] > 1.5 * nominal[1]
