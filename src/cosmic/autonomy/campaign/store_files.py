@@ -39,14 +39,23 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 def write_through(folder: Path) -> None:
-    """See that the names in a folder are on the disk too, where a folder can be opened."""
+    """See that the names in a folder are on the disk too, where a folder can be opened.
+
+    Raises
+    ------
+    CampaignError
+        They cannot be written.
+    """
     if os.name != "posix":
         return
-    opened = os.open(folder, os.O_RDONLY)
     try:
-        os.fsync(opened)
-    finally:
-        os.close(opened)
+        opened = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(opened)
+        finally:
+            os.close(opened)
+    except OSError as exc:
+        raise CampaignError(f"{folder} cannot be written: {exc.strerror or exc}") from exc
 
 
 def remove_parts(folder: Path) -> None:
