@@ -20,6 +20,9 @@ def ids(page: Path) -> str:
 
 
 def with_python(page: Path) -> bool:
+    """Tell whether a page has Python that runs by itself; stations are started in their test."""
+    if "<!-- with stations -->" in page.read_text(encoding="utf-8"):
+        return False
     return any(block.language == "python" for block in blocks(page))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Self, TypeVar, cast
+from typing import TYPE_CHECKING, Self, TypeVar, cast
 from weakref import WeakSet
 
 from typing_extensions import override
@@ -14,7 +14,7 @@ from typing_extensions import override
 from cosmic.app.faults import SimulationFaults
 from cosmic.app.platform import Platform, Uses, build_platform
 from cosmic.app.platform_file import KNOWN_APPLICATIONS, check_applications
-from cosmic.app.remote_station import StationControl
+from cosmic.app.remote_station import RemoteStation, StationControl
 from cosmic.app.serve_options import StationAddress
 from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.procedures.procedure import Procedure
@@ -23,6 +23,10 @@ from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.errors import NotAvailable, NotConnectedError
 from cosmic.mico.api.mico import Mico
 from cosmic.vico.api.vico import Vico
+
+if TYPE_CHECKING:
+    from cosmic.autonomy.campaign.campaign import Campaign
+    from cosmic.autonomy.campaign.recipe import Recipe
 
 logger = logging.getLogger(__name__)
 
@@ -91,6 +95,31 @@ class Rig:
             raise NotAvailable("mico is not hosted here; a control loop has nothing to move")
         return self._control
 
+    def campaign(self, recipe: "Recipe | str | Path", folder: str | Path) -> "Campaign":
+        """Return a campaign that is ready to start: many fibres by one recipe.
+
+        In a folder that holds a campaign by the same recipe it goes on with that one.
+
+        Parameters
+        ----------
+        recipe : Recipe or path
+            A file, or the name of a recipe that ships with CoSMic, such as "bend-test".
+        folder : path
+            Where records are kept; made where it is not there.
+
+        Raises
+        ------
+        ConfigError
+            The recipe is wrong, a line for every mistake, or the platform has not what it names.
+        CampaignError
+            The folder holds another campaign, is in use, or cannot be written.
+        NotAvailable
+            An application is not hosted here.
+        """
+        from cosmic.app.campaigns import campaign_on  # loads statistics, which takes a second
+
+        return campaign_on(self, self._platform, recipe, folder)
+
     def procedure(self, procedure: Procedure[W], work: W) -> ProcedureRun[W]:
         """Return a run of `procedure` that is ready to begin, in the platform's time.
 
@@ -118,8 +147,8 @@ class Rig:
         """The other stations in use, by name, with who may move things there."""
         return {each.name: each.control for each in self._platform.elsewhere.stations}
 
-    def take_control(self) -> None:
-        """Take the right to move things at every station in use; all of them, or none.
+    def take_control(self, *stations: str) -> None:
+        """Take the right to move things at the stations named, all without a name; or at none.
 
         Raises
         ------
@@ -127,18 +156,35 @@ class Rig:
             Another holds it, or the operator there keeps it (`NO_LEASE`).
         StationAway
             A station cannot be reached.
+        NotAvailable
+            No such station is in use.
         """
         with ExitStack() as undo:
-            for each in self._platform.elsewhere.stations:
+            for each in self._chosen(stations):
                 if not each.control.here:
                     each.take_control()
                     undo.callback(each.release_control)
             undo.pop_all()
 
-    def release_control(self) -> None:
-        """Give the right to move back at every station; what moves by it stops."""
-        for each in self._platform.elsewhere.stations:
-            each.release_control()
+    def release_control(self, *stations: str) -> None:
+        """Give the right to move back, at every station without a name; what moves by it stops.
+
+        Raises
+        ------
+        NotAvailable
+            No such station is in use.
+        """
+        for each in self._chosen(stations):
+            if each.control.here:
+                each.release_control()
+
+    def _chosen(self, names: Sequence[str]) -> list[RemoteStation]:
+        known = {each.name: each for each in self._platform.elsewhere.stations}
+        for name in names:
+            if name not in known:
+                used = ", ".join(known) or "none"
+                raise NotAvailable(f"no station {name!r} is in use; in use are: {used}")
+        return [known[name] for name in names or known]
 
     @property
     def stopped(self) -> str | None:

@@ -5,6 +5,7 @@ import secrets
 from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Lock
+from typing import Final
 
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import refusal
@@ -15,6 +16,8 @@ from cosmic.frame.network.transfer import transferable
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 
 logger = logging.getLogger(__name__)
+
+TAKE_IT: Final = 'take control first ("Take control" in the window, rig.take_control() in a script)'
 
 
 @transferable
@@ -176,7 +179,8 @@ class StationLease:
         with self._lock:
             held = self._grant or self._local
             if not secrets.compare_digest(held.token, token):
-                raise refusal(_refused(f"the right to move is held by {held.name}"))
+                advice = TAKE_IT if self._grant is None and self._offered else ""
+                raise refusal(_refused(f"the right to move is held by {held.name}", advice))
         return DeadMan(held.pulse, float("inf") if held.in_process else limit_s)
 
     def poll(self) -> None:
@@ -207,5 +211,6 @@ class StationLease:
         tell(self._listeners, state)
 
 
-def _refused(text: str) -> MoveVerdict:
-    return refuse(Reason.NO_LEASE, f"{text}; ask for it there, or wait until it is given back")
+def _refused(text: str, what_to_do: str = "") -> MoveVerdict:
+    advice = what_to_do or "ask for it there, or wait until it is given back"
+    return refuse(Reason.NO_LEASE, f"{text}; {advice}")
