@@ -175,6 +175,10 @@ class _Span:
         if self._fibre.zero_un is None:
             self._fibre.zero_un = yield from self._mean_un(push.average_s)
         yield work.go({self._probe.x_axis: x - self._probe.tip_um[0]})
+        if self._fibre.tilts:
+            part = self._plan.span_um / push.tilt_longest_um
+            side = -1.0 if self._fibre.tilts % 2 else 1.0
+            yield work.go_up(work.hold_tip_um + side * push.tilt_um * part)
         for way in (aside, surface - push.retreat_um) if known else (aside,):
             yield from self._come_to(way)
 
@@ -297,25 +301,22 @@ class FitSpans(FibreOperation):
         yield SAFE_POINT
 
 
-class Tilt(FibreOperation):
-    """A fibre that was not met is held lower, then higher: it may point up or down."""
+class StepBack(FibreOperation):
+    """The probe goes back before the fibre is pushed again.
 
-    name = "hold it higher or lower"
+    One that was not met may point up or down: it is held lower then, and higher the next time.
+    """
+
+    name = "step back"
 
     @override
     def steps(self, work: FibreWork) -> Steps:
         fibre, push = work.in_hand(), work.settings.push
         _, failure = work.failures[-1]
-        if failure.cause == NO_CONTACT:
-            fibre.tilts += 1
-        side = -1.0 if fibre.tilts % 2 else 1.0
+        fibre.tilts += failure.cause == NO_CONTACT
         x, y = work.tip_now(work.probe)
-        yield work.go(work.at(work.probe, x, y - 3.0 * push.stand_off_um * _ahead(work)))
-        yield work.go_up(work.hold_tip_um + (side * push.tilt_um if fibre.tilts else 0.0))
-
-
-def _ahead(work: FibreWork) -> float:
-    return 1.0 if work.probe.forward[1] > 0.0 else -1.0
+        back = push.stand_off_um + push.search_um
+        yield work.go(work.at(work.probe, x, y - back * (1.0 if work.probe.forward[1] > 0 else -1)))
 
 
 class Retract(FibreOperation):

@@ -134,8 +134,8 @@ class PushSettings(StrictModel):
     retreat_um : float
         How far the probe goes back from the fibre between spans.
     tilt_um, tilt_longest_um : float
-        How much lower, then higher, a fibre is held that was not met, for it may point up or down;
-        and the longest span then.
+        How much lower, then higher, a fibre is held that was not met, for it may point up or down:
+        at the longest span then, and in proportion at shorter ones.
     spans : SpanLimits
         What spans there may be.
     fit : FitSettings

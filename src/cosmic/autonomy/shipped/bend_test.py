@@ -9,7 +9,7 @@ from cosmic.autonomy.handling.prepare import (
     MakeReady,
     TurnOn,
 )
-from cosmic.autonomy.handling.push import NO_CONTACT, NOT_TRUSTED, FitSpans, PushSpans, Tilt
+from cosmic.autonomy.handling.push import NO_CONTACT, NOT_TRUSTED, FitSpans, PushSpans, StepBack
 from cosmic.autonomy.handling.put_away import (
     ADHESION,
     Finish,
@@ -48,7 +48,7 @@ def build_bend_test(settings: HandlingSettings | None = None) -> Procedure[Fibre
         Sequence[FibreWork]("measure", PushSpans(), FitSpans()),
         PUSHES,
         only={NO_CONTACT, NOT_TRUSTED},
-        between=Tilt(),
+        between=StepBack(),
     )
     return Procedure(
         "bend test",
