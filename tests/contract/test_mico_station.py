@@ -211,6 +211,20 @@ def test_poses_ways_and_collisions(mico: Mico) -> None:
     assert not mico["left.x"].collision_detection
     mico.collision.take_in("left.x")
     assert not mico.collision.unwatched
+    with mico.collision.contact("grasp"):
+        assert mico.collision.allowed_contacts == {"grasp"}
+    assert not mico.collision.allowed_contacts
+
+
+def test_a_trajectory_is_rehearsed_against_the_scene(mico: Mico) -> None:
+    assert "left_jaw_a" in mico.collision.scene.bodies
+    assert mico.check({"left.z": -5_000.0}).reason is Reason.COLLISION
+    head = "cosmic-trajectory 1\nplatform FiberStation\n"
+    into_the_plate = mico.trajectories.parse(f"{head}left.z to -5000 um\n")
+    found = mico.trajectories.rehearse(into_the_plate)
+    assert not found.allowed
+    assert "plate" in str(found.verdict)
+    assert mico.trajectories.rehearse(mico.trajectories.parse(f"{head}left.x to 50 um\n")).allowed
 
 
 def test_the_initialisation_tells_how_far_it_is(mico: Mico) -> None:

@@ -34,6 +34,11 @@ class CollisionPort(Protocol):
 
     @property
     @abstractmethod
+    def ignored_pairs(self) -> frozenset[BodyPair]:
+        """The pairs of bodies of the contacts allowed."""
+
+    @property
+    @abstractmethod
     def allowed_contacts(self) -> frozenset[str]:
         """Names of the contacts of the scene that are allowed now."""
 

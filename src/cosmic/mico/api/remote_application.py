@@ -22,12 +22,15 @@ from cosmic.mico.api.station_words import EVENTS, POSITIONS, MicoFacts, MicoPict
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
+from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 
 logger = logging.getLogger(__name__)
 
 FIRST_WORD_S: Final = 10.0
 """How long `initialize` waits for the station, where it may wait."""
+SCENE_LIMIT_S: Final = 10.0
+"""How long the shapes of all bodies may take on the way."""
 _CLOSED: Final = "MiCo is closed here"
 
 
@@ -122,7 +125,10 @@ class RemoteMicoApplication(MicoApplicationBase):
             picture = self._line.call("picture", {})
             if not (isinstance(facts, MicoFacts) and isinstance(picture, MicoPicture)):
                 raise ProtocolError("the station does not say what it has")
-            self.manager.take_facts(facts)
+            scene = self._line.call("scene", {}, SCENE_LIMIT_S) if facts.checks else None
+            if not (scene is None or isinstance(scene, SceneModel)):
+                raise ProtocolError("the station sends something else than its scene")
+            self.manager.take_facts(facts, scene)
             self.manager.take_picture(picture)
             self._dress(facts)
         except CosmicError as exc:

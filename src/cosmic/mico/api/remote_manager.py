@@ -40,6 +40,7 @@ from cosmic.mico.api.station_words import (
     StampedState,
     StartedTogether,
 )
+from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.device_commander import CommanderType, DeviceCommander, join
 from cosmic.mico.core.group_start import GroupStart, GroupStarted
 from cosmic.mico.core.lease import Lease
@@ -309,7 +310,7 @@ class RemoteManager(QObject):
 
     # What the station tells
 
-    def take_facts(self, facts: MicoFacts) -> None:
+    def take_facts(self, facts: MicoFacts, scene: SceneModel | None) -> None:
         """Take what does not change; raises `ProtocolError`."""
         try:
             settings = MicoSettings.model_validate_json(facts.settings)
@@ -322,7 +323,7 @@ class RemoteManager(QObject):
             self._others = {each.name: each for each in (*settings.positioner, *others)}
             self.clock = RatedClock(facts.rate)
             self.controller = RemoteController(facts.controller, facts.simulated)
-        self.collision.learn(facts.contacts)
+        self.collision.learn(scene)
 
     def take_picture(self, picture: MicoPicture) -> None:
         """Begin anew with everything as it is at the station now."""

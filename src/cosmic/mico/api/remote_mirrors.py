@@ -8,11 +8,12 @@ from typing_extensions import override
 
 from cosmic.frame.errors import NotAvailable, ProtocolError
 from cosmic.frame.listeners import tell
+from cosmic.frame.network.errors import CallRefused
 from cosmic.mico.api.remote_line import CommandLine
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.callback import CollisionCallbackBase
 from cosmic.mico.core.collision.exemptions import Exemptions
-from cosmic.mico.core.collision.model import BodyPair, SceneModel
+from cosmic.mico.core.collision.model import BodyPair, SceneModel, pair_of
 from cosmic.mico.core.links import Link, LinkTable
 from cosmic.mico.core.orders import Order
 from cosmic.mico.core.poses import Pose, PoseBook
@@ -64,19 +65,29 @@ class RemoteCollision(Exemptions):
     def __init__(self, line: CommandLine) -> None:
         super().__init__((), ())
         self._line = line
-        self._contact_names: tuple[str, ...] | None = None
+        self._refused = ""
         self.model: SceneModel | None = None
 
     @property
     def available(self) -> bool:
         """False while nothing is checked for collisions, as far as is known here."""
-        return self._contact_names is not None
+        return self.model is not None
 
-    def learn(self, contacts: tuple[str, ...] | None) -> None:
-        """Take note of the operations that the scene describes; None: there is no model."""
-        if contacts != self._contact_names:
-            self._contact_names = contacts
-            tell(self._listeners)
+    def learn(self, model: SceneModel | None) -> None:
+        """Take note of the scene; None: there is none."""
+        with self._guard:
+            self.model = model
+            self._contacts = model.contacts if model is not None else ()
+            self._note_ignored()
+        tell(self._listeners)
+
+    def _note_ignored(self) -> None:
+        self._ignored = frozenset(
+            pair_of(*pair)
+            for contact in self._contacts
+            if contact.name in self._allowed
+            for pair in contact.pairs
+        )
 
     @override
     def take_out(self, axis: str, *, source: str = "script") -> None:
@@ -108,7 +119,13 @@ class RemoteCollision(Exemptions):
 
     def nearest(self, positions: Mapping[str, float]) -> Approach | None:
         """Return the nearest pair; raises `CosmicError` without an answer."""
-        found = self._line.call("nearest", {"positions": dict(positions)})
+        if self._refused:  # a program that may only look; asking again and again changes nothing
+            raise CallRefused(self._refused)
+        try:
+            found = self._line.call("nearest", {"positions": dict(positions)})
+        except CallRefused as exc:
+            self._refused = str(exc)
+            raise
         if not (found is None or isinstance(found, Approach)):
             raise ProtocolError(f"the station does not say what is nearest: {found!r:.80}")
         return found
@@ -129,6 +146,7 @@ class RemoteCollision(Exemptions):
             before = self._taken_out, self._allowed
             self._taken_out, self._allowed = frozenset(taken_out), frozenset(contacts)
             changed = before != (self._taken_out, self._allowed)
+            self._note_ignored()
         if changed:
             tell(self._listeners)
 

@@ -27,6 +27,7 @@ from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.collision.collision_manager import CollisionManager
+from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.orders import FREQUENCY_HZ, Jog, Order, Steer
 from cosmic.mico.core.poses import Pose
 
@@ -72,7 +73,6 @@ class MicoStationSide:
                 found = manager.device(name).container.positioner(manager.address(name).channel)
                 if found is not None:
                     others.append(found.settings.model_dump_json())
-        model = self._application.collision
         return MicoFacts(
             settings=settings.model_dump_json(),
             others=tuple(others),
@@ -80,8 +80,13 @@ class MicoStationSide:
             controller=manager.controller.name,
             simulated=manager.controller.simulated,
             rate=manager.clock.rate,
-            contacts=None if model is None else tuple(each.name for each in model.model.contacts),
+            checks=self._application.collision is not None,
         )
+
+    @remote(reads=True)
+    def scene(self) -> SceneModel:
+        """Return what is watched for collisions, and what it looks like."""
+        return self._model().model
 
     @remote(reads=True)
     def picture(self) -> MicoPicture:

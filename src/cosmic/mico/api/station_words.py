@@ -9,6 +9,16 @@ from cosmic.frame.units import AxisUnit
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
+from cosmic.mico.core.collision.model import (
+    AllowedPair,
+    Contact,
+    Drive,
+    Joint,
+    JointKind,
+    SceneModel,
+    Shape,
+    WatchedPair,
+)
 from cosmic.mico.core.links import Link
 from cosmic.mico.core.orders import (
     Calibrate,
@@ -56,8 +66,8 @@ class MicoFacts:
         Names of the platform and of the library.
     rate : float
         How many times faster than the wall its clock runs at most.
-    contacts : tuple of str or None
-        Operations during which bodies may touch; None without a collision model.
+    checks : bool
+        Movements are checked for collisions.
     """
 
     settings: str
@@ -66,7 +76,7 @@ class MicoFacts:
     controller: str
     simulated: bool
     rate: float
-    contacts: tuple[str, ...] | None
+    checks: bool
 
 
 @transferable
@@ -208,5 +218,6 @@ for _each in (
     MoveTo, MoveBy, Step, Jog, Steer, Calibrate, Reference, ToEndStop, Direction,
     Activity, Channel, PositionerKind, PositionerType, ReferenceKind, Confidence,
     PositionerState, StopState, Link, UndoEntry, Pose, Way, Approach,
+    SceneModel, Joint, JointKind, Shape, Drive, WatchedPair, AllowedPair, Contact,
 ):  # fmt: skip
     transferable(_each)

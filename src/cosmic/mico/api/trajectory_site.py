@@ -12,7 +12,6 @@ from cosmic.frame.task_application import Job
 from cosmic.mico.api.ports import CollisionPort
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
-from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.poses import PoseBook
 from cosmic.mico.core.positioner import Confidence, PositionerState, class_for
@@ -158,7 +157,7 @@ class TrajectorySite:
 
     def _pure_gate(self, bound: Bound) -> tuple[CollisionChecker, ClearanceSearch | None]:
         live = self.worker.collision
-        if not isinstance(live, CollisionManager):  # at another station, whose gate will decide
+        if live is None or live.model is None:
             return NoCollisionModel(), None
         if self._answers is None:
             self._answers = PureAnswers(live.model)

@@ -1,6 +1,7 @@
 """The gate's collision check without its process: for rehearsals, in one thread."""
 
 from collections.abc import Iterable, Mapping, Set
+from typing import Protocol
 
 from typing_extensions import override
 
@@ -17,6 +18,7 @@ class PureAnswers(Answering):
     """Answers as `GateProcess` does, from a `Sweep` of its own; one thread at a time."""
 
     def __init__(self, model: SceneModel) -> None:
+        self.model = model
         self.sweep = Sweep(model)
 
     @override
@@ -42,11 +44,21 @@ class PureAnswers(Answering):
         return free_way(self.sweep, spans, axis, ignored)
 
 
-def pure_copy(
-    live: CollisionManager, answers: PureAnswers, axes: Iterable[str]
-) -> CollisionManager:
+class Exempting(Protocol):
+    """What is left out of the check: a `CollisionManager`, or what is told of one elsewhere."""
+
+    @property
+    def taken_out(self) -> frozenset[str]:
+        """Axes whose movements are not checked."""
+
+    @property
+    def allowed_contacts(self) -> frozenset[str]:
+        """Names of the contacts that are allowed now."""
+
+
+def pure_copy(live: Exempting, answers: PureAnswers, axes: Iterable[str]) -> CollisionManager:
     """Return a manager that judges as `live` does now, without its process."""
-    copy = CollisionManager(live.model, process=answers, axes=axes)
+    copy = CollisionManager(answers.model, process=answers, axes=axes)
     for axis in live.taken_out:
         copy.take_out(axis, source="rehearsal")
     for name in live.allowed_contacts:
