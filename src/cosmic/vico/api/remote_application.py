@@ -11,6 +11,7 @@ from typing_extensions import override
 from cosmic.frame.application import CosmicApplicationBase, GuiFactory
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.listeners import tell
 from cosmic.frame.network.transport import Presence, Rule, Subscription, Transport
 from cosmic.frame.task import Task
 from cosmic.vico.api.places import Places
@@ -18,7 +19,6 @@ from cosmic.vico.api.remote_calls import RemoteCalls, StationClock
 from cosmic.vico.api.remote_places import RemotePlaces
 from cosmic.vico.api.remote_stream import Stream
 from cosmic.vico.api.station_state import PULSE, STATE, CameraPulse, CameraState, VicoState
-from cosmic.vico.api.station_state import pulse_of as _pulse_of
 from cosmic.vico.core.job_thread import JobThread
 from cosmic.vico.core.zoom_scale import ZoomScale
 from cosmic.vico.hw.interface import CameraInfo
@@ -59,7 +59,8 @@ class RemoteVicoApplication(CosmicApplicationBase):
         self._shown: VicoState | None = None
         self._away = "not connected yet"
         self._here = False
-        self._pulse: object = ()
+        self._pulses: dict[str, CameraPulse] = {}
+        self._pulse_listeners: dict[str, Callable[[CameraPulse], object]] = {}
         self._streams: list[Stream[Any]] = []
         self._subscriptions: list[Subscription] = []
         self._forget: Callable[[], None] | None = None
@@ -181,7 +182,11 @@ class RemoteVicoApplication(CosmicApplicationBase):
 
     def pulse_of(self, camera: str) -> CameraPulse | None:
         """Return what was last heard of counters and focus."""
-        return _pulse_of(self._pulse, camera)
+        return self._pulses.get(camera)
+
+    def on_pulse(self, camera: str, listener: Callable[[CameraPulse], object]) -> None:
+        """Call `listener(pulse)` with what is heard of a camera, in the thread that receives."""
+        self._pulse_listeners[camera] = listener
 
     # Commands
 
@@ -257,8 +262,12 @@ class RemoteVicoApplication(CosmicApplicationBase):
             self._changed.notify_all()
         self._show()
 
-    def _on_pulse(self, pulse: object) -> None:
-        self._pulse = pulse
+    def _on_pulse(self, pulses: object) -> None:
+        for pulse in pulses if isinstance(pulses, tuple) else ():
+            if isinstance(pulse, CameraPulse):
+                self._pulses[pulse.name] = pulse
+                if pulse.name in self._pulse_listeners:
+                    tell([self._pulse_listeners[pulse.name]], pulse)
 
     def _show(self) -> None:
         known, away, before = self._known, self._away, self._shown

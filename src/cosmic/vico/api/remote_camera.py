@@ -16,9 +16,10 @@ from cosmic.vico.api.camera_shown import FormatShown, LinkShown, Seen
 from cosmic.vico.api.places import Places
 from cosmic.vico.api.remote_application import RemoteVicoApplication
 from cosmic.vico.api.remote_calls import may_wait_here
+from cosmic.vico.api.remote_pictures import PictureStream
 from cosmic.vico.api.remote_stream import Stream
-from cosmic.vico.api.station_picture import ReceivedPicture, received, received_seen
-from cosmic.vico.api.station_state import CameraState, seen_topic, shown_topic
+from cosmic.vico.api.station_picture import received, received_seen
+from cosmic.vico.api.station_state import CameraState, seen_topic
 from cosmic.vico.core.camera_recordings import PictureRecordingState
 from cosmic.vico.core.job_thread import JobThread
 from cosmic.vico.core.picture import Picture
@@ -36,15 +37,11 @@ class RemoteCameraHandle(CameraHandle):
         self._remote, self._calls = remote, remote.calls
         self.name = name
         self._last_known = remote.camera_state(name)
-        transport = remote.calls.transport
-        self._pictures: Stream[ReceivedPicture] = Stream(
-            transport, shown_topic(name), received, remote.open_soon
-        )
+        self._pictures = PictureStream(remote, name)
         self._seen: Stream[Seen] = Stream(
-            transport, seen_topic(name), received_seen, remote.open_soon
+            remote.calls.transport, seen_topic(name), received_seen, remote.open_soon
         )
-        for stream in (self._pictures, self._seen):
-            remote.keep(stream)
+        remote.keep(self._seen)
 
     @property
     def _state(self) -> CameraState:

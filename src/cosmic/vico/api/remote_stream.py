@@ -39,6 +39,17 @@ class Stream(Generic[T]):
         self._looked_s = 0.0
         self._newest: T | None = None
         self._live = False
+        self._came_s = 0.0
+
+    @property
+    def wanted(self) -> bool:
+        """Somebody has looked lately."""
+        return self._wanted
+
+    @property
+    def silent_s(self) -> float:
+        """Wall time since something came."""
+        return WALL.now_s() - self._came_s
 
     @property
     def live(self) -> bool:
@@ -62,9 +73,7 @@ class Stream(Generic[T]):
         """Begin to receive."""
         with self._lock:
             if self._subscription is None:
-                self._subscription = self._transport.subscribe(
-                    self._topic, Rule.LATEST, self._on_received
-                )
+                self._subscription = self._transport.subscribe(self._topic, Rule.LATEST, self.take)
 
     def close_if_idle(self) -> None:
         """End receiving where nobody has looked for a while."""
@@ -79,7 +88,8 @@ class Stream(Generic[T]):
         if subscription is not None:
             subscription.close()
 
-    def _on_received(self, payload: object) -> None:
+    def take(self, payload: object) -> None:
+        """Take what came, by its topic or because somebody asked."""
         found = self._read(payload)
         if found is not None:
-            self._newest, self._live = found, True
+            self._newest, self._live, self._came_s = found, True, WALL.now_s()

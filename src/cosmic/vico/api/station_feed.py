@@ -1,6 +1,6 @@
 """Publishes what ViCo sees and how it stands; nothing is drawn or sent that nobody receives."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from threading import Condition, Lock
 from typing import Final
@@ -77,12 +77,10 @@ class StateReader:
                 calibrated=tuple(places.calibrated) if places is not None else (),
             )
 
-    def pulse(self) -> tuple[CameraPulse, ...]:
-        """Return what changes with every picture."""
-        return tuple(
-            CameraPulse(name, handle.counters, handle.focus)
-            for name, handle in self._handles.items()
-        )
+    def pulse(self, camera: str, newest_id: int | None) -> CameraPulse:
+        """Return what changes with every picture of a camera."""
+        handle = self._handles[camera]
+        return CameraPulse(camera, handle.counters, handle.focus, newest_id)
 
     def _camera(self, name: str) -> CameraState:
         handle, places = self._handles[name], self._application.places
@@ -106,11 +104,18 @@ class StateReader:
 
 
 class CameraFeed:
-    """The pictures of one camera, and what is seen on them, to the topics of a station."""
+    """The pictures of one camera, and what is seen on them, to the topics of a station.
+
+    Attributes
+    ----------
+    newest_id : int or None
+        Number of the newest whole frame.
+    """
 
     def __init__(self, application: VicoApplication, unit: CameraUnit, station: Station) -> None:
         self._application, self._unit, self._station = application, unit, station
-        name = unit.place.name
+        name = self.name = unit.place.name
+        self.newest_id: int | None = None
         self._pictures, self._shown = pictures_topic(name), shown_topic(name)
         self._seen = seen_topic(name)
         self._newest: Backlog[Picture] = Backlog(Rule.LATEST)
@@ -140,7 +145,10 @@ class CameraFeed:
         if self._station.wanted(self._pictures):
             sent = SentPicture.of(picture, self._application.places)
             self._station.publish(self._pictures, sent)
-        if picture.frame.status is FrameStatus.COMPLETE and self._station.wanted(self._shown):
+        if picture.frame.status is not FrameStatus.COMPLETE:
+            return
+        self.newest_id = int(picture.frame.frame_id)
+        if self._station.wanted(self._shown):
             self._newest.put(picture)
 
     def _view(self, picture: Picture) -> None:
@@ -155,9 +163,15 @@ class CameraFeed:
 class StateFeed(WorkerThread):
     """Publishes state when it changed, and counters now and then, in a thread of its own."""
 
-    def __init__(self, application: VicoApplication, reader: StateReader, station: Station) -> None:
+    def __init__(
+        self,
+        application: VicoApplication,
+        reader: StateReader,
+        cameras: Sequence[CameraFeed],
+        station: Station,
+    ) -> None:
         super().__init__("state of ViCo", station.policy)
-        self._reader, self._station = reader, station
+        self._reader, self._cameras, self._station = reader, cameras, station
         self._changed = Condition()
         self._woken = False
         direct = Qt.ConnectionType.DirectConnection
@@ -177,7 +191,9 @@ class StateFeed(WorkerThread):
             last = self._tell(last) if self._station.wanted(STATE) else None
             if WALL.now_s() - pulsed_s >= PULSE_S and self._station.wanted(PULSE):
                 pulsed_s = WALL.now_s()
-                self._station.publish(PULSE, self._reader.pulse())
+                read = self._reader.pulse
+                pulses = tuple(read(each.name, each.newest_id) for each in self._cameras)
+                self._station.publish(PULSE, pulses)
             self._rest()
 
     def _tell(self, last: VicoState | None) -> VicoState:
@@ -207,7 +223,7 @@ class VicoFeed:
         self._cameras = [
             CameraFeed(application, unit, station) for unit in application.units.values()
         ]
-        self._state = StateFeed(application, reader, station)
+        self._state = StateFeed(application, reader, self._cameras, station)
         self._forget: Callable[[], None] = _nothing
 
     def start(self) -> None:

@@ -1,6 +1,6 @@
 """What a station tells of ViCo: the values that travel, and where they are published."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
@@ -227,15 +227,15 @@ class VicoState:
 @transferable
 @dataclass(frozen=True, slots=True)
 class CameraPulse:
-    """What changes with every picture of a camera."""
+    """What changes with every picture of a camera.
+
+    Attributes
+    ----------
+    newest_id : int or None
+        Number of the newest whole frame.
+    """
 
     name: str
     counters: CameraCounters
     focus: float | None
-
-
-def pulse_of(pulses: object, camera: str) -> CameraPulse | None:
-    """Return that of one camera from what was published; None where there is none."""
-    if not isinstance(pulses, Sequence):
-        return None
-    return next((x for x in pulses if isinstance(x, CameraPulse) and x.name == camera), None)
+    newest_id: int | None
