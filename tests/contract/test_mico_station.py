@@ -33,6 +33,7 @@ from cosmic.frame.verdict import Reason
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.remote_application import RemoteMicoApplication
 from cosmic.mico.api.stepwise import StepwiseMove
+from cosmic.mico.api.ways import Way
 from cosmic.mico.core.orders import Jog, MoveTo
 from cosmic.mico.core.positioner import Confidence, Status
 
@@ -327,6 +328,39 @@ def test_the_station_stops_what_moves_from_elsewhere_by_itself(hosted: HostedMic
     wait_for(lambda: not hosted.mico["left.x"].details.in_motion)
     assert (hosted.mico["left.x"].position_um or 0.0) < 4_000.0
     client.close()
+
+
+def test_what_the_station_carries_out_for_a_client_ends_with_its_lease(hosted: HostedMico) -> None:
+    client = InProcessTransport(hosted.station, "vision")
+    client.take_lease()
+    hosted.application.manager.device("left.x").set_frequency(0, SLOW_HZ)
+    places = ({"left.x": 5_000.0}, {"left.x": 0.0})
+    way = Way({"left.x": 0.0}, places, "straight", 5_000.0, 5_000.0, 1.0)
+    task: Any = client.call("mico", "follow_way", {"way": way})
+    wait_for(lambda: hosted.mico["left.x"].details.in_motion)
+    client.release_lease()
+    with pytest.raises(MoveCancelled, match="given back by vision"):
+        task.wait(5.0)
+    wait_for(lambda: not hosted.mico["left.x"].details.in_motion)
+    assert (hosted.mico["left.x"].position_um or 0.0) < 4_000.0
+    client.close()
+
+
+def test_when_a_client_takes_the_lease_a_jog_of_the_station_ends(hosted: HostedMico) -> None:
+    client = InProcessTransport(hosted.station, "vision")
+    jog = hosted.mico["left.x"].jog(1, 5.0)
+    try:
+        wait_for(lambda: hosted.mico["left.x"].details.in_motion)
+        client.take_lease()
+        until_s = WALL.now_s() + 3.0
+        while not jog.done and WALL.now_s() < until_s:
+            jog.renew()
+            WALL.sleep(0.01)
+        assert jog.done
+        with pytest.raises(MoveRefused, match="vision controls"):
+            jog.movement.wait(1.0)
+    finally:
+        client.close()
 
 
 def test_a_stop_and_a_halt_need_no_lease(hosted: HostedMico, how: str) -> None:

@@ -1,0 +1,125 @@
+"""Who may move: this process, or whoever a station gave the right to."""
+
+from dataclasses import dataclass
+
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.caller import Access, Call, Caller, carrying_out
+from cosmic.frame.network.in_process import InProcessTransport
+from cosmic.frame.network.lease import StationLease
+from cosmic.frame.network.station import Station
+from cosmic.frame.verdict import Reason
+from cosmic.mico.core.collision.checker import NoCollisionModel
+from cosmic.mico.core.gate import Gate, Request
+from cosmic.mico.core.lease import Guard, Lease
+from cosmic.mico.core.orders import MoveTo
+from cosmic.mico.core.positioner import Confidence, PositionerState
+from cosmic.mico.core.rules import Limits
+from cosmic.mico.core.stop_latch import StopLatch
+from cosmic.mico.hw.interface import Channel, PositionerKind
+
+
+@dataclass
+class ByHand(Guard):
+    """A guard that a test ends."""
+
+    why: str = ""
+
+    @property
+    def expired(self) -> bool:
+        return bool(self.why)
+
+
+def gate(lease: Lease) -> Gate:
+    state = PositionerState(
+        "x",
+        Channel(0, 0),
+        PositionerKind.LINEAR,
+        "um",
+        limits=(-10.0, 10.0),
+        position=0.0,
+        read_wall_s=1e12,
+        confidence=Confidence.KNOWN,
+    )
+    return Gate(
+        latch=StopLatch(),
+        lease=lease,
+        checker=NoCollisionModel(),
+        rules=Limits(largest_step={"um": 3.0, "deg": 0.05}, stale_s=5.0),
+        states=lambda: {"x": state},
+    )
+
+
+def ask(one: Gate, token: str, guard: Guard | None = None) -> tuple[Reason, str]:
+    verdict = one.check([Request("x", MoveTo(5.0, "um"), token, guard=guard)])
+    return verdict.reason, verdict.text
+
+
+def test_this_process_moves_while_nobody_else_has_the_right() -> None:
+    lease, station = Lease(), StationLease()
+    one = gate(lease)
+    assert ask(one, lease.local_token)[0] is Reason.ALLOWED
+    lease.join(station)
+    assert ask(one, lease.local_token)[0] is Reason.ALLOWED
+    station.take("vision", "t" * 32, in_process=True)
+    reason, text = ask(one, lease.local_token)
+    assert reason is Reason.NO_LEASE
+    assert "vision controls the platform now; take over" in text
+    station.take_over()
+    assert ask(one, lease.local_token)[0] is Reason.ALLOWED
+
+
+def test_no_token_is_never_the_right_one() -> None:
+    lease, station = Lease(), StationLease()
+    lease.join(station)
+    station.take("vision", "t" * 32, in_process=True)
+    for token in ("", "t" * 32, station.local_token):
+        assert ask(gate(lease), token)[0] is Reason.NO_LEASE
+
+
+def test_a_guard_decides_for_whoever_has_one() -> None:
+    lease, guard = Lease(), ByHand()
+    one = gate(lease)
+    assert ask(one, "", guard)[0] is Reason.ALLOWED
+    guard.why = "vision is silent"
+    assert ask(one, lease.local_token, guard) == (Reason.NO_LEASE, "x: vision is silent")
+
+
+def test_a_motion_begun_in_a_call_is_guarded_by_the_caller() -> None:
+    lease, station = Lease(), StationLease()
+    lease.join(station)
+    assert lease.guard() is None
+    caller = Caller("vision", "t" * 32, Access.MOVE)
+    with carrying_out(Call(caller)):
+        without = lease.guard()
+        assert without is not None
+        assert without.expired
+        assert "held by" in without.why
+        station.take("vision", caller.token, in_process=True)
+        guard = lease.guard()
+    assert guard is not None
+    assert not guard.expired
+    station.take_over()
+    assert guard.expired
+    with carrying_out(Call(Caller("here", station.local_token, Access.MOVE, local=True))):
+        assert lease.guard() is None
+
+
+def test_a_call_at_a_station_that_was_not_joined_moves_nothing() -> None:
+    lease = Lease()
+    with carrying_out(Call(Caller("vision", "t" * 32, Access.MOVE))):
+        guard = lease.guard()
+    assert guard is not None
+    assert guard.expired
+
+
+def test_a_hosted_application_is_told_of_its_station() -> None:
+    class Application:
+        station: Station | None = None
+
+        def on_hosted(self, station: Station) -> None:
+            self.station = station
+
+    station, application = Station("fibres", FailurePolicy()), Application()
+    station.host("stage", application)
+    assert application.station is station
+    InProcessTransport(station, "vision").close()
