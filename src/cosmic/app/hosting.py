@@ -27,6 +27,7 @@ from cosmic.vico.hw.peripheral_factory import make_lens, make_light
 from cosmic.vico.hw.peripherals import Lens
 from cosmic.vico.hw.sim_peripherals import SimPeripherals
 
+
 @dataclass(frozen=True)
 class Site:
     """What the applications of one process share while they are built."""

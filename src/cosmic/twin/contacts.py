@@ -4,6 +4,7 @@ Written apart from the collision gate, to score it: bodies are convex and only s
 pair the set of places where they overlap is a polytope that is computed once.
 """
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
@@ -16,6 +17,11 @@ from cosmic.twin.offsets import ToolOffsets
 from cosmic.twin.optics.solids import read_solids
 from cosmic.twin.settings import TwinSettings
 from cosmic.twin.surroundings import Tell
+
+PLATE_HALF_UM: Final = 12_000.0
+
+FINEST_UM: Final = 20.0
+"""Bodies that touch are not followed more closely than this."""
 
 CHECK_S: Final = 0.005
 """So often bodies are compared while something moves."""
@@ -46,6 +52,7 @@ class Contacts:
         self._skeleton = skeleton
         self._tell = tell
         self._plate = settings.geometry.plate
+        self._stage_names = tuple(settings.stages)
         self._jaws = {jaw for each in settings.geometry.grippers.values() for jaw in each.jaws}
         self._links: list[str] = []
         self._slides: list[Slide] = []
@@ -54,29 +61,57 @@ class Contacts:
         self._read(folder / settings.geometry.urdf)
         self._low = np.array([each.min(axis=0) for each in self._corners])
         self._high = np.array([each.max(axis=0) for each in self._corners])
-        self._first, self._second = self._pairs()
+        self._stages = sorted({name for slide in self._slides for name, _ in slide.ways})
+        self._origins = np.array([slide.origin for slide in self._slides])
+        self._ways = np.array([self._way(slide) for slide in self._slides])
         self._moving = [n for n, slide in enumerate(self._slides) if slide.ways]
+        self._of_tool: dict[str, list[int]] = {}
+        for number in self._moving:
+            self._of_tool.setdefault(self._links[number].partition("_")[0], []).append(number)
+        travels = [settings.kinds[settings.stages[name].kind] for name in self._stages]
+        ends = np.array([[kind.low, kind.high] for kind in travels])
+        swept = self._ways[:, :, :, None] * ends[None, None, :, :]
+        self._lowest = self._origins + self._low + swept.min(axis=3).sum(axis=2)
+        self._highest = self._origins + self._high + swept.max(axis=3).sum(axis=2)
+        self._first, self._second = self._pairs()
+        corner = math.sqrt(2.0) * PLATE_HALF_UM
+        self._above_plate = [
+            number
+            for number in self._moving
+            if (self._lowest[number, :2] < corner).all()
+            and (self._highest[number, :2] > -corner).all()
+            and self._lowest[number, 2] < self._top_um()
+        ]
+        self._looked_at = np.full_like(self._origins, math.inf)
+        self._slack_um = 0.0
         self._faces: dict[tuple[int, int], Faces] = {}
         self._now: dict[tuple[str, str], float] = {}
         self._by_design: frozenset[tuple[str, str]] | None = None
         self._next_s = 0.0
 
-    def look(self, values: Mapping[str, float], time_s: float, offsets: ToolOffsets) -> None:
-        """Compare all bodies, unless that was done just now."""
-        if self._by_design is not None and time_s < self._next_s:
-            return
+    def look(self, values: Mapping[str, float], time_s: float, offsets: ToolOffsets) -> float:
+        """Compare all bodies where needed, and return how far the nearest may still go, um."""
+        places = self._origins + self._ways @ [values[name] for name in self._stages]
+        if not offsets.still:
+            for tool, numbers in self._of_tool.items():
+                places[numbers] += offsets.at(tool, time_s)
+        gone = 2.0 * float(np.abs(places - self._looked_at).max())
+        if self._slack_um > gone or (self._by_design is not None and time_s < self._next_s):
+            return max(self._slack_um - gone, FINEST_UM)
         self._next_s = time_s + CHECK_S
-        depths = self._depths(values, time_s, offsets)
+        self._looked_at = places
+        depths = self._depths(values, places)
         if self._by_design is None:
             self._by_design = frozenset(depths)
         for pair, depth in depths.items():
             if pair in self._by_design:
                 continue
             if pair not in self._now:
-                self._tell("contact", bodies=pair, depth_um=depth)
+                self._tell("contact", bodies=pair, depth_um=round(depth, 3))
             self._now[pair] = max(self._now.get(pair, 0.0), depth)
         for pair in [each for each in self._now if each not in depths]:
             self._over(pair)
+        return max(self._slack_um, FINEST_UM)
 
     def finish(self) -> None:
         """Tell of contacts that still last."""
@@ -106,7 +141,7 @@ class Contacts:
                 self._corners += [part @ turn.T for part in parts]
 
     def _pairs(self) -> tuple[Numbers, Numbers]:
-        """Return the numbers of bodies that could meet: those that different stages carry."""
+        """Return the numbers of bodies that could ever meet: their travels overlap."""
         found = [
             (one, two)
             for two in range(len(self._links))
@@ -121,22 +156,28 @@ class Contacts:
         if not (ways[0] or ways[1]):
             return False
         names = [self._links[each].partition("_")[0] for each in (one, two)]
-        return names[0] != names[1]
+        if names[0] == names[1]:
+            return False
+        low, high = self._lowest, self._highest
+        return bool((low[one] < high[two]).all() and (low[two] < high[one]).all())
+
+    def _way(self, slide: Slide) -> Floats:
+        """Return how a body goes with each stage, shape (3, stages)."""
+        way = np.zeros((3, len(self._stages)))
+        for name, each in slide.ways:
+            way[:, self._stages.index(name)] += each
+        return way
 
     # ------------------------------------------------------------------ depth
 
-    def _depths(
-        self, values: Mapping[str, float], time_s: float, offsets: ToolOffsets
-    ) -> dict[tuple[str, str], float]:
-        places = np.array([slide.at(values) for slide in self._slides])
-        if not offsets.still:
-            for number in self._moving:
-                places[number] += offsets.at(self._links[number].partition("_")[0], time_s)
+    def _depths(self, values: Mapping[str, float], places: Floats) -> dict[tuple[str, str], float]:
         low, high = self._low + places, self._high + places
         first, second = self._first, self._second
-        near = ((low[first] < high[second]) & (low[second] < high[first])).all(axis=1)
+        apart = np.maximum(low[first] - high[second], low[second] - high[first]).max(axis=1)
+        self._slack_um = float(apart.min(initial=math.inf))
         found: dict[tuple[str, str], float] = {}
-        for one, two in zip(first[near].tolist(), second[near].tolist(), strict=True):
+        for pair in np.flatnonzero(apart < 0.0).tolist():
+            one, two = int(first[pair]), int(second[pair])
             normals, reach = self._overlap(one, two)
             depth = float((reach - normals @ (places[two] - places[one])).min())
             self._keep(found, (self._links[one], self._links[two]), depth)
@@ -160,6 +201,11 @@ class Contacts:
             self._faces[one, two] = faces[:, :3], -faces[:, 3]
         return self._faces[one, two]
 
+    def _top_um(self) -> float:
+        """Return the height of the highest thing on the plate."""
+        place = float(self._skeleton.pose(self._plate, dict.fromkeys(self._stage_names, 0.0))[2, 3])
+        return max(float(box[1, 2]) for box in self._boxes) + place
+
     def _on_plate(
         self,
         found: dict[tuple[str, str], float],
@@ -169,9 +215,11 @@ class Contacts:
     ) -> None:
         """Add what stands in the plate or its clip: corners of one in the other."""
         plate = self._skeleton.pose(self._plate, values)
-        top = max(float(box[1, 2]) for box in self._boxes) + float(plate[2, 3])
-        for number in self._moving:
-            if low[number, 2] >= top:
+        top = self._top_um()
+        for number in self._above_plate:
+            above = float(low[number, 2]) - top
+            self._slack_um = min(self._slack_um, above)
+            if above >= 0.0:
                 continue
             corners = (self._corners[number] + places[number] - plate[:3, 3]) @ plate[:3, :3]
             for box in self._boxes:

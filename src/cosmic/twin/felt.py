@@ -29,10 +29,20 @@ class Push:
 
 @dataclass(frozen=True, slots=True)
 class Felt:
-    """What the probe feels at one moment."""
+    """What the probe feels at one moment.
+
+    Attributes
+    ----------
+    slack_um : float
+        Things may come nearer by so much before anything can happen.
+    gap_um : float
+        The same of what jaws may open or close.
+    """
 
     pushes: tuple[Push, ...] = ()
     jaw_un: float = 0.0
+    slack_um: float = 0.0
+    gap_um: float = 0.0
 
     @property
     def total_un(self) -> float:

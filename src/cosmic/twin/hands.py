@@ -3,6 +3,7 @@
 import math
 import random
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from cosmic.twin.surroundings import Surroundings, Tell
 from cosmic.twin.tools import Tool
 from cosmic.twin.twin_faults import TwinFaults
 
+CARRYING_UM: Final = 8.0
+"""Way within which something may happen to a fibre that is lifted or will be lost."""
+
 
 class Hands:
     """The grippers' side of the workplace.
@@ -32,6 +36,11 @@ class Hands:
         Told each event by name, with facts.
     faults : bool
         Whether anything goes wrong by chance.
+
+    Attributes
+    ----------
+    gap_um : float
+        How far jaws may open or close before they take or let go; as of the last look.
     """
 
     def __init__(
@@ -57,6 +66,9 @@ class Hands:
         self._widest: dict[str, float] = {}
         self._came_um: dict[int, tuple[Point, float]] = {}
         self._narrowest = min((each.settings.width_um for each in fibres), default=0.0)
+        self._thickest = max((each.settings.width_um for each in fibres), default=0.0)
+        self.gap_um = 0.0
+        self._slack_um = 0.0
         self._begun = False
 
     @property
@@ -64,27 +76,42 @@ class Hands:
         """The fibres in grippers, each once."""
         return list(dict.fromkeys(self._in_hand.values()))
 
+    @property
+    def slack_um(self) -> float:
+        """How far tools may go before anything can happen to a fibre; as of the last look."""
+        return self._slack_um
+
     def look(self, around: Surroundings) -> None:
         """Go on to where everything is now."""
         if not self._begun:
             self._begun = True
             self._begin(around)
+        self._slack_um = CARRYING_UM if self._clinging else math.inf
+        self.gap_um = math.inf
         for name, tool in around.tools.items():
-            gap = tool.gap_um
-            self._widest[name] = max(self._widest.get(name, gap), gap)
-            held = self._in_hand.get(name)
-            if held is not None:
-                if gap > held.settings.width_um:
-                    self._open(held, tool, around)
-            elif gap < tool.before_um:
-                self._close(tool, around)
-            if gap <= self._narrowest:
-                self._widest[name] = gap
+            self._watch(name, tool, around)
         for name, fibre in list(self._in_hand.items()):
             if len(fibre.holds) == 1:
                 self._carry(fibre, around.tools[name], around)
         for number in list(self._clinging):
             self._shake(number, around)
+
+    def _watch(self, name: str, tool: Tool, around: Surroundings) -> None:
+        """Take, keep or let go with one gripper, as its gap changes."""
+        gap = tool.gap_um
+        self._widest[name] = max(self._widest.get(name, gap), gap)
+        held = self._in_hand.get(name)
+        if held is not None:
+            if gap > held.settings.width_um:
+                self._open(held, tool, around)
+            self.gap_um = min(self.gap_um, held.settings.width_um - gap)
+        else:
+            if gap < tool.before_um:
+                self._close(tool, around)
+            if gap > self._narrowest:
+                self.gap_um = min(self.gap_um, gap - self._thickest)
+        if gap <= self._narrowest:
+            self._widest[name] = gap
 
     def _begin(self, around: Surroundings) -> None:
         """Put each fibre where it was left, at the first look."""
@@ -142,6 +169,8 @@ class Hands:
 
     def _carry(self, fibre: Fibre, tool: Tool, around: Surroundings) -> None:
         fate = fibre.holds[tool.name].fate
+        if fibre.on_plate or fate.slip_at_um < math.inf or fate.drop_after_um < math.inf:
+            self._slack_um = min(self._slack_um, CARRYING_UM)
         if fibre.on_plate:
             height = max(fibre.height_um(tool), 0.0)
             if fibre.peeled_um(height) >= fibre.holds[tool.name].free.length_um:

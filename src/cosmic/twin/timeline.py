@@ -19,10 +19,13 @@ KEPT: Final = 20_000
 """So many looks are remembered: 20 s while something moves, much longer while nothing does."""
 
 MOST_LOOKS: Final = 20_000
-"""Looks for one question; after a long journey unseen they lie further apart."""
+"""Looks for one question; after a longer journey unseen the rest lie further apart."""
 
 LONGEST_WAY: Final = 0.25
 """A slow stage goes so far between two looks, um or degrees; a fast one as far as it must."""
+
+SLACK_PART: Final = 0.25
+"""Where nothing is near, stages go this part of the way to what is: two may meet, and obliquely."""
 
 LONGEST_REST_S: Final = 0.5
 """Stages that stand creep by nanometres; they are looked at again after this time."""
@@ -97,8 +100,11 @@ class Timeline:
         if self._at < 0:
             self._look(0)
         last = math.ceil(time_s / self._step_s - 1e-9)
-        coarse = (last - self._at) // MOST_LOOKS
+        looks, coarse = 0, 0
         while self._at < last:
+            looks += 1
+            if looks == MOST_LOOKS:
+                coarse = (last - self._at) // MOST_LOOKS
             until_s, at_rest = self._next_s()
             if at_rest and until_s > time_s:
                 break  # what was felt last is felt still
@@ -127,10 +133,14 @@ class Timeline:
         now_s = self._at * self._step_s
         until_s = now_s + LONGEST_REST_S
         at_rest = True
+        felt, grippers = self._felt, self._workplace.gripper_stages
+        way = max(LONGEST_WAY, SLACK_PART * felt.slack_um)
+        gap = max(LONGEST_WAY, SLACK_PART * min(felt.slack_um, felt.gap_um))
         for stage in self._stages:
             speed, end_s = stage.leg_then(now_s)
             if speed > 0.0:
                 at_rest = False
-                end_s = min(end_s, now_s + LONGEST_WAY / speed)
+                longest = gap if stage.name in grippers else way
+                end_s = min(end_s, now_s + longest / speed)
             until_s = min(until_s, end_s)
         return until_s, at_rest

@@ -66,6 +66,8 @@ class Workplace:
         As twin.toml or the sample numbers them; pieces that broke off follow.
     faults : TwinFaults
         What was injected.
+    gripper_stages : frozenset of str
+        The stages that open and close jaws.
     offsets : ToolOffsets
         How far tools are from where the drawing has them.
     """
@@ -106,6 +108,8 @@ class Workplace:
         self._peaks_un: dict[int, float] = {}
         self._jaw_touches = {name: Touch() for name in self._grippers}
         self._gaps: dict[str, float] = {}
+        self._slack_um = 0.0
+        self.gripper_stages = frozenset(each.stage for each in self._geometry.grippers.values())
         self._contacts: Contacts | None = None
         if folder is not None:
             self._contacts = Contacts(settings, folder, skeleton, self._tell)
@@ -157,6 +161,7 @@ class Workplace:
         self._hands.look(around)
         self._gaps = {name: tool.gap_um for name, tool in tools.items()}
         probe = added(self._probe.at(values), self.offsets.at(PROBE, time_s))
+        self._slack_um = self._hands.slack_um
         pushes = tuple(
             push
             for fibre in self._hands.held
@@ -164,9 +169,13 @@ class Workplace:
         )
         self._note(pushes)
         if self._contacts is not None:
-            self._contacts.look(values, time_s, self.offsets)
+            self._nothing_before(self._contacts.look(values, time_s, self.offsets))
         jaw_un = sum(self._jaw(name, tool, probe) for name, tool in tools.items())
-        return Felt(pushes, jaw_un)
+        return Felt(pushes, jaw_un, self._slack_um, self._hands.gap_um)
+
+    def _nothing_before(self, slack_um: float) -> None:
+        """Take note that something may happen after so much way."""
+        self._slack_um = min(self._slack_um, max(slack_um, 0.0))
 
     def _tools(self, values: Mapping[str, float], time_s: float) -> dict[str, Tool]:
         return {
@@ -194,8 +203,11 @@ class Workplace:
         touch = self._touches.setdefault(fibre.number, Touch())
         along = line.abscissa_um(probe[0])
         way = line.y_um(along) + fibre.settings.width_um / 2.0 - probe[1]
-        if not touch.look(self._reach(fibre, line, along, probe[2]), way):
+        reach = self._reach(fibre, line, along, probe[2])
+        if not touch.look(reach, way):
+            self._nothing_before(max(-reach, -way))
             return None
+        self._slack_um = 0.0
         curve = fibre.curve(
             line, along, edge_um=self._geometry.probe_edge_radius_um, sensor=self._sensor
         )
@@ -256,7 +268,9 @@ class Workplace:
         way = face - probe[1]
         touch = self._jaw_touches[name]
         if not touch.look(reach, way):
+            self._nothing_before(max(-reach, -way))
             return NOTHING
+        self._slack_um = 0.0
         if way < 0.0:
             touch.lose()
             return NOTHING

@@ -1,12 +1,16 @@
 """The shipped scene with its stages moved by hand, and shorthand for what tests ask of it."""
 
+from typing import Any
+
 import numpy as np
+from typing_extensions import override
 
 from cosmic.frame.clock import ManualClock
 from cosmic.twin.felt import Moment, Push
 from cosmic.twin.force_settings import FibreSettings
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import TwinSettings, shipped_settings
+from cosmic.twin.truth import NO_TRUTH, Truth
 
 FIBRE = FibreSettings(
     length_um=2000.0,
@@ -39,11 +43,37 @@ def settings(
     )
 
 
+class Heard(Truth):
+    """Keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.events: list[tuple[str, dict[str, Any]]] = []
+
+    @override
+    def tell(self, time_s: float, event: str, **facts: object) -> None:
+        self.events.append((event, dict(facts)))
+
+    @override
+    def close(self) -> None:
+        self.events.append(("closed", {}))
+
+    @property
+    def names(self) -> list[str]:
+        """What happened, but for the table at the start."""
+        return [name for name, _ in self.events[1:]]
+
+    def facts(self, name: str) -> dict[str, Any]:
+        """Return the facts of the last event of that name."""
+        return next(facts for event, facts in reversed(self.events) if event == name)
+
+
 class Bench:
     """A scene, its time, and its stages as if by hand: one after another, each at its speed."""
 
-    def __init__(self, twin: TwinSettings | None = None, seed: int = 0) -> None:
-        self.scene = Scene.from_settings(twin or settings(), ManualClock(), seed)
+    def __init__(
+        self, twin: TwinSettings | None = None, seed: int = 0, truth: Truth = NO_TRUTH
+    ) -> None:
+        self.scene = Scene.from_settings(twin or settings(), ManualClock(), seed, truth=truth)
         assert self.scene.force_side is not None
         self.force_side = self.scene.force_side
         self.now_s = 0.0
