@@ -1,0 +1,133 @@
+"""A campaign on the simulated platform: from the sample to the report, ended and gone on with."""
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import cosmic
+from cosmic.app.campaign_output import gui_application, write_output
+from cosmic.app.rig import Rig
+from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
+from cosmic.autonomy.campaign.recipe import OutputSettings
+from cosmic.autonomy.campaign.records import CampaignError, Outcome
+from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.frame.errors import ConfigError
+from cosmic.twin.truth import TruthRecord, read_truth
+from unit.mico.rigs import wait_until
+
+RATE = 10.0
+RECIPE = """
+procedure = "{procedure}"
+[sample]
+name = "three-dry"
+[stop]
+count = {count}
+"""
+
+
+def recipe(folder: Path, count: int, procedure: str = "bend test") -> Path:
+    path = folder / f"{procedure.replace(' ', '-')}-{count}.toml"
+    path.write_text(RECIPE.format(count=count, procedure=procedure), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("campaigns")
+
+
+@pytest.fixture(scope="module")
+def rig(home: Path) -> Iterator[Rig]:
+    with cosmic.connect(rate=RATE, sample="three-dry", seed=1, truth=home / "truth.jsonl") as rig:
+        yield rig
+
+
+@pytest.fixture(scope="module")
+def done(rig: Rig, home: Path) -> Campaign:
+    campaign = rig.campaign(recipe(home, 1), home / "one")
+    campaign.run_here()
+    return campaign
+
+
+@pytest.fixture
+def truth(rig: Rig, home: Path) -> TruthRecord:
+    return read_truth(home / "truth.jsonl")
+
+
+def test_a_fibre_is_measured_and_its_record_agrees_with_the_truth(
+    done: Campaign, home: Path, truth: TruthRecord
+) -> None:
+    assert (done.phase, done.end_reason) == (CampaignPhase.ENDED, "1 fibres done")
+    record = CampaignReader(home / "one").fibre(1)
+    (number,) = {each.facts["fibre"] for each in truth.of("grasped")}
+    true = truth.fibres[number]
+    assert record.outcome is Outcome.GOOD
+    assert record.bending is not None
+    assert record.bending.ei_n_m2 == pytest.approx(true.ei_n_m2, rel=0.1)
+    assert record.shape.length_um == pytest.approx(true.length_um, rel=0.02)
+    assert record.peak_force_un < 0.8 * 180.0
+    assert {each.name for each in record.series} >= {"left.x", "probe.y", "force"}
+    assert record.pictures
+    assert any(each.name == "push the spans" for each in record.operations)
+
+
+def test_every_operation_is_in_the_journal_before_it_is_done(done: Campaign) -> None:
+    journal = CampaignReader(done.store.folder).journal()
+    names = [each.operation for each in journal]
+    assert names.index("close the gripper") < names.index("carry to the probe")
+    assert all(each.phase == "begins" for each in journal)
+    assert journal[-1].fibre == 1
+
+
+def test_report_and_table_are_written_without_a_window(done: Campaign) -> None:
+    application = gui_application()
+    written = write_output(done.store.folder, OutputSettings())
+    assert [each.name for each in written] == ["report.html", "report.pdf", "fibres.csv"]
+    assert all(each.stat().st_size > 100 for each in written)
+    with written[2].open(encoding="utf-8", newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert row["outcome"] == "good"
+    assert application is not None
+
+
+def test_a_campaign_that_is_done_is_not_done_again(done: Campaign, rig: Rig, home: Path) -> None:
+    again = rig.campaign(recipe(home, 1), done.store.folder)
+    again.run_here()
+    assert again.end_reason == "1 fibres done"
+    assert len(CampaignReader(done.store.folder).fibres()) == 1
+
+
+def test_another_recipe_is_refused_in_the_folder_of_a_campaign(
+    done: Campaign, rig: Rig, home: Path
+) -> None:
+    with pytest.raises(CampaignError, match="another recipe"):
+        rig.campaign(recipe(home, 2), done.store.folder)
+
+
+def test_a_wrong_recipe_is_refused_with_file_key_and_reason(rig: Rig, home: Path) -> None:
+    wrong = recipe(home, 1, "juggle")
+    with pytest.raises(ConfigError, match=r"juggle-1\.toml: procedure: .*bend test"):
+        rig.campaign(wrong, home / "never")
+    assert not (home / "never").exists()
+
+
+def test_stop_ends_a_campaign_and_its_fibre_can_be_gone_on_with(
+    done: Campaign, rig: Rig, home: Path
+) -> None:
+    campaign = rig.campaign(recipe(home, 1, "transport"), home / "stopped")
+    campaign.start()
+    wait_until(lambda: campaign.operation == "carry to the probe", timeout_s=60.0)
+    rig.stop("a hand on the button")
+    wait_until(lambda: campaign.over, timeout_s=10.0)
+    campaign.join()
+    assert "a hand on the button" in campaign.end_reason
+    assert not any(axis.details.in_motion for axis in rig.mico)
+    (record,) = CampaignReader(home / "stopped").fibres()
+    assert record.outcome is Outcome.INTERRUPTED
+    rig.reset_stop()
+    again = rig.campaign(recipe(home, 1, "transport"), home / "stopped")
+    assert again.phase is CampaignPhase.READY
+    again.abort("not now")
+    assert (again.phase, again.end_reason) == (CampaignPhase.ENDED, "not now")
