@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing_extensions import override
 
 from cosmic.autonomy.handling.operation import FibreOperation
+from cosmic.autonomy.handling.patience import PatientMove
 from cosmic.autonomy.handling.sight import map_at
 from cosmic.autonomy.handling.work import FibreWork, Measured
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Wish
@@ -120,7 +121,8 @@ def move_jaws(work: FibreWork, by_um: float) -> Steps:
     if steps:
         # They may be at the plate; the gate knows of no smaller movement than their whole travel.
         with work.mico.collision.contact("grasp"):
-            yield axis.steps(steps, frequency_hz=work.settings.grasp.gripper_hz, wait=False)
+            frequency_hz = work.settings.grasp.gripper_hz
+            yield PatientMove(lambda: axis.steps(steps, frequency_hz=frequency_hz, wait=False))
     if work.gap_um is not None:
         work.gap_um = max(0.0, work.gap_um + steps * step_um)
 

@@ -14,6 +14,7 @@ from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.handling.force import ForceMean
 from cosmic.autonomy.handling.grasp import shape_of
 from cosmic.autonomy.handling.operation import FibreOperation
+from cosmic.autonomy.handling.patience import PatientMove
 from cosmic.autonomy.handling.work import FibreInHand, FibreWork
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Wish
 from cosmic.daqco.core.settings import LimitSettings
@@ -125,7 +126,6 @@ class _Span:
         self._plan = plan
         self._push = work.settings.push
         self._probe = work.probe
-        self._axis = work.mico[work.probe.y_axis]
         self._points = _Points()
         self._shape = shape_of(work, fibre)
         # The probe pushes along its own direction; way grows as it does.
@@ -143,8 +143,8 @@ class _Span:
     def _way(self, tip_y_um: float) -> float:
         return self._sign * tip_y_um
 
-    def _axis_at(self, way_um: float) -> float:
-        return self._sign * way_um - self._probe.tip_um[1]
+    def _to_way(self, way_um: float) -> PatientMove:
+        return self._work.go({self._probe.y_axis: self._sign * way_um - self._probe.tip_um[1]})
 
     def _surface_um(self) -> float:
         """Return the way at which the probe should meet the fibre: as it bows, as it was met."""
@@ -171,7 +171,7 @@ class _Span:
         aside = surface - push.stand_off_um - push.bow_part * bow
         _, y = work.tip_now(self._probe)
         if self._way(y) > aside:
-            yield self._axis.move_to(self._axis_at(aside), wait=False)
+            yield self._to_way(aside)
         if self._fibre.zero_un is None:
             self._fibre.zero_un = yield from self._mean_un(push.average_s)
         yield work.go({self._probe.x_axis: x - self._probe.tip_um[0]})
@@ -186,7 +186,7 @@ class _Span:
         """Go there, and back again as long as something is felt that should not be there."""
         push, back = self._push, 0.0
         while True:
-            yield self._axis.move_to(self._axis_at(way_um - back), wait=False)
+            yield self._to_way(way_um - back)
             force = yield from self._mean_un(push.search_average_s)
             if abs(force - (self._fibre.zero_un or 0.0)) <= 2.0 * push.contact_un:
                 return
@@ -214,7 +214,7 @@ class _Span:
         return mean.mean_un
 
     def _to(self, way_um: float, seconds: float, *, loading: bool) -> Reading:
-        yield self._axis.move_to(self._axis_at(way_um), wait=False)
+        yield self._to_way(way_um)
         return (yield from self._measure(seconds, loading=loading))
 
     def _step_um(self) -> float:

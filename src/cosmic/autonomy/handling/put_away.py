@@ -8,13 +8,14 @@ from typing_extensions import override
 from cosmic.autonomy.handling.grasp import in_jaws, seen_at
 from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.prepare import move_jaws, retract_probe
-from cosmic.autonomy.handling.work import FibreWork
+from cosmic.autonomy.handling.work import FibreInHand, FibreWork
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.vico.core.picture import Picture
 
 ADHESION: Final = "jaw adhesion"
 GIVEN_UP: Final = "given up"
 WIPE_UM: Final = 250.0
+ASIDE_UM: Final = 400.0
 SHAKES: Final = 12
 SHAKE_UM: Final = 12.0
 
@@ -60,19 +61,28 @@ class Release(FibreOperation):
 
 
 def see_released(work: FibreWork) -> Steps:
-    """See by picture that nothing hangs at the jaws."""
+    """See by picture that nothing hangs at the jaws: nothing that goes with them."""
     fibre = work.in_hand()
-    picture = yield work.picture()
-    assert isinstance(picture, Picture)
-    # What sticks goes with one of the jaws: it hangs in the middle, or at either side.
-    line, aside = in_jaws(work, fibre), 0.5 * (work.gap_um or 0.0)
-    places = (line + np.array([0.0, y]) for y in (0.0, aside, -aside))
+    for aside in (0.0, ASIDE_UM):
+        if aside:
+            x, y = work.tip_now(work.gripper)
+            yield work.go(work.at(work.gripper, x, y + aside))
+        picture = yield work.picture()
+        assert isinstance(picture, Picture)
+        if not _hangs(work, fibre, picture):
+            fibre.held = False
+            return
+    failure = OperationFailed(ADHESION, f"fibre {fibre.number} still hangs at the jaws")
+    work.failures.append((Release.name, failure))
+    raise failure
+
+
+def _hangs(work: FibreWork, fibre: FibreInHand, picture: Picture) -> bool:
+    """Return whether something lies where the fibre would: what sticks goes with one jaw."""
+    line, apart = in_jaws(work, fibre), 0.5 * (work.gap_um or 0.0)
+    places = (line + np.array([0.0, y]) for y in (0.0, apart, -apart))
     height = work.height_now()
-    if any(seen_at(work, fibre, picture, place, height) for place in places):
-        failure = OperationFailed(ADHESION, f"fibre {fibre.number} still hangs at the jaws")
-        work.failures.append((Release.name, failure))
-        raise failure
-    fibre.held = False
+    return any(seen_at(work, fibre, picture, place, height) for place in places)
 
 
 class Wipe(FibreOperation):

@@ -44,7 +44,7 @@ class PlaceSettings(StrictModel):
     bin_x_um: float = -9000.0
     bin_y_um: float = 0.0
     bin_um: float = Field(40.0, gt=0.0)
-    view_x_um: float = -5000.0
+    view_x_um: float = -5600.0
     view_y_um: float = 0.0
     away_x_um: float = -9000.0
     probe_away_y_um: float = 6000.0
@@ -89,8 +89,8 @@ class GraspSettings(StrictModel):
     longest_um: float = Field(4000.0, gt=0.0)
     curliest: float = Field(0.12, gt=0.0)
     inside_um: float = Field(250.0, gt=0.0)
-    clear_um: float = Field(70.0, gt=0.0)
-    gap_um: float = Field(300.0, gt=0.0, le=1000.0)
+    clear_um: float = Field(55.0, gt=0.0)
+    gap_um: float = Field(240.0, gt=0.0, le=1000.0)
     closing_um: float = Field(60.0, gt=0.0)
     full_um: float = Field(1000.0, gt=0.0)
     gripper_hz: float = Field(5000.0, gt=0.0, le=18500.0)

@@ -25,6 +25,7 @@ OUT_OF_FIELD = "out of the field"
 GIVEN_UP = "given up before"
 OUT_OF_REACH = "out of reach"
 NONE_LEFT = "no fibre"
+LOOK_AGAIN = "look again"
 SAME_UM = 120.0
 SAME_LENGTH = 0.05
 OWN_UM = 1.0
@@ -116,7 +117,8 @@ class Choose(FibreOperation):
             work.skipped[OUT_OF_REACH] += len(work.candidates)
             work.candidates = []
             told = ", ".join(f"{count} {why}" for why, count in sorted(work.skipped.items()))
-            raise OperationFailed(NONE_LEFT, f"none that can be taken up ({told or 'plate empty'})")
+            cause = LOOK_AGAIN if work.since_survey else NONE_LEFT
+            raise OperationFailed(cause, f"none that can be taken up ({told or 'plate empty'})")
         work.candidates = [each for each in work.candidates if each is not best.candidate]
         gone = best.candidate.line_um.mean(axis=0)
         work.lines_um = [

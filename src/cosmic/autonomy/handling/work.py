@@ -8,6 +8,7 @@ from typing import Protocol
 from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.handling.force import ForceWatch
+from cosmic.autonomy.handling.patience import PatientMove
 from cosmic.autonomy.handling.plate import Candidate, Jaws, PlateFrame, Reach
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.sight import PictureWanted, SeenFibre, map_at
@@ -16,7 +17,6 @@ from cosmic.autonomy.tools import axis_targets
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import ConfigError, NotAvailable
-from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.mico import Mico
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.vico import Vico
@@ -271,11 +271,11 @@ class FibreWork:
             targets[tool.z_axis] = z_um - tool.tip_um[2]
         return targets
 
-    def go(self, targets: Mapping[str, float]) -> GroupMovement:
+    def go(self, targets: Mapping[str, float]) -> PatientMove:
         """Begin to move; to be yielded."""
-        return self.mico.move(dict(targets), wait=False)
+        return PatientMove(lambda: self.mico.move(dict(targets), wait=False))
 
-    def go_up(self, z_um: float) -> GroupMovement:
+    def go_up(self, z_um: float) -> PatientMove:
         """Begin to move the gripper to a height; to be yielded."""
         return self.go({self.gripper.z_axis: z_um - self.gripper.tip_um[2]})
 

@@ -30,7 +30,7 @@ from cosmic.autonomy.handling.reach import (
 )
 from cosmic.autonomy.handling.safe import make_safe
 from cosmic.autonomy.handling.settings import HandlingSettings
-from cosmic.autonomy.handling.survey import Choose, Survey
+from cosmic.autonomy.handling.survey import LOOK_AGAIN, Choose, Survey
 from cosmic.autonomy.handling.turning import FindRotationCentre
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.combinators import Fallback, Retry, Sequence
@@ -70,7 +70,7 @@ def beginning(settings: HandlingSettings) -> tuple[Part[FibreWork], ...]:
             Survey(),
             FindRotationCentre(),
         ),
-        Sequence("choose", Survey(), Choose()),
+        Retry(Sequence[FibreWork]("choose", Survey(), Choose()), 2, only={LOOK_AGAIN}),
     )
 
 

@@ -75,7 +75,7 @@ def test_no_way_leads_where_the_gripper_or_the_table_cannot_go():
 
 def test_a_fibre_is_not_taken_where_another_would_be_grasped_as_well():
     one = straight(0.0, 0.0, 0.0)
-    assert found(one, straight(-300.0, 120.0, 5.0, 400.0), straight(300.0, 120.0, 0.0, 400.0)) == []
+    assert found(one, straight(-300.0, 100.0, 5.0, 400.0), straight(300.0, 100.0, 0.0, 400.0)) == []
 
 
 def test_ways_with_nothing_under_the_jaws_come_before_smaller_turns():

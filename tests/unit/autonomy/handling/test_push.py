@@ -63,9 +63,6 @@ class Axis:
     def position_um(self) -> float:
         return round(self.bench.at_um[self.name], 1)
 
-    def move_to(self, target: float, *, wait: bool) -> Done:
-        return self.bench.go({self.name: target})  # type: ignore[return-value]
-
 
 class Daqco:
     """Notes whether the limit was armed."""

@@ -1,0 +1,84 @@
+"""Movements that are ordered again where the gate had no answer."""
+
+from collections.abc import Callable
+from typing import Final
+
+from cosmic.autonomy.procedures.operation import Awaited
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import DeviceTimeout, MoveRefused
+from cosmic.frame.verdict import Reason
+
+TRIES: Final = 5
+APART_WALL_S: Final = 0.5
+
+
+class PatientMove:
+    """A movement; refused without an answer it has not begun, and is ordered again.
+
+    The gate answers late on a busy machine, and not at all while it is being restarted. Every
+    other refusal ends it, as does a stop.
+
+    Parameters
+    ----------
+    order : callable
+        Orders the movement and returns it.
+
+    Raises
+    ------
+    MoveRefused
+        The gate answered, and said no.
+    """
+
+    def __init__(self, order: Callable[[], Awaited]) -> None:
+        self._order = order
+        self._left = TRIES
+        self._again_wall_s = 0.0
+        self._movement: Awaited | None = None
+        self._refusal: MoveRefused | None = None
+        self._cancelled = False
+        self._begin()
+
+    def _begin(self) -> None:
+        self._left -= 1
+        try:
+            self._movement = self._order()
+        except MoveRefused as refusal:
+            self._refused(refusal)
+
+    def _refused(self, refusal: MoveRefused) -> None:
+        if refusal.verdict.reason is not Reason.NO_ANSWER or self._left <= 0:
+            raise refusal
+        self._movement, self._refusal = None, refusal
+        self._again_wall_s = WALL.now_s() + APART_WALL_S
+
+    @property
+    def done(self) -> bool:
+        """It has ended, well or not."""
+        if self._cancelled:
+            return self._movement is None or self._movement.done
+        if self._movement is None and WALL.now_s() >= self._again_wall_s:
+            try:
+                self._begin()
+            except MoveRefused as refusal:
+                self._refusal, self._cancelled = refusal, True
+                return True
+        return self._movement is not None and self._movement.done
+
+    def wait(self, timeout_s: float | None = None) -> object:
+        """Wait for the end, and return what the movement returns; raises what ended it."""
+        until_wall_s = WALL.now_s() + (1e9 if timeout_s is None else timeout_s)
+        while not self.done and self._movement is None:
+            left_s = min(until_wall_s, self._again_wall_s) - WALL.now_s()
+            if WALL.now_s() >= until_wall_s:
+                raise DeviceTimeout("the gate has not answered yet")
+            WALL.sleep(max(left_s, 0.001))
+        if self._movement is None:
+            assert self._refusal is not None
+            raise self._refusal
+        return self._movement.wait(timeout_s)
+
+    def cancel(self) -> None:
+        """End it; what it has set in motion stops."""
+        self._cancelled = True
+        if self._movement is not None:
+            self._movement.cancel()

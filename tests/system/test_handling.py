@@ -1,0 +1,147 @@
+"""The shipped procedures on the twin, through the scripted API only; scored by its truth."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import cosmic
+from cosmic.autonomy.handling.settings import HandlingSettings, PushSettings
+from cosmic.autonomy.handling.work import FibreInHand, FibreWork
+from cosmic.autonomy.procedures.procedure import Procedure
+from cosmic.autonomy.procedures.run import ProcedureRun
+from cosmic.autonomy.shipped.bend_test import build_bend_test
+from cosmic.autonomy.shipped.transport import build_transport
+from cosmic.frame.failure import FailurePolicy
+from cosmic.twin.truth import TrueFibre, TruthRecord, read_truth
+
+RATE = 20.0
+# The limit has a dead man of a tenth of a second of the wall, which a busy machine oversleeps.
+SETTINGS = HandlingSettings(push=PushSettings(stop_un=0.0))
+LIMIT_UN = 0.8 * 180.0
+
+
+@contextmanager
+def sample(name: str, truth: Path, seed: int = 0) -> Iterator[SimpleNamespace]:
+    with cosmic.connect(sample=name, rate=RATE, seed=seed, truth=truth) as rig:
+        work = FibreWork.on(rig, SETTINGS)
+        try:
+            yield SimpleNamespace(rig=rig, work=work)
+        finally:
+            work.close()
+
+
+def carried_out(work: FibreWork, procedure: Procedure[FibreWork]) -> FibreInHand:
+    ProcedureRun(procedure, work, work.clock, FailurePolicy()).run_here()
+    return work.finished[-1]
+
+
+def true_fibre(record: TruthRecord, fibre: FibreInHand) -> TrueFibre:
+    """Return the one that was grasped while `fibre` was in hand."""
+    grasped = [
+        each.facts["fibre"]
+        for each in record.of("grasped")
+        if fibre.found_s <= each.time_s <= fibre.done_s
+    ]
+    (number,) = set(grasped)
+    return next(each for each in record.fibres if each.number == number)
+
+
+def check(record: TruthRecord, fibre: FibreInHand) -> None:
+    """See that what was measured is what is true."""
+    true, found = true_fibre(record, fibre), fibre.bending
+    assert found is not None
+    assert found.trusted, found.reasons
+    assert found.ei_n_m2 == pytest.approx(true.ei_n_m2, rel=0.10)
+    assert fibre.length_um == pytest.approx(true.length_um, rel=0.02)
+    assert fibre.peak_un <= LIMIT_UN
+    assert fibre.put_away
+    assert record.of("released", true.number)
+
+
+def unintended(record: TruthRecord) -> set[frozenset[str]]:
+    """Return which bodies touched that never should; jaws are let down on the plate."""
+    jaws = {"left_jaw_a", "left_jaw_b", "plate"}
+    pairs = {frozenset(each.facts["bodies"]) for each in record.of("contact")}
+    return {pair for pair in pairs if not pair <= jaws}
+
+
+def test_a_fibre_is_found_taken_up_bent_and_put_away(tmp_path: Path):
+    truth = tmp_path / "truth.jsonl"
+    with sample("three-dry", truth) as bench:
+        fibre = carried_out(bench.work, build_bend_test(SETTINGS))
+        assert not bench.work.failures
+        assert {"geometry", "held"} <= set(fibre.pictures)
+        assert len(fibre.spans) == SETTINGS.push.spans.count
+    record = read_truth(truth)
+    check(record, fibre)
+    assert unintended(record) == set()
+
+
+@pytest.mark.slow
+def test_three_fibres_are_measured_one_after_the_other_and_then_none_is_left(tmp_path: Path):
+    truth = tmp_path / "truth.jsonl"
+    with sample("three-dry", truth, seed=2) as bench:
+        fibres = [carried_out(bench.work, build_bend_test(SETTINGS)) for _ in range(3)]
+        with pytest.raises(Exception, match="no fibre"):
+            carried_out(bench.work, build_bend_test(SETTINGS))
+    record = read_truth(truth)
+    for fibre in fibres:
+        check(record, fibre)
+    assert len({true_fibre(record, fibre).number for fibre in fibres}) == 3
+    assert unintended(record) == set()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("fault", "operation", "cause"),
+    [
+        ("missed_grasp", "lift and see that it follows", "missed grasp"),
+        ("jaw_adhesion", "release", "jaw adhesion"),
+    ],
+)
+def test_a_single_fault_is_recovered_from_alone(
+    fault: str, operation: str, cause: str, tmp_path: Path
+):
+    truth = tmp_path / "truth.jsonl"
+    with sample("three-dry", truth, seed=3) as bench:
+        bench.rig.faults.inject(fault)
+        fibre = carried_out(bench.work, build_bend_test(SETTINGS))
+        failed = [(name, failure.cause) for name, failure in bench.work.failures]
+        assert (operation, cause) in failed
+    check(read_truth(truth), fibre)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", ["slip_in_lift", "drop"])
+def test_a_lost_fibre_is_told_and_found_again_by_the_next_run(fault: str, tmp_path: Path):
+    truth = tmp_path / "truth.jsonl"
+    with sample("three-dry", truth, seed=4) as bench:
+        bench.rig.faults.inject(fault)
+        with pytest.raises(Exception, match=r"dropped|lost|missed grasp") as told:
+            carried_out(bench.work, build_bend_test(SETTINGS))
+        lost = bench.work.finished[-1]
+        assert lost.failure is not None
+        assert lost.failure.cause in str(told.value)
+        fibres = [carried_out(bench.work, build_bend_test(SETTINGS)) for _ in range(3)]
+    record = read_truth(truth)
+    for fibre in fibres:
+        check(record, fibre)
+
+
+@pytest.mark.slow
+def test_a_fibre_is_only_carried_where_nothing_is_to_be_measured(tmp_path: Path):
+    with sample("three-dry", tmp_path / "truth.jsonl", seed=5) as bench:
+        fibre = carried_out(bench.work, build_transport(SETTINGS))
+        assert fibre.put_away
+        assert fibre.spans == []
+
+
+def test_an_empty_plate_is_said_to_be_empty(tmp_path: Path):
+    with (
+        sample("empty", tmp_path / "truth.jsonl") as bench,
+        pytest.raises(Exception, match="no fibre"),
+    ):
+        carried_out(bench.work, build_transport(SETTINGS))

@@ -1,0 +1,80 @@
+"""Movements that are ordered again where the gate had no answer."""
+
+from collections.abc import Callable
+
+import pytest
+
+from cosmic.autonomy.handling import patience
+from cosmic.autonomy.handling.patience import TRIES, PatientMove
+from cosmic.frame.errors import DeviceTimeout, MoveRefused
+from cosmic.frame.verdict import MoveVerdict, Reason
+
+
+class Moved:
+    """A movement that has arrived."""
+
+    done = True
+
+    def __init__(self) -> None:
+        self.cancelled = False
+
+    def wait(self, timeout_s: float | None = None) -> str:
+        return "there"
+
+    def cancel(self) -> None:
+        self.cancelled = True
+
+
+def refusing(reason: Reason, times: int) -> tuple[Callable[[], Moved], list[int]]:
+    orders: list[int] = []
+
+    def order() -> Moved:
+        orders.append(1)
+        if len(orders) <= times:
+            raise MoveRefused(MoveVerdict(allowed=False, reason=reason, text="no"))
+        return Moved()
+
+    return order, orders
+
+
+@pytest.fixture(autouse=True)
+def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(patience, "APART_WALL_S", 0.0)
+
+
+def test_a_movement_without_an_answer_is_ordered_again_until_there_is_one():
+    order, orders = refusing(Reason.NO_ANSWER, 2)
+    assert PatientMove(order).wait(1.0) == "there"
+    assert len(orders) == 3
+
+
+def test_a_no_is_a_no():
+    order, orders = refusing(Reason.COLLISION, 1)
+    with pytest.raises(MoveRefused):
+        PatientMove(order)
+    assert len(orders) == 1
+
+
+def test_patience_ends():
+    order, orders = refusing(Reason.NO_ANSWER, 100)
+    with pytest.raises(MoveRefused):
+        PatientMove(order).wait(1.0)
+    assert len(orders) == TRIES
+
+
+def test_a_wait_ends_while_the_gate_has_not_answered(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(patience, "APART_WALL_S", 60.0)
+    move = PatientMove(refusing(Reason.NO_ANSWER, 1)[0])
+    assert not move.done
+    with pytest.raises(DeviceTimeout):
+        move.wait(0.01)
+
+
+def test_a_cancelled_movement_is_not_ordered_again():
+    order, orders = refusing(Reason.NO_ANSWER, 1)
+    move = PatientMove(order)
+    move.cancel()
+    assert move.done
+    with pytest.raises(MoveRefused):
+        move.wait(1.0)
+    assert len(orders) == 1
