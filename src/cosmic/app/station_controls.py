@@ -1,6 +1,6 @@
 """Shows in a window who commands at each station, and takes and gives that right."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 from PySide6.QtCore import QObject, Signal
@@ -13,6 +13,8 @@ from cosmic.frame.gui.relay import Unsubscribe
 from cosmic.frame.network.lease import LeaseState, StationLease
 
 HERE: Final = "this window"
+AXES: Final = "axes"
+Words = tuple[str, ControlAction | None, bool]
 _TAKE_OVER: Final = "take over"
 _OFFER: Final = "offer"
 
@@ -22,10 +24,10 @@ class StationControls(QObject):
 
     Parameters
     ----------
+    hosts : mapping of str to collection of str
+        By station, the applications used there; those that run in this process under "".
     own : StationLease or None
         Of what this window serves to others.
-    hosts : bool
-        Something runs in this process, too.
 
     Signals
     -------
@@ -44,14 +46,13 @@ class StationControls(QObject):
         self,
         sign: ControlsSign,
         stations: Sequence[RemoteStation],
+        hosts: Mapping[str, Collection[str]],
         own: StationLease | None,
         parent: QWidget,
-        *,
-        hosts: bool,
     ) -> None:
         super().__init__(parent)
         self._sign = sign
-        self._hosts = hosts
+        self._moving = {name: _what_moves(applications) for name, applications in hosts.items()}
         self._stations = {each.name: each for each in stations}
         self._known = {name: StationControl(name) for name in self._stations}
         self._own = own
@@ -82,25 +83,18 @@ class StationControls(QObject):
         self._show()
 
     def _show(self) -> None:
-        words, tips, actions, warn = [], [], [], False
-        if self._own_state is not None:
-            word, action = _own_words(self._own_state)
-            words.append(word)
-            tips.append(f"Movements here are commanded by {word}")
-            actions += [action] if action is not None else []
-            warn = not self._own_state.local
-        elif self._hosts:
-            words.append(HERE)
-            tips.append(f"Movements here are commanded by {HERE}")
-        alone = len(self._known) == 1 and not self._hosts
-        for control in self._known.values():
-            who, action = _words(control, alone=alone)
-            words.append(who)
-            tips.append(f"Movements at {control.station} are commanded by {who}")
-            actions += [action] if action is not None else []
-            warn = warn or (alone and not control.here)
-        self._sign.show_holder("; ".join(words), warn=warn, tip="\n".join(tips))
-        self._sign.set_actions(actions)
+        far = [each for each in self._known.values() if self._moving.get(each.station)]
+        shown = [_words(each, alone=len(far) == 1) for each in far]
+        moving = [self._moving[each.station] for each in far]
+        if self._moving.get("") or not shown:
+            shown.append(_own_words(self._own_state))
+            moving.append(self._moving.get("", ""))
+        # What moves the axes stands first.
+        entries = sorted(zip(moving, shown, strict=True), key=lambda each: AXES not in each[0])
+        words = [word if len(entries) == 1 else f"{what}: {word}" for what, (word, *_) in entries]
+        tips = [f"{what or 'movements'}: commanded by {word}" for what, (word, *_) in entries]
+        self._sign.show_holder("; ".join(words), warn=not entries[0][1][2], tip="\n".join(tips))
+        self._sign.set_actions([action for _, (_, action, _) in entries if action is not None])
 
     # What is asked for
 
@@ -119,27 +113,35 @@ class StationControls(QObject):
         self.failed.emit(str(error))
 
 
-def _own_words(state: LeaseState) -> tuple[str, ControlAction | None]:
-    """Return who commands here, and what the operator can do about it."""
+def _what_moves(applications: Collection[str]) -> str:
+    """Return what these applications move, for the operator; empty where nothing moves."""
+    return ", ".join(
+        what for name, what in (("mico", AXES), ("vico", "lens")) if name in applications
+    )
+
+
+def _own_words(state: LeaseState | None) -> Words:
+    """Return who commands here, what the operator can do about it, and whether all is usual."""
+    if state is None:
+        return HERE, None, True
     if not state.local:
         tip = f"What {state.holder} moves stops, and it cannot take control back until you offer it"
-        return state.holder, ControlAction(_TAKE_OVER, "Take over", tip)
+        return state.holder, ControlAction(_TAKE_OVER, "Take over", tip), False
     if not state.offered:
         tip = "Let other programs take control again"
-        return f"{HERE}, kept", ControlAction(_OFFER, "Offer", tip)
-    return HERE, None
+        return f"{HERE}, kept", ControlAction(_OFFER, "Offer", tip), True
+    return HERE, None, True
 
 
-def _words(control: StationControl, *, alone: bool) -> tuple[str, ControlAction | None]:
-    """Return who commands at another station, and what can be done about it from here."""
+def _words(control: StationControl, *, alone: bool) -> Words:
+    """Return the same of another station."""
     station = control.station
-    at = "" if alone else f" {station}"
+    of = "" if alone else f" of {station}"
     if control.away:
-        return f"{station} is away", None
+        return f"{station} is away", None, False
     if control.here:
         tip = f"Give the control over {station} back; what moves by it stops"
-        who = HERE if alone else f"{HERE} ({station})"
-        return who, ControlAction(f"release at {station}", f"Release{at}", tip)
+        return HERE, ControlAction(f"release at {station}", f"Release control{of}", tip), True
     tip = f"Command the movements at {station} from this window"
-    action = ControlAction(f"take at {station}", f"Take control{' of' if at else ''}{at}", tip)
-    return control.holder or f"nobody known ({station})", action if control.offered else None
+    action = ControlAction(f"take at {station}", f"Take control{of}", tip)
+    return control.holder or "not known yet", action if control.offered else None, False

@@ -33,15 +33,17 @@ class WindowStations(QObject):
         super().__init__(window)
         self._window = window
         self._panels: dict[str, list[str]] = {}
+        hosts: dict[str, list[str]] = {"": list(platform.own)}
         for application, station in platform.elsewhere.host_of.items():
+            hosts.setdefault(station.name, []).append(application)
             self._panels.setdefault(station.name, []).extend(panels.get(application, ()))
         self._said = ""
         self._controls = StationControls(
             window.top_bar.controls,
             platform.elsewhere.stations,
+            hosts,
             host.lease if host is not None else None,
             window,
-            hosts=bool(platform.own),
         )
         self._controls.control_changed.connect(self._on_control_changed)
         self._controls.failed.connect(self._on_failed)

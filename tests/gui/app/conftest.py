@@ -9,6 +9,7 @@ from pytestqt.qtbot import QtBot
 
 from cosmic.app.operator_window import OperatorWindow
 from cosmic.app.platform import Platform, build_platform
+from cosmic.app.station_host import StationHost
 from cosmic.daqco.gui.main_widget import make_daqco_gui
 from cosmic.frame.log import RingBufferHandler
 from cosmic.mico.gui.mico_widget import make_mico_gui
@@ -38,6 +39,7 @@ def make(qtbot: QtBot, stored: QSettings) -> Iterator[Make]:
         console: bool = False,
         hardware: bool = True,
         size: tuple[int, int] = (1400, 900),
+        host: StationHost | None = None,
     ) -> OperatorWindow:
         platform = platform or build_platform(
             config,
@@ -48,7 +50,7 @@ def make(qtbot: QtBot, stored: QSettings) -> Iterator[Make]:
             daqco_gui=make_daqco_gui,
             vico_gui=make_vico_gui,
         )
-        window = OperatorWindow(platform, stored, RingBufferHandler(), console=console)
+        window = OperatorWindow(platform, stored, RingBufferHandler(), console=console, host=host)
         made.append(window)
         qtbot.addWidget(window)
         show(qtbot, window, *size)
