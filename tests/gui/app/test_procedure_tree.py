@@ -32,12 +32,21 @@ def timed(part: Part[Work], rate: float = 100.0) -> ProcedureRun[Work]:
     return run_of(part, Work(RatedClock(rate)))
 
 
-@pytest.fixture
-def panel(qtbot: QtBot) -> Iterator[ProcedureTreePanel]:
-    panel = shown(qtbot, ProcedureTreePanel())
+@pytest.fixture(scope="module")
+def only_panel(qapp: QApplication) -> Iterator[ProcedureTreePanel]:
+    panel = ProcedureTreePanel()
     yield panel
     panel.close()
-    panel.shut_down()
+    panel.deleteLater()
+
+
+@pytest.fixture
+def panel(only_panel: ProcedureTreePanel, qtbot: QtBot) -> Iterator[ProcedureTreePanel]:
+    only_panel.resize(640, 480)
+    only_panel.show()
+    qtbot.waitExposed(only_panel)
+    yield only_panel
+    only_panel.shut_down()
 
 
 def shown(qtbot: QtBot, panel: ProcedureTreePanel) -> ProcedureTreePanel:
@@ -92,7 +101,8 @@ def test_only_what_makes_sense_can_be_pressed(panel: ProcedureTreePanel) -> None
     assert set(RULES) == set(RunState)
 
 
-def test_without_a_procedure_nothing_can_be_pressed(panel: ProcedureTreePanel) -> None:
+def test_without_a_procedure_nothing_can_be_pressed(qtbot: QtBot) -> None:
+    panel = shown(qtbot, ProcedureTreePanel())
     assert enabled(panel) == set()
     assert panel.state.text() == "no procedure"
 
