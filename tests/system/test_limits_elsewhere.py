@@ -1,0 +1,55 @@
+"""A force limit stops axes that another process has, whichever of the two has the boards."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
+import cosmic
+from contract.station_rig import free_port, wait_until
+from cosmic.app.network_settings import NetworkSettings, serving
+from cosmic.app.platform import Platform, build_platform
+from cosmic.app.station_host import StationHost
+
+
+@contextmanager
+def served(*applications: str) -> Iterator[tuple[Platform, StationHost, str]]:
+    """Serve applications from here; what a process of its own would do."""
+    platform = build_platform(applications=applications)
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with ExitStack() as at_end:
+        at_end.callback(platform.shut_down)
+        platform.initialize()
+        settings = NetworkSettings()
+        host = StationHost(platform, serving(settings, "there", platform.path, listen=endpoint))
+        at_end.callback(host.close)
+        yield platform, host, endpoint
+
+
+def test_boards_here_stop_axes_there() -> None:
+    with (
+        served("mico") as (there, _, endpoint),
+        cosmic.connect(applications=("daqco",), stations={"there": endpoint}) as rig,
+    ):
+        assert there.mico is not None
+        latch = there.mico.manager.latch
+        rig.daqco.arm_limit("force", low=-500.0, high=-400.0)
+        assert wait_until(lambda: latch.state.reason), (
+            "the force is about 0, and what is elsewhere stands"
+        )
+        assert "force" in (latch.state.reason or "")
+
+
+def test_boards_there_stop_axes_here_and_their_silence_does_as_well() -> None:
+    with (
+        served("daqco") as (_, host, endpoint),
+        cosmic.connect(applications=("mico",), stations={"there": endpoint}) as rig,
+    ):
+        rig.daqco.arm_limit("force", low=-500.0, high=-400.0)
+        assert wait_until(lambda: rig.stopped)
+        assert "force" in (rig.stopped or "")
+        rig.daqco.remove_limit("force")
+        rig.reset_stop()
+
+        rig.daqco.arm_limit("force", low=-500.0, high=500.0)
+        assert rig.stopped is None
+        host.close()
+        assert wait_until(lambda: rig.stopped), "nobody can say that the limit holds"
