@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import pytest
 
 import cosmic
+from cosmic.autonomy.handling.in_hand import FibreInHand
 from cosmic.autonomy.handling.settings import HandlingSettings, PushSettings
-from cosmic.autonomy.handling.work import FibreInHand, FibreWork
+from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun
 from cosmic.autonomy.shipped.bend_test import build_bend_test

@@ -5,12 +5,13 @@ from typing import Final
 import numpy as np
 from typing_extensions import override
 
+from cosmic.autonomy.handling.in_hand import FibreInHand
 from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.plate import along
 from cosmic.autonomy.handling.reach import LOST, line_of
 from cosmic.autonomy.handling.shape import HeldShape, held_shape
 from cosmic.autonomy.handling.sight import trace_along
-from cosmic.autonomy.handling.work import FibreInHand, FibreWork
+from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.pixel_map import Floats
@@ -42,8 +43,10 @@ class TestGrasp(FibreOperation):
         assert isinstance(picture, Picture)
         if seen_at(work, fibre, picture, in_jaws(work, fibre), places.test_um):
             fibre.held = True
+            work.learn_height(held=True)
             return
         if seen_at(work, fibre, picture, before, 0.0):
+            work.learn_height(held=False)
             raise OperationFailed(
                 MISSED, f"fibre {fibre.number} lies where it was: the jaws closed beside it"
             )

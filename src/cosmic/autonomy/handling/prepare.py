@@ -5,10 +5,11 @@ from dataclasses import replace
 
 from typing_extensions import override
 
+from cosmic.autonomy.handling.in_hand import Measured
+from cosmic.autonomy.handling.jaws import in_step, zero_jaws
 from cosmic.autonomy.handling.operation import FibreOperation
-from cosmic.autonomy.handling.patience import PatientMove
 from cosmic.autonomy.handling.sight import map_at
-from cosmic.autonomy.handling.work import FibreWork, Measured
+from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Wish
 from cosmic.autonomy.tools import expected, tip_um
 from cosmic.frame.errors import CosmicError, NotAvailable
@@ -21,7 +22,6 @@ from cosmic.vico.core.vision.tips import find_gripper, find_probe
 from cosmic.vico.core.vision.tool_types import GripperTips, NotSeen, ToolEnd
 
 REACH_PX = 40.0
-COUNT_UM = 30.0
 TURN_ON_DEG = 41.0
 POOR = "calibration poor"
 PLATE = "map of the plate"
@@ -83,48 +83,6 @@ def retract_probe(work: FibreWork) -> Steps:
     away = work.settings.places.probe_away_y_um
     if y < away - 1.0:
         yield work.go(work.at(work.probe, x, away))
-
-
-def zero_jaws(work: FibreWork) -> Steps:
-    """Bring the opening counted in step with the true one, and open the jaws as for a grasp.
-
-    Steps against a stop are counted and move nothing: closed to one stop, then opened against the
-    other until the count says so.
-    """
-    full, count = work.settings.grasp.full_um, work.mico[work.gripper.gap_axis]
-    yield from move_jaws(work, -1.1 * full)
-    work.gap_um = 0.0
-    yield from move_jaws(work, max(0.0, full - (count.position_um or 0.0)))
-    work.gap_um = full
-    yield from move_jaws(work, work.settings.grasp.gap_um - full)
-
-
-def in_step(work: FibreWork) -> bool:
-    """Return whether the opening counted is about the true one."""
-    counted = work.mico[work.gripper.gap_axis].position_um
-    known = work.gap_um is not None and counted is not None
-    return known and abs((counted or 0.0) - (work.gap_um or 0.0)) < COUNT_UM
-
-
-def move_jaws(work: FibreWork, by_um: float) -> Steps:
-    """Open the jaws, or close them: open loop, a step at full voltage is what the file says."""
-    axis = work.mico[work.gripper.gap_axis]
-    step_um = next(
-        (
-            each.step_um
-            for each in work.mico.application.manager.settings.positioner
-            if each.name == work.gripper.gap_axis and each.step_um
-        ),
-        1.0,
-    )
-    steps = round(by_um / step_um)
-    if steps:
-        # They may be at the plate; the gate knows of no smaller movement than their whole travel.
-        with work.mico.collision.contact("grasp"):
-            frequency_hz = work.settings.grasp.gripper_hz
-            yield PatientMove(lambda: axis.steps(steps, frequency_hz=frequency_hz, wait=False))
-    if work.gap_um is not None:
-        work.gap_um = max(0.0, work.gap_um + steps * step_um)
 
 
 class Calibrated(FibreOperation):

@@ -6,9 +6,11 @@ import numpy as np
 from typing_extensions import override
 
 from cosmic.autonomy.handling.grasp import in_jaws, seen_at
+from cosmic.autonomy.handling.in_hand import FibreInHand
+from cosmic.autonomy.handling.jaws import move_jaws
 from cosmic.autonomy.handling.operation import FibreOperation
-from cosmic.autonomy.handling.prepare import move_jaws, retract_probe
-from cosmic.autonomy.handling.work import FibreInHand, FibreWork
+from cosmic.autonomy.handling.prepare import retract_probe
+from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.vico.core.picture import Picture
 
@@ -96,7 +98,7 @@ class Wipe(FibreOperation):
         yield work.go_up(max(places.travel_um, work.height_now()))
         yield work.go(bin_place(work))
         with work.mico.collision.contact("grasp"):
-            yield work.go_up(places.grasp_um)
+            yield work.go_up(work.grasp_um)
             for _ in range(SHAKES):
                 yield from move_jaws(work, -SHAKE_UM)
                 yield from move_jaws(work, SHAKE_UM)

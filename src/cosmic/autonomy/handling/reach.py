@@ -5,11 +5,13 @@ from typing import Final
 import numpy as np
 from typing_extensions import override
 
+from cosmic.autonomy.handling.in_hand import FibreInHand
+from cosmic.autonomy.handling.jaws import move_jaws
 from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.plate import along, ways
-from cosmic.autonomy.handling.prepare import move_jaws, see_tip
+from cosmic.autonomy.handling.prepare import see_tip
 from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen, trace_along
-from cosmic.autonomy.handling.work import FibreInHand, FibreWork
+from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.pixel_map import Floats
@@ -133,11 +135,11 @@ class Approach(FibreOperation):
 
     @override
     def steps(self, work: FibreWork) -> Steps:
-        fibre, places = work.in_hand(), work.settings.places
+        fibre = work.in_hand()
         x, y = along(line_of(fibre), fibre.inside_um).tolist()
         yield work.go(work.at(work.gripper, x, y))
         with work.mico.collision.contact("grasp"):
-            yield work.go_up(places.grasp_um)
+            yield work.go_up(work.grasp_um)
 
     @override
     def undo(self, work: FibreWork) -> Steps:

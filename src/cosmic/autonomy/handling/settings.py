@@ -17,7 +17,10 @@ class PlaceSettings(StrictModel):
     travel_um : float
         Height at which the jaws travel above the plate.
     grasp_um : float
-        Height of the jaws' lower edge when they close around a fibre on the plate.
+        Height of the jaws' lower edge when they first close around a fibre on the plate.
+    lower_um, raise_um, stray_um : float
+        How true that height is nothing tells but grasps: after one that missed they are made so
+        much lower, after one that held so much higher, and never further than `stray_um` from it.
     test_um, test_aside_um : float
         How high and how far aside a grasped fibre is carried to see whether it follows.
     hold_x_um, hold_y_um : float
@@ -35,7 +38,10 @@ class PlaceSettings(StrictModel):
     """
 
     travel_um: float = Field(400.0, gt=0.0)
-    grasp_um: float = 3.0
+    grasp_um: float = 7.0
+    lower_um: float = Field(5.0, ge=0.0)
+    raise_um: float = Field(0.8, ge=0.0)
+    stray_um: float = Field(18.0, ge=0.0)
     test_um: float = Field(120.0, gt=0.0)
     test_aside_um: float = Field(150.0, gt=0.0)
     hold_x_um: float = 0.0

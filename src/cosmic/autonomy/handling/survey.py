@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 from typing_extensions import override
 
+from cosmic.autonomy.handling.in_hand import FibreInHand
 from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.plate import Candidate, Neighbours, Reach, distance_um, reaches
 from cosmic.autonomy.handling.prepare import clear_picture
 from cosmic.autonomy.handling.sight import SeenFibre, find_seen
-from cosmic.autonomy.handling.work import FibreInHand, FibreWork
+from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.pixel_map import Floats

@@ -1,6 +1,7 @@
 """The bend test: a fibre is taken up, pushed as a cantilever at several spans, and put away."""
 
 from cosmic.autonomy.handling.grasp import MISSED, Carry, TestGrasp
+from cosmic.autonomy.handling.one_span import NO_CONTACT
 from cosmic.autonomy.handling.prepare import (
     POOR,
     CalibrateHeld,
@@ -9,7 +10,7 @@ from cosmic.autonomy.handling.prepare import (
     MakeReady,
     TurnOn,
 )
-from cosmic.autonomy.handling.push import NO_CONTACT, NOT_TRUSTED, FitSpans, PushSpans, StepBack
+from cosmic.autonomy.handling.push import NOT_TRUSTED, FitSpans, PushSpans, StepBack
 from cosmic.autonomy.handling.put_away import (
     ADHESION,
     Finish,

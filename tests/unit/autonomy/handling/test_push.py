@@ -9,10 +9,12 @@ from typing_extensions import override
 
 from cosmic.autonomy.bending.fit import fit_bending
 from cosmic.autonomy.handling.force import ForceMean
+from cosmic.autonomy.handling.in_hand import FibreInHand
+from cosmic.autonomy.handling.one_span import NO_CONTACT
 from cosmic.autonomy.handling.plate import Candidate, Reach
-from cosmic.autonomy.handling.push import NO_CONTACT, PushSpans
+from cosmic.autonomy.handling.push import PushSpans
 from cosmic.autonomy.handling.settings import HandlingSettings, PushSettings
-from cosmic.autonomy.handling.work import FibreInHand, FibreWork
+from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps
 from cosmic.frame.clock import ManualClock
 from cosmic.vico.core.tool_settings import ToolSettings

@@ -1,0 +1,51 @@
+"""The jaws of a gripper without a sensor: opened and closed by steps, and counted."""
+
+from typing import Final
+
+from cosmic.autonomy.handling.patience import PatientMove
+from cosmic.autonomy.handling.work import FibreWork
+from cosmic.autonomy.procedures.operation import Steps
+
+COUNT_UM: Final = 30.0
+
+
+def zero_jaws(work: FibreWork) -> Steps:
+    """Bring the opening counted in step with the true one, and open the jaws as for a grasp.
+
+    Steps against a stop are counted and move nothing: closed to one stop, then opened against the
+    other until the count says so.
+    """
+    full, count = work.settings.grasp.full_um, work.mico[work.gripper.gap_axis]
+    yield from move_jaws(work, -1.1 * full)
+    work.gap_um = 0.0
+    yield from move_jaws(work, max(0.0, full - (count.position_um or 0.0)))
+    work.gap_um = full
+    yield from move_jaws(work, work.settings.grasp.gap_um - full)
+
+
+def in_step(work: FibreWork) -> bool:
+    """Return whether the opening counted is about the true one."""
+    counted = work.mico[work.gripper.gap_axis].position_um
+    known = work.gap_um is not None and counted is not None
+    return known and abs((counted or 0.0) - (work.gap_um or 0.0)) < COUNT_UM
+
+
+def move_jaws(work: FibreWork, by_um: float) -> Steps:
+    """Open the jaws, or close them: open loop, a step at full voltage is what the file says."""
+    axis = work.mico[work.gripper.gap_axis]
+    step_um = next(
+        (
+            each.step_um
+            for each in work.mico.application.manager.settings.positioner
+            if each.name == work.gripper.gap_axis and each.step_um
+        ),
+        1.0,
+    )
+    steps = round(by_um / step_um)
+    if steps:
+        # They may be at the plate; the gate knows of no smaller movement than their whole travel.
+        with work.mico.collision.contact("grasp"):
+            frequency_hz = work.settings.grasp.gripper_hz
+            yield PatientMove(lambda: axis.steps(steps, frequency_hz=frequency_hz, wait=False))
+    if work.gap_um is not None:
+        work.gap_um = max(0.0, work.gap_um + steps * step_um)
