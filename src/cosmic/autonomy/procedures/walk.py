@@ -250,9 +250,11 @@ class Branch:
     def end(self) -> Pending:
         """End it at once and return what may yet be moving."""
         pending, self.pending = self.pending, ForNothing()
-        pending.cancel()
         self.over = True
-        self._steps.close()
+        try:
+            pending.cancel()
+        finally:
+            self._steps.close()
         return pending
 
     def until_ended(self, *left: Pending) -> Pending:
