@@ -120,6 +120,25 @@ def test_a_less_certain_instrument_makes_a_wider_interval() -> None:
         assert width_percent(unsure) > 1.02 * sure, name
 
 
+def test_what_is_known_of_the_offset_beforehand_counts_by_its_certainty() -> None:
+    spans = pushed(rig(clamp_um=8.0, contact_std_um=0.1))
+    free = fit_bending(spans)
+    sure = fit_bending(spans, settings=FitSettings(offset_um=8.0, offset_std_um=0.1))
+    wrong = fit_bending(spans, settings=FitSettings(offset_um=30.0, offset_std_um=0.1))
+    assert width_percent(sure) < 0.8 * width_percent(free)
+    assert sure.clamp_offset_um == pytest.approx(8.0, abs=0.3)
+    assert wrong.clamp_offset_um == pytest.approx(30.0, abs=0.3)
+    assert wrong.ei_n_m2 > 1.1 * DRY
+    assert not wrong.trusted
+
+
+def test_a_zero_that_wanders_makes_a_soft_fibre_less_certain() -> None:
+    spans = pushed(Rig(1e-12, np.random.default_rng(6)))
+    calm = fit_bending(spans, settings=FitSettings(drift_un_sqrt_s=0.0))
+    restless = fit_bending(spans, settings=FitSettings(drift_un_sqrt_s=0.2))
+    assert width_percent(restless) > 1.3 * width_percent(calm)
+
+
 # ---------------------------------------------------------------------- few and soft
 
 
@@ -143,6 +162,13 @@ def test_a_fibre_too_soft_for_the_sensor_is_not_trusted() -> None:
     )
     assert not found.trusted
     assert found.flags & {Quality.TOO_SOFT, Quality.NO_CONTACT, Quality.TOO_FEW_SPANS}
+
+
+def test_an_interval_wider_than_wanted_is_not_trusted() -> None:
+    found = fit_bending(pushed(rig()), settings=FitSettings(soft_percent=1.0))
+    assert found.flags == {Quality.TOO_SOFT}
+    assert not found.trusted
+    assert "more than 1 %" in found.reasons[-1]
 
 
 def test_no_span_at_all_is_refused() -> None:

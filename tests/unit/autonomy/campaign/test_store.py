@@ -78,6 +78,7 @@ def test_a_fibre_has_one_end(store: CampaignStore) -> None:
     with pytest.raises(CampaignError, match="which is no end"):
         store.finish_fibre(FibreRecord(number, Outcome.RUNNING, 0.0, 1.0))
     assert [each.cause for each in store.reader.finished()] == ["missed grasp"]
+    assert store.reader.fibre(number).spans == (), "its files are those of the first end"
 
 
 def test_the_campaign_says_what_it_is_and_what_held(store: CampaignStore) -> None:
