@@ -118,7 +118,7 @@ class FakePort:
     def rate_hz(self) -> float:
         return self.settings.rate_hz
 
-    def carry_out(self, action, told) -> None:
+    def carry_out(self, action, told, *, slow=False) -> None:
         try:
             result = action()
         except CosmicError as exc:

@@ -1,11 +1,13 @@
 """The widgets of DAQCo over a station: as at home, and never waiting for the line."""
 
 from contextlib import ExitStack
+from threading import Event
 
 import pytest
 from PySide6.QtWidgets import QDialogButtonBox
 
 from contract.daqco_rig import at_home, connected, elsewhere, free_port, hosted, settings
+from cosmic.daqco.core.file_writer import UDaqFileWriter
 from cosmic.daqco.gui.configure_dialog import UDaqConfigureDialog
 from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.main_widget import make_daqco_gui
@@ -135,3 +137,46 @@ def test_a_station_that_goes_greys_the_panel_with_the_reason(seen):
     assert main.plotter.isEnabled()
     before = curve(main)[0]
     seen.wait(lambda: curve(main)[0] > before)
+
+
+# --- at home ----------------------------------------------------------------------------------
+
+
+def test_the_window_does_not_wait_for_a_slow_disk_to_close_the_file(qtbot, tmp_path, monkeypatch):
+    closing, go_on = Event(), Event()
+    join = UDaqFileWriter.join
+
+    def slow_join(writer, timeout_s=5.0):
+        closing.set()
+        go_on.wait(10.0)
+        return join(writer, timeout_s)
+
+    monkeypatch.setattr(UDaqFileWriter, "join", slow_join)
+    with at_home(settings(tmp_path)) as home:
+        main = make_daqco_gui(home.application)
+        qtbot.addWidget(main)
+        files = main.files
+        qtbot.waitUntil(files.start.isEnabled)
+        files.start.click()
+        qtbot.waitUntil(files.stop.isEnabled)
+        files.stop.click()
+        qtbot.waitUntil(closing.is_set)
+        files.refresh()
+        assert not files.start.isEnabled()
+        assert files.start.toolTip() == "The file is being closed"
+        go_on.set()
+        qtbot.waitUntil(files.start.isEnabled)
+        assert not home.application.recorder.state.active
+        main.close()
+
+
+@pytest.mark.defects
+def test_a_mistake_in_what_is_carried_out_aside_is_reported_and_told(qtbot, tmp_path):
+    told = []
+    with at_home(settings(tmp_path)) as home:
+        home.application.carry_out(lambda: 1 / 0, lambda *how: told.append(how), slow=True)
+        qtbot.waitUntil(lambda: bool(told))
+        assert "ZeroDivisionError" in str(told[0][1])
+        assert [each.defect for each in home.failures] == [True]
+    home.application.carry_out(lambda: 1, lambda *how: told.append(how), slow=True)
+    assert "closed" in str(told[1][1])

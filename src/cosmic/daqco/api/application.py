@@ -9,8 +9,8 @@ from typing import Final, TypeVar
 from PySide6.QtCore import QObject, Qt
 from typing_extensions import override
 
+from cosmic.daqco.api.errands import Errands, Told, do_and_tell
 from cosmic.daqco.api.files import LocalFiles
-from cosmic.daqco.api.ports import Told
 from cosmic.daqco.api.recorder import Recorder
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.limits import Crossing, Limit, LimitGuard
@@ -85,6 +85,7 @@ class DaqcoApplication(TaskApplication):
         self._core: UDaqCore | None = None
         self._problem = ""
         self._silence = SilenceWatch(self.guard, policy)
+        self._errands = Errands(policy)
         self._before_change: tuple[Callable[[DaqcoSettings], None], ...] = ()
         self.recorder = Recorder(self, policy, software=software, configuration=configuration)
 
@@ -331,14 +332,12 @@ class DaqcoApplication(TaskApplication):
         """Call `listener(crossing)` after each trip, in the thread that saw it."""
         self.guard.subscribe(lambda crossing: (listener(crossing), None)[1])
 
-    def carry_out(self, action: Callable[[], T], told: Told[T]) -> None:
-        """Do `action` now and tell its result, or what it raised; nothing waits for a line here."""
-        try:
-            result = action()
-        except CosmicError as exc:
-            told(None, exc)
+    def carry_out(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
+        """Do `action` and tell how it ended: at once, or in another thread what is `slow`."""
+        if slow:
+            self._errands.do(action, told)
         else:
-            told(result, None)
+            do_and_tell(action, told)
 
     # The end
 
@@ -351,6 +350,8 @@ class DaqcoApplication(TaskApplication):
     def shut_down(self) -> None:
         """Close the recording, end acquisition, close the boards, end all threads; any state."""
         self.request_end()
+        self._errands.request_end()
+        self._errands.join()
         self.recorder.stop()
         self._silence.request_end()
         self._silence.join()

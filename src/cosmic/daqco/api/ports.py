@@ -8,6 +8,7 @@ from typing import Protocol, TypeVar
 
 from PySide6.QtCore import SignalInstance
 
+from cosmic.daqco.api.errands import Told
 from cosmic.daqco.api.files import NamedFile
 from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.core.chunk import DataChunk
@@ -16,13 +17,10 @@ from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.daqco.hw.interface import BoardInfo
 from cosmic.frame.clock import Clock
-from cosmic.frame.errors import CosmicError
 from cosmic.frame.file_names import NameOption
 from cosmic.frame.task import Task
 
 T = TypeVar("T")
-Told = Callable[[T | None, CosmicError | None], object]
-"""Takes the result of something, or why there is none."""
 
 
 class SampleBuffer(Protocol):
@@ -238,5 +236,8 @@ class DaqcoHost(Protocol):
         """Call `listener(crossing)` when a limit was crossed, or nobody can say it was not."""
 
     @abstractmethod
-    def carry_out(self, action: Callable[[], T], told: Told[T]) -> None:
-        """Do what may have to wait for a line; `told` at its end, maybe in another thread."""
+    def carry_out(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
+        """Do what may have to wait for a line; `told` at its end, maybe in another thread.
+
+        What is `slow` waits for boards or a disk: at home it is done in another thread, too.
+        """

@@ -10,13 +10,13 @@ from typing import Final, TypeVar
 from PySide6.QtCore import QObject
 from typing_extensions import override
 
-from cosmic.daqco.api.ports import Told
+from cosmic.daqco.api.errands import Errands, Told
 from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.api.remote_buffer import RemoteBuffer
 from cosmic.daqco.api.remote_clock import Reading, StationClock
 from cosmic.daqco.api.remote_files import RemoteFiles
 from cosmic.daqco.api.remote_guard import RemoteGuard
-from cosmic.daqco.api.remote_line import DaqcoLine, Errands
+from cosmic.daqco.api.remote_line import DaqcoLine
 from cosmic.daqco.api.remote_recorder import RemoteRecorder
 from cosmic.daqco.api.station_report import (
     CROSSINGS,
@@ -186,7 +186,6 @@ class RemoteDaqcoApplication(TaskApplication):
 
     def _begin(self) -> None:
         self.start()
-        self._errands.start()
         self.buffer.open()
         subscribe = self._transport.subscribe
         self._subscriptions = [
@@ -254,8 +253,9 @@ class RemoteDaqcoApplication(TaskApplication):
         """
         self.guard.subscribe(lambda crossing: (listener(crossing), None)[1])
 
-    def carry_out(self, action: Callable[[], T], told: Told[T]) -> None:
+    def carry_out(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
         """Do what may have to wait for the line; aside where this thread must not wait."""
+        del slow  # everything may be
         self._line.carry_out(action, told)
 
     def command(self, function: str, arguments: Mapping[str, object] | None = None, /) -> object:

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from cosmic.daqco.api.daqco import Daqco
+from cosmic.daqco.api.errands import Told
 from cosmic.daqco.api.files import NamedFile
-from cosmic.daqco.api.ports import Told
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.frame.file_names import NameOption
 
@@ -39,10 +39,10 @@ class WindowPort(Daqco):
         """
         return self.application.buffer.follow(lambda chunk: (receiver(chunk), None)[1])
 
-    def carry_out(self, action: Callable[[], T], told: Told[T]) -> None:
+    def carry_out(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
         """Do what may have to wait for a line, without waiting in a window's thread.
 
         `told` takes the result, or the `CosmicError` that was raised; at home it is called at
-        once, else maybe in another thread.
+        once, unless it is `slow`, else maybe in another thread.
         """
-        self.application.carry_out(action, told)
+        self.application.carry_out(action, told, slow=slow)

@@ -8,17 +8,17 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 from shiboken6 import isValid
 
+from cosmic.daqco.api.errands import Told
 from cosmic.frame.errors import CosmicError
 
 T = TypeVar("T")
-Told = Callable[[T | None, CosmicError | None], object]
 
 
 class CarriesOut(Protocol):
     """What an application offers to its widgets, as far as it matters here."""
 
     @abstractmethod
-    def carry_out(self, action: Callable[[], T], told: Told[T]) -> None:
+    def carry_out(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
         """Do `action`; `told(result, error)` at its end, maybe in another thread."""
 
 
@@ -32,14 +32,17 @@ class Asking(QObject):
         self._port = port
         self._told.connect(self._on_told)
 
-    def ask(self, action: Callable[[], T], told: Told[T]) -> None:
-        """Have `action` done and call `told(result, error)`: at home before this returns."""
+    def ask(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
+        """Have `action` done and call `told(result, error)`.
+
+        At home that is before this returns, unless it is `slow`: then a thread waits for it.
+        """
 
         def tell(result: T | None, error: CosmicError | None) -> None:
             if isValid(self):  # the widget may go while a station is asked
                 self._told.emit(told, result, error)
 
-        self._port.carry_out(action, tell)
+        self._port.carry_out(action, tell, slow=slow)
 
     def _on_told(self, told: Told[object], result: object, error: CosmicError | None) -> None:
         told(result, error)

@@ -16,11 +16,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from cosmic.daqco.api.errands import Told
 from cosmic.daqco.api.files import NamedFile
 from cosmic.daqco.core.recording_format import SUFFIX
 from cosmic.daqco.gui.amounts import recording_text, room_text
 from cosmic.daqco.gui.append_row import append_row
-from cosmic.daqco.gui.asking import Asking, Told
+from cosmic.daqco.gui.asking import Asking
 from cosmic.daqco.gui.file_naming import name_pattern
 from cosmic.daqco.gui.ports import DaqPort
 from cosmic.frame.errors import CosmicError
@@ -281,10 +282,12 @@ class UDaqFileWidget(QWidget):
     def _on_start(self) -> None:
         self._ask(self._name_now, self._on_named, "The name is being completed")
 
-    def _ask(self, action: Callable[[], T], told: Told[T], what: str) -> None:
+    def _ask(
+        self, action: Callable[[], T], told: Told[T], what: str, *, slow: bool = False
+    ) -> None:
         self._error, self._waits = "", what
         self.refresh()
-        self._asking.ask(action, told)
+        self._asking.ask(action, told, slow=slow)
 
     def _answered(self, error: CosmicError | None) -> None:
         self._waits = ""
@@ -319,7 +322,8 @@ class UDaqFileWidget(QWidget):
         )
 
     def _on_stop(self) -> None:
-        self._ask(self._port.stop_recording, self._on_done, "The file is being closed")
+        what = "The file is being closed"
+        self._ask(self._port.stop_recording, self._on_done, what, slow=True)
 
     def _on_done(self, _result: object, error: CosmicError | None) -> None:
         self._answered(error)

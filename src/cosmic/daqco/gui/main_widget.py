@@ -163,7 +163,7 @@ class UDaqMainWidget(QWidget):
         self.error.set_text(f"■ {text}" if text else "")
 
     def _do(self, action: Callable[[], object]) -> None:
-        self._asking.ask(action, self._on_done)
+        self._asking.ask(action, self._on_done, slow=True)
 
     def _on_done(self, _result: object, error: CosmicError | None) -> None:
         if error is not None:

@@ -10,10 +10,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import Protocol, TypeVar
 
+from cosmic.daqco.api.errands import Told
 from cosmic.daqco.api.files import NamedFile
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, LimitSettings
-from cosmic.daqco.gui.asking import Told
 from cosmic.daqco.hw.interface import BoardInfo
 from cosmic.frame.file_names import NameOption
 from cosmic.frame.task import Task
@@ -174,10 +174,10 @@ class DaqPort(Protocol):
         """Call `listener()`, in any thread, when anything but samples and counters changed."""
 
     @abstractmethod
-    def carry_out(self, action: Callable[[], T], told: Told[T]) -> None:
+    def carry_out(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
         """Do `action`, which commands; `told(result, error)` at its end, maybe in another thread.
 
-        At home both is done at once.
+        At home both is done at once, unless it is `slow`: then a thread waits for it.
         """
 
     # Acquisition
