@@ -26,12 +26,12 @@ class Question(Protocol):
 
 
 class Outlet(Protocol):
-    """Where messages of one topic go out; one thread at a time."""
+    """Where messages of one topic go out; one thread at a time, but `wanted` is for any."""
 
     @property
     @abstractmethod
     def wanted(self) -> bool:
-        """Whether anybody receives them."""
+        """Whether anybody receives them; False once it is closed."""
 
     @abstractmethod
     def put(self, message: bytes) -> None:

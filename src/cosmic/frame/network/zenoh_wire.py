@@ -195,15 +195,20 @@ class _ZenohQuestion(Question):
 class _ZenohOutlet(Outlet):
     def __init__(self, publisher: "zenoh.Publisher") -> None:
         self._publisher = publisher
+        self._lock = Lock()  # it must not be released while another thread asks
+        self._closed = False
 
     @property
     @override
     def wanted(self) -> bool:
-        try:
-            status: Any = self._publisher.matching_status  # the stub says bool
-            return bool(status.matching)
-        except zenoh.ZError:
-            return False
+        with self._lock:
+            if self._closed:
+                return False
+            try:
+                status: Any = self._publisher.matching_status  # the stub says bool
+                return bool(status.matching)
+            except zenoh.ZError:
+                return False
 
     @override
     def put(self, message: bytes) -> None:
@@ -214,7 +219,10 @@ class _ZenohOutlet(Outlet):
 
     @override
     def close(self) -> None:
-        _undeclare(self._publisher)
+        with self._lock:
+            if not self._closed:
+                self._closed = True
+                _undeclare(self._publisher)
 
 
 class _ZenohSign(Sign):
