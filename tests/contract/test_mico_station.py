@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,11 +28,12 @@ from cosmic.frame.errors import (
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.errors import CallRefused, StationAway
 from cosmic.frame.network.in_process import InProcessTransport
-from cosmic.frame.network.transport import Rule
+from cosmic.frame.network.transport import Receiver, Rule, Subscription
 from cosmic.frame.task import Progress
 from cosmic.frame.verdict import Reason
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.remote_application import RemoteMicoApplication
+from cosmic.mico.api.station_words import AxisPositions, StampedState
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.orders import Jog, MoveTo
@@ -447,6 +449,51 @@ def test_an_ill_typed_order_moves_nothing(
 
 
 # --- what is told ------------------------------------------------------------------------------
+
+
+class Deaf(InProcessTransport):
+    """Hears nothing of any topic."""
+
+    def subscribe(self, topic: str, rule: Rule, receiver: Receiver) -> Subscription:
+        del receiver
+        return super().subscribe(topic, rule, lambda _: None)
+
+
+def test_what_a_call_has_changed_is_known_when_it_returns(hosted: HostedMico) -> None:
+    """Topics come when they come; a script must not have to wait for them."""
+    client = Deaf(hosted.station, "vision")
+    client.take_lease()
+    application = RemoteMicoApplication(client, hosted.application.trajectories.policy)
+    try:
+        application.initialize()
+        mico = Mico(application)
+        axis = mico["left.x"]
+        axis.move_to(60.0)
+        assert axis.position_um == pytest.approx(60.0, abs=1.0)
+        mico.move({"left.x": 40.0, "right.x": 20.0})
+        assert mico["right.x"].position_um == pytest.approx(20.0, abs=1.0)
+        axis.set_zero()
+        assert axis.position_um == pytest.approx(0.0, abs=1.0)
+        axis.clear_zero()
+        assert mico.undo_entries
+        application.manager.stop("x")
+        assert application.manager.latch.state.latched
+        application.manager.reset_stop()
+        assert not application.manager.latch.state.latched
+    finally:
+        application.shut_down()
+        client.close()
+
+
+def test_an_older_word_changes_nothing(hosted: HostedMico) -> None:
+    with remote_mico(hosted, "in-process", takes_lease=False) as (mico, application, _):
+        manager, now = application.manager, mico["left.x"].details
+        manager.take_event(StampedState(10**9, replace(now, position=1.0), 0.0))
+        manager.take_event(StampedState(10**9 - 1, replace(now, position=2.0), 0.0))
+        manager.take_positions(AxisPositions({"left.x": (10**9 - 1, 3.0, 0.0)}))
+        assert mico["left.x"].position_um == 1.0
+        manager.take_positions(AxisPositions({"left.x": (10**9, 4.0, 0.0)}))
+        assert mico["left.x"].position_um == 4.0
 
 
 def test_who_commands_is_told_and_positions_are_told_seldom(hosted: HostedMico, how: str) -> None:
