@@ -1,4 +1,4 @@
-"""The control mode of a window: MCM, SCM, or ECM with a collision model (thesis 3.4)."""
+"""The control mode of a window: MCM, SCM, ECM with a collision model, or ACM (thesis 3.4)."""
 
 import logging
 from collections.abc import Mapping
@@ -13,21 +13,26 @@ logger = logging.getLogger(__name__)
 MCM: Final = "MCM"
 SCM: Final = "SCM"
 ECM: Final = "ECM"
+ACM: Final = "ACM"
 NO_MICO: Final = "nothing here moves"
+NO_ACM: Final = "procedures need MiCo, DAQCo and ViCo, all in this program"
 NO_ECM: Final = f"{NO_COLLISION_MODEL}; name a scene in the platform file"
 _KEY: Final = "window/mode"
 
 
-def blocked_modes(*, mico: bool, model: bool) -> dict[str, str]:
+def blocked_modes(*, mico: bool, model: bool, campaigns: bool) -> dict[str, str]:
     """Return which modes cannot be chosen, and why.
 
     Parameters
     ----------
     mico, model : bool
         The window has axes, and a model of what they may collide with.
+    campaigns : bool
+        It has all that procedures need.
     """
     blocked = {} if mico else {SCM: NO_MICO}
-    return blocked if model else blocked | {ECM: NO_ECM}
+    blocked |= {} if model else {ECM: NO_ECM}
+    return blocked if campaigns else blocked | {ACM: NO_ACM}
 
 
 class ControlMode(QObject):
@@ -61,8 +66,8 @@ class ControlMode(QObject):
         self._bar = bar
         self._settings = settings
         self._mode = MCM
-        self._available = tuple(mode for mode in (MCM, SCM, ECM) if mode not in blocked)
-        for each in (SCM, ECM):
+        self._available = tuple(mode for mode in (MCM, SCM, ECM, ACM) if mode not in blocked)
+        for each in (SCM, ECM, ACM):
             bar.set_mode_available(each, blocked.get(each, ""))
         bar.mode_requested.connect(self.choose)
 

@@ -7,8 +7,9 @@ from PySide6.QtCore import QSettings, Qt
 from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
 import cosmic
+from cosmic.app.campaign_dock import CAMPAIGN, CampaignDock, can_run
 from cosmic.app.collision_bar import CollisionBar
-from cosmic.app.control_mode import ECM, SCM, ControlMode, blocked_modes
+from cosmic.app.control_mode import ACM, ECM, SCM, ControlMode, blocked_modes
 from cosmic.app.hint_bar import HintBar, first_steps
 from cosmic.app.instrument_panels import instruments_of
 from cosmic.app.platform import Platform
@@ -90,11 +91,18 @@ class OperatorWindow(CosmicServerGui):
             self._procedures = ProcedurePanels(
                 self, self._mico_gui, self._scene, self._rig.control, beside=SCENE
             )
+        self._campaign: CampaignDock | None = None
+        if self._scene is not None and can_run(platform):
+            self._campaign = CampaignDock(self, self._rig, self._scene, beside=MICO)
+            self._campaign.replayed.connect(self._raise_scene)
+            self.dock(MICO).raise_()
         if pictures:
             self.dock(pictures).raise_()
         self._stations = WindowStations(self, platform, host, self._instruments.panels)
         model = self._mico_gui is not None and self._mico_gui.collision.has_model
-        blocked = blocked_modes(mico=self._mico_gui is not None, model=model)
+        blocked = blocked_modes(
+            mico=self._mico_gui is not None, model=model, campaigns=self._campaign is not None
+        )
         self._mode = ControlMode(self.top_bar, settings, blocked, self)
         self._mode.changed.connect(self._on_mode_changed)
         self._mode.restore()
@@ -126,7 +134,7 @@ class OperatorWindow(CosmicServerGui):
         way_bar = WayBar()
         self._scene.set_bar(way_bar)
         self._guide = WayGuide(gui, self._scene, way_bar, self)
-        self._guide.offered.connect(self._on_way_offered)
+        self._guide.offered.connect(self._raise_scene)
 
     def _add_instruments(self) -> str:
         """Put picture and lens in the middle, force below the scene; return the picture's title."""
@@ -200,7 +208,7 @@ class OperatorWindow(CosmicServerGui):
 
     @property
     def mode(self) -> str:
-        """The control mode in force: MCM, SCM or ECM."""
+        """The control mode in force: MCM, SCM, ECM or ACM."""
         return self._mode.mode
 
     @property
@@ -249,12 +257,13 @@ class OperatorWindow(CosmicServerGui):
         if self._mico_gui is None or self._guide is None:
             return
         self._mico_gui.set_seeking_ways(mode == ECM)
-        if mode == SCM:
-            self.raise_panel(TRAJECTORIES)
+        panel = {SCM: TRAJECTORIES, ACM: CAMPAIGN}.get(mode)
+        if panel is not None:
+            self.raise_panel(panel)
         if self._guide.stage is not Stage.GOING:
             self._guide.cancel()
 
-    def _on_way_offered(self) -> None:
+    def _raise_scene(self) -> None:
         self.raise_panel(SCENE)
 
     def _on_failure(self, failure: Failure) -> None:
@@ -285,6 +294,8 @@ class OperatorWindow(CosmicServerGui):
             self._scene.save()
         if self._mico_gui is not None:
             self._mico_gui.release_keys()
+        if self._campaign is not None:
+            self._campaign.shut_down()
         if self._procedures is not None:
             self._procedures.shut_down()
         self._rig.close()

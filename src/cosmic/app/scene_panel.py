@@ -2,6 +2,7 @@
 
 import json
 import logging
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 from PySide6.QtCore import QSettings, Qt, QTimer, Signal
@@ -71,6 +72,7 @@ class ScenePanel(QWidget):
         self._verdict: MoveVerdict | None = None
         self._stood: dict[str, float | None] = {}
         self._planned: Path | None = None
+        self._replayed = False
         self._commanders: set[DeviceCommander] = set()
         self._feed = StateFeed(self._mico, self, period_ms=PERIOD_MS)
         self._feed.set_paused(True)
@@ -190,7 +192,7 @@ class ScenePanel(QWidget):
     def _on_flushed(self) -> None:
         if self._verdict is not None and self._moves_again():
             self.clear_refused()
-        if self._scene is None or not self.isVisible():
+        if self._scene is None or not self.isVisible() or self._replayed:
             return
         self._scene.set_positions(self._positions)
         unknown = [name for name, is_unknown in self._unknown.items() if is_unknown]
@@ -291,3 +293,21 @@ class ScenePanel(QWidget):
         self._planned = path
         if self._scene is not None:
             self._scene.set_planned(path)
+
+    # What was
+
+    def set_recorded(self, path: "Path | None") -> None:
+        """Draw the way that all axes took, pose by pose; None: none."""
+        if self._scene is not None:
+            self._scene.set_recorded(path)
+
+    def set_replay(self, pose: Mapping[str, float] | None, text: str) -> None:
+        """Show a pose of before, and say so; None: where the axes are."""
+        self._replayed = pose is not None
+        if pose is None:
+            self._on_flushed()
+            return
+        if self._scene is not None:
+            self._scene.set_positions(pose)
+        self._note.set_text(f"{state_look(State.REFUSED).glyph} {text}")
+        self._note.show()

@@ -1,0 +1,106 @@
+"""The panel of campaigns in the operator window, and what joins it to the scene."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from PySide6.QtCore import QObject, QStandardPaths, QTimer, Signal
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from cosmic.app.platform import Platform
+from cosmic.app.rig import Rig
+from cosmic.app.scene_panel import ScenePanel
+from cosmic.frame.gui.server_gui import CosmicServerGui
+from cosmic.frame.overrides import override
+
+if TYPE_CHECKING:
+    from cosmic.app.campaign_panel import CampaignPanel
+    from cosmic.autonomy.campaign.records import FibreRecord
+
+CAMPAIGN: Final = "Campaign"
+
+
+class _Holder(QWidget):
+    """Has its content made when it is first seen."""
+
+    def __init__(self, fill: Callable[[], object]) -> None:
+        super().__init__()
+        self._fill = fill
+        QVBoxLayout(self).setContentsMargins(0, 0, 0, 0)
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        QTimer.singleShot(0, self, self._fill)
+        super().showEvent(event)
+
+
+class CampaignDock(QObject):
+    """Hosts the panel beside another one; GUI thread.
+
+    The panel is made when it is first seen or asked for: statistics take a second to load.
+
+    Parameters
+    ----------
+    rig : Rig
+        Where campaigns run.
+    scene : ScenePanel
+        Where fibres are replayed.
+    beside : str
+        Title of the panel whose place it shares.
+
+    Signals
+    -------
+    replayed()
+        The scene shows movements of before from now on.
+    """
+
+    replayed = Signal()
+
+    def __init__(self, window: CosmicServerGui, rig: Rig, scene: ScenePanel, beside: str) -> None:
+        super().__init__(window)
+        self._rig = rig
+        self._scene = scene
+        self._panel: CampaignPanel | None = None
+        self._holder = _Holder(lambda: self.panel)
+        window.add_panel(CAMPAIGN, self._holder, beside=beside, tabbed=True)
+
+    @property
+    def panel(self) -> "CampaignPanel":
+        """The panel, made now if need be."""
+        if self._panel is None:
+            self._panel = self._made()
+        return self._panel
+
+    def _made(self) -> "CampaignPanel":
+        from cosmic.app.campaign_panel import CampaignPanel
+        from cosmic.app.scene_replay import SceneReplay
+
+        panel = CampaignPanel(self._rig.campaign, campaigns_folder())
+        self._replay = SceneReplay(self._scene, self)
+        panel.replay_requested.connect(self._on_replay)
+        layout = self._holder.layout()
+        if layout is not None:
+            layout.addWidget(panel)
+        return panel
+
+    def shut_down(self) -> None:
+        """End what runs; what it did is kept."""
+        if self._panel is not None:
+            self._replay.stop()
+            self._panel.shut_down()
+
+    def _on_replay(self, record: "FibreRecord") -> None:
+        self.replayed.emit()
+        self._replay.start(record.series, f"fibre {record.number}")
+
+
+def can_run(platform: Platform) -> bool:
+    """Return whether all that a campaign needs runs in this program."""
+    return {"mico", "daqco", "vico"} <= set(platform.own)
+
+
+def campaigns_folder() -> Path:
+    """Return where folders of campaigns are made unless the operator says otherwise."""
+    place = QStandardPaths.StandardLocation.DocumentsLocation
+    return Path(QStandardPaths.writableLocation(place)) / "CoSMic" / "campaigns"

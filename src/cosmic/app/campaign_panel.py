@@ -1,0 +1,235 @@
+"""The panel "Campaign": a recipe is chosen and run; its procedure, its fibres, one fibre's card."""
+
+import logging
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import Final
+
+from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtWidgets import QComboBox, QFileDialog, QLineEdit, QTabWidget, QVBoxLayout, QWidget
+
+from cosmic.app.campaign_board import CampaignBoard
+from cosmic.app.campaign_output import write_output
+from cosmic.app.campaign_port import CampaignRun
+from cosmic.app.fibre_card import FibreCard
+from cosmic.app.procedure_tree import ProcedureTreePanel
+from cosmic.app.procedure_tree_port import ProcedurePort
+from cosmic.autonomy.campaign.board import board_of, card_of
+from cosmic.autonomy.campaign.campaign import Campaign
+from cosmic.autonomy.campaign.recipe import shipped_recipes
+from cosmic.autonomy.campaign.records import FibreRecord
+from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.ask_directory import ask_directory
+from cosmic.frame.gui.build import named, push_button, tipped
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.flow_layout import FlowLayout
+from cosmic.frame.gui.theme import STEP_PX, State, state_look
+
+logger = logging.getLogger(__name__)
+
+OTHER: Final = "another file…"
+PERIOD_MS: Final = 500
+_FIRST: Final = "quick"
+
+Open = Callable[[Path, Path], Campaign]
+
+
+class _Relay(QObject):
+    """Brings what a campaign says to the window's thread; outlives the panel."""
+
+    changed = Signal()
+
+
+class CampaignPanel(QWidget):
+    """Runs campaigns on the platform of the window; GUI thread.
+
+    Parameters
+    ----------
+    open_campaign : callable
+        Returns a campaign by a recipe in a folder, ready to start.
+    folder : Path
+        Where folders of campaigns are made.
+
+    Signals
+    -------
+    replay_requested(FibreRecord)
+        The operator wants to see the movements of a fibre.
+    """
+
+    replay_requested = Signal(object)
+
+    def __init__(self, open_campaign: Open, folder: Path, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("CampaignPanel")
+        self._open = open_campaign
+        self._home = folder
+        self._campaign: Campaign | None = None
+        self._card: FibreRecord | None = None
+        self._relay = _Relay()
+        self._make_widgets()
+        self._arrange()
+        self._redraw = QTimer(self, interval=PERIOD_MS, singleShot=True)
+        self._redraw.timeout.connect(self.refresh)
+        self._connect()
+        self._suggest_folder()
+
+    def _make_widgets(self) -> None:
+        self.recipe = named(tipped(QComboBox(), "What is done with the fibres"), "recipe")
+        self.recipe.addItems([*sorted(shipped_recipes()), OTHER])
+        self.recipe.setCurrentText(_FIRST)
+        self.folder = named(QLineEdit(), "campaignFolder")
+        self.folder.setToolTip("Records and report go there; a campaign in it is gone on with")
+        self.choose = named(push_button("Folder…", "Choose where records go"), "chooseFolder")
+        self.report = named(
+            push_button("Report", "Write report and table of what there is by now"), "report"
+        )
+        self.told = named(ElidedLabel(), "campaignTold")
+        self.procedure = ProcedureTreePanel(self._make_run)
+        self.board = CampaignBoard()
+        self.card = FibreCard()
+        self.report.setEnabled(False)
+
+    def _arrange(self) -> None:
+        head, flow = QWidget(), FlowLayout(STEP_PX)
+        head.setLayout(flow)
+        for widget in (self.recipe, self.choose, self.report):
+            flow.addWidget(widget)
+        self.tabs = QTabWidget()
+        self.tabs.addTab(self.procedure, "Procedure")
+        self.tabs.addTab(self.board, "Fibres")
+        self.tabs.addTab(self.card, "Fibre")
+        whole = QVBoxLayout(self)
+        whole.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, 0)
+        whole.setSpacing(STEP_PX)
+        whole.addWidget(head)
+        whole.addWidget(self.folder)
+        whole.addWidget(self.told)
+        whole.addWidget(self.tabs, 1)
+        self.told.hide()
+
+    def _connect(self) -> None:
+        self.recipe.activated.connect(self._on_recipe)
+        self.choose.clicked.connect(self._on_choose)
+        self.report.clicked.connect(self.write_report)
+        self.card.replay_requested.connect(self._on_replay)
+        self.board.fibre_chosen.connect(self.show_fibre)
+        self._relay.changed.connect(self._on_changed)
+
+    @property
+    def campaign(self) -> Campaign | None:
+        """The one that runs, or ran last."""
+        return self._campaign
+
+    # Choosing
+
+    def _on_recipe(self) -> None:
+        if self.recipe.currentText() == OTHER:
+            self.recipe.setCurrentIndex(0)
+            dialog = QFileDialog(self, "Recipe", str(self._home), "Recipes (*.toml)")
+            dialog.fileSelected.connect(self.use_recipe)
+            dialog.finished.connect(dialog.deleteLater)
+            dialog.open()
+            return
+        self._suggest_folder()
+
+    def use_recipe(self, path: str) -> None:
+        """Offer the recipe in a file, and choose it."""
+        if self.recipe.findText(path) < 0:
+            self.recipe.insertItem(0, path)
+        self.recipe.setCurrentText(path)
+        self._suggest_folder()
+
+    def _suggest_folder(self) -> None:
+        name = Path(self.recipe.currentText()).stem
+        self.folder.setText(str(self._home / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"))
+
+    def _on_choose(self) -> None:
+        ask_directory(self, "Where records go", str(self._home), self.folder.setText)
+
+    # Running
+
+    def _make_run(self) -> ProcedurePort:
+        """Return a campaign that is ready to begin; the tree shows why there is none."""
+        before = self._campaign
+        if before is not None and not before.over:
+            raise CosmicError("a campaign is under way; end it first")
+        campaign = self._open(Path(self.recipe.currentText()), Path(self.folder.text()))
+        campaign.on_change(self._relay.changed.emit)
+        self._campaign = campaign
+        self._say("")
+        self.refresh()
+        return CampaignRun(campaign)
+
+    def _on_changed(self) -> None:
+        if not self._redraw.isActive():
+            self._redraw.start()
+
+    def refresh(self) -> None:
+        """Show the campaign as it is now."""
+        campaign = self._campaign
+        running = campaign is not None and not campaign.over
+        for widget in (self.recipe, self.folder, self.choose):
+            widget.setEnabled(not running)
+        self.report.setEnabled(campaign is not None)
+        if campaign is None:
+            return
+        self.board.set_state(
+            board_of(
+                campaign.recipe.name,
+                str(campaign.phase),
+                campaign.fibres,
+                campaign.progress,
+                left_s=campaign.left_s,
+                operation=campaign.operation,
+                reason=campaign.end_reason,
+            )
+        )
+        if campaign.over and not self.folder.isModified():
+            self._suggest_folder()
+
+    # Looking at what there is
+
+    def show_fibre(self, number: int) -> None:
+        """Show the card of a fibre."""
+        campaign = self._campaign
+        if campaign is None:
+            return
+        try:
+            record = CampaignReader(campaign.store.folder).fibre(number)
+        except CosmicError as exc:
+            self._say(str(exc))
+            return
+        self._card = record
+        self.card.set_card(card_of(record))
+        self.tabs.setCurrentIndex(2)
+
+    def _on_replay(self, number: int) -> None:
+        if self._card is not None and self._card.number == number:
+            self.replay_requested.emit(self._card)
+
+    def write_report(self) -> None:
+        """Write report and table of the campaign as it stands."""
+        campaign = self._campaign
+        if campaign is None:
+            return
+        try:
+            written = write_output(campaign.store.folder, campaign.recipe.file.output)
+        except CosmicError as exc:
+            self._say(str(exc))
+            return
+        self._say(f"written: {', '.join(str(each) for each in written)}", State.OK)
+
+    def _say(self, text: str, state: State = State.REFUSED) -> None:
+        self.told.set_text(f"{state_look(state).glyph} {text}" if text else "")
+        self.told.setVisible(bool(text))
+
+    # Leaving
+
+    def shut_down(self) -> None:
+        """End what runs, in order: it can be gone on with."""
+        campaign = self._campaign
+        if campaign is not None and not campaign.over:
+            campaign.abort("the window was closed")
+            campaign.join()
