@@ -379,7 +379,7 @@ def test_a_path_without_a_root_begins_on_the_stations_disk(away: VicoRig, tmp_pa
 
 
 def test_who_may_only_look_sees_all_and_changes_nothing(tmp_path: Path) -> None:
-    with at_home(tmp_path) as home, hosted(home) as station:
+    with at_home(tmp_path, rate=1.0) as home, hosted(home) as station:
         client = InProcessTransport(station, "guest", Access.VIEW)
         with following(client, home.policy) as remote:
             vico = Vico(remote)
@@ -456,14 +456,24 @@ def test_lens_and_light_do_as_they_are_told(rig: VicoRig) -> None:
     assert lens.problem == light.problem == ""
 
 
-def test_an_abort_stops_the_lens(rig: VicoRig) -> None:
-    take_lease(rig)
-    lens = rig.vico.lens
-    assert lens is not None
-    task = lens.seek_focus(7900)
-    lens.abort()
-    with pytest.raises(MoveCancelled, match="aborted"):
-        task.wait(LIMIT_S)
+@pytest.mark.parametrize("where", ["home", *TRANSPORTS])
+def test_a_movement_of_the_lens_is_ended_early(where: str, tmp_path: Path) -> None:
+    with vico_rig(where, tmp_path, rate=1.0) as rig:
+        take_lease(rig)
+        lens = rig.vico.lens
+        assert lens is not None
+        task = lens.seek_focus(7900)
+        lens.abort()
+        with pytest.raises(MoveCancelled, match="aborted"):
+            task.wait(LIMIT_S)
+        task = lens.home()
+        assert soon(lambda: task.progress.text)
+        task.cancel()
+        with pytest.raises(MoveCancelled):
+            task.wait(LIMIT_S)
+        focus = rig.home.application.peripherals.state.focus
+        assert focus is not None
+        assert focus.position_counts > 100
 
 
 def test_moving_the_lens_needs_the_right_to_move(away: VicoRig) -> None:
@@ -480,7 +490,7 @@ def test_moving_the_lens_needs_the_right_to_move(away: VicoRig) -> None:
 
 def test_the_lens_stops_when_who_moves_it_is_gone(tmp_path: Path) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
-    with at_home(tmp_path) as home, hosted(home, endpoint):
+    with at_home(tmp_path, rate=1.0) as home, hosted(home, endpoint):
         peripherals = home.application.peripherals
         with connected(endpoint) as client, following(client, home.policy) as remote:
             client.take_lease()

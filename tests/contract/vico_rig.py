@@ -278,9 +278,11 @@ def settings(folder: Path) -> VicoSettings:
 
 
 @contextmanager
-def at_home(folder: Path, size_px: tuple[int, int] = (64, 48)) -> Iterator[Home]:
-    """Run ViCo in this process, its lens twenty times as fast as a real one."""
-    clock, policy, twin = RatedClock(20.0), FailurePolicy(), PeripheralRig()
+def at_home(
+    folder: Path, size_px: tuple[int, int] = (64, 48), rate: float = 20.0
+) -> Iterator[Home]:
+    """Run ViCo in this process, its lens `rate` times as fast as a real one."""
+    clock, policy, twin = RatedClock(rate), FailurePolicy(), PeripheralRig()
     camera, simulation = PushedCamera(clock, size_px), SimPeripherals(twin.lens, twin.light, clock)
     application = VicoApplication(
         lambda _: PushedLibrary(camera),
@@ -328,10 +330,12 @@ def following(transport: Transport, policy: FailurePolicy) -> Iterator[RemoteVic
 
 
 @contextmanager
-def vico_rig(where: str, folder: Path, size_px: tuple[int, int] = (64, 48)) -> Iterator[VicoRig]:
+def vico_rig(
+    where: str, folder: Path, size_px: tuple[int, int] = (64, 48), rate: float = 20.0
+) -> Iterator[VicoRig]:
     """Yield ViCo as it is used at "home", "in-process" or over "zenoh"."""
     with ExitStack() as stack:
-        home = stack.enter_context(at_home(folder, size_px))
+        home = stack.enter_context(at_home(folder, size_px, rate))
         endpoint = f"tcp/127.0.0.1:{free_port()}" if where == "zenoh" else ""
         station = stack.enter_context(hosted(home, endpoint))
         if where == "home":
