@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
+from cosmic.app.network_settings import serving
 from cosmic.app.platform_file import PlatformFile, load_platform, platform_path
 from cosmic.app.scene_fit import misfits
 from cosmic.frame.config import load_model, read_toml
-from cosmic.frame.errors import ConfigError
+from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.units import format_quantity
 from cosmic.mico.core.settings import PositionerSettings
 from cosmic.twin.settings import StageKind, TwinSettings
@@ -30,6 +31,7 @@ def find_mistakes(config: str | Path) -> list[str]:
     if file is not None:
         lines += key_mistakes(file, path)
         lines += _tool_mistakes(file, path)
+        lines += _network_mistakes(file, path)
     if file is not None and twin is not None:
         lines += _twin_mistakes(file, path, twin, twin_path)
     if file is not None and file.platform.scene:
@@ -45,6 +47,16 @@ def _scene_mistakes(file: PlatformFile, path: Path) -> list[str]:
         return misfits(file, path, load_scene(path.parent / file.platform.scene))
     except ConfigError as exc:
         return str(exc).splitlines()
+
+
+def _network_mistakes(file: PlatformFile, path: Path) -> list[str]:
+    try:
+        serving(file.network, file.platform.name, path.parent)
+    except ConfigError as exc:
+        return [f"{path}: network: {line}" for line in str(exc).splitlines()]
+    except NotAvailable as exc:
+        return [f"{path}: network.serve: {exc}"] if file.network.serve else []
+    return []
 
 
 def _named_twin(path: Path) -> str:

@@ -117,7 +117,7 @@ def serving(
         for client in access:
             checked_name(client)
     except ValueError as exc:
-        raise ConfigError(f"network: {exc}") from exc
+        raise ConfigError(str(exc)) from exc
     endpoint = listen or settings.listen
     try:
         line = Line(endpoint, True, called, found, tuple(access))

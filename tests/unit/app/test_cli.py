@@ -182,6 +182,38 @@ def test_a_station_that_cannot_be_says_why(
     assert wanted in "\n".join(complaints(capsys))
 
 
+@pytest.mark.parametrize(
+    ("section", "wanted"),
+    [
+        ('listen = "tcp/0.0.0.0:7447"', "only tls with certificates is allowed"),
+        ('certificates = "keys/here"', "keys/here/authority.pem: there is no such file"),
+        ('move = ["a desk"]', "letters, digits, - and _"),
+    ],
+)
+def test_check_finds_what_keeps_a_platform_from_serving(
+    folder: Path, section: str, wanted: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    platform = folder / "platform.toml"
+    with platform.open("a", encoding="utf-8") as file:
+        file.write(f"\n[network]\n{section}\n")
+    assert main(["check", str(platform)]) == 1
+    said = complaints(capsys)
+    assert wanted in said[0]
+    assert f"{platform}: network: " in said[0]
+
+
+def test_a_window_serves_when_it_is_told_to_on_the_line_or_in_the_file(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What it is told is impossible, so that it says so and never opens."""
+    quick = ["daqco", "--config", str(folder), "--offscreen", "0"]
+    assert main([*quick, "--serve", "--listen", "tcp/0.0.0.0:7447"]) == 1
+    assert "only tls with certificates" in complaints(capsys)[0]
+    edit(folder / "platform.toml", "[mico]\n", '[network]\nserve = true\nname = "a b"\n\n[mico]\n')
+    assert main(quick) == 1
+    assert "letters, digits" in complaints(capsys)[0]
+
+
 def test_whoever_wants_to_serve_other_computers_is_told_what_to_do(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
