@@ -65,7 +65,7 @@ def at_zero(rig: cosmic.Rig) -> None:
         rig.mico[axis].set_closed_loop_frequency(18_500)
     rig.mico.move(dict.fromkeys(AXES, 0.0))
     for axis in AXES:
-        rig.mico[axis].set_closed_loop_frequency(500)  # slow enough to be ended on the way
+        rig.mico[axis].set_closed_loop_frequency(60)  # slow enough to be ended on the way
 
 
 def started(rig: cosmic.Rig, part: Part[cosmic.Rig], event: str) -> ProcedureRun[cosmic.Rig]:
