@@ -259,6 +259,8 @@ def test_a_station_that_goes_says_why_and_goes_on_by_itself_when_it_is_back(line
     assert "away" in daqco.problem
     assert not daqco.running
     assert daqco.settings == line.home.application.settings
+    with pytest.raises(NotAvailable, match="away"):
+        daqco.latest()
     with pytest.raises(StationAway):
         daqco.configure(rate_hz=500.0)
     with pytest.raises(StationAway):
@@ -270,6 +272,8 @@ def test_a_station_that_goes_says_why_and_goes_on_by_itself_when_it_is_back(line
     assert wait_until(lambda: not daqco.away and daqco.running, 10.0)
     assert wait_until(lambda: len(firsts) > before + 3)
     end()
+    assert wait_until(lambda: daqco.latest_chunk is not None)
+    assert daqco.latest()["force"] == pytest.approx(10.0, abs=0.1)
     daqco.configure(rate_hz=2000.0)
     assert daqco.rate_hz == 2000.0
     assert line.stops == []

@@ -2,43 +2,37 @@
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import replace
-from pathlib import Path
-from threading import Event, Lock
+from threading import Event
 from typing import Final, TypeVar
 
 from PySide6.QtCore import QObject
 from typing_extensions import override
 
 from cosmic.daqco.api.errands import Errands, Told
-from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.api.remote_buffer import RemoteBuffer
 from cosmic.daqco.api.remote_clock import Reading, StationClock
 from cosmic.daqco.api.remote_files import RemoteFiles
 from cosmic.daqco.api.remote_guard import RemoteGuard
 from cosmic.daqco.api.remote_line import DaqcoLine
 from cosmic.daqco.api.remote_recorder import RemoteRecorder
+from cosmic.daqco.api.remote_view import StationView
 from cosmic.daqco.api.station_report import (
     CROSSINGS,
     FAILURES,
     HOSTED_AS,
     REPORTS,
-    DaqRecordingReport,
     DaqReport,
     plain_settings,
-    settings_of,
 )
 from cosmic.daqco.core.limits import Crossing
 from cosmic.daqco.core.scale import Scale
-from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings
-from cosmic.daqco.hw.interface import BoardInfo
+from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, ProtocolError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.transport import Presence, Rule, Subscription, Transport
 from cosmic.frame.task import Task
-from cosmic.frame.task_application import TaskApplication
 from cosmic.frame.threads import WorkerThread
 
 logger = logging.getLogger(__name__)
@@ -50,10 +44,6 @@ RETRY_S: Final = 0.5
 _LOOK_S: Final = 0.05
 _CLOCK_S: Final = 20.0
 _READINGS: Final = 5
-NOTHING_KNOWN: Final = DaqcoSettings(
-    channel=(ChannelSettings(name="unknown", board="unknown", input="ai0", active=False),)
-)
-"""Stands for settings while the station was never reached."""
 
 
 class Keeper(WorkerThread):
@@ -69,7 +59,7 @@ class Keeper(WorkerThread):
             self._look()
 
 
-class RemoteDaqcoApplication(TaskApplication):
+class RemoteDaqcoApplication(StationView):
     """Stands where a `DaqcoApplication` does, over a transport; any thread.
 
     Everything that is read is known here already, as the station last told; every command goes
@@ -93,17 +83,12 @@ class RemoteDaqcoApplication(TaskApplication):
         gui_factory: GuiFactory | None = None,
         parent: QObject | None = None,
     ) -> None:
-        super().__init__("DAQCo", policy, gui_factory, parent)
+        super().__init__(policy, gui_factory, parent)
         self._transport = transport
         self._errands = Errands(policy)
         self._line = DaqcoLine(transport, name, self._errands)
         self._keeper = Keeper(self._keep, policy)
-        self._lock = Lock()
-        self._report: DaqReport | None = None
-        self._settings = NOTHING_KNOWN
-        self._away, self._here = "not connected yet", False
         self._ready = Event()
-        self._heard_wall_s = -float("inf")
         self._retry_wall_s = self._clock_wall_s = -float("inf")
         self._subscriptions: list[Subscription] = []
         self._end_presence: Callable[[], None] = lambda: None
@@ -119,48 +104,6 @@ class RemoteDaqcoApplication(TaskApplication):
     def transport(self) -> Transport:
         """The way to the station."""
         return self._transport
-
-    @property
-    def away(self) -> str:
-        """Why the station cannot be reached; empty while it can."""
-        return self._away
-
-    @property
-    def settings(self) -> DaqcoSettings:
-        """What is in force there."""
-        return self._settings
-
-    @property
-    def directory(self) -> Path:
-        """Where recordings go there unless somebody says otherwise."""
-        return Path(self._report.directory) if self._report is not None else Path()
-
-    @property
-    def problem(self) -> str:
-        """Why acquisition cannot run, or ended by itself, or that the station is away."""
-        return self._away or (self._report.problem if self._report is not None else "")
-
-    @property
-    def infos(self) -> Mapping[str, BoardInfo]:
-        """The boards there are, by name."""
-        boards = self._report.boards if self._report is not None else ()
-        return {each.name: each for each in boards}
-
-    @property
-    def running(self) -> bool:
-        """Samples are being acquired, and the station is there."""
-        return not self._away and self._report is not None and self._report.running
-
-    @property
-    def rate_hz(self) -> float:
-        """The rate the boards really make; that of the settings while nothing runs."""
-        return self._report.rate_hz if self._report is not None else self._settings.rate_hz
-
-    def scales(self) -> dict[str, Scale]:
-        """Return the scale in force of every channel, by its name."""
-        settings = self._settings
-        known = settings.scales()
-        return {each.name: known[each.scale] for each in settings.channel}
 
     # Starting and ending
 
@@ -285,7 +228,7 @@ class RemoteDaqcoApplication(TaskApplication):
 
     def _on_presence(self, presence: Presence) -> None:
         self.files.station = presence.name
-        self._here = presence.here
+        self.note_presence(presence.here)
         if presence.here:
             self._retry_wall_s = -float("inf")
         else:
@@ -293,31 +236,20 @@ class RemoteDaqcoApplication(TaskApplication):
 
     def _take(self, report: DaqReport) -> None:
         """Take a report unless a newer one is known; any thread."""
-        settings = settings_of(report.settings)
-        with self._lock:
-            before = self._report
-            first = before is None or before.station != report.station
-            was_away, self._away = self._away, "" if self._here else self._away
-            if before is not None and not first and before.number >= report.number:
-                return
-            self._heard_wall_s = WALL.now_s()
-            if first:
-                self.clock.forget(report.clock_rate)
-                self._clock_wall_s = -float("inf")
-            if settings != self._settings:
-                self._settings = settings
-            self._report = report
-        if not report.running:
-            self.buffer.clear()
-        self.guard.take_limits(report.limits, report.crossings, first=first)
+        taken = self.take_report(report)
+        if taken is None:
+            return
+        if taken.first:
+            self.clock.forget(report.clock_rate)
+            self._clock_wall_s = -float("inf")
+        self.guard.take_limits(report.limits, report.crossings, first=taken.first)
         self.recorder.take(report.recording.state())
-        if first or was_away != self._away or _kept(before) != _kept(report):
+        if taken.changed:
             self._tell()
 
     def _set_away(self, why: str) -> None:
-        with self._lock:
-            before, self._away = self._away, why
-        if before != why:
+        self.buffer.clear()  # nobody shall take old values for those of now
+        if self.note_away(why):
             self._tell()
 
     def _tell(self) -> None:
@@ -327,16 +259,16 @@ class RemoteDaqcoApplication(TaskApplication):
 
     def _keep(self) -> None:
         now_s = WALL.now_s()
-        heard_s = max(self._heard_wall_s, self.buffer.heard_wall_s)
-        self.guard.look_for_silence(now_s - heard_s, self._away or "nothing comes from it")
+        heard_s = max(self.heard_wall_s, self.buffer.heard_wall_s)
+        self.guard.look_for_silence(now_s - heard_s, self.away or "nothing comes from it")
         self.buffer.tidy()
-        if not self._here:
+        if not self.here:
             return
-        unheard = self._away or now_s - self._heard_wall_s > RETRY_S
+        unheard = self.away or now_s - self.heard_wall_s > RETRY_S
         if unheard and now_s - self._retry_wall_s > RETRY_S:
             self._retry_wall_s = now_s
             self._fetch()
-        if not self._away and now_s - self._clock_wall_s > _CLOCK_S:
+        if not self.away and now_s - self._clock_wall_s > _CLOCK_S:
             self._read_clock()
 
     def _fetch(self) -> None:
@@ -359,11 +291,3 @@ class RemoteDaqcoApplication(TaskApplication):
         self.clock.take(readings)
         if readings:
             self._ready.set()
-
-
-def _kept(report: DaqReport | None) -> DaqReport | None:
-    """Return a report without what changes all the time, or is told by the recorder."""
-    if report is None:
-        return None
-    quiet = DaqRecordingReport.of(RecordingState())
-    return replace(report, number=0, now_s=0.0, samples=0, recording=quiet)

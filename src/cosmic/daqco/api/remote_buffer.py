@@ -116,7 +116,7 @@ class RemoteBuffer:
         self._display = self._transport.subscribe(DISPLAY, Rule.LATEST, self._take_newest)
 
     def clear(self) -> None:
-        """Forget what was there: nothing comes now."""
+        """Forget the newest: it is no longer what there is now."""
         self._filled.clear()
         self._latest = None
 
