@@ -148,10 +148,9 @@ class RemoteVicoApplication(CosmicApplicationBase):
         return state.found if state is not None else ()
 
     @property
-    def places(self) -> Places | None:
-        """What joins pixels and platform, where the station hosts micromanipulation as well."""
-        state = self._shown
-        return self._places if state is not None and state.places else None
+    def places(self) -> Places:
+        """What joins pixels and platform, as far as the station does."""
+        return self._places
 
     @property
     def has_lens(self) -> bool:
@@ -270,11 +269,12 @@ class RemoteVicoApplication(CosmicApplicationBase):
                     tell([self._pulse_listeners[pulse.name]], pulse)
 
     def _show(self) -> None:
-        known, away, before = self._known, self._away, self._shown
-        if known is not None:
-            now = self._shown = known.greyed(away) if away else known
-            if before is not None and now.says_the_same_as(before):
-                return
+        with self._changed:
+            known, away, before = self._known, self._away, self._shown
+            if known is not None:
+                now = self._shown = known.greyed(away) if away else known
+                if before is not None and now.says_the_same_as(before):
+                    return
         self.status_changed.emit()
 
     def _rate(self) -> float:

@@ -26,7 +26,7 @@ from cosmic.vico.core.picture import Picture
 from cosmic.vico.hw.interface import CameraCounters, CameraInfo, CameraRanges, CameraSettings
 
 CLOSE_S: Final = 30.0
-"""How long a recording may take to close its file."""
+"""How long the end of a recording may make no progress."""
 LOOK_S: Final = 0.05
 
 
@@ -118,7 +118,7 @@ class RemoteCameraHandle(CameraHandle):
         try:
             picture = received(wait.wait(timeout_s))
         except DeviceTimeout:
-            wait.cancel()
+            self._calls.later(wait.cancel)
             reason = self.problem or ("none arrived" if self.running else "it is stopped")
             text = f"no picture of {self.name} in {timeout_s:g} s: {reason}"
             raise NotAvailable(text) from None
@@ -243,10 +243,12 @@ class RemoteCameraHandle(CameraHandle):
         if not wait:
             return
         forbid_waiting_here("waiting for a recording to end")
-        until_s = WALL.now_s() + CLOSE_S
-        while self.recording.active:
+        until_s, before = WALL.now_s() + CLOSE_S, self.recording
+        while (now := self.recording).active:
+            if now != before:  # what waits is being written
+                until_s, before = WALL.now_s() + CLOSE_S, now
             if WALL.now_s() > until_s:
-                raise DeviceTimeout(f"{self.name}: the recording had not ended after {CLOSE_S:g} s")
+                raise DeviceTimeout(f"{self.name}: the recording does not end; {now.waiting} wait")
             WALL.sleep(LOOK_S)
             self._remote.refresh()
 

@@ -77,7 +77,8 @@ class Stream(Generic[T]):
 
     def close_if_idle(self) -> None:
         """End receiving where nobody has looked for a while."""
-        if self._wanted and WALL.now_s() - self._looked_s > IDLE_S:
+        received = self._wanted or self._subscription is not None
+        if received and WALL.now_s() - self._looked_s > IDLE_S:
             self.close()
 
     def close(self) -> None:

@@ -72,7 +72,6 @@ class StateReader:
                 light_name=peripherals.light_name,
                 zoom_points=application.zoom_scale.points,
                 peripherals=peripherals.state,
-                places=places is not None,
                 tools=tuple(places.targets) if places is not None else (),
                 calibrated=tuple(places.calibrated) if places is not None else (),
             )

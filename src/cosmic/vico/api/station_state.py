@@ -175,8 +175,6 @@ class VicoState:
         Where pictures go on the station's disk unless somebody says otherwise.
     lens, light : bool
         The platform has one.
-    places : bool
-        Pixels can be told as places there, once they are calibrated.
     tools : tuple of str
         What can be moved to a place in a picture.
     """
@@ -192,7 +190,6 @@ class VicoState:
     light_name: str
     zoom_points: tuple[ZoomPoint, ...]
     peripherals: PeripheralState
-    places: bool
     tools: tuple[str, ...]
     calibrated: tuple[CalibrationShown, ...]
 

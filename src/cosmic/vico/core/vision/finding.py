@@ -31,7 +31,7 @@ SLENDER = 5.0
 LEAST_PX = 12.0
 LEAST_OF_PICTURE = 0.025
 # More cannot be told apart in time, nor in a network at all.
-MOST_STRANDS = 48
+MOST_STRANDS = 96
 
 
 def find_fibres(image: npt.NDArray[np.generic]) -> list[Fibre]:
