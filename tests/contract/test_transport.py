@@ -356,6 +356,17 @@ def test_a_receiver_that_raises_is_reported_and_called_again(rig: StationRig) ->
     assert wait_until(lambda: received == [1, 2])
 
 
+def test_a_station_knows_whether_anybody_receives_a_topic(rig: StationRig) -> None:
+    rig.station.publish("camera/frames", None)  # over a line it is known from then on
+    assert not rig.station.wanted("camera/frames")
+    for rule in Rule:
+        subscription = rig.client.subscribe("camera/frames", rule, lambda _: None)
+        assert wait_until(lambda: rig.station.wanted("camera/frames"))
+        assert not rig.station.wanted("camera/other")
+        subscription.close()
+        assert wait_until(lambda: not rig.station.wanted("camera/frames"))
+
+
 def test_a_client_publishes_to_shared_topics_only(rig: StationRig) -> None:
     received: list[object] = []
     subscribe(rig, "shared/notes", Rule.ALL, received.append)
