@@ -183,6 +183,11 @@ def _cannot_be_moved(rig: DaqcoRig) -> None:
     assert rig.home.application.settings == before
     with pytest.raises(NotAvailable, match="other stations may use"):
         rig.daqco.free_bytes(Path("/"))
+    with pytest.raises(RecordingError):
+        rig.daqco.application.files.recordings(Path("/"))
+    assert rig.daqco.application.files.recordings(rig.daqco.directory) == (
+        rig.daqco.directory / "run.h5",
+    )
 
 
 BAD_CALLS: list[tuple[str, dict[str, Any]]] = [

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cosmic.daqco.api.files import NamedFile, named_file
+from cosmic.daqco.api.files import NamedFile, named_file, recordings_in
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.settings import (
     COLOURS,
@@ -220,6 +220,9 @@ class FakePort:
         if not directory.is_dir():
             raise ConfigError(f"{directory}: there is no such directory")
         return self.free
+
+    def recordings(self, directory: Path) -> tuple[Path, ...]:
+        return recordings_in(directory)
 
     def export(self, source: Path, target: Path) -> Task:
         self._do("export", source, target)

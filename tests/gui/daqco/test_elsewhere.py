@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QDialogButtonBox
 from contract.daqco_rig import at_home, connected, elsewhere, free_port, hosted, settings
 from cosmic.daqco.core.file_writer import UDaqFileWriter
 from cosmic.daqco.gui.configure_dialog import UDaqConfigureDialog
+from cosmic.daqco.gui.export_dialog import StationExportDialog
 from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.main_widget import make_daqco_gui
 from cosmic.frame.threads import declare_gui_thread
@@ -118,9 +119,21 @@ def test_a_recording_is_made_on_the_disk_of_the_station(seen, tmp_path):
     seen.wait(lambda: not seen.home.application.recorder.state.active)
     seen.wait(files.start.isEnabled)
     assert len(list(tmp_path.glob("recording_*.h5"))) == 1
+    _export(seen, tmp_path)
     files.directory.setText("/")
     seen.wait(lambda: "other stations may use" in files.room.text())
     assert not files.start.isEnabled()
+
+
+def _export(seen, tmp_path):
+    main = seen.main
+    main.export.trigger()
+    seen.wait(lambda: main.findChild(StationExportDialog) is not None)
+    dialog = main.findChild(StationExportDialog)
+    assert dialog.files.count() == 1
+    dialog.buttons.button(Button.Ok).click()
+    seen.wait(lambda: "done" in main.export_bar.text.text())
+    assert len(list(tmp_path.glob("recording_*.csv"))) == 1
 
 
 def test_a_station_that_goes_greys_the_panel_with_the_reason(seen):

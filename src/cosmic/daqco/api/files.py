@@ -3,12 +3,15 @@
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Final
 
 from cosmic.daqco.core.recording_format import SUFFIX
 from cosmic.frame.errors import CosmicError, RecordingError
 from cosmic.frame.file_names import NameOption, directory_problem, file_name, space_left
 from cosmic.frame.task import Task
 from cosmic.frame.task_application import TaskApplication
+
+MOST_LISTED: Final = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +30,15 @@ def named_file(base: str, option: NameOption, directory: Path, when: datetime) -
         return NamedFile(path, path.stat().st_size if path.exists() else None)
     except OSError as exc:
         raise RecordingError(f"{path}: {exc}") from exc
+
+
+def recordings_in(directory: Path) -> tuple[Path, ...]:
+    """Return the newest recordings in a directory, newest first; raises `RecordingError`."""
+    try:
+        dated = [(each.stat().st_mtime, each) for each in directory.glob(f"*{SUFFIX}")]
+    except OSError as exc:
+        raise RecordingError(f"{directory}: {exc}") from exc
+    return tuple(each for _, each in sorted(dated, reverse=True)[:MOST_LISTED])
 
 
 class LocalFiles:
@@ -49,6 +61,10 @@ class LocalFiles:
     def name(self, base: str, option: NameOption, directory: Path, when: datetime) -> NamedFile:
         """Return the file for a recording that is begun now; raises `RecordingError`."""
         return named_file(base, option, directory, when)
+
+    def recordings(self, directory: Path) -> tuple[Path, ...]:
+        """Return the newest recordings in a directory, newest first; raises `RecordingError`."""
+        return recordings_in(directory)
 
     def export(self, source: Path, target: Path) -> Task:
         """Begin to export a recording to CSV or TDMS, by the suffix of `target`.

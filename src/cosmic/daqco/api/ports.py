@@ -132,6 +132,10 @@ class Files(Protocol):
         """Return the file for a recording that is begun now; raises `RecordingError`."""
 
     @abstractmethod
+    def recordings(self, directory: Path) -> tuple[Path, ...]:
+        """Return the newest recordings in a directory, newest first."""
+
+    @abstractmethod
     def export(self, source: Path, target: Path) -> Task:
         """Begin to export a recording, by the suffix of `target`."""
 

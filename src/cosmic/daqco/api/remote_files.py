@@ -74,6 +74,13 @@ class RemoteFiles:
             raise ProtocolError("the station named a file in an unknown way")
         return NamedFile(Path(said[0]), said[1] if isinstance(said[1], int) else None)
 
+    def recordings(self, directory: Path) -> tuple[Path, ...]:
+        """Return the newest recordings in a directory there; raises as `LocalFiles.recordings`."""
+        said = self._line.call("recordings", {"directory": str(directory)})
+        if not (isinstance(said, list) and all(isinstance(each, str) for each in said)):
+            raise ProtocolError("the station listed its recordings in an unknown way")
+        return tuple(Path(each) for each in said)
+
     def export(self, source: Path, target: Path) -> Task:
         """Begin to export a recording there; what forbids it ends the task."""
         task = Task(f"Export to {target.name}")

@@ -11,7 +11,7 @@ from cosmic.frame.threads import forbid_waiting_here
 T = TypeVar("T")
 SLOW_CALL_S: Final = 20.0
 """Opening boards and closing files may take that long."""
-_READS: Final = ("report", "now_s", "folder", "name_recording", "mark")
+_READS: Final = ("report", "now_s", "folder", "name_recording", "recordings", "mark")
 
 
 class Asks(Protocol):

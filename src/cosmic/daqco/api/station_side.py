@@ -10,7 +10,7 @@ from typing import Final
 from PySide6.QtCore import Qt
 
 from cosmic.daqco.api.application import DaqcoApplication
-from cosmic.daqco.api.files import named_file
+from cosmic.daqco.api.files import named_file, recordings_in
 from cosmic.daqco.api.station_folders import EXPORTS, RECORDINGS, StationFolders
 from cosmic.daqco.api.station_report import (
     CROSSINGS,
@@ -147,6 +147,11 @@ class DaqcoStationSide:
         except CosmicError as exc:
             return DaqFolder(directory, str(exc), 0)
         return DaqFolder(directory, problem, free)
+
+    @remote(reads=True)
+    def recordings(self, directory: str) -> list[str]:
+        """Return the recordings in a directory here, the newest first."""
+        return [str(each) for each in recordings_in(self._folders.folder(directory))]
 
     @remote(reads=True)
     def name_recording(

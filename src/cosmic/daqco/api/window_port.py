@@ -32,6 +32,10 @@ class WindowPort(Daqco):
         """Return the file for a recording that is begun now; raises `RecordingError`."""
         return self.application.files.name(base, option, directory, when)
 
+    def recordings(self, directory: Path) -> tuple[Path, ...]:
+        """Return the newest recordings in a directory, newest first; raises `RecordingError`."""
+        return self.application.files.recordings(directory)
+
     def follow(self, receiver: Callable[[DataChunk], object]) -> Callable[[], None]:
         """Call `receiver(chunk)` with the newest samples, for a display; as `subscribe` at home.
 

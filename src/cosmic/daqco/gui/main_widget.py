@@ -21,6 +21,7 @@ from cosmic.daqco.api.remote_application import RemoteDaqcoApplication
 from cosmic.daqco.api.window_port import WindowPort
 from cosmic.daqco.gui.asking import Asking
 from cosmic.daqco.gui.configure_dialog import UDaqConfigureDialog
+from cosmic.daqco.gui.export_dialog import StationExportDialog
 from cosmic.daqco.gui.file_widget import UDaqFileWidget
 from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.plotter import UDaqPlotter
@@ -154,8 +155,7 @@ class UDaqMainWidget(QWidget):
         self.stop.setEnabled(running)
         self.start_recording.setEnabled(running and not recording)
         self.stop_recording.setEnabled(recording and not away)
-        self.export.setEnabled(not port.elsewhere)
-        self.export.setToolTip(f"The recordings lie {port.elsewhere}" if port.elsewhere else "")
+        self.export.setEnabled(not away)
         self.quit.setText("&Close this panel" if port.elsewhere else "&Stop DAQCo")
         self._say(port.problem)
 
@@ -200,9 +200,21 @@ class UDaqMainWidget(QWidget):
     # Export
 
     def _on_export(self) -> None:
+        if self._port.elsewhere:
+            folder = self.files.folder
+            self._asking.ask(lambda: self._port.recordings(folder), self._on_listed)
+            return
         dialog = QFileDialog(self, "Recording to export", str(self.files.folder), RECORDINGS)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.fileSelected.connect(self._on_source_chosen)
+        self._open(dialog)
+
+    def _on_listed(self, found: tuple[Path, ...] | None, error: CosmicError | None) -> None:
+        if found is None:
+            self._say(str(error))
+            return
+        dialog = StationExportDialog(found, self._port.elsewhere, self)
+        dialog.chosen.connect(self.export_recording)
         self._open(dialog)
 
     def _on_source_chosen(self, source: str) -> None:

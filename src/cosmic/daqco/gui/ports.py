@@ -230,6 +230,10 @@ class DaqPort(Protocol):
         """Return how much room there is for files in `directory`; raises when there is none."""
 
     @abstractmethod
+    def recordings(self, directory: Path) -> tuple[Path, ...]:
+        """Return the newest recordings in a directory, newest first; it commands."""
+
+    @abstractmethod
     def export(self, source: Path, target: Path) -> Task:
         """Begin to export a recording to CSV or TDMS, by the suffix of `target`."""
 
