@@ -25,6 +25,7 @@ from cosmic.frame.errors import (
     StoppedError,
     UnknownAxisError,
 )
+from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.errors import CallRefused, StationAway
 from cosmic.frame.network.in_process import InProcessTransport
@@ -158,6 +159,18 @@ def test_a_jog_goes_on_while_it_is_renewed_and_ends_at_once(mico: Mico) -> None:
 def test_a_jog_that_nobody_renews_ends_by_itself(mico: Mico) -> None:
     jog = mico["left.x"].jog(1)
     wait_for(lambda: jog.done, 3.0)
+
+
+def test_a_steered_axis_follows_the_hand_and_ends_without_it(mico: Mico) -> None:
+    axis = mico["left.x"]
+    order = axis.commander.steer(0, 5.0, dead_man_s=0.3)
+    until_s = WALL.now_s() + 0.4
+    while WALL.now_s() < until_s:
+        axis.commander.steer_on(order, 5.0)
+        WALL.sleep(0.01)
+    assert not order.movement.done
+    order.movement.exception(3.0)  # the hand is away
+    assert 5.0 < (axis.position_um or 0.0) < 200.0
 
 
 def test_a_stop_stays_until_it_is_reset(mico: Mico) -> None:
@@ -348,6 +361,42 @@ def test_what_the_station_carries_out_for_a_client_ends_with_its_lease(hosted: H
     client.close()
 
 
+def test_what_a_program_has_begun_stops_when_it_closes_mico(hosted: HostedMico, how: str) -> None:
+    with transport_to(hosted, how) as client:
+        client.take_lease()
+        application = RemoteMicoApplication(client, FailurePolicy())
+        application.initialize()
+        axis = Mico(application)["left.x"]
+        axis.set_closed_loop_frequency(SLOW_HZ)
+        movement = axis.move_to(5_000.0, wait=False)
+        wait_for(lambda: hosted.mico["left.x"].details.in_motion)
+        application.shut_down()
+        assert not hosted.station.lease.state.local
+        wait_for(lambda: not hosted.mico["left.x"].details.in_motion)
+        assert (hosted.mico["left.x"].position_um or 0.0) < 4_000.0
+        assert movement.exception(5.0) is not None
+
+
+@pytest.mark.defects
+def test_a_mistake_in_the_program_that_moves_stops_the_station(hosted: HostedMico) -> None:
+    policy = FailurePolicy()
+    with transport_to(hosted, "in-process") as client:
+        client.take_lease()
+        application = RemoteMicoApplication(client, policy)
+        try:
+            application.initialize()
+            policy.report(ValueError("nothing moves"), "here")
+            assert not hosted.application.manager.latch.state.latched
+            axis = Mico(application)["left.x"]
+            axis.set_closed_loop_frequency(SLOW_HZ)
+            axis.move_to(5_000.0, wait=False)
+            wait_for(lambda: hosted.mico["left.x"].details.in_motion)
+            policy.report(ValueError("a mistake"), "here")
+            wait_for(lambda: hosted.application.manager.latch.state.latched)
+        finally:
+            application.shut_down()
+
+
 def test_when_a_client_takes_the_lease_a_jog_of_the_station_ends(hosted: HostedMico) -> None:
     client = InProcessTransport(hosted.station, "vision")
     jog = hosted.mico["left.x"].jog(1, 5.0)
@@ -434,14 +483,12 @@ BAD_ORDERS: list[dict[str, object]] = [
 ]
 
 
-@pytest.mark.parametrize("bad", BAD_ORDERS)
-def test_an_ill_typed_order_moves_nothing(
-    hosted: HostedMico, how: str, bad: dict[str, object]
-) -> None:
+def test_an_ill_typed_order_moves_nothing(hosted: HostedMico, how: str) -> None:
     with transport_to(hosted, how) as client:
         client.take_lease()
-        with pytest.raises(CallRefused):
-            client.call("mico", "order", {"axis": "left.x", "number": 1} | bad)
+        for bad in BAD_ORDERS:
+            with pytest.raises(CallRefused):
+                client.call("mico", "order", {"axis": "left.x", "number": 1} | bad)
         senseless = {"axis": "left.x", "number": 2, "motion": Jog(5, float("nan"))}
         ended: Any = client.call("mico", "jog", senseless)
         assert ended.wait(5.0).of["left.x"].error is not None

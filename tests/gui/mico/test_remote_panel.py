@@ -96,6 +96,14 @@ def test_the_panel_of_another_station_moves_jogs_steps_undoes_and_stops(qtbot: Q
         assert series.movement.success
         assert series.begun == 3
 
+        panel.rescan()
+        task = panel.mico.application.running_task
+        assert task is not None
+        qtbot.waitUntil(lambda: task.done, timeout=LONG_MS)
+        assert task.failure is None
+        panel.mico["left.x"].move_to(240.0, wait=False)
+        wait_for_position(qtbot, panel.cards["left.x"], 240.0)
+
         panel.mico.application.manager.stop("the button")
         qtbot.waitUntil(lambda: hosted.application.manager.latch.state.latched, timeout=LONG_MS)
 

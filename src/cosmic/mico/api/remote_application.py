@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from threading import Event
 from typing import Final
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, Qt
 from typing_extensions import override
 
 from cosmic.frame.application import GuiFactory
@@ -65,7 +65,7 @@ class RemoteMicoApplication(MicoApplicationBase):
         self._subscriptions: list[Subscription] = []
         self._told = Event()
         self._here = False
-        self._closed = self._watching = False
+        self._closed = self._dressed = False
         self.manager = RemoteManager(self._line)
         self.collision = self.manager.collision
         self.clearance_watch = ClearanceWatch(self.collision, self.manager.positions, policy)
@@ -73,6 +73,7 @@ class RemoteMicoApplication(MicoApplicationBase):
         self.teleoperation = Teleoperation(self.manager, policy)
         self.trajectories = TrajectorySite(self, policy)
         self.trajectories.poses = self.manager.poses
+        self.manager.changed.connect(self.status_changed, Qt.ConnectionType.DirectConnection)
         self._forget = policy.on_safe_stop(self._on_safe_stop)
         self._leave_presence: Callable[[], None] = lambda: None
 
@@ -141,17 +142,18 @@ class RemoteMicoApplication(MicoApplicationBase):
     def _dress(self, facts: MicoFacts) -> None:
         """Make what depends on the settings of the station, once they are known."""
         self.trajectories.platform = facts.platform
-        if self.teleoperation.settings != self.manager.settings.teleoperation:
-            self.teleoperation.close()
-            self.teleoperation = Teleoperation(self.manager, self._policy)
-        if self.collision.available and not self._watching:
-            self._watching = True
+        if self._dressed:
+            return
+        self._dressed = True
+        self.teleoperation.close()
+        self.teleoperation = Teleoperation(self.manager, self._policy)
+        if self.collision.available:
             self.clearance_watch.start()
 
     def _on_safe_stop(self, reason: str) -> None:
         """Stop what was begun here, when something here has failed."""
-        if self._here and any(state.in_motion for state in self.manager.states().values()):
-            self.manager.stop(reason)
+        if self._here and self._line.open_orders():
+            self._line.at_once_later("stop", {"reason": reason})
 
     @override
     def shut_down(self) -> None:
@@ -160,6 +162,7 @@ class RemoteMicoApplication(MicoApplicationBase):
             return
         self._closed = True
         self._forget()
+        self._line.give_up()
         self._leave_presence()
         self.request_end()
         self.teleoperation.close()

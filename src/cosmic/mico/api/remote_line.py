@@ -223,6 +223,21 @@ class CommandLine:
         arguments = {"numbers": [number]}
         self._stops.put(lambda: _forget(self.call("withdraw", arguments, STOP_LIMIT_S)))
 
+    def open_orders(self) -> list[int]:
+        """Return the numbers of the orders whose movements have not ended."""
+        with self._lock:
+            return [number for movement, number in self._numbers.items() if not movement.done]
+
+    def give_up(self) -> None:
+        """Have everything stop that was begun here, before this end closes."""
+        numbers = self.open_orders()
+        if not (self._open and numbers):
+            return
+        try:
+            self.call("withdraw", {"numbers": numbers}, STOP_LIMIT_S)
+        except CosmicError as exc:
+            logger.warning("what was begun here stops by the lease only: %s", exc)
+
     def renew(self, function: str, axis: str, number: int, **more: object) -> None:
         """Say that somebody still holds the key; only the newest word counts."""
         arguments = {"axis": axis, "number": number, **more}
