@@ -90,6 +90,8 @@ class Picture:
     pixels : ndarray, shape (height, width), uint8 or uint16
     scale_um_px : float
         nan where it is not known.
+    region_px : tuple of four int
+        Left, top, width and height of what it is about; None: all of it.
     """
 
     name: str
@@ -99,6 +101,7 @@ class Picture:
     zoom: float = math.nan
     focus_um: float = math.nan
     light_percent: float = math.nan
+    region_px: tuple[int, int, int, int] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

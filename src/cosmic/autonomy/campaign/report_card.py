@@ -13,6 +13,9 @@ from cosmic.autonomy.campaign.report_markup import ShowPng, ShowSvg, table
 from cosmic.autonomy.campaign.report_words import interval, number, outcome_words, stiffness
 
 PICTURE_PX: Final = 360
+ASPECT: Final = 4.0 / 3.0
+ROOM: Final = 1.5
+"""How much more of the picture is shown than what it is about."""
 
 
 def card(record: FibreRecord, svg: ShowSvg, png: ShowPng) -> str:
@@ -75,7 +78,7 @@ def _numbers(record: FibreRecord) -> str:
 
 
 def _shown(picture: Picture, png: ShowPng) -> str:
-    pixels: npt.NDArray[Any] = picture.pixels
+    pixels = _cut(picture)
     if pixels.dtype == np.uint16:
         pixels = (pixels >> 8).astype(np.uint8)
     height, width = pixels.shape[:2]
@@ -85,4 +88,20 @@ def _shown(picture: Picture, png: ShowPng) -> str:
     _, data = cv2.imencode(".png", pixels)
     scale = f", {picture.scale_um_px * width:.0f} µm wide" if picture.scale_um_px > 0.0 else ""
     words = f"{picture.name}{scale}"
-    return f"{png(data.tobytes(), pixels.shape[1], words)}<br><small>{escape(words)}</small>"
+    shown_px = PICTURE_PX if picture.region_px is not None else pixels.shape[1]
+    return f"{png(data.tobytes(), shown_px, words)}<br><small>{escape(words)}</small>"
+
+
+def _cut(picture: Picture) -> npt.NDArray[Any]:
+    """Return what a picture is about, with room around it, as wide as high times 4 / 3."""
+    pixels: npt.NDArray[Any] = picture.pixels
+    if picture.region_px is None:
+        return pixels
+    left, top, width, height = picture.region_px
+    wide = max(width, height * ASPECT) * ROOM
+    high = wide / ASPECT
+    x, y = left + width / 2.0 - wide / 2.0, top + height / 2.0 - high / 2.0
+    rows = slice(max(0, round(y)), max(1, round(y + high)))
+    columns = slice(max(0, round(x)), max(1, round(x + wide)))
+    part = pixels[rows, columns]
+    return part if part.size else pixels

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.campaign.records import FibreRecord, Floats
 from cosmic.autonomy.campaign.report_svg import (
     BLUE,
@@ -24,6 +25,9 @@ Mask = npt.NDArray[np.bool_]
 
 EI_UNIT: Final = 1e-12
 EI_LABEL: Final = "10⁻¹² N m²"
+PALE: Final = "#9dbfdc"
+FEW: Final = 8
+"""Fewer fibres are drawn one by one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,29 +114,47 @@ def stiffness_figure(record: FibreRecord) -> str:
     return plot.svg()
 
 
-def distribution_figure(values_n_m2: Sequence[float], mean: MeanEi) -> str:
-    """Return the distribution of stiffnesses on a logarithmic axis, with the mean's interval."""
-    values = np.array([each for each in values_n_m2 if each > 0.0]) / EI_UNIT
+def distribution_figure(results: Sequence[BendingResult], mean: MeanEi) -> str:
+    """Return the distribution of stiffnesses on a logarithmic axis; of few, each with its interval.
+
+    Across the top the 95 % interval of their mean.
+    """
+    values = np.array([each.ei_n_m2 for each in results]) / EI_UNIT
     logs = np.log(values)
+    few = len(values) < FEW
     bins = max(4, min(16, round(1.5 * math.sqrt(len(values)))))
-    room = max(0.08, 0.5 * float(np.ptp(logs)) / bins)
+    room = max(0.12, 0.5 * float(np.ptp(logs)) / bins)
     edges = np.linspace(logs.min() - room, logs.max() + room, bins + 1)
     counts, _ = np.histogram(logs, edges)
+    high = len(values) + 0.8 if few else 1.15 * float(counts.max())
     x = Axis(f"bending stiffness, {EI_LABEL}", math.exp(edges[0]), math.exp(edges[-1]), log=True)
-    y = Axis("fibres", 0.0, 1.15 * float(counts.max()))
+    y = Axis("fibre" if few else "fibres", 0.0, high, whole=True)
     plot = Plot(x, y, "Distribution of bending stiffness", width=640.0, height=280.0)
-    for count, low, high in zip(counts, edges[:-1], edges[1:], strict=True):
-        if count:
-            plot.box(math.exp(low + 0.01), math.exp(high - 0.01), 0.0, float(count), "#9dbfdc")
-    if mean.count >= 2 and mean.spread_ln > 0.0:
-        at = np.linspace(edges[0], edges[-1], 120)
-        middle = math.log(mean.ei_n_m2 / EI_UNIT)
-        bell = np.exp(-0.5 * ((at - middle) / mean.spread_ln) ** 2)
-        scale = len(values) * (edges[1] - edges[0]) / (mean.spread_ln * math.sqrt(2.0 * math.pi))
-        high = np.minimum(bell * scale, y.high)
-        plot.line(np.exp(at).tolist(), high.tolist(), INK)
-        ends = [max(mean.ei_low_n_m2 / EI_UNIT, x.low), min(mean.ei_high_n_m2 / EI_UNIT, x.high)]
-        plot.line(ends, [0.96 * y.high] * 2, ORANGE)
-        plot.note(ends[1], 0.96 * y.high, "95 % interval of the mean")
-    plot.points(values.tolist(), [0.02 * y.high] * len(values), BLUE)
+    if few:
+        for place, each in enumerate(results, 1):
+            ends = _inside(x, each.ei_low_n_m2, each.ei_high_n_m2)
+            plot.line(ends, [float(place)] * 2, BLUE)
+            plot.points([each.ei_n_m2 / EI_UNIT], [float(place)], BLUE)
+    else:
+        for count, low, end in zip(counts, edges[:-1], edges[1:], strict=True):
+            if count:
+                plot.box(math.exp(low + 0.01), math.exp(end - 0.01), 0.0, float(count), PALE)
+        _bell(plot, mean, len(values) * (edges[1] - edges[0]))
+        plot.points(values.tolist(), [0.02 * high] * len(values), BLUE)
+    if mean.count >= 2:
+        plot.line(_inside(x, mean.ei_low_n_m2, mean.ei_high_n_m2), [0.96 * high] * 2, ORANGE)
     return plot.svg()
+
+
+def _inside(axis: Axis, low_n_m2: float, high_n_m2: float) -> list[float]:
+    return [max(low_n_m2 / EI_UNIT, axis.low), min(high_n_m2 / EI_UNIT, axis.high)]
+
+
+def _bell(plot: Plot, mean: MeanEi, area: float) -> None:
+    """Draw the lognormal distribution with a mean and spread."""
+    if not mean.spread_ln > 0.0:
+        return
+    at = np.linspace(math.log(plot.x.low), math.log(plot.x.high), 120)
+    away = (at - math.log(mean.ei_n_m2 / EI_UNIT)) / mean.spread_ln
+    high = np.exp(-0.5 * away**2) * area / (mean.spread_ln * math.sqrt(2.0 * math.pi))
+    plot.line(np.exp(at).tolist(), np.minimum(high, plot.y.high).tolist(), INK)

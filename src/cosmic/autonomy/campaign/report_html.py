@@ -9,9 +9,10 @@ import numpy as np
 
 from cosmic.autonomy.campaign.records import FibreRecord, Outcome
 from cosmic.autonomy.campaign.report_card import card
-from cosmic.autonomy.campaign.report_data import OperationTime, ReportData
+from cosmic.autonomy.campaign.report_data import ReportData
 from cosmic.autonomy.campaign.report_figures import (
     EI_LABEL,
+    FEW,
     distribution_figure,
 )
 from cosmic.autonomy.campaign.report_markup import ShowPng, ShowSvg, inline_png, inline_svg, table
@@ -27,6 +28,9 @@ from cosmic.autonomy.campaign.report_words import (
     stiffness,
     when,
 )
+
+SHORTEST_S: Final = 0.05
+"""Of an operation that is drawn."""
 
 LEGEND: Final = (
     "Discs: on the way out; circles: on the way back; lines: the model; each push with the place "
@@ -48,7 +52,7 @@ def body(data: ReportData, *, svg: ShowSvg = inline_svg, png: ShowPng = inline_p
         "<h2>Fibres</h2>",
         _fibres(data.finished),
         *_failures(data, svg),
-        *_operations(data.operations, svg),
+        *_operations(data, svg),
         *_calibrations(data),
         "<h2>Each fibre</h2>",
         f"<p>{escape(LEGEND)}</p>",
@@ -106,7 +110,7 @@ def _shape(fibres: Sequence[FibreRecord]) -> str:
     for values, digits, unit in (
         ([each.shape.length_um for each in fibres], 0, " µm"),
         ([each.shape.width_um for each in fibres], 0, " µm"),
-        ([each.shape.curl for each in fibres], 2, ""),
+        ([each.shape.curl for each in fibres], 3, ""),
     ):
         known = [each for each in values if math.isfinite(each)]
         told.append(f"{np.mean(known):.{digits}f}{unit}" if known else NONE)
@@ -114,17 +118,22 @@ def _shape(fibres: Sequence[FibreRecord]) -> str:
 
 
 def _distribution(data: ReportData, svg: ShowSvg) -> list[str]:
-    values = [
-        each.bending.ei_n_m2
+    results = [
+        each.bending
         for each in data.finished
-        if each.outcome is Outcome.GOOD and each.bending is not None
+        if each.outcome is Outcome.GOOD and each.bending is not None and each.bending.ei_n_m2 > 0.0
     ]
-    if not values:
+    if not results:
         return []
-    figure = svg(distribution_figure(values, data.progress.mean), 640)
+    figure = svg(distribution_figure(results, data.progress.mean), 640)
+    kind = (
+        "each with its 95 % interval"
+        if len(results) < FEW
+        else "dots; the curve is the lognormal distribution with their mean and spread"
+    )
     words = (
-        "Good fibres only, on a logarithmic axis; dots are the fibres, the line is the lognormal "
-        "distribution with their mean and spread."
+        f"The good fibres on a logarithmic axis, {kind}. The line across the top is the 95 % "
+        "interval of their geometric mean."
     )
     return ["<h2>Distribution</h2>", figure, f"<p>{words}</p>"]
 
@@ -153,7 +162,7 @@ def _fibre_row(each: FibreRecord) -> tuple[str, ...]:
         NONE if result is None else interval(result.ei_low_n_m2, result.ei_high_n_m2),
         number(each.shape.length_um),
         number(each.shape.width_um),
-        number(each.shape.curl, 2),
+        number(each.shape.curl, 3),
         number(each.peak_force_un, 1),
         number(each.duration_s),
     )
@@ -167,10 +176,15 @@ def _failures(data: ReportData, svg: ShowSvg) -> list[str]:
     return ["<h2>Failures by cause</h2>", svg(bars("Failures by cause", rows), 430)]
 
 
-def _operations(times: Sequence[OperationTime], svg: ShowSvg) -> list[str]:
+def _operations(data: ReportData, svg: ShowSvg) -> list[str]:
+    times, done = data.operations, max(data.progress.done, 1)
     if not times:
         return []
-    rows = [(each.name, each.median_s, f"{each.median_s:.1f} s") for each in times]
+    rows = [
+        (each.name, each.total_s / done, f"{each.total_s / done:.1f} s")
+        for each in times
+        if each.total_s / done >= SHORTEST_S
+    ]
     head = ("operation", "tries", "failed", "median, s", "95 %, s", "sum, s")
     cells = [
         (
@@ -183,8 +197,9 @@ def _operations(times: Sequence[OperationTime], svg: ShowSvg) -> list[str]:
         )
         for each in times
     ]
-    shown = svg(bars("Median time of each operation", rows, width=560.0), 560)
-    return ["<h2>Time of the operations</h2>", shown, table(head, cells)]
+    shown = svg(bars("Time of each operation, for one fibre", rows, width=560.0), 560)
+    words = "Time of each operation for one fibre, all tries together:"
+    return ["<h2>Time of the operations</h2>", f"<p>{words}</p>", shown, table(head, cells)]
 
 
 def _calibrations(data: ReportData) -> list[str]:

@@ -13,6 +13,8 @@ ORANGE: Final = "#c9600c"
 GREY: Final = "#7a828a"
 LEFT, RIGHT, TOP, BOTTOM = 58.0, 14.0, 12.0, 44.0
 TEXT: Final = 11
+LETTER: Final = 6.0
+"""Width of a letter, more or less."""
 STEPS: Final = (1.0, 2.0, 5.0, 10.0)
 LOG_PARTS: Final = (
     (0.4, (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8)),
@@ -30,12 +32,15 @@ class Axis:
     ----------
     low, high : float
         What it shows; both positive where it is logarithmic.
+    whole : bool
+        Only whole numbers are told.
     """
 
     label: str
     low: float
     high: float
     log: bool = False
+    whole: bool = False
 
     def part(self, value: float) -> float:
         """Return where a value lies, 0 at the low end and 1 at the high one."""
@@ -52,6 +57,7 @@ class Axis:
         raw = (self.high - self.low) / 5.0
         power = 10.0 ** math.floor(math.log10(raw))
         step = next(each for each in STEPS if each * power >= raw * 0.999) * power
+        step = max(step, 1.0) if self.whole else step
         first = math.ceil(self.low / step - 1e-9)
         last = math.floor(self.high / step + 1e-9)
         return [n * step for n in range(first, last + 1)]
@@ -160,13 +166,16 @@ def bars(title: str, rows: Sequence[tuple[str, float, str]], *, width: float = 4
     """Return lying bars: what, how much, and how much in words."""
     height = 24.0 * len(rows) + 8.0
     most = max((amount for _, amount, _ in rows), default=1.0) or 1.0
+    begin = LETTER * max((len(name) for name, _, _ in rows), default=0) + 16.0
     parts = []
     for number, (name, amount, told) in enumerate(rows):
         top = 24.0 * number + 6.0
-        long = max(amount / most * (width - 270.0), 1.0)
-        parts.append(_text(160.0, top + 13.0, name, anchor="end"))
-        parts.append(f'<rect x="168" y="{top:.1f}" width="{long:.1f}" height="17" fill="{BLUE}"/>')
-        parts.append(_text(174.0 + long, top + 13.0, told, anchor="start"))
+        long = max(amount / most * (width - begin - 70.0), 1.0)
+        parts.append(_text(begin - 8.0, top + 13.0, name, anchor="end"))
+        parts.append(
+            f'<rect x="{begin:.1f}" y="{top:.1f}" width="{long:.1f}" height="17" fill="{BLUE}"/>'
+        )
+        parts.append(_text(begin + 6.0 + long, top + 13.0, told, anchor="start"))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:g}" height="{height:g}" '
         f'viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{escape(title)}" '

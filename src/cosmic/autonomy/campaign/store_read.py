@@ -23,7 +23,7 @@ from cosmic.autonomy.campaign.records import (
 )
 from cosmic.autonomy.campaign.store_curves import read_curves
 from cosmic.autonomy.campaign.store_files import DATABASE
-from cosmic.autonomy.campaign.store_rows import Cell, Row, fibre_record, number
+from cosmic.autonomy.campaign.store_rows import Cell, Row, fibre_record, number, region_px
 from cosmic.autonomy.campaign.store_schema import SCHEMA_VERSION
 
 
@@ -150,6 +150,7 @@ class CampaignReader:
                 zoom=number(row["zoom"]),
                 focus_um=number(row["focus_um"]),
                 light_percent=number(row["light_percent"]),
+                region_px=region_px(row),
             )
             for row in rows
         )

@@ -45,6 +45,12 @@ SPAN_NUMBERS: Final = (
     "chi2",
 )
 SHAPE_NUMBERS: Final = ("length_um", "length_std_um", "width_um", "curl")
+REGION_NUMBERS: Final = (
+    "region_left_px",
+    "region_top_px",
+    "region_width_px",
+    "region_height_px",
+)
 SEPARATOR: Final = "\n"
 
 
@@ -101,6 +107,7 @@ def span_row(fit: SpanFit) -> dict[str, Cell]:
 
 def picture_row(picture: Picture, file: PurePosixPath, sha256: str) -> dict[str, Cell]:
     """Return the row of a picture."""
+    region = picture.region_px or (None, None, None, None)
     return {
         "name": picture.name,
         "file": str(file),
@@ -110,7 +117,17 @@ def picture_row(picture: Picture, file: PurePosixPath, sha256: str) -> dict[str,
         "zoom": cell(picture.zoom),
         "focus_um": cell(picture.focus_um),
         "light_percent": cell(picture.light_percent),
+        **dict(zip(REGION_NUMBERS, region, strict=True)),
     }
+
+
+def region_px(row: Row) -> tuple[int, int, int, int] | None:
+    """Return the region of a picture, if it has one."""
+    # A table of a campaign begun before there were regions does not have the columns.
+    left, top, width, height = (row.get(name) for name in REGION_NUMBERS)
+    if left is None or top is None or width is None or height is None:
+        return None
+    return int(left), int(top), int(width), int(height)
 
 
 def operation_row(operation: OperationRecord) -> dict[str, Cell]:

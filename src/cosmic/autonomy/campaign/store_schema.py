@@ -44,7 +44,10 @@ CREATE TABLE span (
 CREATE TABLE picture (
     fibre INTEGER NOT NULL REFERENCES fibre, number INTEGER NOT NULL, name TEXT NOT NULL,
     file TEXT NOT NULL, sha256 TEXT NOT NULL, taken_s REAL NOT NULL,
-    scale_um_px REAL, zoom REAL, focus_um REAL, light_percent REAL, PRIMARY KEY (fibre, number)
+    scale_um_px REAL, zoom REAL, focus_um REAL, light_percent REAL,
+    region_left_px INTEGER, region_top_px INTEGER,
+    region_width_px INTEGER, region_height_px INTEGER,
+    PRIMARY KEY (fibre, number)
 );
 CREATE TABLE operation (
     fibre INTEGER NOT NULL REFERENCES fibre, number INTEGER NOT NULL, name TEXT NOT NULL,

@@ -132,6 +132,15 @@ def test_what_is_known_of_the_offset_beforehand_counts_by_its_certainty() -> Non
     assert not wrong.trusted
 
 
+def test_one_span_is_as_uncertain_as_its_place_and_the_clamp_together() -> None:
+    span = rig().push(300.0, 12.0)
+    widths = [
+        width_percent(fit_bending([span], settings=FitSettings(offset_std_um=6.0, **more)))
+        for more in ({"contact_std_um": 0.1}, {"contact_std_um": 6.0})
+    ]
+    assert widths[1] == pytest.approx(math.sqrt(2.0) * widths[0], rel=0.1)
+
+
 def test_a_zero_that_wanders_makes_a_soft_fibre_less_certain() -> None:
     spans = pushed(Rig(1e-12, np.random.default_rng(6)))
     calm = fit_bending(spans, settings=FitSettings(drift_un_sqrt_s=0.0))

@@ -58,7 +58,9 @@ def picture(seed: int = 0, size: tuple[int, int] = (240, 320)) -> Picture:
     bow = size[0] / 2 + 30.0 * np.sin(x / size[1] * math.pi + seed)
     inside = (np.abs(y - bow) < 5.0) & (x > 40) & (x < size[1] - 40)
     grey = np.where(inside, 70.0, 165.0) + 3.0 * rng.standard_normal(size)
-    return Picture("before grasp", grey.astype(np.uint8), 12.0, 7.6, 0.58, 0.0, 50.0)
+    pixels = grey.astype(np.uint8)
+    region = (40, int(bow.min()) - 5, size[1] - 80, int(np.ptp(bow)) + 10)
+    return Picture("before grasp", pixels, 12.0, 7.6, 0.58, 0.0, 50.0, region)
 
 
 def good(

@@ -56,6 +56,7 @@ def test_what_is_written_is_read_back_whole(store: CampaignStore) -> None:
         assert fit.flags == same.flags
     np.testing.assert_array_equal(read.pictures[0].pixels, record.pictures[0].pixels)
     assert read.pictures[0].scale_um_px == 7.6
+    assert read.pictures[0].region_px == record.pictures[0].region_px
     assert {each.name: each.unit for each in read.series} == {"left.x": "um", "force": "uN"}
 
 
