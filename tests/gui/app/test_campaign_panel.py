@@ -1,0 +1,148 @@
+"""The panel of campaigns: what is refused is told, what there is can be looked at."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+
+from cosmic.app.campaign_panel import CampaignPanel
+from cosmic.app.control_mode import ACM, blocked_modes
+from cosmic.app.scene_replay import poses_of
+from cosmic.autonomy.campaign.campaign import CampaignPhase
+from cosmic.autonomy.campaign.recipe import load_recipe
+from cosmic.autonomy.campaign.records import CampaignInfo, FibreRecord, Series
+from cosmic.autonomy.campaign.statistics import progress
+from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.procedures.procedure import Procedure
+from cosmic.autonomy.shipped.bend_test import build_bend_test
+from cosmic.frame.clock import ManualClock
+from cosmic.frame.errors import CosmicError
+from unit.autonomy.campaign.sample_records import good
+
+INFO = CampaignInfo("quick", "bend test", "three", "", "2026-11-21T12:00:00+00:00")
+
+
+class Work:
+    clock = ManualClock()
+
+
+class StoredCampaign:
+    """A campaign that is over, with what it left."""
+
+    def __init__(self, folder: Path) -> None:
+        self.store = CampaignStore.create(folder, INFO)
+        for number in (1, 2):
+            self.store.begin_fibre(time_s=10.0 * number)
+            self.store.finish_fibre(good(number))
+        self.store.close()
+        self.recipe = load_recipe(Path("quick"))
+        self.phase = CampaignPhase.READY
+        self.procedure: Procedure = build_bend_test()
+        self.work = Work()
+        self.run = None
+        self.end_reason, self.operation, self.left_s = "", "", float("nan")
+
+    @property
+    def over(self) -> bool:
+        return self.phase is CampaignPhase.ENDED
+
+    @property
+    def fibres(self) -> tuple[FibreRecord, ...]:
+        return self.store.reader.fibres()
+
+    @property
+    def progress(self):
+        return progress(self.fibres, 100.0)
+
+    def on_change(self, listener):
+        return lambda: None
+
+    def start(self) -> None:
+        self.phase, self.end_reason = CampaignPhase.ENDED, "2 fibres done"
+
+    def abort(self, reason: str) -> None:
+        self.phase, self.end_reason = CampaignPhase.ENDED, reason
+
+    def join(self) -> None:
+        pass
+
+
+@pytest.fixture
+def opened() -> list[tuple[Path, Path]]:
+    return []
+
+
+@pytest.fixture
+def panel(qtbot, tmp_path: Path, opened) -> Iterator[CampaignPanel]:
+    def open_campaign(recipe: Path, folder: Path):
+        opened.append((recipe, folder))
+        if folder.name == "taken":
+            raise CosmicError(f"{folder} holds a campaign by another recipe")
+        return StoredCampaign(folder)
+
+    panel = CampaignPanel(open_campaign, tmp_path)
+    qtbot.addWidget(panel)
+    panel.resize(520, 700)
+    panel.show()
+    yield panel
+    panel.shut_down()
+
+
+def press(qtbot, button) -> None:
+    qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+
+
+def test_a_campaign_that_cannot_begin_says_why_and_nothing_runs(panel, qtbot, tmp_path) -> None:
+    panel.folder.setText(str(tmp_path / "taken"))
+    press(qtbot, panel.procedure.start)
+    assert "by another recipe" in panel.procedure.reason.text()
+    assert panel.campaign is None
+    assert panel.recipe.isEnabled()
+
+
+def test_start_opens_the_chosen_recipe_in_the_folder_that_is_shown(
+    panel, qtbot, tmp_path, opened
+) -> None:
+    panel.recipe.setCurrentText("transport")
+    panel.folder.setText(str(tmp_path / "here"))
+    press(qtbot, panel.procedure.start)
+    assert opened == [(Path("transport"), tmp_path / "here")]
+
+
+def test_a_finished_fibre_is_shown_and_can_be_replayed(panel, qtbot, tmp_path) -> None:
+    panel.folder.setText(str(tmp_path / "here"))
+    press(qtbot, panel.procedure.start)
+    panel.refresh()
+    panel.board.fibre_chosen.emit(2)
+    assert panel.tabs.currentWidget() is panel.card
+    assert panel.card.card.number == 2
+    with qtbot.waitSignal(panel.replay_requested) as told:
+        press(qtbot, panel.card.replay)
+    assert told.args[0].number == 2
+
+
+def test_the_report_is_written_where_the_campaign_is(panel, qtbot, tmp_path) -> None:
+    panel.folder.setText(str(tmp_path / "here"))
+    press(qtbot, panel.procedure.start)
+    press(qtbot, panel.report)
+    assert (tmp_path / "here" / "report.html").exists()
+
+
+def test_a_replay_goes_from_the_first_to_the_last_position_of_every_axis() -> None:
+    times = np.array([10.0, 12.0, 20.0])
+    poses = poses_of(
+        [
+            Series("left.x", "um", times, np.array([0.0, 100.0, 100.0])),
+            Series("table.rotation", "deg", times[:1], np.array([5.0])),
+        ]
+    )
+    assert poses[0] == {"left.x": 0.0, "table.rotation": 5.0}
+    assert poses[-1] == {"left.x": 100.0, "table.rotation": 5.0}
+    assert len(poses) == 50
+
+
+def test_automatic_mode_is_offered_only_where_all_that_it_needs_runs() -> None:
+    assert ACM not in blocked_modes(mico=True, model=True, campaigns=True)
+    assert "ViCo" in blocked_modes(mico=True, model=True, campaigns=False)[ACM]
