@@ -124,11 +124,16 @@ def distribution_figure(results: Sequence[BendingResult], mean: MeanEi) -> str:
     few = len(values) < FEW
     bins = max(4, min(16, round(1.5 * math.sqrt(len(values)))))
     room = max(0.12, 0.5 * float(np.ptp(logs)) / bins)
-    edges = np.linspace(logs.min() - room, logs.max() + room, bins + 1)
+    low, high = float(logs.min()) - room, float(logs.max()) + room
+    if few and mean.count >= 2:
+        # The mean of few is known badly: its interval is shown as far as it does not hide them.
+        low = min(low, max(math.log(mean.ei_low_n_m2 / EI_UNIT) - room, low - 1.0))
+        high = max(high, min(math.log(mean.ei_high_n_m2 / EI_UNIT) + room, high + 1.0))
+    edges = np.linspace(low, high, bins + 1)
     counts, _ = np.histogram(logs, edges)
-    high = len(values) + 0.8 if few else 1.15 * float(counts.max())
+    top = len(values) + 0.8 if few else 1.15 * float(counts.max())
     x = Axis(f"bending stiffness, {EI_LABEL}", math.exp(edges[0]), math.exp(edges[-1]), log=True)
-    y = Axis("fibre" if few else "fibres", 0.0, high, whole=True)
+    y = Axis("good fibres in order" if few else "fibres", 0.0, top, whole=True)
     plot = Plot(x, y, "Distribution of bending stiffness", width=640.0, height=280.0)
     if few:
         for place, each in enumerate(results, 1):
@@ -136,13 +141,13 @@ def distribution_figure(results: Sequence[BendingResult], mean: MeanEi) -> str:
             plot.line(ends, [float(place)] * 2, BLUE)
             plot.points([each.ei_n_m2 / EI_UNIT], [float(place)], BLUE)
     else:
-        for count, low, end in zip(counts, edges[:-1], edges[1:], strict=True):
+        for count, first, last in zip(counts, edges[:-1], edges[1:], strict=True):
             if count:
-                plot.box(math.exp(low + 0.01), math.exp(end - 0.01), 0.0, float(count), PALE)
+                plot.box(math.exp(first + 0.01), math.exp(last - 0.01), 0.0, float(count), PALE)
         _bell(plot, mean, len(values) * (edges[1] - edges[0]))
-        plot.points(values.tolist(), [0.02 * high] * len(values), BLUE)
+        plot.points(values.tolist(), [0.02 * top] * len(values), BLUE)
     if mean.count >= 2:
-        plot.line(_inside(x, mean.ei_low_n_m2, mean.ei_high_n_m2), [0.96 * high] * 2, ORANGE)
+        plot.line(_inside(x, mean.ei_low_n_m2, mean.ei_high_n_m2), [0.96 * top] * 2, ORANGE)
     return plot.svg()
 
 
