@@ -290,6 +290,16 @@ def test_a_window_that_hangs_keeps_ten_seconds_and_says_what_it_left_out(plotter
     assert "not shown 5000" in plotter.lost.text()
 
 
+def test_what_another_station_passed_over_is_told_as_not_shown(plotter, port):
+    port.push(np.zeros((2, 50)))
+    port.push(np.zeros((2, 50)), lost_before=150)
+    port.next_sample = 0
+    port.push(np.zeros((2, 50)))
+    plotter.refresh()
+    plotter.read_out()
+    assert plotter.lost.text() == "lost 0, not shown 150"
+
+
 def test_a_lost_board_is_told(qtbot, plotter, port):
     port.change(problem="Dev1 is gone: check its cable", running=False)
     qtbot.waitUntil(lambda: "Dev1 is gone" in plotter.problem.text())

@@ -14,20 +14,24 @@ class ChunkInbox:
 
     A deque's ends are atomic, so the acquisition thread never waits for the window. Were the
     window to hang, the oldest chunks go: they are still recorded, only not shown, and `skipped`
-    counts them.
+    counts them, as it does what was passed over on the way from another station.
     """
 
     def __init__(self) -> None:
         self._chunks: deque[DataChunk] = deque()
         self._skipped = 0
+        self._next: int | None = None
 
     @property
     def skipped(self) -> int:
-        """Samples a channel that came and were never given out."""
+        """Samples a channel that came and were never given out, or were passed over."""
         return self._skipped
 
     def put(self, chunk: DataChunk) -> None:
         """Keep `chunk`; acquisition thread."""
+        if self._next is not None:  # numbers that begin anew are another acquisition
+            self._skipped += max(0, chunk.first_sample - self._next)
+        self._next = chunk.first_sample + chunk.samples
         self._chunks.append(chunk)
         held_s = len(self._chunks) * chunk.samples / chunk.rate_hz
         if held_s > LARGEST_S:
