@@ -11,14 +11,16 @@ import cosmic
 from cosmic.autonomy.handling.in_hand import FibreInHand
 from cosmic.autonomy.handling.settings import HandlingSettings, PushSettings
 from cosmic.autonomy.handling.work import FibreWork
+from cosmic.autonomy.procedures.failures import ProcedureStopped
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun
+from cosmic.autonomy.procedures.tree import NodeEvent, NodeState
 from cosmic.autonomy.shipped.bend_test import build_bend_test
 from cosmic.autonomy.shipped.transport import build_transport
 from cosmic.frame.failure import FailurePolicy
 from cosmic.twin.truth import TrueFibre, TruthRecord, read_truth
 
-RATE = 20.0
+RATE = 8.0
 # The limit has a dead man of a tenth of a second of the wall, which a busy machine oversleeps.
 SETTINGS = HandlingSettings(push=PushSettings(stop_un=0.0))
 LIMIT_UN = 0.8 * 180.0
@@ -146,3 +148,30 @@ def test_an_empty_plate_is_said_to_be_empty(tmp_path: Path):
         pytest.raises(Exception, match="no fibre"),
     ):
         carried_out(bench.work, build_transport(SETTINGS))
+
+
+@pytest.mark.slow
+def test_after_a_stop_in_mid_air_the_next_run_puts_away_what_it_finds_in_the_jaws(tmp_path: Path):
+    truth = tmp_path / "truth.jsonl"
+    with sample("three-dry", truth, seed=6) as bench:
+        rig, work = bench.rig, bench.work
+        procedure = build_bend_test(SETTINGS)
+        run = ProcedureRun(procedure, work, work.clock, FailurePolicy())
+
+        def stop_there(event: NodeEvent) -> None:
+            if event.name == "push the spans" and event.state is NodeState.RUNNING:
+                rig.stop("somebody pressed the key")
+
+        run.subscribe(stop_there)
+        with pytest.raises(ProcedureStopped, match="somebody pressed the key"):
+            run.run_here()
+        assert work.fibre is not None
+        rig.reset_stop()
+        fibre = carried_out(work, procedure)
+        left = work.finished[-2]
+    record = read_truth(truth)
+    assert left.failure is not None
+    assert left.failure.cause == "interrupted"
+    assert len(record.of("released")) == 2
+    check(record, fibre)
+    assert unintended(record) == set()

@@ -15,7 +15,7 @@ from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import ConfigError, DeviceTimeout, NotAvailable
 
 KEPT_S: Final = 5.0
-LIMIT_WALL_S: Final = 5.0
+LIMIT_WALL_S: Final = 15.0
 """How long samples may fail to come, wall time."""
 
 
@@ -58,6 +58,11 @@ class ForceWatch:
         self._waiting: tuple[Callable[[], None], ...] = ()
         self._peak_un = 0.0
         self._forget: Callable[[], None] | None = None
+
+    @property
+    def problem(self) -> str:
+        """Why no samples come, as far as acquisition knows."""
+        return self._daqco.problem or "acquisition says nothing about it"
 
     def open(self) -> None:
         """Begin to keep samples; harmless the second time."""
@@ -180,7 +185,8 @@ class ForceWanted:
             self._watch.wait_for_chunk(min(left_s, 0.05))
         if self._mean is None:
             raise NotAvailable(
-                f"no samples of the force for {LIMIT_WALL_S:g} s; look whether acquisition runs"
+                f"no samples of the force for {LIMIT_WALL_S:g} s: {self._watch.problem}; look "
+                "whether acquisition runs"
             )
         return self._mean
 

@@ -22,6 +22,8 @@ from cosmic.vico.core.vision.tips import find_gripper, find_probe
 from cosmic.vico.core.vision.tool_types import GripperTips, NotSeen, ToolEnd
 
 REACH_PX = 40.0
+OTHER_UP_UM = 5000.0
+OTHER_BACK_UM = 4000.0
 TURN_ON_DEG = 41.0
 POOR = "calibration poor"
 PLATE = "map of the plate"
@@ -53,23 +55,28 @@ class MakeReady(FibreOperation):
         for tool in self._tools(work):
             for name in (tool.x_axis, tool.y_axis, *filter(None, [tool.z_axis])):
                 work.mico[name].set_closed_loop_frequency(settings.frequency_hz)
-        heights = {}
+        lifted = {work.gripper.z_axis: self._high(work)}
         if settings.other:
-            other = work.tool(settings.other)
-            heights[other.z_axis] = 5000.0
-        heights[work.gripper.z_axis] = max(
-            places.travel_um - work.gripper.tip_um[2],
-            work.mico[work.gripper.z_axis].position_um or 0.0,
-        )
-        yield work.go(heights)
+            lifted[work.tool(settings.other).z_axis] = OTHER_UP_UM
+        yield work.go(lifted)
         yield from retract_probe(work)
         if settings.other:
             other = work.tool(settings.other)
-            yield work.go({other.x_axis: 4000.0 if other.forward[0] < 0.0 else -4000.0})
+            yield work.go({other.x_axis: OTHER_BACK_UM * (-1.0 if other.forward[0] > 0.0 else 1.0)})
+        # What may be left between the jaws falls where fibres are put away.
+        yield work.go(work.at(work.gripper, places.bin_x_um * work.jaws.forward, places.bin_y_um))
+        with work.mico.collision.contact("grasp"):
+            yield work.go_up(places.bin_um)
         yield from zero_jaws(work)
+        yield work.go({work.gripper.z_axis: self._high(work)})
         yield from zoom_to(work, settings.zoom)
         work.ready = True
         yield SAFE_POINT
+
+    @staticmethod
+    def _high(work: FibreWork) -> float:
+        tool, travel = work.gripper, work.settings.places.travel_um
+        return max(travel - tool.tip_um[2], work.mico[tool.z_axis].position_um or 0.0)
 
     @staticmethod
     def _tools(work: FibreWork) -> list[ToolSettings]:

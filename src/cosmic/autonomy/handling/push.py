@@ -35,6 +35,8 @@ class PushSpans(FibreOperation):
             plan_spans(fibre.free_um, limits=span_limits(work))
         except BendingError as exc:
             raise OperationFailed(TOO_SHORT, str(exc)) from exc
+        if not work.daqco.running:
+            work.daqco.start()
         arm(work, armed=True)
         try:
             yield from self._spans(work, fibre)

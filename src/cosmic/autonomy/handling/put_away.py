@@ -16,6 +16,7 @@ from cosmic.vico.core.picture import Picture
 
 ADHESION: Final = "jaw adhesion"
 GIVEN_UP: Final = "given up"
+INTERRUPTED: Final = "interrupted"
 WIPE_UM: Final = 250.0
 ASIDE_UM: Final = 400.0
 SHAKES: Final = 12
@@ -152,3 +153,23 @@ class GiveUp(FibreOperation):
         work.fibre = None
         yield SAFE_POINT
         raise fibre.failure or OperationFailed(GIVEN_UP, f"fibre {fibre.number}")
+
+
+class ClearUp(FibreOperation):
+    """What a run before this one left in the jaws is put away; nothing where all was in order."""
+
+    name = "clear up"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        fibre = work.fibre
+        if fibre is None:
+            return
+        work.ready, work.surveyed, work.zoomed = False, False, None
+        yield from ToBin().steps(work)
+        yield from Wipe().steps(work)
+        yield from Release().steps(work)
+        fibre.failure = fibre.failure or OperationFailed(INTERRUPTED, "the run before was ended")
+        fibre.done_s = work.clock.now_s()
+        work.finished.append(fibre)
+        work.fibre = None

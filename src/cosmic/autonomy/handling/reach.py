@@ -67,6 +67,7 @@ class FindAgain(FibreOperation):
             if seen is not None:
                 _take_note(work, fibre, seen, picture)
                 return
+        fibre.pictures["not found"] = picture
         # One that was grasped, and is gone, lies somewhere else now.
         work.surveyed = work.surveyed and not fibre.tries
         raise OperationFailed(

@@ -15,7 +15,7 @@ from cosmic.vico.core.pixel_map import Floats, PixelMap
 from cosmic.vico.core.vision.algorithms import grey
 from cosmic.vico.core.vision.fibre import Fibre
 
-LIMIT_WALL_S: Final = 8.0
+LIMIT_WALL_S: Final = 15.0
 Box = tuple[int, int, int, int]
 
 

@@ -179,7 +179,7 @@ class FibreWork:
 
     def go(self, targets: Mapping[str, float]) -> PatientMove:
         """Begin to move; to be yielded."""
-        return PatientMove(lambda: self.mico.move(dict(targets), wait=False))
+        return PatientMove(lambda: self.mico.move(dict(targets), wait=False), to_a_place=True)
 
     def go_up(self, z_um: float) -> PatientMove:
         """Begin to move the gripper to a height; to be yielded."""

@@ -13,6 +13,7 @@ from cosmic.autonomy.handling.prepare import (
 from cosmic.autonomy.handling.push import NOT_TRUSTED, FitSpans, PushSpans, StepBack
 from cosmic.autonomy.handling.put_away import (
     ADHESION,
+    ClearUp,
     Finish,
     GiveUp,
     NoteFailure,
@@ -63,6 +64,7 @@ def beginning(settings: HandlingSettings) -> tuple[Part[FibreWork], ...]:
     return (
         Sequence(
             "prepare",
+            ClearUp(),
             MakeReady(),
             *(
                 Retry(each, settings.calibration.tries, only={POOR}, between=TurnOn())

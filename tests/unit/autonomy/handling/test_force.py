@@ -17,6 +17,7 @@ class Daqco:
     """As much of `rig.daqco` as a watch uses."""
 
     channels = ("aux", "force")
+    problem = "the board is gone"
 
     def __init__(self) -> None:
         self.receiver: Any = None
@@ -77,7 +78,7 @@ def test_a_wait_ends_when_no_samples_come(
     with pytest.raises(DeviceTimeout):
         watch.wanted(0.05).wait(0.01)
     monkeypatch.setattr(force, "LIMIT_WALL_S", -1.0)
-    with pytest.raises(NotAvailable, match="no samples"):
+    with pytest.raises(NotAvailable, match="the board is gone"):
         watch.wanted(0.05).wait(1.0)
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from cosmic.autonomy.handling import patience
 from cosmic.autonomy.handling.patience import TRIES, PatientMove
-from cosmic.frame.errors import DeviceTimeout, MoveRefused
+from cosmic.frame.errors import CosmicError, DeviceTimeout, MoveRefused
 from cosmic.frame.verdict import MoveVerdict, Reason
 
 
@@ -15,14 +15,19 @@ class Moved:
 
     done = True
 
-    def __init__(self) -> None:
-        self.cancelled = False
+    def __init__(self, error: CosmicError | None = None) -> None:
+        self.error = error
 
     def wait(self, timeout_s: float | None = None) -> str:
+        if self.error is not None:
+            raise self.error
         return "there"
 
+    def exception(self, timeout: float | None = 0.0) -> CosmicError | None:
+        return self.error
+
     def cancel(self) -> None:
-        self.cancelled = True
+        """It has arrived already."""
 
 
 def refusing(reason: Reason, times: int) -> tuple[Callable[[], Moved], list[int]]:
@@ -78,3 +83,20 @@ def test_a_cancelled_movement_is_not_ordered_again():
     with pytest.raises(MoveRefused):
         move.wait(1.0)
     assert len(orders) == 1
+
+
+def test_a_way_to_a_place_is_ordered_again_where_an_axis_did_not_come_on():
+    moves = [Moved(DeviceTimeout("no progress")), Moved()]
+    assert PatientMove(lambda: moves.pop(0), to_a_place=True).wait(1.0) == "there"
+
+
+def test_steps_are_not_for_some_of_them_may_have_been_made():
+    moves = [Moved(DeviceTimeout("no progress")), Moved()]
+    with pytest.raises(DeviceTimeout, match="no progress"):
+        PatientMove(lambda: moves.pop(0)).wait(1.0)
+    assert len(moves) == 1
+
+
+def test_an_axis_that_never_comes_on_is_told_in_the_end():
+    with pytest.raises(DeviceTimeout, match="no progress"):
+        PatientMove(lambda: Moved(DeviceTimeout("no progress")), to_a_place=True).wait(1.0)

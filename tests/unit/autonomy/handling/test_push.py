@@ -69,6 +69,8 @@ class Axis:
 class Daqco:
     """Notes whether the limit was armed."""
 
+    running = True
+
     def __init__(self) -> None:
         self.armed: list[bool] = []
 
