@@ -3,11 +3,17 @@
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
+import pytest
+
 import cosmic
 from contract.station_rig import free_port, wait_until
 from cosmic.app.network_settings import NetworkSettings, serving
-from cosmic.app.platform import Platform, build_platform
+from cosmic.app.platform import Platform, Uses, build_platform
+from cosmic.app.rig import Rig
+from cosmic.app.serve_options import StationAddress
 from cosmic.app.station_host import StationHost
+from cosmic.frame.errors import NotAvailable
+from cosmic.frame.failure import Failure
 
 
 @contextmanager
@@ -24,18 +30,25 @@ def served(*applications: str) -> Iterator[tuple[Platform, StationHost, str]]:
         yield platform, host, endpoint
 
 
-def test_boards_here_stop_axes_there() -> None:
-    with (
-        served("mico") as (there, _, endpoint),
-        cosmic.connect(applications=("daqco",), stations={"there": endpoint}) as rig,
-    ):
-        assert there.mico is not None
-        latch = there.mico.manager.latch
-        rig.daqco.arm_limit("force", low=-500.0, high=-400.0)
-        assert wait_until(lambda: latch.state.reason), (
-            "the force is about 0, and what is elsewhere stands"
-        )
-        assert "force" in (latch.state.reason or "")
+def test_boards_here_stop_axes_there_and_say_so_where_they_cannot() -> None:
+    with served("mico") as (there, host, endpoint):
+        uses = Uses((StationAddress("there", endpoint),))
+        here = build_platform(applications=("daqco",), uses=uses)
+        failures: list[Failure] = []
+        here.policy.subscribe(failures.append)
+        with Rig(here) as rig:
+            here.initialize()
+            assert there.mico is not None
+            latch = there.mico.manager.latch
+            rig.daqco.arm_limit("force", low=-500.0, high=-400.0)
+            assert wait_until(lambda: latch.state.reason), "the force is about 0"
+            assert "force" in (latch.state.reason or "")
+
+            rig.daqco.remove_limit("force")
+            host.close()
+            assert wait_until(lambda: rig.stations["there"].away)
+            rig.daqco.arm_limit("force", low=-500.0, high=-400.0)
+            assert wait_until(lambda: [each for each in failures if "stop at there" in each.where])
 
 
 def test_boards_there_stop_axes_here_and_their_silence_does_as_well() -> None:
@@ -53,3 +66,10 @@ def test_boards_there_stop_axes_here_and_their_silence_does_as_well() -> None:
         assert rig.stopped is None
         host.close()
         assert wait_until(lambda: rig.stopped), "nobody can say that the limit holds"
+
+
+def test_a_taken_port_is_said_to_be_taken() -> None:
+    with served("daqco") as (platform, _, endpoint):
+        how = serving(NetworkSettings(), "another", platform.path, listen=endpoint)
+        with pytest.raises(NotAvailable, match="another program listens there already"):
+            StationHost(platform, how)

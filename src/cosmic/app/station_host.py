@@ -2,7 +2,7 @@
 
 import logging
 from contextlib import ExitStack
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import cosmic
 from cosmic.app.network_settings import Serving
@@ -10,10 +10,14 @@ from cosmic.app.platform import Platform
 from cosmic.app.station_facts import ITSELF, StationFacts, StationSide
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.frame.errors import ConfigError
+from cosmic.frame.network.errors import StationAway
 from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.station import Station
 from cosmic.mico.api.application import MicoApplication
 from cosmic.vico.api.application import VicoApplication
+
+if TYPE_CHECKING:
+    from cosmic.frame.network.wire import Wire
 
 logger = logging.getLogger(__name__)
 
@@ -39,7 +43,6 @@ class StationHost:
     def __init__(self, platform: Platform, how: Serving) -> None:
         # Imported here: they need the extra `net`.
         from cosmic.frame.network.server_listener import ServerListener
-        from cosmic.frame.network.zenoh_wire import ZenohWire
 
         sides = _sides(platform)
         if not sides:
@@ -55,7 +58,7 @@ class StationHost:
                 self._station.host(name, side)
             facts = _facts(platform, self._applications)
             self._station.host(ITSELF, StationSide(facts, lease))
-            listener = ServerListener(self._station, ZenohWire(how.line), how.allowed)
+            listener = ServerListener(self._station, _opened(how), how.allowed)
             undo.callback(listener.shut_down)
             listener.start()
             self._undo = undo.pop_all()
@@ -80,6 +83,19 @@ class StationHost:
     def close(self) -> None:
         """Stop what clients have set in motion, send them away and answer no more; any state."""
         self._undo.close()
+
+
+def _opened(how: Serving) -> "Wire":
+    from cosmic.frame.network.zenoh_wire import ZenohWire
+
+    try:
+        return ZenohWire(how.line)
+    except StationAway as exc:
+        logger.debug("%s", exc)
+        raise StationAway(
+            f"{how.name} cannot listen at {how.line.endpoint}: the address is not one of this "
+            "computer, or another program listens there already; choose another with --listen"
+        ) from exc
 
 
 def _sides(platform: Platform) -> dict[str, object]:
