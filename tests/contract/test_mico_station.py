@@ -37,7 +37,7 @@ from cosmic.mico.api.remote_application import RemoteMicoApplication
 from cosmic.mico.api.station_words import AxisPositions, StampedState
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.api.ways import Way
-from cosmic.mico.core.orders import Jog, MoveTo
+from cosmic.mico.core.orders import Jog, MoveTo, Steer
 from cosmic.mico.core.positioner import Confidence, Status
 
 SLOW_HZ = 10
@@ -489,7 +489,25 @@ def test_an_ill_typed_order_moves_nothing(hosted: HostedMico, how: str) -> None:
         for bad in BAD_ORDERS:
             with pytest.raises(CallRefused):
                 client.call("mico", "order", {"axis": "left.x", "number": 1} | bad)
-        senseless = {"axis": "left.x", "number": 2, "motion": Jog(5, float("nan"))}
+        nan = float("nan")
+        for function, arguments in (
+            ("set_zero", {"axis": "left.x", "zero": nan}),
+            ("jog", {"axis": "left.x", "number": 3, "motion": Steer(1, 5.0, 1e9)}),
+            ("link", {"first": "left.x", "second": "left.gripper", "ratio": 1.0}),
+            ("link", {"first": "left.x", "second": "right.x", "ratio": nan}),
+            ("put_pose", {"name": "x", "positions": {"left.x": nan}}),
+            ("find_way", {"targets": {"left.x": 1.0}, "budget_s": 1e9}),
+            ("set_frequency", {"axis": "left.x", "frequency_hz": 0}),
+            ("halt", {"axis": "nowhere"}),
+        ):
+            with pytest.raises((MoveRefused, NotAvailable, UnknownAxisError)):
+                client.call("mico", function, arguments)
+        client.call("mico", "stop", {"reason": "a\nforged line\x1b[31m" + 500 * "x"})
+        reason = hosted.application.manager.latch.state.reason or ""
+        assert reason.startswith("a forged line")
+        assert len(reason) < 200
+        client.call("mico", "reset_stop")
+        senseless = {"axis": "left.x", "number": 2, "motion": Jog(5, nan)}
         ended: Any = client.call("mico", "jog", senseless)
         assert ended.wait(5.0).of["left.x"].error is not None
     assert hosted.mico["left.x"].position_um == pytest.approx(0.0, abs=1.0)

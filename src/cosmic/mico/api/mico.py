@@ -18,6 +18,7 @@ from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.entry import Number, as_number
 from cosmic.mico.api.group import GroupMovement, waited_for
 from cosmic.mico.api.initialisation import Confirm
+from cosmic.mico.api.links import check_linkable
 from cosmic.mico.api.poses import Poses
 from cosmic.mico.api.trajectories import Trajectories
 from cosmic.mico.api.ways import Way
@@ -29,7 +30,6 @@ from cosmic.mico.core.orders import Motion, MoveBy, MoveTo
 from cosmic.mico.core.ports import DevicePort
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 from cosmic.mico.core.undo import UndoEntry
-from cosmic.mico.hw.interface import PositionerKind
 
 
 class Mico:
@@ -382,10 +382,7 @@ class Mico:
         NotAvailable
             They are linked already, have no sensor, or are not of one kind.
         """
-        kinds = {self[name].kind for name in (first, second)}
-        if len(kinds) > 1 or PositionerKind.OPEN_LOOP in kinds:
-            text = f"{first} and {second} cannot be linked: both must be linear, or both rotary"
-            raise NotAvailable(text)
+        check_linkable(self._manager, first, second)
         return self._manager.links.add(first, second, float(ratio))
 
     def unlink(self, axis: str) -> bool:

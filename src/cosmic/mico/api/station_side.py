@@ -4,7 +4,7 @@ import logging
 from typing import Final
 
 from cosmic.frame.errors import MoveCancelled, NotAvailable, refusal
-from cosmic.frame.network.caller import JOG_LIMIT_S, current_call
+from cosmic.frame.network.caller import JOG_LIMIT_S, MOVE_LIMIT_S, current_call
 from cosmic.frame.network.remote import remote
 from cosmic.frame.network.station import Station
 from cosmic.frame.task import Task
@@ -12,6 +12,8 @@ from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.api.application_base import WAY_BUDGET_S
 from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.links import check_linkable
+from cosmic.mico.api.station_checks import finite, one_line
 from cosmic.mico.api.station_orders import Key, OrderBook, Ordered
 from cosmic.mico.api.station_tell import MicoTeller
 from cosmic.mico.api.station_ways import WaySearch
@@ -33,7 +35,8 @@ from cosmic.mico.core.poses import Pose
 
 logger = logging.getLogger(__name__)
 
-NAME: Final = "mico"
+LONGEST_SEARCH_S: Final = 60.0
+"""For how long a client may have a way looked for; other long operations wait for it."""
 
 
 class MicoStationSide:
@@ -123,6 +126,11 @@ class MicoStationSide:
         self, axis: str, number: int, motion: Jog | Steer, consent: bool = False, source: str = ""
     ) -> Ordered:
         """Begin to move on and on, while `renew` or `steer` comes."""
+        if isinstance(motion, Steer) and not 0.0 < motion.dead_man_s <= MOVE_LIMIT_S:
+            text = (
+                f"{axis}: a dead-man time is at most {MOVE_LIMIT_S:g} s, not {motion.dead_man_s:g}"
+            )
+            raise refusal(refuse(Reason.LIMIT, text, axis=axis, limit=MOVE_LIMIT_S, unit="s"))
         return self._order(axis, number, motion, consent=consent, source=source)
 
     @remote(moves=True, at_once=True, limit_s=JOG_LIMIT_S)
@@ -137,7 +145,7 @@ class MicoStationSide:
         """Keep a steered movement alive at another speed."""
         order = self._orders.find(self._key(number))
         if order is not None:
-            self._manager.device(axis).steer_jog(order, velocity)
+            self._manager.device(axis).steer_jog(order, finite(velocity, f"{axis}: a speed"))
 
     def _order(
         self,
@@ -222,14 +230,14 @@ class MicoStationSide:
     @remote(at_once=True)
     def stop(self, reason: str = "stop") -> MicoStatus:
         """Stop every axis and stay stopped; anybody may."""
-        self._manager.stop(f"{reason} (from {self._who()})")
+        self._manager.stop(f"{one_line(reason)} (from {self._who()})")
         return self._teller.status()
 
     @remote(at_once=True)
     def halt(self, axis: str, up_to: int = 0, why: str = "stopped") -> None:
         """Stop one axis past every queue; anybody may."""
         self._orders.void(self._key(0)[0], axis, up_to)
-        self._manager.device(axis).halt(self._manager.address(axis).channel, why)
+        self._manager.device(axis).halt(self._manager.address(axis).channel, one_line(why))
 
     @remote(at_once=True)
     def withdraw(self, numbers: list[int]) -> None:
@@ -251,6 +259,7 @@ class MicoStationSide:
     @remote(moves=True)
     def set_zero(self, axis: str, zero: float) -> StampedState | None:
         """Show positions relative to `zero`, in gate coordinates."""
+        finite(zero, f"{axis}: a zero")
         self._log(f"{axis}: zero at {zero:g}", "")
         self._manager.device(axis).set_zero(self._manager.address(axis).channel, zero)
         return self._teller.note(axis)
@@ -268,8 +277,7 @@ class MicoStationSide:
     @remote(moves=True)
     def link(self, first: str, second: str, ratio: float) -> MicoStatus:
         """Link two axes."""
-        for name in (first, second):
-            self._manager.address(name)
+        check_linkable(self._manager, first, second)
         self._log(f"link of {first} and {second}, {ratio:g}", "")
         self._manager.links.add(first, second, ratio)
         return self._teller.status()
@@ -305,7 +313,9 @@ class MicoStationSide:
 
     @remote
     def find_way(self, targets: dict[str, float], budget_s: float = WAY_BUDGET_S) -> WaySearch:
-        """Look for a way round what is in between."""
+        """Look for a way round what is in between, for at most a minute."""
+        if not 0.0 < budget_s <= LONGEST_SEARCH_S:
+            raise NotAvailable(f"a way is looked for during at most {LONGEST_SEARCH_S:g} s")
         return WaySearch(self._application, targets, budget_s)
 
     @remote(moves=True)
@@ -319,8 +329,9 @@ class MicoStationSide:
     @remote
     def put_pose(self, name: str, positions: dict[str, float]) -> MicoStatus:
         """Keep a named pose."""
-        for axis in positions:
+        for axis, position in positions.items():
             self._manager.address(axis)
+            finite(position, f"{axis}: a position")
         self._log(f"pose {name!r}", "")
         self._application.trajectories.poses.put(Pose(name, positions))
         return self._teller.status()
@@ -343,7 +354,7 @@ class MicoStationSide:
         return (call.caller.token if call is not None else "", number)
 
     def _source(self, source: str) -> str:
-        return f"{self._who()} {source[:40]}".strip()
+        return f"{self._who()} {one_line(source)}".strip()
 
     def _log(self, what: str, source: str) -> None:
         if self._station is not None:
