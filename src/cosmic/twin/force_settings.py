@@ -99,8 +99,7 @@ class FibreSettings(StrictModel):
     x_um, y_um, angle_deg : float
         Middle and direction on the plate.
     curl_deg, kink_deg : float
-        By how much it turns, evenly from end to end and at once in its middle, where it lies. It
-        is seen so; what takes and pushes it takes it for straight.
+        By how much it turns, evenly from end to end and at once in its middle.
     role : str
         What it is to somebody who wants single fibres: told in the truth, without effect.
     bonded_to : int or None
