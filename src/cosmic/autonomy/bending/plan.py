@@ -30,6 +30,11 @@ class SpanLimits(StrictModel):
         How many spans.
     shortest_um, longest_um : float
         From the tip of the jaws to the middle of the probe.
+    shortest_part : float
+        Shortest span as a part of the longest: a smaller part makes EI more certain, and takes
+        longer, as stiff spans are approached in smaller steps.
+    shortest_stroke_um : float
+        Spans so short that less than this reaches the highest force are left out.
     beyond_um : float
         Length of fibre that must remain beyond the probe.
     stroke_part : float
@@ -43,6 +48,8 @@ class SpanLimits(StrictModel):
     count: int = Field(3, ge=1, le=10)
     shortest_um: float = Field(150.0, gt=0.0)
     longest_um: float = Field(500.0, gt=0.0)
+    shortest_part: float = Field(0.5, gt=0.0, lt=1.0)
+    shortest_stroke_um: float = Field(2.0, gt=0.0)
     beyond_um: float = Field(80.0, ge=0.0)
     stroke_part: float = Field(0.1, gt=0.0, le=0.2)
     longest_stroke_um: float = Field(40.0, gt=0.0)
@@ -99,7 +106,8 @@ def plan_spans(
     # At a push of stroke_part * span the force is 3 EI stroke_part / span^2.
     enough = math.sqrt(3.0 * ei * limits.stroke_part / limits.wanted_un)
     longest = min(room_um, max(enough, LEAST_SPREAD * limits.shortest_um))
-    shortest = max(limits.shortest_um, longest / 2.0)
+    clear = (3.0 * ei * limits.shortest_stroke_um / limits.highest_un) ** (1.0 / 3.0)
+    shortest = min(max(limits.shortest_um, limits.shortest_part * longest, clear), longest)
     remaining = limits.count - len(done)
     places = _spread(shortest, longest, limits.count)
     left = _farthest(places, [span.nominal_um for span in done], remaining)

@@ -38,6 +38,14 @@ def test_softer_fibres_get_shorter_spans() -> None:
     assert longest(soft) < longest(stiff)
 
 
+def test_spans_of_a_stiff_fibre_are_not_so_short_that_nothing_bends() -> None:
+    limits = SpanLimits(shortest_part=0.3)
+    stiff, dry = plan_spans(1500.0, 2e-10, limits), plan_spans(1500.0, 5e-11, limits)
+    assert min(each.span_um for each in dry) == pytest.approx(155.0, abs=1.0)
+    assert min(each.span_um for each in stiff) == pytest.approx(246.6, abs=1.0)
+    assert min(each.stroke_um for each in stiff) == pytest.approx(limits.shortest_stroke_um)
+
+
 def test_the_longest_span_comes_first() -> None:
     spans = [each.span_um for each in plan_spans(1500.0, 5e-11)]
     assert spans == sorted(spans, reverse=True)
