@@ -305,6 +305,9 @@ class Daqco:
         reason = crossing.text if crossing is not None else ""
         if not reason and self.rate_hz < LOWEST_RATE_HZ:
             reason = f"limits are watched from {LOWEST_RATE_HZ:g} Hz on"
+        reaction_ms = None
+        if crossing is not None and math.isfinite(crossing.reaction_s):
+            reaction_ms = 1000.0 * crossing.reaction_s
         return DaqLimit(
             settings=LimitSettings(
                 channel=limit.channel,
@@ -315,7 +318,7 @@ class Daqco:
             ),
             crossed=limit.tripped,
             value=crossing.value if crossing is not None and known else None,
-            reaction_ms=1000.0 * crossing.reaction_s if crossing is not None else None,
+            reaction_ms=reaction_ms,
             reason=reason,
         )
 

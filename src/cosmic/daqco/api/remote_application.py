@@ -232,7 +232,8 @@ class RemoteDaqcoApplication(StationView):
         if presence.here:
             self._retry_wall_s = -float("inf")
         else:
-            self._set_away(f"{presence.name} is away: {presence.why}")
+            said = f"{presence.name} is away: "
+            self._set_away(said + presence.why.removeprefix(said))
 
     def _take(self, report: DaqReport) -> None:
         """Take a report unless a newer one is known; any thread."""
