@@ -105,7 +105,7 @@ class Workplace:
             settings, self.fibres, seed, injected=self.faults, tell=self._tell, faults=wander
         )
         self._touches: dict[int, Touch] = {}
-        self._peaks_un: dict[int, float] = {}
+        self._peaks_un: dict[int | str, float] = {}
         self._jaw_touches = {name: Touch() for name in self._grippers}
         self._gaps: dict[str, float] = {}
         self._slack_um = 0.0
@@ -167,10 +167,11 @@ class Workplace:
             for fibre in self._hands.held
             if (push := self._push(fibre, tools, probe, around)) is not None
         )
-        self._note(pushes)
         if self._contacts is not None:
             self._nothing_before(self._contacts.look(values, time_s, self.offsets))
-        jaw_un = sum(self._jaw(name, tool, probe) for name, tool in tools.items())
+        on_jaws = {name: self._jaw(name, tool, probe) for name, tool in tools.items()}
+        self._note(pushes, on_jaws)
+        jaw_un = sum(on_jaws.values())
         return Felt(pushes, jaw_un, self._slack_um, self._hands.gap_um)
 
     def _nothing_before(self, slack_um: float) -> None:
@@ -185,7 +186,7 @@ class Workplace:
 
     def finish(self) -> None:
         """Tell what lasts until the end."""
-        self._note(())
+        self._note((), {})
         if self._contacts is not None:
             self._contacts.finish()
 
@@ -239,18 +240,20 @@ class Workplace:
         off = abs(probe_z_um - line.z_um(along_um))
         return min(along_um, line.reach_um - along_um, thick - off)
 
-    def _note(self, pushes: tuple[Push, ...]) -> None:
-        """Tell when the probe comes to a fibre, and the highest force once it has left."""
-        if not pushes and not self._peaks_un:
+    def _note(self, pushes: tuple[Push, ...], on_jaws: Mapping[str, float]) -> None:
+        """Tell when the probe comes to a fibre or a jaw, and the highest force once it has left."""
+        if not (pushes or self._peaks_un or any(on_jaws.values())):
             return
-        touched = {push.fibre: push for push in pushes}
-        for number, push in touched.items():
-            if number not in self._peaks_un:
-                self._tell("touched", fibre=number, abscissa_um=push.abscissa_um)
-            peak = self._peaks_un.get(number, 0.0)
-            self._peaks_un[number] = max(peak, abs(push.force_un))
-        for number in [each for each in self._peaks_un if each not in touched]:
-            self._tell("left", fibre=number, peak_un=self._peaks_un.pop(number))
+        forces: dict[int | str, float] = {push.fibre: push.force_un for push in pushes}
+        forces |= {name: force for name, force in on_jaws.items() if force}
+        along = {push.fibre: push.abscissa_um for push in pushes}
+        for what, force in forces.items():
+            if what not in self._peaks_un:
+                at = {"abscissa_um": along[what]} if isinstance(what, int) else {}
+                self._tell("touched", **_named(what), **at)
+            self._peaks_un[what] = max(self._peaks_un.get(what, 0.0), abs(force))
+        for what in [each for each in self._peaks_un if each not in forces]:
+            self._tell("left", **_named(what), peak_un=self._peaks_un.pop(what))
 
     def _jaw(self, name: str, tool: Tool, probe: Point) -> float:
         """Return the force of a jaw's outer face on the probe's tip."""
@@ -275,3 +278,7 @@ class Workplace:
             touch.lose()
             return NOTHING
         return self._sensor * way
+
+
+def _named(what: int | str) -> dict[str, int | str]:
+    return {"fibre": what} if isinstance(what, int) else {"tool": what}

@@ -99,5 +99,9 @@ def test_the_probe_in_a_jaw_is_a_contact_and_beside_it_is_none() -> None:
     bench = before_the_fibre(Bench(truth=heard), 400.0)
     assert bench.moment and "contact" not in heard.names
     bench.go(probe_y=-4700.0).go(probe_x=-1000.0).go(probe_y=-4890.0)
-    assert bench.moment
+    highest = bench.force_un
     assert "probe_tip" in heard.facts("contact")["bodies"]
+    assert heard.facts("touched") == {"tool": "left"}
+    bench.go(probe_y=-4700.0)
+    assert bench.force_un == 0.0
+    assert heard.facts("left") == {"tool": "left", "peak_un": pytest.approx(highest)}
