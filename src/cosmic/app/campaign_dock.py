@@ -63,7 +63,7 @@ class CampaignDock(QObject):
         self._scene = scene
         self._panel: CampaignPanel | None = None
         self._holder = _Holder(lambda: self.panel)
-        window.add_panel(CAMPAIGN, self._holder, beside=beside, tabbed=True)
+        window.add_panel(CAMPAIGN, self._holder, scroll=False, beside=beside, tabbed=True)
 
     @property
     def panel(self) -> "CampaignPanel":
