@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
@@ -19,6 +20,14 @@ from cosmic.mico.core.orders import Order
 from cosmic.mico.core.poses import Pose, PoseBook
 from cosmic.mico.core.stop_latch import StopLatch, StopState
 from cosmic.mico.core.undo import UndoEntry
+
+
+@dataclass(frozen=True, slots=True)
+class RemoteController:
+    """What is known of the controller at a station."""
+
+    name: str = "a controller of another station"
+    simulated: bool = False
 
 
 class RemoteLatch(StopLatch):

@@ -1,57 +1,40 @@
 """What MiCo offers to other processes: hosted under the name "mico" on a `Station`."""
 
-import logging
 from typing import Final
 
 from cosmic.frame.errors import MoveCancelled, NotAvailable, refusal
-from cosmic.frame.network.caller import JOG_LIMIT_S, MOVE_LIMIT_S, current_call
+from cosmic.frame.network.caller import JOG_LIMIT_S, MOVE_LIMIT_S
 from cosmic.frame.network.remote import remote
 from cosmic.frame.network.station import Station
 from cosmic.frame.task import Task
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
-from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.api.application_base import WAY_BUDGET_S
 from cosmic.mico.api.group import GroupMovement
-from cosmic.mico.api.links import check_linkable
 from cosmic.mico.api.station_checks import finite, one_line
-from cosmic.mico.api.station_orders import Key, OrderBook, Ordered
-from cosmic.mico.api.station_tell import MicoTeller
+from cosmic.mico.api.station_orders import Ordered
+from cosmic.mico.api.station_settings import SettingsSide
 from cosmic.mico.api.station_ways import WaySearch
 from cosmic.mico.api.station_words import (
-    COMMANDS,
     MicoFacts,
     MicoPicture,
     MicoStatus,
     SentMotion,
-    StampedState,
 )
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
-from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
-from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.collision.model import SceneModel
-from cosmic.mico.core.orders import FREQUENCY_HZ, Jog, Order, Steer
-from cosmic.mico.core.poses import Pose
-
-logger = logging.getLogger(__name__)
+from cosmic.mico.core.orders import Jog, Order, Steer
 
 LONGEST_SEARCH_S: Final = 60.0
 """For how long a client may have a way looked for; other long operations wait for it."""
 
 
-class MicoStationSide:
+class MicoStationSide(SettingsSide):
     """Carries out what other processes ask of MiCo, and tells them how it is; any thread.
 
     What moves, and what changes how things move, needs the lease. A stop, a halt and a question
     need none. Positions are in gate coordinates.
     """
-
-    def __init__(self, application: MicoApplication) -> None:
-        self._application = application
-        self._manager = application.manager
-        self._orders = OrderBook()
-        self._teller = MicoTeller(application, application.trajectories.policy)
-        self._station: Station | None = None
 
     def on_hosted(self, station: Station) -> None:
         """Tell on this station, and let its lease decide who moves."""
@@ -254,55 +237,6 @@ class MicoStationSide:
         self._manager.reset_stop()
         return self._teller.status()
 
-    # Settings that change how things move
-
-    @remote(moves=True)
-    def set_zero(self, axis: str, zero: float) -> StampedState | None:
-        """Show positions relative to `zero`, in gate coordinates."""
-        finite(zero, f"{axis}: a zero")
-        self._log(f"{axis}: zero at {zero:g}", "")
-        self._manager.device(axis).set_zero(self._manager.address(axis).channel, zero)
-        return self._teller.note(axis)
-
-    @remote(moves=True)
-    def set_frequency(self, axis: str, frequency_hz: int) -> None:
-        """Limit the closed-loop speed."""
-        low, high = FREQUENCY_HZ
-        if not low <= frequency_hz <= high:
-            text = f"{axis}: frequency {frequency_hz} Hz is outside {low} to {high} Hz"
-            raise refusal(refuse(Reason.LIMIT, text, axis=axis, value=frequency_hz, unit="Hz"))
-        channel = self._manager.address(axis).channel
-        self._manager.device(axis).set_frequency(channel, frequency_hz)
-
-    @remote(moves=True)
-    def link(self, first: str, second: str, ratio: float) -> MicoStatus:
-        """Link two axes."""
-        check_linkable(self._manager, first, second)
-        self._log(f"link of {first} and {second}, {ratio:g}", "")
-        self._manager.links.add(first, second, ratio)
-        return self._teller.status()
-
-    @remote(moves=True)
-    def unlink(self, axis: str) -> MicoStatus:
-        """Take away every link of an axis."""
-        self._log(f"{axis}: unlinked", "")
-        self._manager.links.remove(axis)
-        return self._teller.status()
-
-    @remote(moves=True)
-    def watch_axis(self, axis: str, watched: bool) -> MicoStatus:
-        """Take an axis out of collision detection, or in again."""
-        change = self._model().take_in if watched else self._model().take_out
-        change(axis, source=self._who())
-        return self._teller.status()
-
-    @remote(moves=True)
-    def set_contact(self, name: str, allowed: bool) -> MicoStatus:
-        """Let the bodies of an operation touch, or watch them again."""
-        change = self._model().allow_contact if allowed else self._model().forbid_contact
-        change(name, source=self._who())
-        return self._teller.status()
-
     # What takes long
 
     @remote(moves=True)
@@ -323,45 +257,3 @@ class MicoStationSide:
         """Go a way that was found."""
         self._log(f"a way of {len(way.waypoints)} parts", "")
         return self._application.follow_way(way, self._source(""))
-
-    # Poses
-
-    @remote
-    def put_pose(self, name: str, positions: dict[str, float]) -> MicoStatus:
-        """Keep a named pose."""
-        for axis, position in positions.items():
-            self._manager.address(axis)
-            finite(position, f"{axis}: a position")
-        self._log(f"pose {name!r}", "")
-        self._application.trajectories.poses.put(Pose(name, positions))
-        return self._teller.status()
-
-    @remote
-    def remove_pose(self, name: str) -> MicoStatus:
-        """Forget a named pose."""
-        self._log(f"pose {name!r} removed", "")
-        self._application.trajectories.poses.remove(name)
-        return self._teller.status()
-
-    # Who asks
-
-    def _who(self) -> str:
-        call = current_call()
-        return call.caller.name if call is not None else "this program"
-
-    def _key(self, number: int) -> Key:
-        call = current_call()
-        return (call.caller.token if call is not None else "", number)
-
-    def _source(self, source: str) -> str:
-        return f"{self._who()} {one_line(source)}".strip()
-
-    def _log(self, what: str, source: str) -> None:
-        if self._station is not None:
-            self._station.publish(COMMANDS, f"{self._source(source)}: {what}"[:500])
-
-    def _model(self) -> CollisionManager:
-        model = self._application.collision
-        if model is None:
-            raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the station's platform file")
-        return model
