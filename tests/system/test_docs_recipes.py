@@ -8,6 +8,7 @@ from pydantic import BaseModel
 
 from cosmic.autonomy.bending.plan import SpanLimits
 from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.autonomy.campaign.opening import read_recipe
 from cosmic.autonomy.campaign.recipe import (
     OutputSettings,
     RecipeFile,
@@ -51,6 +52,11 @@ def test_the_recipe_on_the_page_is_one(tmp_path: Path) -> None:
     path = tmp_path / "page.toml"
     path.write_text(text, encoding="utf-8")
     assert load_recipe(path).file.stop.count == 40
+
+
+def test_every_shipped_recipe_names_a_procedure_and_parameters_that_there_are() -> None:
+    for path in shipped_recipes().values():
+        assert read_recipe(path).parameters is not None
 
 
 def test_every_shipped_recipe_is_listed() -> None:

@@ -21,11 +21,10 @@ class Parameters(StrictModel):
 PROCEDURES: dict[str, type[StrictModel]] = {
     "bend test": Parameters,
     "transport": Parameters,
-    "ping-pong": Parameters,
 }
 
 
-@pytest.mark.parametrize("name", ["bend-test", "quick", "ping-pong", "transport"])
+@pytest.mark.parametrize("name", ["bend-test", "quick", "transport"])
 def test_a_shipped_recipe_is_found_by_its_name_and_is_right(name: str) -> None:
     assert name in shipped_recipes()
     recipe = load_recipe(Path(name), procedures=PROCEDURES)
@@ -48,7 +47,7 @@ def written(folder: Path, text: str) -> Path:
         ('procedure = "bend test"\n[stop]\n', ("stop: give at least one of count",)),
         ('procedure = "bend test"\n[stop]\ncount = 0', ("stop.count: ", "has 0")),
         ('procedure = "bend test"\n[stop]\ncuont = 3', ("stop.cuont: unknown key",)),
-        ('procedure = "fly"\n[stop]\ncount = 3', ("procedure: ", "'fly'", "bend test, ping-pong")),
+        ('procedure = "fly"\n[stop]\ncount = 3', ("procedure: ", "'fly'", "bend test, transport")),
         (
             'procedure = "bend test"\n[stop]\ncount = 3\n[parameters.push.spans]\ncount = 99',
             ("parameters.push.spans.count: ", "has 99"),
