@@ -97,7 +97,7 @@ def test_the_table_has_the_newest_fibre_on_top(board: CampaignBoard) -> None:
     assert cell(board, 4, OUTCOME) == "good"
 
 
-def test_a_new_fibre_leaves_the_selection_where_it_is(board: CampaignBoard) -> None:
+def test_a_new_fibre_leaves_the_selection_where_it_is(board: CampaignBoard, qtbot: QtBot) -> None:
     board.set_state(state(FIBRES[:3]))
     board.table.selectRow(1)
     running = replace(failed(4, ""), outcome=Outcome.RUNNING, ended_s=math.nan)
@@ -105,7 +105,10 @@ def test_a_new_fibre_leaves_the_selection_where_it_is(board: CampaignBoard) -> N
     assert board.table.currentIndex().row() == 2
     assert cell(board, 0, OUTCOME) == "running"
     assert cell(board, 0, TIME) == "–"
-    board.set_state(state(FIBRES[:4]))
+    with qtbot.waitSignal(board.table.rows.dataChanged) as changed:
+        board.set_state(state(FIBRES[:4]))
+    assert changed.args is not None
+    assert [index.row() for index in changed.args[:2]] == [0, 0]
     assert cell(board, 0, OUTCOME) == "failed"
     assert board.table.currentIndex().row() == 2
     board.set_state(state(FIBRES[:1]))
@@ -233,10 +236,11 @@ def test_a_narrow_card_has_its_curves_below_the_picture(card: FibreCard, qtbot: 
 
 
 def test_a_picture_of_16_bit_is_shown(card: FibreCard) -> None:
-    pixels = (np.arange(100 * 80) % 4096 * 16).astype(np.uint16).reshape(80, 100)
-    wide = Picture("deep", pixels, 0.0)
-    card.set_card(card_of(replace(good(1), pictures=(wide,))))
-    assert card.picture.shown.width() == 100
+    deep = Picture("deep", np.full((80, 100), 0x8012, dtype=np.uint16), 0.0)
+    card.set_card(card_of(replace(good(1), pictures=(deep,))))
+    assert (card.picture.shown.width(), card.picture.shown.height()) == (100, 80)
+    middle = card.picture.grab().toImage().pixelColor(card.picture.rect().center())
+    assert middle.value() == 0x80
 
 
 @pytest.mark.parametrize(("value", "round_one"), [(1.0, 1.0), (4.9, 2.0), (730.0, 500.0)])

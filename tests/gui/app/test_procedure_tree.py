@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.procedure_tree import ProcedureTreePanel
+from cosmic.app.procedure_tree_port import ChangeBridge
 from cosmic.app.procedure_tree_view import CAUSE, PART, STATE, TRY
 from cosmic.autonomy.procedures.combinators import Fallback, Parallel, Repeat, Retry, Sequence
 from cosmic.autonomy.procedures.operation import SAFE_POINT
@@ -204,8 +205,9 @@ def test_many_changes_are_drawn_a_few_times(
     monkeypatch.setattr(tree, "show_view", lambda view: (next(drawn), real(view)))
     rounds = iter(range(2000))
     run = timed(Repeat(Op("a", steps=(0.0,)), lambda _work: next(rounds) == 1999), 1e5)
-    told = count()
+    told, signalled = count(), count()
     run.on_change(lambda: next(told))
+    panel._bridge.changed.connect(lambda: next(signalled))
     panel.follow(run)
     click(qtbot, panel.start)
     with qtbot.waitSignal(panel._redraw.timeout):
@@ -213,7 +215,20 @@ def test_many_changes_are_drawn_a_few_times(
     qtbot.waitUntil(lambda: panel.state.text() == "done")
     assert next(told) > 4000
     assert next(drawn) < 200
+    assert 0 < next(signalled) < 200
     assert panel.tree.row(())[STATE] == "done"
+
+
+def test_what_changes_after_a_drawing_is_told_again(qtbot: QtBot) -> None:
+    panel = shown(qtbot, ProcedureTreePanel())
+    bridge = ChangeBridge(panel)
+    told = count()
+    bridge.changed.connect(lambda: next(told))
+    for _ in range(3):
+        bridge.tell()
+    bridge.take()
+    bridge.tell()
+    assert next(told) == 2
 
 
 def test_closing_the_panel_aborts_the_run_begun_there_and_no_other(qtbot: QtBot) -> None:
@@ -225,8 +240,8 @@ def test_closing_the_panel_aborts_the_run_begun_there_and_no_other(qtbot: QtBot)
     panel.follow(other)
     qtbot.waitUntil(lambda: panel.state.text() == "running")
     panel.close()
+    qtbot.waitUntil(lambda: mine.state == "aborted")
     panel.shut_down()
-    assert mine.state == "aborted"
     assert other.state == "running"
     other.abort()
     other.join()
@@ -236,6 +251,7 @@ def test_its_tree_follows_the_theme(panel: ProcedureTreePanel, qapp: QApplicatio
     run = run_of(Op("a"))
     panel.follow(run)
     run.run_here()
+    panel.refresh()
     apply_theme(qapp, "light")
     try:
         panel.refresh()

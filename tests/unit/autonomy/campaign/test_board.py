@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cosmic.autonomy.campaign.board import board_of, card_of, row_of
-from cosmic.autonomy.campaign.records import Outcome
+from cosmic.autonomy.campaign.records import FibreRecord, Outcome
 from cosmic.autonomy.campaign.statistics import progress
 from unit.autonomy.campaign.sample_records import failed, good
 
@@ -52,8 +52,22 @@ def test_a_result_without_a_number_is_none() -> None:
     assert row.ei is None
 
 
+def raised(record: FibreRecord, offset_un: float) -> FibreRecord:
+    """Return the record of a sensor whose zero is off."""
+    assert record.bending is not None
+    spans = [replace(each, force_un=each.force_un + offset_un) for each in record.spans]
+    fits = [
+        replace(
+            each, baseline_un=each.baseline_un + offset_un, fitted_un=each.fitted_un + offset_un
+        )
+        for each in record.bending.spans
+    ]
+    bending = replace(record.bending, spans=tuple(fits))
+    return replace(record, spans=tuple(spans), bending=bending)
+
+
 def test_a_card_has_curves_from_the_first_contact_without_their_baseline() -> None:
-    record = good(1)
+    record = raised(good(1), 40.0)
     card = card_of(record)
     assert record.bending is not None
     assert len(card.curves) == len(record.spans)
