@@ -12,6 +12,7 @@ from cosmic.autonomy.handling.in_hand import FibreInHand
 from cosmic.autonomy.handling.settings import HandlingSettings, PushSettings
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.failures import ProcedureStopped
+from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun
 from cosmic.autonomy.procedures.tree import NodeEvent, NodeState
@@ -119,19 +120,24 @@ def test_a_single_fault_is_recovered_from_alone(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", ["slip_in_lift", "drop"])
-def test_a_lost_fibre_is_told_and_found_again_by_the_next_run(fault: str, tmp_path: Path):
+def test_a_fibre_that_was_lost_on_the_way_is_found_and_measured_all_the_same(
+    fault: str, tmp_path: Path
+):
     truth = tmp_path / "truth.jsonl"
     with sample("three-dry", truth, seed=4) as bench:
         bench.rig.faults.inject(fault)
-        with pytest.raises(Exception, match=r"dropped|lost|missed grasp") as told:
-            carried_out(bench.work, build_bend_test(SETTINGS))
-        lost = bench.work.finished[-1]
-        assert lost.failure is not None
-        assert lost.failure.cause in str(told.value)
-        fibres = [carried_out(bench.work, build_bend_test(SETTINGS)) for _ in range(3)]
+        failures: list[str] = []
+        while "no fibre" not in failures:
+            try:
+                carried_out(bench.work, build_bend_test(SETTINGS))
+            except OperationFailed as failure:
+                failures.append(failure.cause)
+        good = [each for each in bench.work.finished if each.failure is None]
     record = read_truth(truth)
-    for fibre in fibres:
+    assert set(failures) <= {"dropped", "lost", "no fibre"}
+    for fibre in good:
         check(record, fibre)
+    assert {true_fibre(record, fibre).number for fibre in good} == {0, 1, 2}
 
 
 @pytest.mark.slow
