@@ -12,12 +12,12 @@ from cosmic.app.platform import Platform, Uses, build_platform
 from cosmic.app.rig import Rig
 from cosmic.app.serve_options import StationAddress
 from cosmic.app.station_host import StationHost
-from cosmic.frame.errors import NotAvailable
+from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.failure import Failure
 
 
 @contextmanager
-def served(*applications: str) -> Iterator[tuple[Platform, StationHost, str]]:
+def served(*applications: str, name: str = "there") -> Iterator[tuple[Platform, StationHost, str]]:
     """Serve applications from here; what a process of its own would do."""
     platform = build_platform(applications=applications)
     endpoint = f"tcp/127.0.0.1:{free_port()}"
@@ -25,7 +25,7 @@ def served(*applications: str) -> Iterator[tuple[Platform, StationHost, str]]:
         at_end.callback(platform.shut_down)
         platform.initialize()
         settings = NetworkSettings()
-        host = StationHost(platform, serving(settings, "there", platform.path, listen=endpoint))
+        host = StationHost(platform, serving(settings, name, platform.path, listen=endpoint))
         at_end.callback(host.close)
         yield platform, host, endpoint
 
@@ -66,6 +66,15 @@ def test_boards_there_stop_axes_here_and_their_silence_does_as_well() -> None:
         assert rig.stopped is None
         host.close()
         assert wait_until(lambda: rig.stopped), "nobody can say that the limit holds"
+
+
+def test_an_application_that_two_stations_host_is_used_at_neither() -> None:
+    with served("daqco") as (_, _, first), served("daqco", name="other") as (_, _, second):
+        there = StationAddress("there", first)
+        with pytest.raises(ConfigError, match="both there and other host daqco"):
+            build_platform(uses=Uses((there, StationAddress("other", second))))
+        with pytest.raises(ConfigError, match="there: this station is named twice"):
+            build_platform(uses=Uses((there, there)))
 
 
 def test_a_taken_port_is_said_to_be_taken() -> None:

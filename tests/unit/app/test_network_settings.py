@@ -1,0 +1,61 @@
+"""What the section [network] means."""
+
+from pathlib import Path
+
+import pytest
+
+from cosmic.app.network_settings import NetworkSettings, serving
+from cosmic.app.serve_options import StationAddress
+from cosmic.frame.errors import ConfigError
+from cosmic.frame.network.caller import Access
+from cosmic.frame.network.certificates import make_certificates
+
+
+def test_on_this_computer_everybody_may_do_everything_unless_names_are_listed() -> None:
+    how = serving(NetworkSettings(), "Lab", Path())
+    assert how.line.endpoint == "tcp/127.0.0.1:7447"
+    assert how.allowed("anybody") is Access.MOVE
+
+
+def test_whoever_is_not_listed_is_not_let_in() -> None:
+    settings = NetworkSettings(view=("visitor", "desk"), call=("camera",), move=("desk",))
+    how = serving(settings, "Lab", Path())
+    assert how.allowed("visitor") is Access.VIEW
+    assert how.allowed("camera") is Access.CALL
+    assert how.allowed("desk") is Access.MOVE, "of two lists the one with more counts"
+    assert how.allowed("anybody") is None
+    assert set(how.line.clients) == {"visitor", "desk", "camera"}
+
+
+@pytest.mark.parametrize(
+    ("platform", "name"),
+    [("FiberStation", "fiberstation"), ("Labor Süd 2", "labor-s-d-2"), ("纤维", "station")],
+)
+def test_a_station_is_called_as_its_platform(platform: str, name: str) -> None:
+    assert serving(NetworkSettings(), platform, Path()).name == name
+
+
+def test_with_certificates_a_station_bears_the_name_in_them(tmp_path: Path) -> None:
+    make_certificates(tmp_path / "keys", "fibres")
+    settings = NetworkSettings(
+        certificates="keys/fibres", move=("desk",), listen="tls/192.168.1.5:7447"
+    )
+    how = serving(settings, "Lab", tmp_path)
+    assert how.name == "fibres"
+    assert how.line.encrypted
+    assert serving(settings, "Lab", tmp_path, name="other").name == "other"
+
+
+def test_with_certificates_somebody_has_to_be_let_in(tmp_path: Path) -> None:
+    make_certificates(tmp_path / "keys", "fibres")
+    settings = NetworkSettings(certificates="keys/fibres", listen="tls/192.168.1.5:7447")
+    with pytest.raises(ConfigError, match=r"list the clients[\s\S]*move = "):
+        serving(settings, "Lab", tmp_path)
+
+
+def test_an_address_names_the_station_and_where_it_listens() -> None:
+    address = StationAddress.read("fibervision=tcp/127.0.0.1:7448")
+    assert (address.name, address.endpoint) == ("fibervision", "tcp/127.0.0.1:7448")
+    for text in ("", "fibervision", "fibervision=", "=tcp/127.0.0.1:7448"):
+        with pytest.raises(ConfigError, match="it reads NAME="):
+            StationAddress.read(text)
