@@ -12,6 +12,7 @@ from cosmic.autonomy.bending.span import Span
 Mask = npt.NDArray[np.bool_]
 
 LEAST_POINTS: Final = 6
+LEAST_OUT: Final = 4
 CLEAR_SIGMAS: Final = 5.0
 FREE_PART: Final = 0.125
 """Of a way: the part that the probe is taken to be free on."""
@@ -79,6 +80,11 @@ def points_of(span: Span) -> Points:
         raise BendingError(
             f"the span at {span.nominal_um:g} um has {kept.sum()} usable points, and a fit needs "
             f"{LEAST_POINTS}: measure it again with more steps"
+        )
+    if np.sum(span.loading[kept]) < LEAST_OUT:
+        raise BendingError(
+            f"the span at {span.nominal_um:g} um has {np.sum(span.loading[kept])} points on the "
+            f"way out, and a fit needs {LEAST_OUT}: measure it again with more steps"
         )
     return Points(
         span.way_um[kept],

@@ -24,13 +24,19 @@ from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.bending.symptoms import (
     back_and_forth_percent,
     lost_while_pushing,
+    rises,
     saturated,
     touched,
 )
 
 ROUNDS: Final = 2
+LEAST_OF_A_WAY: Final = 3
 CLOSE_SIGMAS: Final = 2.5
 TINY: Final = 1e-4
+BRANCH_STDS: Final = (5.0, 1000.0)
+BASELINE_STDS: Final = (1000.0, 10.0)
+"""How little is known of each value without any point; of ln(uN/um), um, uN and uN/s."""
+
 HIGHEST_LOG: Final = 20.0
 """Of a stiffness: beyond any fibre, and short of an overflow."""
 
@@ -57,7 +63,9 @@ class _Model:
         self._settings = settings
         self._length_um = length_um
         self._elapsed_s = points.time_s - points.time_s[0]
-        self.branches = [each for each in (points.loading, ~points.loading) if each.sum() > 2]
+        # A way back that never touches says where the baseline is, and nothing of the fibre.
+        back = [~points.loading] if rises(points, ~points.loading) else []
+        self.branches = [points.loading, *back]
 
     def contact(self, values: Floats) -> Floats:
         force = np.zeros(len(self._points.way_um))
@@ -129,7 +137,9 @@ class _Model:
                 misfit, values, jac=slopes, method="lm", x_scale="jac", max_nfev=400
             )
             values, chi2, jacobian = found.x, 2.0 * float(found.cost), found.jac
-        covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian), dtype=np.float64)
+        weak = np.array([*BRANCH_STDS * len(self.branches), *BASELINE_STDS]) ** -2.0
+        information = jacobian.T @ jacobian + np.diag(weak)
+        covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
         return _Found(values, covariance, chi2, len(points.way_um) - len(values))
 
 
@@ -150,6 +160,7 @@ def fit_span(span: Span, *, settings: FitSettings, place_um: float, length_um: f
     """
     points = points_of(span)
     points = points.but(clings(points, settings.drift_un_sqrt_s))
+    points = points.but(_alone(points))
     if not touched(points, settings.drift_un_sqrt_s):
         peak = float(np.max(points.force_un - free_force_un(points)))
         return _without_contact(span, place_um, peak)
@@ -165,6 +176,12 @@ def fit_span(span: Span, *, settings: FitSettings, place_um: float, length_um: f
             k_std_un_um=fit.k_loading_un_um * math.sqrt(found.covariance[0, 0]),
         )
     return replace(fit, flags=flags)
+
+
+def _alone(points: Points) -> Mask:
+    """Return the points of a way that has too few of them for a line."""
+    ways = (points.loading, ~points.loading)
+    return next((way for way in ways if 0 < way.sum() < LEAST_OF_A_WAY), points.loading & False)
 
 
 def _without_contact(span: Span, place_um: float, peak_un: float) -> SpanFit:
@@ -198,7 +215,7 @@ def _told(span: Span, points: Points, model: _Model, found: _Found, place_um: fl
     baseline = model.baseline(values)
     fitted = np.full(len(span.way_um), math.nan)
     fitted[points.kept] = model.total(values)
-    out, back = (values[:2], values[2:4]) if both else (values[:2], values[:2])
+    out, back = (values[:2], values[2:4]) if both else (values[:2], (math.nan, math.nan))
     return SpanFit(
         place_um=place_um,
         k_un_um=k,

@@ -5,12 +5,13 @@ from typing import Final
 
 import numpy as np
 
-from cosmic.autonomy.bending.branch import CLEAR_SIGMAS, Points, free_force_un
+from cosmic.autonomy.bending.branch import CLEAR_SIGMAS, Mask, Points, free_force_un
 from cosmic.autonomy.bending.result import Floats
 from cosmic.autonomy.bending.span import Span
 
 NEAR_RANGE: Final = 0.98
 NEIGHBOURS: Final = 3
+LEAST_CLEAR: Final = 2
 LOST_PART: Final = 0.4
 """Of the highest force so far: less than this farther out is a force that was lost."""
 
@@ -29,6 +30,12 @@ def touched(points: Points, drift_un_sqrt_s: float) -> bool:
         float(np.median(points.std_un)) / math.sqrt(NEIGHBOURS), drift_un_sqrt_s * math.sqrt(took_s)
     )
     return bool(np.max(mean) > CLEAR_SIGMAS * noise)
+
+
+def rises(points: Points, way: Mask) -> bool:
+    """Return whether a few points of one way stand clear of the baseline."""
+    height = (points.force_un - free_force_un(points))[way]
+    return bool(np.sum(height > CLEAR_SIGMAS * points.std_un[way]) >= LEAST_CLEAR)
 
 
 def saturated(span: Span, range_un: float) -> bool:

@@ -275,12 +275,35 @@ def test_points_that_are_no_numbers_are_left_out() -> None:
     assert np.isfinite(found.spans[0].fitted_un).sum() >= len(holed) - 12
 
 
+def part(span: Span, kept: np.ndarray) -> Span:
+    """Return some points of a span."""
+    columns = ("way_um", "force_un", "force_std_un", "time_s", "loading")
+    return dataclasses.replace(span, **{name: getattr(span, name)[kept] for name in columns})
+
+
+@pytest.mark.parametrize(
+    "back",
+    [[], [30, 40], [44, 45, 46, 47], [41, 42, 43, 44, 45]],
+    ids=["none", "two", "free", "kink"],
+)
+def test_a_way_back_with_few_points_does_no_harm(back: list[int]) -> None:
+    spans = pushed(rig())
+    kept = np.array([*range(24), *back])
+    found = fit_bending([part(span, kept) for span in spans])
+    whole = fit_bending(spans)
+    assert found.ei_n_m2 == pytest.approx(whole.ei_n_m2, rel=0.02)
+    assert width_percent(found) == pytest.approx(width_percent(whole), rel=0.15)
+    assert found.trusted, found.reasons
+
+
 def test_a_span_that_is_not_whole_is_refused_with_what_is_wrong() -> None:
     (span, *_) = pushed(rig())
     with pytest.raises(BendingError, match="has 48 positions, but 47"):
         fit_bending([dataclasses.replace(span, force_un=span.force_un[1:])])
     with pytest.raises(BendingError, match="has 0 usable points"):
         fit_bending([dataclasses.replace(span, force_std_un=np.zeros(48))])
+    with pytest.raises(BendingError, match="has 2 points on the way out"):
+        fit_bending([part(span, np.arange(22, 48))])
 
 
 def test_the_fitted_curve_runs_through_the_points() -> None:
