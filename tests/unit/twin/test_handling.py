@@ -317,6 +317,11 @@ def test_rates_of_trouble_are_those_of_the_settings() -> None:
     assert sum(each.missed for each in fates) == pytest.approx(320, abs=60)
     assert sum(each.slip_at_um < math.inf for each in fates) == pytest.approx(200, abs=50)
     assert sum(each.sticks for each in fates) == pytest.approx(240, abs=55)
+    assert sum(each.break_strain < 0.01 for each in fates) == pytest.approx(32, abs=20)
+    assert sum(each.loosen_strain < 0.01 for each in fates) == pytest.approx(48, abs=25)
+    steep = [abs(math.degrees(math.atan(each.rise))) for each in fates]
+    assert sum(each > 5.0 for each in steep) == pytest.approx(40, abs=22)
+    assert np.median(steep) == pytest.approx(0.34, abs=0.05)
     calm = draw_fate(shipped.handling, shipped.contact, "0 0 1", faults=False)
     assert not (calm.missed or calm.sticks) and calm.rise == 0.0
     assert calm.slip_at_um == math.inf and calm.drop_after_um == math.inf
