@@ -8,6 +8,11 @@ from pydantic import BaseModel
 
 import cosmic
 from cosmic.app.remote_station import StationControl
+from cosmic.autonomy.bending.plan import PlannedSpan
+from cosmic.autonomy.bending.result import BendingError, BendingResult, Quality, SpanFit
+from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.campaign.records import CampaignError, FibreRecord, Outcome, Shape
+from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.control.handle import ControlHandle
 from cosmic.autonomy.control.law import ControlState
@@ -153,6 +158,13 @@ CLASSES: Final[dict[str, type]] = {
     "NodeView": NodeView,
     "OperationTimes": OperationTimes,
     "OperationStatistics": OperationStatistics,
+    "PlannedSpan": PlannedSpan,
+    "Span": Span,
+    "BendingResult": BendingResult,
+    "SpanFit": SpanFit,
+    "CampaignReader": CampaignReader,
+    "FibreRecord": FibreRecord,
+    "Shape": Shape,
 }
 ENUMS: Final[dict[str, type[Enum]]] = {
     "Reason": cosmic.Reason,
@@ -170,6 +182,8 @@ ENUMS: Final[dict[str, type[Enum]]] = {
     "ControlEnding": ControlEnding,
     "RunState": RunState,
     "NodeState": NodeState,
+    "Quality": Quality,
+    "Outcome": Outcome,
 }
 # Exceptions that a script may want to name and that `cosmic` does not export.
 FURTHER_EXCEPTIONS: Final = (
@@ -181,6 +195,8 @@ FURTHER_EXCEPTIONS: Final = (
     ProcedureStopped,
     UndoFailed,
     ProcedureAborted,
+    BendingError,
+    CampaignError,
     StationAway,
     StationTimeout,
     Busy,
@@ -191,6 +207,7 @@ FURTHER_EXCEPTIONS: Final = (
 # Attributes that an object gets when it is made, which the class does not show.
 MADE_LATER: Final = {
     "Vico": ("lens", "light"),
+    "CampaignReader": ("folder",),
     "CameraHandle": ("name",),
     "Control": ("settings",),
     "ProcedureRun": ("procedure", "work", "times"),

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
@@ -34,6 +35,7 @@ from cosmic.autonomy.campaign.store_line import WriteLine, last_number
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.campaign.store_rows import (
     Row,
+    cell,
     fibre_row,
     insert,
     operation_row,
@@ -155,12 +157,18 @@ class CampaignStore:
 
     # ------------------------------------------------------------------ writing
 
-    def begin_fibre(self, found: Pose | None = None, *, time_s: float) -> int:
-        """Note that a fibre's treatment begins, and return its number."""
+    def begin_fibre(
+        self, found: Pose | None = None, *, time_s: float, length_um: float = math.nan
+    ) -> int:
+        """Note that a fibre's treatment begins, and return its number.
+
+        Place and length let it be known again if the treatment is interrupted.
+        """
         row: dict[str, str | int | float | None] = {
             "run": self._run,
             "outcome": Outcome.RUNNING.value,
             "began_s": time_s,
+            "length_um": cell(length_um),
         }
         if found is not None:
             row["found_x_plate_um"] = found.x_plate_um

@@ -73,3 +73,14 @@ def test_an_interrupted_fibre_is_tried_once_more_only(store: CampaignStore) -> N
     assert not resume(store).is_done(LEFT_THERE, 1500.0)
     store.begin_fibre(LEFT_THERE, time_s=60.0)
     assert resume(store).is_done(LEFT_THERE, 1500.0)
+
+
+def test_another_fibre_at_the_place_of_an_interrupted_one_is_not_taken_for_it(
+    store: CampaignStore,
+) -> None:
+    for _ in range(2):
+        store.begin_fibre(LEFT_THERE, time_s=0.0, length_um=1500.0)
+        plan = resume(store)
+    assert plan.is_done(LEFT_THERE, 1510.0)
+    assert not plan.is_done(LEFT_THERE, 2500.0)
+    assert [each.length_um for each in plan.known] == [1500.0, 1500.0]
