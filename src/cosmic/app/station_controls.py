@@ -1,6 +1,7 @@
 """Shows in a window who commands at each station, and takes and gives that right."""
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 from PySide6.QtCore import QObject, Signal
@@ -14,7 +15,7 @@ from cosmic.frame.network.lease import LeaseState, StationLease
 
 HERE: Final = "this window"
 AXES: Final = "axes"
-Words = tuple[str, ControlAction | None, bool]
+_OPERATOR: Final = "the operator at "
 _TAKE_OVER: Final = "take over"
 _OFFER: Final = "offer"
 
@@ -83,18 +84,20 @@ class StationControls(QObject):
         self._show()
 
     def _show(self) -> None:
-        far = [each for each in self._known.values() if self._moving.get(each.station)]
-        shown = [_words(each, alone=len(far) == 1) for each in far]
-        moving = [self._moving[each.station] for each in far]
-        if self._moving.get("") or not shown:
-            shown.append(_own_words(self._own_state))
-            moving.append(self._moving.get("", ""))
-        # What moves the axes stands first.
-        entries = sorted(zip(moving, shown, strict=True), key=lambda each: AXES not in each[0])
-        words = [word if len(entries) == 1 else f"{what}: {word}" for what, (word, *_) in entries]
-        tips = [f"{what or 'movements'}: commanded by {word}" for what, (word, *_) in entries]
-        self._sign.show_holder("; ".join(words), warn=not entries[0][1][2], tip="\n".join(tips))
-        self._sign.set_actions([action for _, (_, action, _) in entries if action is not None])
+        entries = [
+            _words(control, self._moving[control.station])
+            for control in self._known.values()
+            if self._moving.get(control.station)
+        ]
+        if self._moving.get("") or not entries:
+            entries.append(_own_words(self._own_state, self._moving.get("", "")))
+        entries.sort(key=lambda each: AXES not in each.what)  # what moves the axes stands first
+        text = entries[0].who
+        if len(entries) > 1:
+            text = "; ".join(f"{each.what}: {each.who.removeprefix(_OPERATOR)}" for each in entries)
+        tip = "\n".join(f"{each.what or 'movements'}: commanded by {each.who}" for each in entries)
+        self._sign.show_holder(text, warn=not entries[0].here, tip=tip)
+        self._sign.set_actions([each.action for each in entries if each.action is not None])
 
     # What is asked for
 
@@ -113,6 +116,16 @@ class StationControls(QObject):
         self.failed.emit(str(error))
 
 
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """Who commands, what the operator can do about it, and whether it is this window."""
+
+    what: str
+    who: str
+    action: ControlAction | None
+    here: bool
+
+
 def _what_moves(applications: Collection[str]) -> str:
     """Return what these applications move, for the operator; empty where nothing moves."""
     return ", ".join(
@@ -120,28 +133,29 @@ def _what_moves(applications: Collection[str]) -> str:
     )
 
 
-def _own_words(state: LeaseState | None) -> Words:
-    """Return who commands here, what the operator can do about it, and whether all is usual."""
+def _own_words(state: LeaseState | None, what: str) -> _Entry:
+    """Return the entry of what runs in this process."""
     if state is None:
-        return HERE, None, True
+        return _Entry(what, HERE, None, here=True)
     if not state.local:
         tip = f"What {state.holder} moves stops, and it cannot take control back until you offer it"
-        return state.holder, ControlAction(_TAKE_OVER, "Take over", tip), False
+        return _Entry(what, state.holder, ControlAction(_TAKE_OVER, "Take over", tip), here=False)
     if not state.offered:
         tip = "Let other programs take control again"
-        return f"{HERE}, kept", ControlAction(_OFFER, "Offer", tip), True
-    return HERE, None, True
+        return _Entry(what, f"{HERE}, kept", ControlAction(_OFFER, "Offer", tip), here=True)
+    return _Entry(what, HERE, None, here=True)
 
 
-def _words(control: StationControl, *, alone: bool) -> Words:
-    """Return the same of another station."""
+def _words(control: StationControl, what: str) -> _Entry:
+    """Return the entry of another station."""
     station = control.station
-    of = "" if alone else f" of {station}"
     if control.away:
-        return f"{station} is away", None, False
+        return _Entry(what, f"{station} is away", None, here=False)
     if control.here:
         tip = f"Give the control over {station} back; what moves by it stops"
-        return HERE, ControlAction(f"release at {station}", f"Release control{of}", tip), True
+        action = ControlAction(f"release at {station}", f"Release {what}", tip)
+        return _Entry(what, HERE, action, here=True)
     tip = f"Command the movements at {station} from this window"
-    action = ControlAction(f"take at {station}", f"Take control{of}", tip)
-    return control.holder or "not known yet", action if control.offered else None, False
+    take = ControlAction(f"take at {station}", f"Take {what}", tip)
+    who = control.holder or "not known yet"
+    return _Entry(what, who, take if control.offered else None, here=False)

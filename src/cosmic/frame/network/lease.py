@@ -17,7 +17,7 @@ from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 
 logger = logging.getLogger(__name__)
 
-TAKE_IT: Final = 'take control first ("Take control" in the window, rig.take_control() in a script)'
+TAKE_IT: Final = "take control first (the button in the top bar, rig.take_control() in a script)"
 
 
 @transferable
