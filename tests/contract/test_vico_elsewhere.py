@@ -44,7 +44,7 @@ from cosmic.vico.api.lens import LensHandle, LightHandle
 from cosmic.vico.api.remote_camera import RemoteCameraHandle
 from cosmic.vico.api.remote_lens import RemoteLensHandle, RemoteLightHandle
 from cosmic.vico.api.station_picture import SentPicture
-from cosmic.vico.api.station_state import pictures_topic, shown_topic
+from cosmic.vico.api.station_state import STATE, pictures_topic, shown_topic
 from cosmic.vico.api.vico import Vico
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.recording.reading import open_picture_recording
@@ -310,6 +310,42 @@ def test_a_picture_that_the_line_dropped_is_asked_for(
         assert soon(shown)
     finally:
         take_back()
+
+
+def test_the_live_view_is_corrected_by_the_background(away: VicoRig) -> None:
+    camera, pushed = away.vico.camera(), away.home.camera
+    ground = pushed.grey(100)
+    ground[:, 32:] = 200
+    camera.set_background()
+    pushed.push(*[ground.copy() for _ in range(8)])
+    assert soon(lambda: camera.has_background)
+
+    def even() -> bool:
+        pushed.keep_coming(ground.copy())
+        found = camera.latest()
+        return is_live(camera) and found is not None and int(np.ptp(found.data)) <= 1
+
+    assert soon(even)
+    assert np.array_equal(
+        while_waiting(away, lambda: away.vico.snap(timeout_s=LIMIT_S), 4), noise(4)
+    )
+
+
+def test_a_state_that_was_overtaken_is_passed_over(away: VicoRig) -> None:
+    assert away.remote is not None
+    known, told = away.remote.state, []
+    assert known is not None
+    got = Event()
+    forget = away.vico.on_change(lambda: told.append(tuple(away.vico.cameras)))
+    assert away.client is not None
+    fence = away.client.subscribe(STATE, Rule.LATEST, lambda _: got.set())
+    away.station.publish(STATE, replace(known, number=known.number - 1, cameras=()))
+    assert got.wait(LIMIT_S)
+    away.vico.camera().switch("focus", on=True)  # a newer one follows
+    assert soon(lambda: told)
+    assert set(told) == {("top",)}
+    forget()
+    fence.close()
 
 
 def test_a_slow_view_delays_no_call(away: VicoRig) -> None:
@@ -611,7 +647,7 @@ def test_a_station_that_goes_away_says_so_and_comes_back(tmp_path: Path) -> None
         first.close()
         assert soon(lambda: "fibres is away" in camera.problem)
         assert not camera.running
-        assert (camera.settings, camera.info) == (None, None)
+        assert (camera.settings, camera.info, tuple(vico.tools)) == (None, None, ())
         assert lens is not None and vico.light is not None
         assert "fibres is away" in lens.problem
         assert "fibres is away" in vico.light.problem
