@@ -11,7 +11,9 @@ from cosmic.app.remote_station import StationControl
 from cosmic.autonomy.bending.plan import PlannedSpan
 from cosmic.autonomy.bending.result import BendingError, BendingResult, Quality, SpanFit
 from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.records import CampaignError, FibreRecord, Outcome, Shape
+from cosmic.autonomy.campaign.statistics import CampaignProgress, MeanEi
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.control.handle import ControlHandle
@@ -162,6 +164,9 @@ CLASSES: Final[dict[str, type]] = {
     "Span": Span,
     "BendingResult": BendingResult,
     "SpanFit": SpanFit,
+    "Campaign": Campaign,
+    "CampaignProgress": CampaignProgress,
+    "MeanEi": MeanEi,
     "CampaignReader": CampaignReader,
     "FibreRecord": FibreRecord,
     "Shape": Shape,
@@ -181,6 +186,7 @@ ENUMS: Final[dict[str, type[Enum]]] = {
     "ControlState": ControlState,
     "ControlEnding": ControlEnding,
     "RunState": RunState,
+    "CampaignPhase": CampaignPhase,
     "NodeState": NodeState,
     "Quality": Quality,
     "Outcome": Outcome,
@@ -207,6 +213,7 @@ FURTHER_EXCEPTIONS: Final = (
 # Attributes that an object gets when it is made, which the class does not show.
 MADE_LATER: Final = {
     "Vico": ("lens", "light"),
+    "Campaign": ("work", "recipe", "store"),
     "CampaignReader": ("folder",),
     "CameraHandle": ("name",),
     "Control": ("settings",),

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from cosmic.autonomy.bending.result import BendingResult, SpanFit
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.campaign.records import FibreRecord, Floats, Outcome, Picture, Shape
-from cosmic.autonomy.campaign.statistics import MeanEi, Progress, mean_ei
+from cosmic.autonomy.campaign.statistics import CampaignProgress, MeanEi, mean_ei
 
 Mask = npt.NDArray[np.bool_]
 
@@ -104,7 +104,7 @@ def board_of(
     name: str,
     state: str,
     fibres: Iterable[FibreRecord],
-    progress: Progress,
+    progress: CampaignProgress,
     *,
     left_s: float = math.nan,
     operation: str = "",

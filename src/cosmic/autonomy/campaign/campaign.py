@@ -11,7 +11,7 @@ from cosmic.autonomy.campaign.keeper import Keeper, skip_known
 from cosmic.autonomy.campaign.recipe import Recipe
 from cosmic.autonomy.campaign.records import FibreRecord
 from cosmic.autonomy.campaign.resume import ResumePlan
-from cosmic.autonomy.campaign.statistics import Progress
+from cosmic.autonomy.campaign.statistics import CampaignProgress
 from cosmic.autonomy.campaign.stop_rule import StopRule
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.handling.survey import NONE_LEFT
@@ -163,7 +163,7 @@ class Campaign:
         return self._keeper.times
 
     @property
-    def progress(self) -> Progress:
+    def progress(self) -> CampaignProgress:
         """How it stands."""
         return self._keeper.progress()
 

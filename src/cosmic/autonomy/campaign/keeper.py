@@ -10,7 +10,7 @@ from cosmic.autonomy.campaign.journal import Journal
 from cosmic.autonomy.campaign.motion_log import MotionLog
 from cosmic.autonomy.campaign.records import CalibrationNote, FibreRecord
 from cosmic.autonomy.campaign.resume import Known, ResumePlan
-from cosmic.autonomy.campaign.statistics import Progress, progress
+from cosmic.autonomy.campaign.statistics import CampaignProgress, progress
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.handling.plate import Candidate
 from cosmic.autonomy.handling.work import FibreInHand, FibreWork
@@ -48,7 +48,7 @@ class Keeper:
         self._begun: FibreInHand | None = None
         self._number: int | None = None
 
-    def progress(self) -> Progress:
+    def progress(self) -> CampaignProgress:
         """Return how the campaign stands; any thread."""
         elapsed_s = self._before_s + self._work.clock.now_s() - self._began_s
         return progress(self.fibres, elapsed_s)

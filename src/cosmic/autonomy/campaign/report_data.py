@@ -11,7 +11,7 @@ from cosmic.autonomy.campaign.records import (
     CampaignInfo,
     FibreRecord,
 )
-from cosmic.autonomy.campaign.statistics import Progress, progress
+from cosmic.autonomy.campaign.statistics import CampaignProgress, progress
 from cosmic.autonomy.campaign.store_read import CampaignReader
 
 
@@ -41,7 +41,7 @@ class ReportData:
 
     info: CampaignInfo
     ended: tuple[str, str]
-    progress: Progress
+    progress: CampaignProgress
     finished: tuple[FibreRecord, ...]
     calibrations: tuple[CalibrationNote, ...]
     operations: tuple[OperationTime, ...]

@@ -40,7 +40,7 @@ class MeanEi:
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class CampaignProgress:
     """How a campaign stands.
 
     Attributes
@@ -93,13 +93,13 @@ def mean_ei(values_n_m2: Iterable[float]) -> MeanEi:
     return MeanEi(count, math.exp(middle), *ends, spread)
 
 
-def progress(fibres: Sequence[FibreRecord], elapsed_s: float) -> Progress:
+def progress(fibres: Sequence[FibreRecord], elapsed_s: float) -> CampaignProgress:
     """Return how a campaign with these fibres stands."""
     finished = [each for each in fibres if each.outcome in FINISHED]
     counts = Counter(each.outcome for each in fibres)
     good = [each for each in finished if each.outcome is Outcome.GOOD]
     causes = Counter(each.cause or "not told" for each in finished if each not in good)
-    return Progress(
+    return CampaignProgress(
         done=len(finished),
         good=len(good),
         doubtful=counts[Outcome.DOUBTFUL],

@@ -6,7 +6,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from cosmic.autonomy.campaign.statistics import Progress
+from cosmic.autonomy.campaign.statistics import CampaignProgress
 from cosmic.frame.config import StrictModel
 
 
@@ -50,7 +50,7 @@ class StopRule:
 
     settings: StopSettings
 
-    def reason(self, now: Progress) -> str:
+    def reason(self, now: CampaignProgress) -> str:
         """Return which rule is met, in words; empty: go on."""
         rules = self.settings
         if rules.count is not None and now.done >= rules.count:
@@ -65,7 +65,7 @@ class StopRule:
             return f"mean stiffness known to +/-{found:.1f} %"
         return ""
 
-    def left_s(self, now: Progress) -> float:
+    def left_s(self, now: CampaignProgress) -> float:
         """Return the time until the first rule is met, as far as can be told; nan: it cannot."""
         rules, times = self.settings, []
         cycle = now.elapsed_s / now.done if now.done else math.nan
@@ -83,7 +83,7 @@ class StopRule:
         return min(told) if told else math.nan
 
 
-def _needed(now: Progress, precision_percent: float) -> float:
+def _needed(now: CampaignProgress, precision_percent: float) -> float:
     """Return how many good fibres make the mean so precise, by the spread so far."""
     half = math.log1p(precision_percent / 100.0)
     return math.ceil((1.96 * now.mean.spread_ln / half) ** 2) if now.mean.count >= 2 else math.nan

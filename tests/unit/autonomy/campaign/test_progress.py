@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from cosmic.autonomy.campaign.records import FibreRecord, Outcome
-from cosmic.autonomy.campaign.statistics import Progress, mean_ei, progress
+from cosmic.autonomy.campaign.statistics import CampaignProgress, mean_ei, progress
 from cosmic.autonomy.campaign.stop_rule import StopRule, StopSettings
 from unit.autonomy.campaign.sample_records import failed, good
 
@@ -85,7 +85,7 @@ def test_the_time_left_follows_from_the_pace_so_far() -> None:
 
 
 def test_the_time_to_a_precision_grows_with_the_spread() -> None:
-    def spread(ln: float) -> Progress:
+    def spread(ln: float) -> CampaignProgress:
         logs = ln * np.array([-1.0, 0.0, 1.0, -0.5, 0.5])
         fibres = [good(n, ei_n_m2=float(5e-11 * np.exp(each))) for n, each in enumerate(logs)]
         return progress(fibres, 100.0)
