@@ -11,9 +11,10 @@ from cosmic.app.remote_station import StationControl
 from cosmic.autonomy.bending.plan import PlannedSpan
 from cosmic.autonomy.bending.result import BendingError, BendingResult, Quality, SpanFit
 from cosmic.autonomy.bending.span import Span
-from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
+from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.records import CampaignError, FibreRecord, Outcome, Shape
 from cosmic.autonomy.campaign.statistics import CampaignProgress, MeanEi
+from cosmic.autonomy.campaign.steering import CampaignPhase
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.control.handle import ControlHandle

@@ -10,9 +10,10 @@ from typing import Final, TextIO
 
 from cosmic.app.campaign_output import gui_application, write_output
 from cosmic.app.rig import connect
-from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
+from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.opening import read_recipe
 from cosmic.autonomy.campaign.recipe import Recipe
+from cosmic.autonomy.campaign.steering import CampaignPhase
 from cosmic.frame.clock import WALL
 
 _EVERY_S: Final = 0.5

@@ -6,7 +6,8 @@ from typing import Final
 from typing_extensions import override
 
 from cosmic.app.procedure_tree_port import ProcedurePort
-from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
+from cosmic.autonomy.campaign.campaign import Campaign
+from cosmic.autonomy.campaign.steering import CampaignPhase
 from cosmic.autonomy.procedures.procedure import outline_of
 from cosmic.autonomy.procedures.run_state import RunState
 from cosmic.autonomy.procedures.tree import NodeView, TreeKeeper

@@ -10,10 +10,10 @@ from PySide6.QtCore import Qt
 from cosmic.app.campaign_panel import CampaignPanel
 from cosmic.app.control_mode import ACM, blocked_modes
 from cosmic.app.scene_replay import poses_of
-from cosmic.autonomy.campaign.campaign import CampaignPhase
 from cosmic.autonomy.campaign.recipe import load_recipe
 from cosmic.autonomy.campaign.records import CampaignInfo, FibreRecord, Series
 from cosmic.autonomy.campaign.statistics import progress
+from cosmic.autonomy.campaign.steering import CampaignPhase
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.shipped.bend_test import build_bend_test

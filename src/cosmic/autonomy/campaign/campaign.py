@@ -3,8 +3,6 @@
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import StrEnum
-from threading import Condition
 from typing import Final
 
 from cosmic.autonomy.campaign.keeper import Keeper, skip_known
@@ -12,6 +10,7 @@ from cosmic.autonomy.campaign.recipe import Recipe
 from cosmic.autonomy.campaign.records import FibreRecord
 from cosmic.autonomy.campaign.resume import ResumePlan
 from cosmic.autonomy.campaign.statistics import CampaignProgress
+from cosmic.autonomy.campaign.steering import OVER, CampaignPhase, CampaignSteering
 from cosmic.autonomy.campaign.stop_rule import StopRule
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.handling.survey import NONE_LEFT
@@ -20,34 +19,16 @@ from cosmic.autonomy.procedures.failures import STOPPED, ProcedureAborted
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun
-from cosmic.autonomy.procedures.run_state import RunState
 from cosmic.autonomy.procedures.run_thread import RunThread
 from cosmic.autonomy.procedures.times import OperationTimes
 from cosmic.autonomy.procedures.tree import OPERATION, NodeEvent, NodeState
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.listeners import tell
 
 logger = logging.getLogger(__name__)
 
 MOST_STUCK: Final = 3
 """Fibres in a row that cannot be put away before a person is asked for."""
-_POLL_S: Final = 0.2
-
-
-class CampaignPhase(StrEnum):
-    """What a campaign is at; the value is the word."""
-
-    READY = "ready"
-    RUNNING = "running"
-    PAUSING = "pausing"
-    PAUSED = "paused"
-    ENDING = "ending"
-    ENDED = "ended"
-    FAILED = "failed"
-
-
-OVER: Final = frozenset({CampaignPhase.ENDED, CampaignPhase.FAILED})
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +47,7 @@ class Doing:
     measures: bool = True
 
 
-class Campaign:
+class Campaign(CampaignSteering):
     """Runs a procedure again and again on one platform, and keeps what comes of it; any thread.
 
     Parameters
@@ -98,6 +79,7 @@ class Campaign:
         stopped: Callable[[], str | None],
         known: ResumePlan | None = None,
     ) -> None:
+        super().__init__()
         self.work = work
         self.recipe = recipe
         self.store = store
@@ -111,13 +93,8 @@ class Campaign:
         )
         self._broken: CosmicError | None = None
         self._stuck = 0
-        self._changed = Condition()
-        self._phase = CampaignPhase.READY
-        self._run: ProcedureRun[FibreWork] | None = None
         self._end_reason = ""
         self._operation = ""
-        self._abort: str | None = None
-        self._listeners: tuple[Callable[[], object], ...] = ()
         self._thread: RunThread | None = None
 
     # What is known of it
@@ -128,16 +105,6 @@ class Campaign:
         return self._doing.procedure
 
     @property
-    def phase(self) -> CampaignPhase:
-        """What it is at."""
-        return self._phase
-
-    @property
-    def over(self) -> bool:
-        """True when it has ended, well or not."""
-        return self._phase in OVER
-
-    @property
     def end_reason(self) -> str:
         """Why it ended; empty before."""
         return self._end_reason
@@ -146,11 +113,6 @@ class Campaign:
     def operation(self) -> str:
         """The operation under way, in words."""
         return self._operation
-
-    @property
-    def run(self) -> ProcedureRun[FibreWork] | None:
-        """The run of the procedure on the fibre in hand, for drawing; None before the first."""
-        return self._run
 
     @property
     def fibres(self) -> tuple[FibreRecord, ...]:
@@ -171,17 +133,6 @@ class Campaign:
     def left_s(self) -> float:
         """Time until it ends, on the platform's clock, as far as can be told; nan: it cannot."""
         return self._rule.left_s(self.progress)
-
-    def on_change(self, listener: Callable[[], object]) -> Callable[[], None]:
-        """Call `listener()` when anything changed, in any thread; returns what ends it."""
-        with self._changed:
-            self._listeners = (*self._listeners, listener)
-
-        def forget() -> None:
-            with self._changed:
-                self._listeners = tuple(each for each in self._listeners if each is not listener)
-
-        return forget
 
     # What can be asked of it
 
@@ -207,38 +158,6 @@ class Campaign:
         """
         self._begin()
         self._carry_out()
-
-    def pause(self) -> None:
-        """Rest at the next place where that is safe; harmless when it does not run."""
-        with self._changed:
-            if self._phase is not CampaignPhase.RUNNING:
-                return
-            self._phase = CampaignPhase.PAUSING
-            run = self._run
-        if run is not None:
-            run.pause()
-        self._tell()
-
-    def resume(self) -> None:
-        """Go on after a pause; harmless when it does not pause."""
-        with self._changed:
-            if self._phase not in (CampaignPhase.PAUSING, CampaignPhase.PAUSED):
-                return
-            self._phase = CampaignPhase.RUNNING
-            self._changed.notify_all()
-            run = self._run
-        if run is not None:
-            run.resume()
-        self._tell()
-
-    def step(self) -> None:
-        """Carry out one operation, then rest; harmless when it is over."""
-        with self._changed:
-            if self._phase in OVER or self._run is None or self._run.over:
-                return
-            self._phase = CampaignPhase.PAUSING
-            run = self._run
-        run.step()
 
     def abort(self, reason: str = "ended by the operator") -> None:
         """End it at once: what moves is cancelled, then it is made safe; returns at once."""
@@ -293,10 +212,8 @@ class Campaign:
             self.store.close()
         told = logger.error if failed else logger.info
         told("campaign %s: %s", self.recipe.name, self._end_reason)
-        with self._changed:
-            self._phase = CampaignPhase.FAILED if failed else CampaignPhase.ENDED
-            self._operation = ""
-            self._changed.notify_all()
+        self._operation = ""
+        self._move_on(CampaignPhase.FAILED if failed else CampaignPhase.ENDED)
         self._tell()
 
     def _treat_all(self) -> str:
@@ -320,13 +237,10 @@ class Campaign:
             stopped=self._stopped,
         )
         run.subscribe(self._on_event)
-        run.on_change(self._on_run_changed)
         self._keeper.begin_run()
         taken = len(self.work.finished)
-        with self._changed:
-            self._run = run
-            if self._abort is not None:
-                return self._abort
+        if reason := self._follow(run):
+            return reason
         try:
             run.run_here()
         except ProcedureAborted as exc:
@@ -379,29 +293,3 @@ class Campaign:
             self._broken = exc
             if self._run is not None:
                 self._run.abort(str(exc))
-
-    def _on_run_changed(self) -> None:
-        run = self._run
-        with self._changed:
-            pausing = run is not None and self._phase is CampaignPhase.PAUSING
-            if pausing and run is not None and run.state is RunState.PAUSED:
-                self._phase = CampaignPhase.PAUSED
-        if pausing and run is not None and run.state is RunState.RUNNING:
-            run.pause()  # it was wanted while the run had not begun
-        self._tell()
-
-    def _rest(self) -> None:
-        """Wait between two fibres while a pause is wanted."""
-        with self._changed:
-            if self._phase is CampaignPhase.PAUSING:
-                self._phase = CampaignPhase.PAUSED
-            resting = self._phase is CampaignPhase.PAUSED
-        if not resting:
-            return
-        self._tell()
-        with self._changed:
-            while self._phase is CampaignPhase.PAUSED and self._abort is None:
-                self._changed.wait(_POLL_S)
-
-    def _tell(self) -> None:
-        tell(self._listeners)
