@@ -6,7 +6,10 @@ from cosmic.autonomy.handling.patience import PatientMove
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import Steps
 
-COUNT_UM: Final = 30.0
+OVER: Final = 0.1
+"""Part of the travel by which the jaws are closed too far, to be closed for sure."""
+COUNT_UM: Final = 130.0
+"""How wrong the opening counted may be for a calibration; pictures show the jaws all the same."""
 
 
 def zero_jaws(work: FibreWork) -> Steps:
@@ -16,11 +19,13 @@ def zero_jaws(work: FibreWork) -> Steps:
     other until the count says so.
     """
     full, count = work.settings.grasp.full_um, work.mico[work.gripper.gap_axis]
-    yield from move_jaws(work, -1.1 * full)
-    work.gap_um = 0.0
+    close = -(1.0 + OVER) * full
+    yield from move_jaws(work, close)
     yield from move_jaws(work, max(0.0, full - (count.position_um or 0.0)))
-    work.gap_um = full
-    yield from move_jaws(work, work.settings.grasp.gap_um - full)
+    # From closed again: nothing is between jaws that come down no wider than they should be.
+    yield from move_jaws(work, close)
+    work.gap_um = 0.0
+    yield from move_jaws(work, work.settings.grasp.gap_um)
 
 
 def in_step(work: FibreWork) -> bool:
