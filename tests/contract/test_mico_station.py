@@ -559,6 +559,10 @@ def test_an_older_word_changes_nothing(hosted: HostedMico) -> None:
         assert mico["left.x"].position_um == 1.0
         manager.take_positions(AxisPositions({"left.x": (10**9, 4.0, 0.0)}))
         assert mico["left.x"].position_um == 4.0
+        manager.lose("the cable is out")
+        manager.take_event(StampedState(10**9 + 1, now, 0.0))
+        assert not mico["left.x"].details.present
+        assert mico["left.x"].error == "the cable is out"
 
 
 def test_who_commands_is_told_and_positions_are_told_seldom(hosted: HostedMico, how: str) -> None:

@@ -49,6 +49,7 @@ from cosmic.mico.hw.interface import Channel, PositionerKind
 
 logger = logging.getLogger(__name__)
 
+_OUTDATED: Final = -1
 NOT_YET: Final = "MiCo of the station has not told anything yet"
 
 
@@ -72,6 +73,8 @@ class RemoteAxes(QObject):
         self._facts: MicoFacts | None = None
         self._status: MicoStatus | None = None
         self._states: dict[str, StampedState] = {}
+        self._telling = RLock()
+        self._shown: dict[str, PositionerState] = {}
         self._devices: dict[int, RemoteDevice] = {}
         self._away = NOT_YET
         self._others: dict[str, PositionerSettings] = {}
@@ -190,9 +193,13 @@ class RemoteAxes(QObject):
         with self._lock:
             self._away = ""
             self._status = None
-            self._states = {}
+            for name, known in self._states.items():
+                self._states[name] = replace(known, stamp=_OUTDATED)
         for each in picture.states:
             self.heed(each)
+        with self._lock:
+            kept = {n: each for n, each in self._states.items() if each.stamp != _OUTDATED}
+            self._states = kept
         self._take_status(picture.status)
 
     def lose(self, why: str) -> None:
@@ -203,7 +210,7 @@ class RemoteAxes(QObject):
             for state in lost:
                 self._states[state.name] = replace(self._states[state.name], state=state)
         for state in lost:
-            self._devices[state.address.device].state_changed.emit(state)
+            self._tell(state.name)
         self.changed.emit()
 
     def take_event(self, event: object) -> None:
@@ -253,18 +260,28 @@ class RemoteAxes(QObject):
         state = replace(stamped.state, read_wall_s=WALL.now_s() - stamped.age_s)
         with self._lock:
             before = self._states.get(state.name)
-            if before is not None and stamped.stamp < before.stamp:
+            if self._away or (before is not None and stamped.stamp < before.stamp):
                 return
             self._states[state.name] = replace(stamped, state=state)
             device = self._device(state.address.device)
             device.container.put(state, self._settings_of(state))
-        if before is not None and _alike(before.state, state):
-            return
-        device.state_changed.emit(state)
-        if state.position is not None and (
-            before is None or before.state.position != state.position
-        ):
-            device.position_changed.emit(PositionChanged(state.name, state.position, state.unit))
+        self._tell(state.name)
+
+    def _tell(self, name: str) -> None:
+        """Emit the newest state of an axis; one at a time, so that the newest comes last."""
+        with self._telling:
+            known, before = self._states.get(name), self._shown.get(name)
+            if known is None:
+                return
+            state = known.state
+            if before is not None and _alike(before, state):
+                return
+            self._shown[name] = state
+            device = self._device(state.address.device)
+            device.state_changed.emit(state)
+            moved = before is None or before.position != state.position
+            if moved and state.position is not None:
+                device.position_changed.emit(PositionChanged(name, state.position, state.unit))
 
     def _device(self, index: int) -> RemoteDevice:
         device = self._devices.get(index)
