@@ -72,6 +72,7 @@ def unintended(record: TruthRecord) -> set[frozenset[str]]:
     return {pair for pair in pairs if not pair <= jaws}
 
 
+@pytest.mark.slow
 def test_a_fibre_is_found_taken_up_bent_and_put_away(tmp_path: Path):
     truth = tmp_path / "truth.jsonl"
     with sample("three-dry", truth) as bench:

@@ -115,11 +115,14 @@ class Choose(FibreOperation):
         ways = [way for each in work.candidates for way in self._ways(work, each, angle)]
         best = min(ways, key=lambda each: (each.under, abs(each.angle_deg - angle)), default=None)
         if best is None:
-            work.skipped[OUT_OF_REACH] += len(work.candidates)
+            if work.candidates:
+                work.skipped[OUT_OF_REACH] += len(work.candidates)
             work.candidates = []
             told = ", ".join(f"{count} {why}" for why, count in sorted(work.skipped.items()))
             cause = LOOK_AGAIN if work.since_survey else NONE_LEFT
-            raise OperationFailed(cause, f"none that can be taken up ({told or 'plate empty'})")
+            raise OperationFailed(
+                cause, f"none that can be taken up ({told or 'the plate is empty'})"
+            )
         work.candidates = [each for each in work.candidates if each is not best.candidate]
         gone = best.candidate.line_um.mean(axis=0)
         work.lines_um = [

@@ -1,0 +1,120 @@
+"""What of a survey may be taken up, and why the rest may not."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from typing_extensions import override
+
+from cosmic.autonomy.handling import survey
+from cosmic.autonomy.handling.plate import Jaws
+from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.handling.survey import Choose, look
+from cosmic.autonomy.handling.work import FibreWork
+from cosmic.autonomy.procedures.operation import OperationFailed
+from cosmic.frame.clock import ManualClock
+
+SCALE_UM_PX = 7.6
+
+
+class Bench(FibreWork):
+    """A plate to look at; nothing that could move."""
+
+    def __init__(self) -> None:
+        none: Any = None
+        super().__init__(none, none, none, HandlingSettings(), ManualClock(), Peak())  # type: ignore[arg-type]
+
+    @property
+    @override
+    def table_deg(self) -> float:
+        return 0.0
+
+    @property
+    @override
+    def jaws(self) -> Any:
+        return Jaws()
+
+
+class Peak:
+    """Stands for the force."""
+
+    def take_peak_un(self) -> float:
+        return 0.0
+
+
+class Seen:
+    """A fibre on a picture, as much of it as a survey looks at."""
+
+    def __init__(
+        self,
+        x_um: float,
+        y_um: float,
+        *,
+        length_um: float = 1200.0,
+        angle_deg: float = 60.0,
+        curl: float = 0.01,
+        doubts: tuple[str, ...] = (),
+    ) -> None:
+        way = np.linspace(-length_um / 2, length_um / 2, 80)
+        angle = math.radians(angle_deg)
+        self.line_um = np.column_stack([x_um + way * math.cos(angle), y_um + way * math.sin(angle)])
+        self.length_um, self.width_um = length_um, 30.0
+        self.fibre: Any = self
+        self.curl, self.doubts, self.certain, self.contrast = curl, doubts, not doubts, 60.0
+
+
+def looked(*seen: Seen) -> Bench:
+    bench = Bench()
+    look(bench, list(seen))  # type: ignore[arg-type]
+    return bench
+
+
+@pytest.mark.parametrize(
+    ("seen", "problem"),
+    [
+        (Seen(0.0, 0.0, length_um=300.0), survey.TOO_SHORT),
+        (Seen(0.0, 0.0, length_um=5000.0), survey.TOO_LONG),
+        (Seen(0.0, 0.0, curl=0.4), survey.TOO_CURLED),
+        (Seen(0.0, 0.0, doubts=("a crossing can be read in two ways",)), survey.CROSSING),
+        (Seen(0.0, 0.0, doubts=("the picture's border cuts it off",)), survey.OUT_OF_FIELD),
+        (Seen(0.0, 0.0, doubts=("it runs into something wider",)), survey.NOT_CERTAIN),
+    ],
+)
+def test_what_is_not_taken_is_counted_by_its_reason(seen: Seen, problem: str):
+    bench = looked(seen)
+    assert bench.candidates == []
+    assert bench.skipped == {problem: 1}
+
+
+def test_two_that_lie_close_together_are_both_left():
+    bench = looked(Seen(0.0, 0.0), Seen(40.0, 0.0), Seen(2000.0, 500.0))
+    assert [each.place_um for each in bench.candidates] == [pytest.approx((2000.0, 500.0))]
+    assert bench.skipped == {survey.TOO_NEAR: 2}
+
+
+def test_one_that_was_given_up_is_not_chosen_again():
+    bench = looked(Seen(0.0, 0.0))
+    bench.given_up = list(bench.candidates)
+    look(bench, [Seen(20.0, -15.0), Seen(-1500.0, 900.0)])  # type: ignore[list-item]
+    assert len(bench.candidates) == 1
+    assert bench.skipped == {survey.GIVEN_UP: 1}
+
+
+def test_each_is_chosen_once_and_the_last_choice_says_to_look_again():
+    bench = looked(Seen(0.0, 0.0), Seen(-2500.0, 800.0))
+    places = set()
+    for _ in range(2):
+        for _ in Choose().run(bench):
+            pass
+        places.add(bench.in_hand().reach.candidate.place_um)
+    assert len(places) == 2
+    with pytest.raises(OperationFailed) as told:
+        next(Choose().run(bench))
+    assert told.value.cause == survey.LOOK_AGAIN
+
+
+def test_a_plate_with_nothing_on_it_is_said_to_have_no_fibre():
+    with pytest.raises(OperationFailed, match="the plate is empty") as told:
+        next(Choose().run(looked()))
+    assert told.value.cause == survey.NONE_LEFT
