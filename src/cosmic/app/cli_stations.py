@@ -76,6 +76,7 @@ def serve_station(chosen: argparse.Namespace) -> int:
             seed=chosen.seed,
             cold=chosen.cold,
             sample=chosen.sample,
+            truth=chosen.truth,
         )
     )
 

@@ -69,6 +69,7 @@ def _build(options: ServeOptions, how: Serving, hosted: tuple[str, ...]) -> Plat
         cold=options.cold,
         seed=options.seed,
         sample=options.sample,
+        truth=options.truth,
         uses=Uses(options.stations, how.name, options.certificates, every=True),
     )
     for name in options.applications:

@@ -60,3 +60,4 @@ class ServeOptions:
     seed: int = 0
     cold: bool = False
     sample: str | None = None
+    truth: Path | None = None
