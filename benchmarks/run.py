@@ -2,7 +2,7 @@
 
 `python -m benchmarks.run --repeat 3` starts each benchmark three times, in turn, each time in a
 process of its own, and prints the medians with the range. The long ones, `soak`,
-`acquisition_soak` and `collision_oracles`, are commands of their own.
+`acquisition_soak`, `collision_oracles` and `campaign`, are commands of their own.
 """
 
 import argparse
@@ -44,8 +44,10 @@ NAMES = (
     "teleoperation",
     "control_loop",
     "network",
+    "procedure_engine",
+    "bending",
 )
-ALL = (*NAMES, "collision_oracles", "soak", "acquisition_soak")
+ALL = (*NAMES, "collision_oracles", "soak", "acquisition_soak", "campaign")
 ROOT = Path(__file__).resolve().parents[1]
 
 

@@ -2,6 +2,9 @@
 
 import math
 from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
 
 from cosmic.autonomy.campaign.records import (
     FibreRecord,
@@ -16,6 +19,9 @@ from cosmic.autonomy.handling.plate import Candidate
 from cosmic.autonomy.handling.work import FibreInHand
 from cosmic.autonomy.procedures.tree import ENDS, OPERATION, NodeEvent
 from cosmic.vico.core.picture import Picture as TakenPicture
+
+GEOMETRY: Final = "geometry"
+ROOM_PX: Final = 40
 
 
 def pose_of(candidate: Candidate) -> Pose:
@@ -92,7 +98,10 @@ def record_of(
         peak_force_un=fibre.peak_un,
         bending=fibre.bending,
         spans=tuple(fibre.spans),
-        pictures=tuple(_picture(name, each) for name, each in fibre.pictures.items())
+        pictures=tuple(
+            _picture(name, each, _region_px(fibre, each) if name == GEOMETRY else None)
+            for name, each in fibre.pictures.items()
+        )
         if pictures
         else (),
         operations=operations_of(events),
@@ -113,7 +122,9 @@ def _outcome(fibre: FibreInHand, *, measures: bool, interrupted: str) -> tuple[O
     return Outcome.GOOD, "", ""
 
 
-def _picture(name: str, taken: TakenPicture) -> Picture:
+def _picture(
+    name: str, taken: TakenPicture, region_px: tuple[int, int, int, int] | None
+) -> Picture:
     def known(value: float | None) -> float:
         return math.nan if value is None else value
 
@@ -126,4 +137,17 @@ def _picture(name: str, taken: TakenPicture) -> Picture:
         zoom=known(now.zoom_counts),
         focus_um=math.nan,
         light_percent=known(now.light_percent),
+        region_px=region_px,
     )
+
+
+def _region_px(fibre: FibreInHand, taken: TakenPicture) -> tuple[int, int, int, int] | None:
+    """Return the part of a picture with the fibre in it, with room around it."""
+    line = fibre.line_px
+    if line is None:
+        return None
+    height, width = taken.data.shape[:2]
+    low = np.clip(np.floor(line.min(axis=0)) - ROOM_PX, 0, None).astype(int)
+    high = np.ceil(line.max(axis=0)).astype(int) + ROOM_PX
+    right, bottom = min(int(high[0]), width), min(int(high[1]), height)
+    return int(low[0]), int(low[1]), right - int(low[0]), bottom - int(low[1])

@@ -77,8 +77,10 @@ class Keeper:
             return
         self._begun = fibre
         self._motion.begin()
-        found = pose_of(fibre.reach.candidate)
-        self._number = self.store.begin_fibre(found, time_s=fibre.found_s)
+        candidate = fibre.reach.candidate
+        self._number = self.store.begin_fibre(
+            pose_of(candidate), time_s=fibre.found_s, length_um=candidate.length_um
+        )
         self._journal.fibre = self._number
 
     def keep(self, fibre: FibreInHand | None, interrupted: str = "") -> None:
