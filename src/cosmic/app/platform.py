@@ -201,6 +201,7 @@ def build_platform(
             elsewhere=elsewhere,
             end=None if scene is None else scene.close,
         )
+        undo.callback(platform.shut_down)
         platform.begin_elsewhere()
         undo.pop_all()
     return platform
