@@ -1,0 +1,172 @@
+"""One fault at a time in the middle of a campaign: whether it goes on, and whether it is safe.
+
+Each fault is injected once into a campaign of easy fibres, while the first is treated. Recovered:
+two were measured, without a hand. Safe: the campaign ended by itself and said why, all axes stand,
+no body ran into another that should not, and no force came near the sensor's end; scored from the
+twin's truth.
+
+    python -m benchmarks.campaign_faults          # about 15 minutes on two quiet cores
+"""
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+import cosmic
+from benchmarks.figures import Figure, main
+from cosmic.autonomy.campaign.records import Outcome
+from cosmic.frame.clock import WALL
+from cosmic.twin.truth import read_truth
+
+NAME = "campaign_faults"
+RATE = 10.0
+LIMIT_S = 120.0
+PEAK_UN = 0.8 * 180.0
+RECIPE = """
+procedure = "bend test"
+[sample]
+name = "three-dry"
+[stop]
+count = 3
+good = 2
+time_s = 900.0
+[output]
+pictures = false
+html = false
+pdf = false
+table = false
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """A fault and when it strikes.
+
+    Attributes
+    ----------
+    lasts_s : float
+        Wall time after which it is cleared; 0: it clears itself, or never.
+    """
+
+    name: str
+    at: str = "turn the table"
+    where: tuple[tuple[str, Any], ...] = ()
+    lasts_s: float = 0.0
+
+
+TROUBLES = (
+    Trouble("missed_grasp"),
+    Trouble("slip_in_lift"),
+    Trouble("drop"),
+    Trouble("jaw_adhesion"),
+    Trouble("fibre_break"),
+    Trouble("loose_grip"),
+    Trouble("out_of_plane"),
+    Trouble("tip_bent", where=(("tool", "left"),)),
+    Trouble("light_dimmed"),
+    Trouble("zoom_lost_steps"),
+    Trouble("sensor_drift", where=(("amount", 0.2),)),
+    Trouble("sensor_saturated", at="push the spans"),
+    Trouble("board overrun", at="push the spans"),
+    Trouble("board unplugged", at="push the spans"),
+    Trouble("camera lost", where=(("share", 0.3),)),
+    Trouble("camera incomplete", where=(("share", 0.3),)),
+    Trouble("camera frozen", lasts_s=3.0),
+    Trouble("controller lost_completed", at="carry to the probe", lasts_s=3.0),
+    Trouble("controller doubled_completed", at="carry to the probe"),
+    Trouble("controller end_stop", at="carry to the probe", lasts_s=1.0),
+    Trouble("controller unplugged", at="carry to the probe", where=(("device", 0),)),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcomes:
+    """How a campaign with one fault ended."""
+
+    good: int
+    over: bool
+    reason: str
+    still: bool
+    contacts: int
+    peak_un: float
+
+    @property
+    def recovered(self) -> bool:
+        """Two fibres were measured."""
+        return self.good >= 2
+
+    @property
+    def safe(self) -> bool:
+        """Nothing was harmed, and it ended with a reason."""
+        ended = self.over and bool(self.reason) and self.still
+        return ended and not self.contacts and self.peak_un <= PEAK_UN
+
+
+def try_one(trouble: Trouble, folder: Path) -> Outcomes:
+    """Run a campaign with one fault to its end."""
+    recipe = folder / "two.toml"
+    recipe.write_text(RECIPE, encoding="utf-8")
+    truth = folder / "truth.jsonl"
+    struck = Event()
+    with cosmic.connect(rate=RATE, sample="three-dry", seed=3, truth=truth) as rig:
+        campaign = rig.campaign(recipe, folder / "out")
+
+        def look() -> None:
+            if campaign.operation == trouble.at and not struck.is_set():
+                struck.set()
+                rig.faults.inject(trouble.name, **dict(trouble.where))
+
+        campaign.on_change(look)
+        began_s = WALL.now_s()
+        campaign.start()
+        until_s: float | None = None
+        while not campaign.over and WALL.now_s() - began_s < LIMIT_S:
+            WALL.sleep(0.02)
+            if struck.is_set() and until_s is None:
+                until_s = WALL.now_s() + (trouble.lasts_s or LIMIT_S)
+            if until_s is not None and trouble.lasts_s and WALL.now_s() > until_s:
+                rig.faults.clear(trouble.name)
+                until_s = WALL.now_s() + LIMIT_S
+        over = campaign.over
+        if not over:
+            campaign.abort("the benchmark waited long enough")
+            campaign.join()
+        good = sum(each.outcome is Outcome.GOOD for each in campaign.fibres)
+        still = not any(axis.details.in_motion for axis in rig.mico)
+        reason = campaign.end_reason
+    return _scored(good, reason, truth, over=over, still=still)
+
+
+def _scored(good: int, reason: str, truth: Path, *, over: bool, still: bool) -> Outcomes:
+    record = read_truth(truth)
+    contacts = sum(not event.facts["meant"] for event in record.of("contact over"))
+    peaks = [float(event.facts.get("peak_un", 0.0)) for event in record.of("left")]
+    return Outcomes(good, over, reason, still, contacts, max(peaks, default=0.0))
+
+
+def measure(quick: bool = False) -> list[Figure]:
+    """Return the figures of all faults."""
+    figures, recovered, safe = [], 0, 0
+    troubles = TROUBLES[:1] if quick else TROUBLES
+    for trouble in troubles:
+        with tempfile.TemporaryDirectory() as folder:
+            found = try_one(trouble, Path(folder))
+        recovered, safe = recovered + found.recovered, safe + found.safe
+        figures += [
+            Figure(NAME, f"{trouble.name}: good of 2", found.good, "fibres"),
+            Figure(NAME, f"{trouble.name}: not safe", float(not found.safe), "", 0.0),
+        ]
+    parts = 100.0 / len(troubles)
+    return [
+        *figures,
+        Figure(NAME, "recovered alone", parts * recovered, "%"),
+        Figure(NAME, "the same, below 80 %", max(0.0, 80.0 - parts * recovered), "", 0.0),
+        Figure(NAME, "ended safe", parts * safe, "%"),
+        Figure(NAME, "the same, below 100 %", 100.0 - parts * safe, "", 0.0),
+    ]
+
+
+if __name__ == "__main__":
+    main(__doc__, measure)
