@@ -33,9 +33,23 @@ class ToBin(FibreOperation):
         places = work.settings.places
         yield from retract_probe(work)
         yield work.go_up(max(places.travel_um, work.height_now()))
+        if work.in_hand().bending is not None:
+            yield from self._look_on_the_way(work)
         yield work.go(bin_place(work))
         with work.mico.collision.contact("grasp"):
             yield work.go_up(places.bin_um)
+
+    @staticmethod
+    def _look_on_the_way(work: FibreWork) -> Steps:
+        """See that a measured fibre is still there: one that fell must not be measured again."""
+        fibre, places = work.in_hand(), work.settings.places
+        x = places.view_x_um * work.jaws.forward
+        yield work.go(work.at(work.gripper, x, places.view_y_um))
+        picture = yield work.picture()
+        assert isinstance(picture, Picture)
+        if not seen_at(work, fibre, picture, in_jaws(work, fibre), work.height_now()):
+            fibre.held, work.surveyed = False, False
+            work.spilled.append(fibre)
 
 
 def bin_place(work: FibreWork) -> dict[str, float]:

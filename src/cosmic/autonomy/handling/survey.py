@@ -1,5 +1,6 @@
 """Operations that look at the whole sample and choose a fibre."""
 
+import math
 from collections import Counter
 from dataclasses import replace
 
@@ -24,12 +25,16 @@ TOO_CURLED = "too curled"
 TOO_NEAR = "too near to another"
 OUT_OF_FIELD = "out of the field"
 GIVEN_UP = "given up before"
+MEASURED = "measured before"
 OUT_OF_REACH = "out of reach"
 NONE_LEFT = "no fibre"
 LOOK_AGAIN = "look again"
 SAME_UM = 120.0
 SAME_LENGTH = 0.05
 OWN_UM = 1.0
+SPILLED_LENGTH = 0.004
+SPILLED_WIDTH = 0.08
+SPILLED_CURL = 0.006
 
 
 class Survey(FibreOperation):
@@ -56,6 +61,7 @@ def look(work: FibreWork, seen: list[SeenFibre]) -> None:
     found = [_candidate(work, each, frame.on_plate(each.line_um, angle)) for each in seen]
     work.lines_um = [each.line_um for each in found]
     judged = [replace(each, problem=each.problem or _lonely(work, each)) for each in found]
+    judged = leave_spilled(judged, work.spilled)
     work.candidates = [each for each in judged if not each.problem]
     work.skipped = Counter(each.problem for each in judged if each.problem)
     work.surveyed, work.since_survey, work.survey_deg = True, 0, angle
@@ -102,6 +108,28 @@ def same_fibre(one: Candidate, other: Candidate) -> bool:
     (x0, y0), (x1, y1) = one.place_um, other.place_um
     near = abs(x0 - x1) < SAME_UM and abs(y0 - y1) < SAME_UM
     return near and abs(one.length_um - other.length_um) < SAME_LENGTH * other.length_um
+
+
+def leave_spilled(candidates: list[Candidate], spilled: list[FibreInHand]) -> list[Candidate]:
+    """Return the sightings; of each fibre that fell the one most like it is not to be taken."""
+    left = list(candidates)
+    for fibre in spilled:
+        likes = [(_unlike(each, fibre), number) for number, each in enumerate(left)]
+        unlike, number = min(likes, default=(math.inf, 0))
+        if unlike < 1.0:
+            left[number] = replace(left[number], problem=MEASURED)
+    return left
+
+
+def _unlike(one: Candidate, other: FibreInHand) -> float:
+    """Return how little a sighting is like a fibre that was measured; 1 and more is another."""
+    if one.problem:
+        return math.inf
+    return max(
+        abs(one.length_um / other.length_um - 1.0) / SPILLED_LENGTH,
+        abs(one.width_um / other.width_um - 1.0) / SPILLED_WIDTH,
+        abs(one.curl - other.curl) / SPILLED_CURL,
+    )
 
 
 class Choose(FibreOperation):

@@ -55,6 +55,8 @@ class FibreWork:
         Of the last survey, less those that were taken; on the plate.
     given_up : list of Candidate
         Those on which grasping failed: they are not tried a second time.
+    spilled : list of FibreInHand
+        Those that were measured, and fell on the way to the bin: they lie on the plate again.
     skipped : Counter of str
         Why fibres of the last survey are not taken, and how many.
     fibre : FibreInHand or None
@@ -79,6 +81,7 @@ class FibreWork:
     candidates: list[Candidate] = field(default_factory=list)
     lines_um: list[Floats] = field(default_factory=list)
     given_up: list[Candidate] = field(default_factory=list)
+    spilled: list[FibreInHand] = field(default_factory=list)
     skipped: Counter[str] = field(default_factory=Counter)
     ready: bool = False
     zoomed: float | None = None

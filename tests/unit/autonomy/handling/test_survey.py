@@ -101,6 +101,17 @@ def test_one_that_was_given_up_is_not_chosen_again():
     assert bench.skipped == {survey.GIVEN_UP: 1}
 
 
+def test_one_that_was_measured_and_fell_is_known_again_wherever_it_lies():
+    bench = looked(Seen(0.0, 0.0))
+    for _ in Choose().run(bench):
+        pass
+    bench.spilled.append(bench.in_hand())
+    there = Seen(3000.0, 1000.0, angle_deg=5.0)
+    look(bench, [Seen(-1500.0, 0.0, length_um=1202.0), there])  # type: ignore[list-item]
+    assert [each.length_um for each in bench.candidates] == [1202.0], "the most alike is left"
+    assert bench.skipped == {survey.MEASURED: 1}
+
+
 def test_each_is_chosen_once_and_the_last_choice_says_to_look_again():
     bench = looked(Seen(0.0, 0.0), Seen(-2500.0, 800.0))
     places = set()
