@@ -84,7 +84,7 @@ class MicoStationSide(SettingsSide):
         """Return the gate's answer, without moving."""
         return self._manager.check(motions, consent=consent)
 
-    @remote
+    @remote(reads=True)
     def nearest(self, positions: dict[str, float]) -> Approach | None:
         """Return the nearest pair of bodies with the axes at `positions`."""
         return self._model().nearest(positions)
