@@ -66,6 +66,8 @@ class FibreInHand:
         The force without contact.
     tilts : int
         How often it was held at another height because it was not met.
+    looks : int
+        How often something was seen at the jaws that had opened.
     contacts : list of (float, float)
         Where along it, from the jaws, the probe has met it, and how far from where foreseen.
     """
@@ -83,6 +85,7 @@ class FibreInHand:
     contacts: list[tuple[float, float]] = field(default_factory=list)
     zero_un: float | None = None
     tilts: int = 0
+    looks: int = 0
     ei_guess_n_m2: float | None = None
     spans: list[Span] = field(default_factory=list)
     pictures: dict[str, Picture] = field(default_factory=dict)
