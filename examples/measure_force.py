@@ -13,7 +13,7 @@ def push(rig: cosmic.Rig, file: Path) -> None:
     probe.move_to(-4940.0)
     probe.set_closed_loop_frequency(30)  # about 45 um/s: its position is read 20 times a second
     with rig.daqco.record(file, overwrite=True):
-        probe.move_to(-5050.0)
+        probe.move_to(-5040.0)
     print(f"force at the end: {rig.daqco.latest()['force']:.0f} {rig.daqco.units['force']}")
 
 

@@ -16,7 +16,11 @@ from PySide6.QtCore import QObject, Signal
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "src"
 DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
-EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+_LOOKED_AT = (ROOT / "tests" / "system" / "test_examples.py").read_text(encoding="utf-8")
+# Those whose words are looked at run there.
+EXAMPLES = [
+    each for each in sorted((ROOT / "examples").glob("*.py")) if f'"{each.name}"' not in _LOOKED_AT
+]
 
 
 def _modules() -> list[str]:

@@ -11,7 +11,8 @@ import numpy.typing as npt
 import pytest
 
 import cosmic
-from cosmic.app import platform as platform_module
+from cosmic.app import hosting
+from cosmic.app.platform import build_platform
 from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.errors import MoveCancelled
 from cosmic.twin.scene import Scene
@@ -76,7 +77,7 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def lab(config: Path) -> Iterator[Lab]:
     scenes: list[Scene] = []
     libraries: list[CameraLibrary] = []
-    real_scene, real_library = Scene.from_settings, platform_module.make_camera_library
+    real_scene, real_library = Scene.from_settings, hosting.make_camera_library
 
     def scene(*args: Any, **kwargs: Any) -> Scene:
         scenes.append(real_scene(*args, **kwargs))
@@ -88,7 +89,7 @@ def lab(config: Path) -> Iterator[Lab]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Scene, "from_settings", scene)
-        patch.setattr(platform_module, "make_camera_library", library)
+        patch.setattr(hosting, "make_camera_library", library)
         with cosmic.connect(config, ("mico", "vico"), rate=6.0) as rig:
             zoom_to(rig, 2.0)
             rig.vico.snap()
@@ -210,7 +211,7 @@ def test_a_calibration_is_told_with_zoom_height_and_residual(lab: Lab) -> None:
 
 def test_a_calibration_is_found_again_at_the_next_start(lab: Lab, config: Path) -> None:
     assert (config.parent / "measured" / "microscope-right.toml").exists()
-    again = platform_module.build_platform(config).vico
+    again = build_platform(config).vico
     assert again is not None
     assert again.places is not None
     assert again.places.calibrated == lab.rig.vico.calibrated

@@ -352,7 +352,7 @@ def test_a_picture_of_the_window_is_saved_without_a_display(
 
 
 def test_a_picture_that_cannot_be_saved_is_an_error(tmp_path: Path) -> None:
-    done = run("--offscreen", "0.2", "--screenshot", str(tmp_path / "no" / "window.png"))
+    done = run("mico", "--offscreen", "0.2", "--screenshot", str(tmp_path / "no" / "window.png"))
     assert done.returncode == 1
     assert "cannot be saved" in done.stderr
 

@@ -130,7 +130,7 @@ class Recorder:
         with self._lock:
             if self.state.active:
                 raise NotAvailable(f"{self.state.path} is being recorded; stop it first")
-            self.stop()
+            self._close()
             if not self._application.running:
                 raise NotAvailable("nothing is acquired; start the acquisition first")
             writer = UDaqFileWriter(path, self._header(), self._policy, overwrite=overwrite)
@@ -145,6 +145,10 @@ class Recorder:
 
     def stop(self) -> None:
         """Close the file and wait until it is closed; harmless when nothing is recorded."""
+        self._application.guard.wait_told()  # the crossing that ended a script's move belongs in it
+        self._close()
+
+    def _close(self) -> None:
         with self._lock:
             writer, self._writer = self._writer, None
             if self._unsubscribe is not None:

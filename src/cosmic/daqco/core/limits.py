@@ -4,7 +4,7 @@ import logging
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from threading import Lock
+from threading import Lock, RLock
 from typing import Final
 
 import numpy as np
@@ -19,6 +19,7 @@ logger = logging.getLogger(__name__)
 LOWEST_RATE_HZ: Final = 200.0
 STALE_S: Final = 0.1
 """How long data may stay away while a limit is armed, wall time."""
+_TOLD_S: Final = 1.0
 LAXEST: Final = 10.0
 """A simulation that runs faster than the wall may be silent so much longer: nothing can break."""
 
@@ -91,6 +92,7 @@ class LimitGuard:
         self.trip = trip
         self._stale_s = STALE_S * min(max(clock.rate, 1.0), LAXEST)
         self._lock = Lock()
+        self._telling = RLock()
         self._limits: dict[str, Limit] = {}
         self._listeners: tuple[Callable[[Crossing], None], ...] = ()
         self._last_wall_s = -math.inf
@@ -99,7 +101,8 @@ class LimitGuard:
 
     @property
     def limits(self) -> dict[str, Limit]:
-        """The limits by channel."""
+        """The limits by channel; a crossing that stopped something is among them."""
+        self.wait_told()
         return dict(self._limits)
 
     @property
@@ -110,7 +113,13 @@ class LimitGuard:
     @property
     def crossings(self) -> tuple[Crossing, ...]:
         """What happened so far, oldest first; the last hundred."""
+        self.wait_told()
         return self._crossings
+
+    def wait_told(self) -> None:
+        """Wait until a crossing under way was told to everybody; it stops motion before that."""
+        if self._telling.acquire(timeout=_TOLD_S):
+            self._telling.release()
 
     def subscribe(self, listener: Callable[[Crossing], None]) -> None:
         """Call `listener(crossing)` after each trip, in the thread that saw it."""
@@ -242,10 +251,12 @@ class LimitGuard:
                 self._limits[limit.channel] = replace(now, tripped=tripped, beyond=beyond)
 
     def _trip(self, crossing: Crossing, limit: Limit) -> None:
-        if self.trip is not None:
-            self.trip(crossing.text)
-        crossing = replace(crossing, reaction_s=self._clock.now_s() - crossing.time_s)
-        self._note(limit, beyond=True)
-        self._crossings = (*self._crossings[-99:], crossing)
-        logger.warning("%s; stopped after %.1f ms", crossing.text, 1000.0 * crossing.reaction_s)
-        tell(self._listeners, crossing)
+        with self._telling:
+            if self.trip is not None:
+                self.trip(crossing.text)
+            reaction_s = self._clock.now_s() - crossing.time_s
+            crossing = replace(crossing, reaction_s=reaction_s)
+            self._note(limit, beyond=True)
+            self._crossings = (*self._crossings[-99:], crossing)
+            logger.warning("%s; stopped after %.1f ms", crossing.text, 1000.0 * reaction_s)
+            tell(self._listeners, crossing)
