@@ -43,13 +43,10 @@ class TwinChoice(StrictModel):
     ----------
     rate : float
         Platform seconds for one of the wall.
-    faults : bool
-        Whether operations fail now and then, as on a real platform.
     """
 
     seed: int = Field(0, ge=0)
-    rate: float = Field(20.0, gt=0.0, le=1000.0)
-    faults: bool = True
+    rate: float = Field(4.0, gt=0.0, le=1000.0)
 
 
 class RecipeFile(StrictModel):
