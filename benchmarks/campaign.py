@@ -29,8 +29,6 @@ NAME = "campaign"
 SEEDS = 10
 RATE = 4.0
 LIMIT_S = 1800.0
-SAME_UM, SAME_LENGTH = 250.0, 0.1
-"""How far a record and a true fibre may lie apart to be the same."""
 GOAL_FROM_N_M2 = 1e-12
 SENSOR_UN = 180.0
 PEAK_PART = 0.8
@@ -71,17 +69,14 @@ class Run:
         return [each for each in self.fibres if each.outcome is not Outcome.RUNNING]
 
     def true_of(self, record: FibreRecord) -> TrueFibre | None:
-        """Return the fibre that a record is of; None where none lay there."""
-        if record.found is None:
-            return None
-        x, y, length = record.found.x_plate_um, record.found.y_plate_um, record.shape.length_um
-        near = [
-            each
-            for each in self.truth.fibres
-            if math.hypot(each.x_um - x, each.y_um - y) < SAME_UM
-            and abs(each.length_um - length) < SAME_LENGTH * each.length_um
+        """Return the fibre that was in the jaws while a record was made; None: none was."""
+        held = [
+            each.facts["fibre"]
+            for each in self.truth.of("grasped")
+            if record.began_s <= each.time_s <= record.ended_s
         ]
-        return min(near, key=lambda each: math.hypot(each.x_um - x, each.y_um - y), default=None)
+        known = {each.number: each for each in self.truth.fibres}
+        return known.get(held[-1]) if held else None
 
 
 def carry_out(seed: int, stop: str, folder: Path) -> Run:
@@ -131,13 +126,16 @@ def _short(name: str, value: float, wanted: float) -> Figure:
 
 def stiffness(runs: list[Run]) -> list[Figure]:
     """Return how far off the stiffness of good fibres is, and whether the interval says so."""
-    errors, covered, lengths, widths, strangers = [], [], [], [], 0
+    errors, covered, lengths, widths, strangers, twice = [], [], [], [], 0, 0
     for run in runs:
+        measured: set[int] = set()
         for record in run.good:
             true, found = run.true_of(record), record.bending
             if true is None or found is None:
                 strangers += 1
                 continue
+            twice += true.number in measured
+            measured.add(true.number)
             lengths.append(100.0 * abs(record.shape.length_um / true.length_um - 1.0))
             widths.append(100.0 * abs(record.shape.width_um / true.width_um - 1.0))
             if true.ei_n_m2 >= GOAL_FROM_N_M2:
@@ -152,7 +150,8 @@ def stiffness(runs: list[Run]) -> list[Figure]:
         Figure(NAME, "the same, outside of 90 to 99 %", outside, "%", 0.0),
         Figure(NAME, "error of length, median", statistics.median(lengths), "%"),
         Figure(NAME, "error of width, median", statistics.median(widths), "%"),
-        Figure(NAME, "good records of no single fibre", strangers, "fibres", 0.0),
+        Figure(NAME, "good records without a fibre", strangers, "fibres", 0.0),
+        Figure(NAME, "fibres measured twice", twice, "fibres", 0.0),
     ]
 
 
