@@ -59,12 +59,32 @@ def look(work: FibreWork, seen: list[SeenFibre]) -> None:
     """Take note of what lies on the plate, and of what may be taken."""
     angle, frame = work.table_deg, work.calibration.frame
     found = [_candidate(work, each, frame.on_plate(each.line_um, angle)) for each in seen]
-    work.lines_um = [each.line_um for each in found]
+    before, work.lines_um = work.lines_um, [each.line_um for each in found]
     judged = [replace(each, problem=each.problem or _lonely(work, each)) for each in found]
     judged = leave_spilled(judged, work.spilled)
+    judged = _leave_fallen(work, judged, before)
     work.candidates = [each for each in judged if not each.problem]
     work.skipped = Counter(each.problem for each in judged if each.problem)
     work.surveyed, work.since_survey, work.survey_deg = True, 0, angle
+
+
+def _leave_fallen(
+    work: FibreWork, candidates: list[Candidate], before: list[Floats]
+) -> list[Candidate]:
+    """Return the sightings; one like a measured fibre, where nothing lay before, is not taken.
+
+    It clung to the jaws, was seen nowhere, and fell when nobody looked.
+    """
+    measured = [each for each in work.finished if each.bending is not None]
+    left = []
+    for each in candidates:
+        new = all(distance_um(each.line_um, line) > SAME_UM for line in before)
+        if before and new and any(_unlike(each, fibre) < 1.0 for fibre in measured):
+            work.given_up.append(each)
+            left.append(replace(each, problem=MEASURED))
+        else:
+            left.append(each)
+    return left
 
 
 def _candidate(work: FibreWork, seen: SeenFibre, line_um: Floats) -> Candidate:

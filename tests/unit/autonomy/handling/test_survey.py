@@ -112,6 +112,23 @@ def test_one_that_was_measured_and_fell_is_known_again_wherever_it_lies():
     assert bench.skipped == {survey.MEASURED: 1}
 
 
+@pytest.mark.parametrize(
+    ("length_um", "taken"), [(1200.0, False), (1260.0, True)], ids=["like it", "another"]
+)
+def test_one_that_clung_and_fell_unseen_is_not_measured_again(length_um: float, taken: bool):
+    bench = looked(Seen(0.0, 0.0), Seen(-2500.0, 800.0, length_um=1500.0))
+    for _ in Choose().run(bench):
+        pass
+    done = bench.in_hand()
+    done.bending = object()  # type: ignore[assignment]
+    bench.finished.append(done)
+    lies = Seen(-2500.0, 800.0, length_um=1500.0)
+    for _ in range(2):
+        look(bench, [lies, Seen(-3000.0, -3000.0, length_um=length_um)])  # type: ignore[list-item]
+        lengths = [each.length_um for each in bench.candidates]
+        assert lengths == ([1500.0, length_um] if taken else [1500.0])
+
+
 def test_each_is_chosen_once_and_the_last_choice_says_to_look_again():
     bench = looked(Seen(0.0, 0.0), Seen(-2500.0, 800.0))
     places = set()
