@@ -93,6 +93,7 @@ def test_a_force_is_measured_and_a_limit_stops_the_push(said: str) -> None:
     assert float(numbers["crossed"][-1]) < 500.0
 
 
+@pytest.mark.slow  # the tutorial that shows it runs as a test
 @example("look_at_a_fibre.py")
 def test_a_fibre_is_looked_at_measured_and_recorded(said: str) -> None:
     numbers = {line.split(":")[0]: re.findall(r"-?[\d.]+", line) for line in said.splitlines()}
