@@ -150,6 +150,7 @@ def test_a_fibre_is_only_carried_where_nothing_is_to_be_measured(tmp_path: Path)
         assert fibre.spans == []
 
 
+@pytest.mark.slow
 def test_an_empty_plate_is_said_to_be_empty(tmp_path: Path):
     with (
         sample("empty", tmp_path / "truth.jsonl") as bench,

@@ -337,7 +337,7 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize("command", [[], ["mico"]])
+@pytest.mark.parametrize("command", [pytest.param([], marks=pytest.mark.slow), ["mico"]])
 def test_a_picture_of_the_window_is_saved_without_a_display(
     tmp_path: Path, command: list[str]
 ) -> None:

@@ -75,6 +75,7 @@ def test_there_and_back_again_is_the_same_place() -> None:
     assert found.std_um(points_px).shape == (2, 2)
 
 
+@pytest.mark.slow
 def test_the_uncertainty_told_is_the_error_made() -> None:
     """Over many calibrations the errors scatter as the map says, in the middle and outside."""
     points_px = np.array([AXIS_PX, AXIS_PX + np.array([900.0, 500.0])])

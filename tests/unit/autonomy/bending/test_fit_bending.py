@@ -54,7 +54,10 @@ def test_a_small_push_is_that_of_a_straight_beam() -> None:
 # ---------------------------------------------------------------------- how good it is
 
 
-@pytest.mark.parametrize("ei_n_m2", [1e-12, 5e-12, 5e-11, 2e-10])
+@pytest.mark.parametrize(
+    "ei_n_m2",
+    [1e-12, 5e-11, *(pytest.param(each, marks=pytest.mark.slow) for each in (5e-12, 2e-10))],
+)
 def test_stiffness_is_found_with_an_honest_interval(ei_n_m2: float) -> None:
     rng, errors, covered, trusted = np.random.default_rng(11), [], 0, 0
     for _ in range(DRAWS):
