@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from cosmic.app.platform import Platform
 from cosmic.app.rig import Rig
 from cosmic.app.scene_panel import ScenePanel
+from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.frame.overrides import override
 
@@ -46,6 +47,8 @@ class CampaignDock(QObject):
         Where campaigns run.
     scene : ScenePanel
         Where fibres are replayed.
+    policy : FailurePolicy
+        Told of defects.
     beside : str
         Title of the panel whose place it shares.
 
@@ -57,10 +60,18 @@ class CampaignDock(QObject):
 
     replayed = Signal()
 
-    def __init__(self, window: CosmicServerGui, rig: Rig, scene: ScenePanel, beside: str) -> None:
+    def __init__(
+        self,
+        window: CosmicServerGui,
+        rig: Rig,
+        scene: ScenePanel,
+        policy: FailurePolicy,
+        beside: str,
+    ) -> None:
         super().__init__(window)
         self._rig = rig
         self._scene = scene
+        self._policy = policy
         self._panel: CampaignPanel | None = None
         self._holder = _Holder(lambda: self.panel)
         window.add_panel(CAMPAIGN, self._holder, scroll=False, beside=beside, tabbed=True)
@@ -76,7 +87,7 @@ class CampaignDock(QObject):
         from cosmic.app.campaign_panel import CampaignPanel
         from cosmic.app.scene_replay import SceneReplay
 
-        panel = CampaignPanel(self._rig.campaign, campaigns_folder())
+        panel = CampaignPanel(self._rig.campaign, campaigns_folder(), self._policy)
         self._replay = SceneReplay(self._scene, self)
         panel.replay_requested.connect(self._on_replay)
         layout = self._holder.layout()

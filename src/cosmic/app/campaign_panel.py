@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QComboBox, QFileDialog, QLineEdit, QTabWidget, QVBoxLayout, QWidget
 
 from cosmic.app.campaign_board import CampaignBoard
-from cosmic.app.campaign_output import write_output
+from cosmic.app.campaign_output import OutputThread
 from cosmic.app.campaign_port import CampaignRun
 from cosmic.app.fibre_card import FibreCard
 from cosmic.app.procedure_tree import ProcedureTreePanel
@@ -21,6 +21,7 @@ from cosmic.autonomy.campaign.recipe import shipped_recipes
 from cosmic.autonomy.campaign.records import FibreRecord
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.gui.ask_directory import ask_directory
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
@@ -40,6 +41,7 @@ class _Relay(QObject):
     """Brings what a campaign says to the window's thread; outlives the panel."""
 
     changed = Signal()
+    written = Signal(str, bool)
 
 
 class CampaignPanel(QWidget):
@@ -51,6 +53,8 @@ class CampaignPanel(QWidget):
         Returns a campaign by a recipe in a folder, ready to start.
     folder : Path
         Where folders of campaigns are made.
+    policy : FailurePolicy
+        Told of a defect while a report is written.
 
     Signals
     -------
@@ -60,11 +64,19 @@ class CampaignPanel(QWidget):
 
     replay_requested = Signal(object)
 
-    def __init__(self, open_campaign: Open, folder: Path, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        open_campaign: Open,
+        folder: Path,
+        policy: FailurePolicy,
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
         self.setObjectName("CampaignPanel")
         self._open = open_campaign
         self._home = folder
+        self._policy = policy
+        self._writing: OutputThread | None = None
         self._campaign: Campaign | None = None
         self._card: FibreRecord | None = None
         self._relay = _Relay()
@@ -116,6 +128,7 @@ class CampaignPanel(QWidget):
         self.card.replay_requested.connect(self._on_replay)
         self.board.fibre_chosen.connect(self.show_fibre)
         self._relay.changed.connect(self._on_changed)
+        self._relay.written.connect(self._on_written)
 
     @property
     def campaign(self) -> Campaign | None:
@@ -172,7 +185,7 @@ class CampaignPanel(QWidget):
         running = campaign is not None and not campaign.over
         for widget in (self.recipe, self.folder, self.choose):
             widget.setEnabled(not running)
-        self.report.setEnabled(campaign is not None)
+        self.report.setEnabled(campaign is not None and self._writing is None)
         if campaign is None:
             return
         self.board.set_state(
@@ -210,16 +223,22 @@ class CampaignPanel(QWidget):
             self.replay_requested.emit(self._card)
 
     def write_report(self) -> None:
-        """Write report and table of the campaign as it stands."""
+        """Begin to write report and table of the campaign as it stands; returns at once."""
         campaign = self._campaign
-        if campaign is None:
+        if campaign is None or self._writing is not None:
             return
-        try:
-            written = write_output(campaign.store.folder, campaign.recipe.file.output)
-        except CosmicError as exc:
-            self._say(str(exc))
-            return
-        self._say(f"written: {', '.join(str(each) for each in written)}", State.OK)
+        folder, wanted = campaign.store.folder, campaign.recipe.file.output
+        self._say("writing the report", State.BUSY)
+        self._writing = OutputThread(folder, wanted, self._policy, self._relay.written.emit)
+        self._writing.start()
+        self.refresh()
+
+    def _on_written(self, text: str, well: bool) -> None:
+        if self._writing is not None:
+            self._writing.join()
+            self._writing = None
+        self._say(text, State.OK if well else State.REFUSED)
+        self.refresh()
 
     def _say(self, text: str, state: State = State.REFUSED) -> None:
         self.told.set_text(f"{state_look(state).glyph} {text}" if text else "")
@@ -233,3 +252,5 @@ class CampaignPanel(QWidget):
         if campaign is not None and not campaign.over:
             campaign.abort("the window was closed")
             campaign.join()
+        if self._writing is not None:
+            self._writing.join()

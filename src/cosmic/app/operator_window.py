@@ -93,7 +93,9 @@ class OperatorWindow(CosmicServerGui):
             )
         self._campaign: CampaignDock | None = None
         if self._scene is not None and can_run(platform):
-            self._campaign = CampaignDock(self, self._rig, self._scene, beside=MICO)
+            self._campaign = CampaignDock(
+                self, self._rig, self._scene, platform.policy, beside=MICO
+            )
             self._campaign.replayed.connect(self._raise_scene)
             self.dock(MICO).raise_()
         if pictures:

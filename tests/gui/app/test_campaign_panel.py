@@ -19,6 +19,7 @@ from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.shipped.bend_test import build_bend_test
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.failure import FailurePolicy
 from unit.autonomy.campaign.sample_records import good
 
 INFO = CampaignInfo("quick", "bend test", "three", "", "2026-11-21T12:00:00+00:00")
@@ -82,7 +83,7 @@ def panel(qtbot, tmp_path: Path, opened) -> Iterator[CampaignPanel]:
             raise CosmicError(f"{folder} holds a campaign by another recipe")
         return StoredCampaign(folder)
 
-    panel = CampaignPanel(open_campaign, tmp_path)
+    panel = CampaignPanel(open_campaign, tmp_path, FailurePolicy())
     qtbot.addWidget(panel)
     panel.resize(520, 700)
     panel.show()
@@ -127,7 +128,10 @@ def test_the_report_is_written_where_the_campaign_is(panel, qtbot, tmp_path) -> 
     panel.folder.setText(str(tmp_path / "here"))
     press(qtbot, panel.procedure.start)
     press(qtbot, panel.report)
+    assert not panel.report.isEnabled(), "the press returned before the report was written"
+    qtbot.waitUntil(panel.report.isEnabled, timeout=20_000)
     assert (tmp_path / "here" / "report.html").exists()
+    assert "report.html" in panel.told.toolTip() or "report.html" in panel.told.text()
 
 
 def test_a_replay_goes_from_the_first_to_the_last_position_of_every_axis() -> None:
