@@ -1,6 +1,7 @@
 """Limits are watched sample by sample, and nothing beyond one is missed."""
 
 import math
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -184,3 +185,19 @@ def test_a_simulation_that_runs_faster_may_be_silent_longer():
     wait_until(lambda: WALL.now_s() > until_s)
     guard.look_for_silence()
     assert not stops
+
+
+def test_who_asks_after_a_stop_is_told_of_the_crossing_that_made_it() -> None:
+    rig = Rig()
+    answers: list[tuple[Crossing, ...]] = []
+    reader = Thread(target=lambda: answers.append(rig.guard.crossings))
+
+    def trip(_why: str) -> None:
+        reader.start()  # as a script does that the stop has woken
+        reader.join(0.1)
+
+    rig.guard.trip = trip
+    rig.arm()
+    rig.guard.look(chunk([4.5]))
+    reader.join(2.0)
+    assert [len(each) for each in answers] == [1]
