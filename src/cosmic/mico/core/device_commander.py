@@ -106,7 +106,6 @@ class DeviceCommander(QObject):
     jog_renewed = Signal(object)
     jog_steered = Signal(object, float)
     halt_requested = Signal(int, str)
-    frequency_requested = Signal(int, int)
     position_changed = Signal(object)
     state_changed = Signal(object)
     movement_ended = Signal(object)
@@ -191,10 +190,6 @@ class DeviceCommander(QObject):
         """Stop one channel; nothing is latched."""
         self.halt_requested.emit(channel, why)
 
-    def set_frequency(self, channel: int, frequency_hz: int) -> None:
-        """Limit the closed-loop speed, 1 to 18500 Hz."""
-        self.frequency_requested.emit(channel, frequency_hz)
-
     def send(
         self,
         channel: int,
@@ -229,7 +224,6 @@ def join(device: Commanded, commander: DeviceCommander, kind: CommanderType) -> 
             (commander.jog_renewed, device.renew_jog),
             (commander.jog_steered, device.steer_jog),
             (commander.halt_requested, device.halt),
-            (commander.frequency_requested, device.set_frequency),
         ]
     if CommanderType.OUTPUT in kind:
         pairs += [
