@@ -28,8 +28,8 @@ def force(rig: cosmic.Rig) -> float:
 
 def settled(rig: cosmic.Rig, target_um: float) -> float:
     rig.mico["probe.y"].move_to(target_um)
-    seen = rig.daqco.counters.samples
-    wait_until(lambda: rig.daqco.counters.samples > seen + 200)
+    arrived_s = rig.daqco.application.clock.now_s()
+    wait_until(lambda: (chunk := rig.daqco.latest_chunk) is not None and chunk.time_s > arrived_s)
     return force(rig)
 
 

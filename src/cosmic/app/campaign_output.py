@@ -8,7 +8,6 @@ from typing import Final
 
 from PySide6.QtCore import QCoreApplication
 from PySide6.QtGui import QGuiApplication
-from typing_extensions import override
 
 from cosmic.app.report_pdf import write_pdf
 from cosmic.autonomy.campaign.recipe import OutputSettings
@@ -17,6 +16,7 @@ from cosmic.autonomy.campaign.report_table import write_table
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.overrides import override
 from cosmic.frame.threads import WorkerThread
 
 HTML: Final = "report.html"

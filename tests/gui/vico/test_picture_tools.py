@@ -108,11 +108,11 @@ def test_a_measurement_keeps_the_scale_it_was_made_at(qtbot, shown, mouse, camer
 
 def test_a_region_that_is_dragged_becomes_that_of_the_camera(qtbot, shown, mouse, camera):
     click(qtbot, shown.row.tools["region"])
-    mouse.drag((400, 300), (800, 600))
+    mouse.drag((403, 300), (797, 597))
     assert camera.settings.roi == Roi(400, 296, 400, 304)  # in steps of 8
     assert shown.view.tool is None
     click(qtbot, shown.row.tools["region"])
-    mouse.drag((100, 100), (200, 180))
+    mouse.drag((100, 100), (197, 180))
     assert camera.settings.roi == Roi(496, 392, 104, 88)  # a part of the part
     click(qtbot, shown.row.more)
     click(qtbot, shown.form.full_sensor)
