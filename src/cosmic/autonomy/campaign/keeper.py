@@ -123,7 +123,11 @@ class Keeper:
 
 
 def skip_known(work: FibreWork, plan: ResumePlan) -> None:
-    """Have the fibres that were treated before left alone where they are found again."""
+    """Have the fibres that were treated before left alone where they are found again.
+
+    After an end without warning no position is believed: the platform is initialised first.
+    """
+    work.distrusted = plan.cut_off
     work.given_up += [_as_candidate(each) for each in plan.known]
 
 

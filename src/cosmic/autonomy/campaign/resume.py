@@ -41,12 +41,15 @@ class ResumePlan:
         Fibres to be skipped where they are found again.
     last : tuple of JournalEntry
         What was about to be done, oldest first.
+    cut_off : bool
+        The run before ended without a word, as when the program is killed.
     """
 
     finished: int
     interrupted: tuple[int, ...]
     known: tuple[Known, ...]
     last: tuple[JournalEntry, ...]
+    cut_off: bool = False
 
     def is_done(self, pose: Pose, length_um: float) -> bool:
         """Return whether the fibre found there has been treated already."""
@@ -68,6 +71,7 @@ def resume(store: CampaignStore) -> ResumePlan:
         interrupted=tuple(interrupted),
         known=_known(fibres),
         last=store.reader.journal(JOURNAL_LINES),
+        cut_off=store.reader.cut_off(),
     )
 
 

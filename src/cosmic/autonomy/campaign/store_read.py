@@ -79,6 +79,11 @@ class CampaignReader:
         (row,) = self._rows("SELECT ended, end_reason FROM campaign")
         return str(row["ended"]), str(row["end_reason"])
 
+    def cut_off(self) -> bool:
+        """Return whether the run before the last one ended without a word."""
+        rows = self._rows("SELECT end_s FROM run ORDER BY number DESC LIMIT 2")
+        return len(rows) == 2 and rows[1]["end_s"] is None
+
     def elapsed_s(self) -> float:
         """Return how long all runs took together, on the platform's clock."""
         rows = self._rows(

@@ -63,6 +63,8 @@ class FibreWork:
         The one in hand.
     finished : list of FibreInHand
         Those that were put away.
+    distrusted : bool
+        Positions are not to be believed before the platform was initialised again.
     gap_um : float or None
         Opening of the jaws, as steps since they were closed say; None before.
     stray_um : float
@@ -91,6 +93,7 @@ class FibreWork:
     fibre: FibreInHand | None = None
     finished: list[FibreInHand] = field(default_factory=list)
     numbers: int = 0
+    distrusted: bool = False
     gap_um: float | None = None
     stray_um: float = 0.0
     failures: list[tuple[str, OperationFailed]] = field(default_factory=list)

@@ -1,6 +1,7 @@
 """The bend test: a fibre is taken up, pushed as a cantilever at several spans, and put away."""
 
 from cosmic.autonomy.handling.grasp import MISSED, Carry, TestGrasp
+from cosmic.autonomy.handling.initialise import InitialiseAgain
 from cosmic.autonomy.handling.one_span import NO_CONTACT
 from cosmic.autonomy.handling.prepare import (
     POOR,
@@ -64,6 +65,7 @@ def beginning(settings: HandlingSettings) -> tuple[Part[FibreWork], ...]:
     return (
         Sequence(
             "prepare",
+            InitialiseAgain(),
             ClearUp(),
             MakeReady(),
             *(
