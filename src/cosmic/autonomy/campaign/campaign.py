@@ -246,7 +246,7 @@ class Campaign(CampaignSteering):
         except ProcedureAborted as exc:
             if self._broken is not None:
                 raise self._broken from exc
-            self._keeper.keep(self.work.fibre, interrupted=str(exc))
+            self._keep_cut_off(taken, str(exc))
             return self._abort or str(exc)
         except OperationFailed as exc:
             return self._after_failure(exc, taken)
@@ -257,7 +257,7 @@ class Campaign(CampaignSteering):
         if failure.cause == NONE_LEFT:
             return str(failure)
         if failure.cause == STOPPED:
-            self._keeper.keep(self.work.fibre, interrupted=str(failure))
+            self._keep_cut_off(taken, str(failure))
             return str(failure)
         if self._keep_last(taken):
             return ""
@@ -272,6 +272,11 @@ class Campaign(CampaignSteering):
         if self._stuck >= MOST_STUCK:
             return f"{self._stuck} fibres in a row could not be put away, the last: {failure}"
         return ""
+
+    def _keep_cut_off(self, taken: int, reason: str) -> None:
+        """Keep the fibre of a run that was cut off: one that was done with by then is no less."""
+        if not self._keep_last(taken):
+            self._keeper.keep(self.work.fibre, interrupted=reason)
 
     def _keep_last(self, taken: int) -> bool:
         """Keep the fibre that was done with in this run; returns whether there was one."""
