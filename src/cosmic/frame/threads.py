@@ -125,6 +125,11 @@ def _declare_never_waiting(whom: str) -> Callable[[], None]:
     return take_back
 
 
+def may_wait_here() -> bool:
+    """Return whether the calling thread may wait for what other threads bring about."""
+    return threading.get_ident() not in _busy_threads
+
+
 def forbid_waiting_here(what: str) -> None:
     """Raise where `what` would freeze a window, or a thread that has to bring about its end.
 

@@ -1,6 +1,7 @@
 """Pictures as procedures want them: exposed after what was done, and what is on them."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -19,6 +20,10 @@ LIMIT_WALL_S: Final = 15.0
 Box = tuple[int, int, int, int]
 
 
+def _nothing() -> None:
+    return
+
+
 class PictureWanted:
     """A picture exposed from a time on; to be yielded by an operation."""
 
@@ -27,15 +32,25 @@ class PictureWanted:
         self._since_s = clock.now_s()
         self._late_wall_s = WALL.now_s() + LIMIT_WALL_S
         self._picture: Picture | None = None
+        self._forget: Callable[[], None] = _nothing
 
     @property
     def done(self) -> bool:
         """It is there, or was given up."""
         if self._picture is None:
-            newest = self._camera.latest()
-            if newest is not None and newest.frame.exposed_s >= self._since_s:
-                self._picture = newest
+            self._picture = self._camera.picture_since(self._since_s)
         return self._picture is not None or WALL.now_s() > self._late_wall_s
+
+    def add_callback(self, callback: Callable[["PictureWanted"], object]) -> None:
+        """Call `callback(self)` when it may be there, in the camera's thread."""
+
+        def look() -> None:
+            if self.done:
+                self._forget()
+                callback(self)
+
+        self._forget = self._camera.on_picture(look)
+        look()
 
     def wait(self, timeout_s: float | None = None) -> Picture:
         """Wait for it, and return it.
@@ -62,6 +77,7 @@ class PictureWanted:
 
     def cancel(self) -> None:
         """Want it no longer: nothing was set in motion."""
+        self._forget()
         self._late_wall_s = -math.inf
 
 

@@ -1,6 +1,6 @@
 """One camera of ``rig.vico``; its view uses this as well."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from typing_extensions import override
@@ -100,6 +100,20 @@ class CameraHandle(CameraPlaces, CameraShape):
         """
         since = self._application.clock.now_s() if since_s is None else since_s
         return self._thread.next_picture(since, timeout_s)
+
+    def picture_since(self, since_s: float) -> Picture | None:
+        """Return the newest whole picture if it was exposed at `since_s` of platform time or later.
+
+        Asked for often, it costs nothing: who wants a certain picture does not look at all.
+        """
+        last = self._thread.last
+        if last is None or not last.frame.exposed_s >= since_s:
+            return None
+        return self._unit.corrected(last)
+
+    def on_picture(self, listener: Callable[[], object]) -> Callable[[], None]:
+        """Call `listener()` in the camera's thread at each whole picture; returns what ends it."""
+        return self._thread.on_newest(listener)
 
     @property
     def focus(self) -> float | None:

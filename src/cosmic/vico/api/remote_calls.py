@@ -8,12 +8,12 @@ from threading import Condition, Lock
 from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errors import CosmicError, NotAvailable, ProtocolError, WrongThreadError
+from cosmic.frame.errors import CosmicError, NotAvailable, ProtocolError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.ongoing import Ongoing
 from cosmic.frame.network.transport import Transport
 from cosmic.frame.task import Progress, Task
-from cosmic.frame.threads import WorkerThread, forbid_waiting_here
+from cosmic.frame.threads import WorkerThread, may_wait_here
 from cosmic.vico.api.station_state import APPLICATION
 
 logger = logging.getLogger(__name__)
@@ -204,15 +204,6 @@ class StationClock(Clock):
     @override
     def sleep(self, duration_s: float) -> None:
         WALL.sleep(duration_s / (self.rate or 1.0))
-
-
-def may_wait_here() -> bool:
-    """Return whether the calling thread may wait for a line."""
-    try:
-        forbid_waiting_here("waiting for a station")
-    except WrongThreadError:
-        return False
-    return True
 
 
 def _log(error: CosmicError) -> None:

@@ -1,6 +1,6 @@
 """One camera of another station, used as one at home."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -10,12 +10,11 @@ from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, DeviceTimeout, NotAvailable
 from cosmic.frame.network.ongoing import Ongoing
 from cosmic.frame.task import Progress, Task
-from cosmic.frame.threads import forbid_waiting_here
+from cosmic.frame.threads import forbid_waiting_here, may_wait_here
 from cosmic.vico.api.camera import CameraHandle
 from cosmic.vico.api.camera_shown import FormatShown, LinkShown, Seen
 from cosmic.vico.api.places import Places
 from cosmic.vico.api.remote_application import RemoteVicoApplication
-from cosmic.vico.api.remote_calls import may_wait_here
 from cosmic.vico.api.remote_pictures import PictureStream
 from cosmic.vico.api.remote_stream import Stream
 from cosmic.vico.api.station_picture import received, received_seen
@@ -125,6 +124,15 @@ class RemoteCameraHandle(CameraHandle):
         if picture is None:
             raise NotAvailable(f"no picture of {self.name}: something else came")
         return picture
+
+    @override
+    def picture_since(self, since_s: float) -> Picture | None:
+        newest = self.latest()
+        return newest if newest is not None and newest.frame.exposed_s >= since_s else None
+
+    @override
+    def on_picture(self, listener: Callable[[], object]) -> Callable[[], None]:
+        return lambda: None  # over a line, who waits for a picture looks again and again
 
     @property
     @override

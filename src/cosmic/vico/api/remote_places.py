@@ -7,8 +7,8 @@ from typing_extensions import override
 
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.task import Task
+from cosmic.frame.threads import may_wait_here
 from cosmic.vico.api.places import CalibrationShown, Pixel, Places, RotationShown
-from cosmic.vico.api.remote_calls import may_wait_here
 from cosmic.vico.api.station_picture import NOT_HOSTED, ReceivedPicture
 from cosmic.vico.core.picture import Picture
 

@@ -125,7 +125,7 @@ class CameraFeed:
         """Begin."""
         self._viewing.start()
         self._unsubscribe = self._unit.thread.subscribe(self._on_picture)
-        self._unit.vision.subscribe(self._on_analysis)
+        self._unit.vision.subscribe(self._on_analysis, self._analysis_wanted)
 
     def close(self) -> None:
         """End."""
@@ -155,8 +155,10 @@ class CameraFeed:
         self._station.publish(self._shown, SentPicture.of(shown, self._application.places))
 
     def _on_analysis(self, newest: Analysis) -> None:
-        if not self._over and self._station.wanted(self._seen):
-            self._station.publish(self._seen, SentSeen.of(Seen.of(newest)))
+        self._station.publish(self._seen, SentSeen.of(Seen.of(newest)))
+
+    def _analysis_wanted(self) -> bool:
+        return not self._over and self._station.wanted(self._seen)
 
 
 class StateFeed(WorkerThread):

@@ -99,6 +99,7 @@ class CameraThread(WorkerThread):
         self._looked_s = self._drawn_s = -SEARCH_S
         self._arrived = Condition()
         self._receivers: tuple[Receiver, ...] = ()
+        self._waiting: tuple[Callable[[], object], ...] = ()
         self._lock = Lock()
         self._over = False
 
@@ -145,6 +146,22 @@ class CameraThread(WorkerThread):
         """
         self._looked_s = WALL.now_s()
         return self._shown or self._newest
+
+    @property
+    def last(self) -> Picture | None:
+        """The newest whole picture, for one who wants a certain one and does not look at all."""
+        return self._newest
+
+    def on_newest(self, listener: Callable[[], object]) -> Unsubscribe:
+        """Call `listener()` in the camera's thread when there is a newer `last`."""
+        with self._lock:
+            self._waiting = (*self._waiting, listener)
+
+        def unsubscribe() -> None:
+            with self._lock:
+                self._waiting = tuple(each for each in self._waiting if each is not listener)
+
+        return unsubscribe
 
     def subscribe(self, receiver: Receiver) -> Unsubscribe:
         """Call `receiver(picture)` with every frame, in the camera's thread."""
@@ -333,6 +350,7 @@ class CameraThread(WorkerThread):
             with self._arrived:
                 self._newest = picture
                 self._arrived.notify_all()
+            tell(self._waiting)
 
     def _show(self, picture: Picture) -> None:
         now_s = WALL.now_s()

@@ -1,5 +1,6 @@
 """`VisionThread`: runs machine vision on the newest picture, at the pace it can keep (V5)."""
 
+import math
 from collections.abc import Callable
 from threading import Condition
 from typing import Final, Generic, TypeVar
@@ -7,19 +8,26 @@ from typing import Final, Generic, TypeVar
 from PySide6.QtCore import QObject
 from typing_extensions import override
 
+from cosmic.frame.clock import WALL
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.listeners import tell
-from cosmic.frame.threads import WorkerThread
+from cosmic.frame.threads import WorkerThread, may_wait_here
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.hw.interface import FrameStatus
 
 T = TypeVar("T")
 
 LOOK_S: Final = 0.2
+LOOKED_S: Final = 1.0
+"""So long after somebody looked, pictures are analysed for the next look, wall time."""
+WAIT_S: Final = 1.0
+"""How long the first look waits for what it asks for, wall time."""
 
 
 class VisionThread(WorkerThread, Generic[T]):
     """Analyses pictures one at a time; those that arrive meanwhile are passed over but the newest.
+
+    It does so while somebody listens or looks again and again, and else not at all.
 
     Parameters
     ----------
@@ -41,31 +49,59 @@ class VisionThread(WorkerThread, Generic[T]):
         self._next: Picture | None = None
         self._newest: T | None = None
         self._passed_over = 0
+        self._looked_s = -math.inf
+        self._analysed = 0
         self._changed = Condition()
-        self._listeners: tuple[Callable[[T], object], ...] = ()
+        self._listeners: tuple[tuple[Callable[[T], object], Callable[[], bool]], ...] = ()
 
     @property
     def newest(self) -> T | None:
-        """What was found last; None before."""
+        """What was found last; None before.
+
+        Who looks for the first time in a while waits for the newest picture to be analysed, or
+        gets None where nothing may wait.
+        """
+        awake, self._looked_s = self.awake, WALL.now_s()
+        if awake:
+            return self._newest
+        with self._changed:
+            self._changed.notify_all()
+            if self._next is None or not self.isRunning():
+                return self._newest
+            if not may_wait_here():
+                return None
+            before = self._analysed
+            self._changed.wait_for(lambda: self._analysed != before or self.end_requested, WAIT_S)
         return self._newest
+
+    @property
+    def awake(self) -> bool:
+        """True while pictures are analysed, because somebody wants to know."""
+        return WALL.now_s() - self._looked_s < LOOKED_S or any(
+            wanted() for _, wanted in self._listeners
+        )
 
     @property
     def passed_over(self) -> int:
         """Pictures that nobody had time for."""
         return self._passed_over
 
-    def subscribe(self, listener: Callable[[T], object]) -> None:
-        """Call `listener(found)` after each picture, in this thread."""
-        self._listeners = (*self._listeners, listener)
+    def subscribe(
+        self, listener: Callable[[T], object], wanted: Callable[[], bool] = lambda: True
+    ) -> None:
+        """Call `listener(found)` after each picture, in this thread, while it is `wanted`."""
+        self._listeners = (*self._listeners, (listener, wanted))
 
     def put(self, picture: Picture) -> None:
         """Offer a picture; any thread, returns at once."""
         if picture.frame.status is not FrameStatus.COMPLETE:
             return
+        awake = self.awake
         with self._changed:
-            self._passed_over += self._next is not None
+            self._passed_over += awake and self._next is not None
             self._next = picture
-            self._changed.notify()
+            if awake:
+                self._changed.notify_all()
 
     def forget(self) -> None:
         """Forget what was found."""
@@ -75,17 +111,25 @@ class VisionThread(WorkerThread, Generic[T]):
     def run_body(self) -> None:
         while not self.end_requested:
             with self._changed:
-                self._changed.wait_for(lambda: self._next or self.end_requested, LOOK_S)
+                self._changed.wait_for(self._due, LOOK_S)
+                if not self._due():
+                    continue
                 picture, self._next = self._next, None
             if picture is None:
                 continue
             found = self._analyse(picture)
-            self._newest = found
+            with self._changed:
+                self._newest = found
+                self._analysed += 1
+                self._changed.notify_all()
             if found is not None:
-                tell(self._listeners, found)
+                tell([listener for listener, wanted in self._listeners if wanted()], found)
+
+    def _due(self) -> bool:
+        return self.end_requested or (self._next is not None and self.awake)
 
     @override
     def request_end(self) -> None:
         super().request_end()
         with self._changed:
-            self._changed.notify()
+            self._changed.notify_all()
