@@ -7,10 +7,11 @@ from typing import Protocol
 
 from cosmic.autonomy.handling.force import ForceWatch
 from cosmic.autonomy.handling.in_hand import Calibration, FibreInHand
+from cosmic.autonomy.handling.live import LastSeen, LivePicture
 from cosmic.autonomy.handling.patience import PatientMove
 from cosmic.autonomy.handling.plate import Candidate, Jaws
 from cosmic.autonomy.handling.settings import HandlingSettings
-from cosmic.autonomy.handling.sight import PictureWanted, map_at
+from cosmic.autonomy.handling.sight import map_at
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.autonomy.tools import axis_targets
 from cosmic.daqco.api.daqco import Daqco
@@ -65,6 +66,8 @@ class FibreWork:
         Those that were put away.
     distrusted : bool
         Positions are not to be believed before the platform was initialised again.
+    seen : LastSeen
+        By which a frozen camera is known.
     gap_um : float or None
         Opening of the jaws, as steps since they were closed say; None before.
     stray_um : float
@@ -94,6 +97,7 @@ class FibreWork:
     finished: list[FibreInHand] = field(default_factory=list)
     numbers: int = 0
     distrusted: bool = False
+    seen: LastSeen = field(default_factory=LastSeen)
     gap_um: float | None = None
     stray_um: float = 0.0
     failures: list[tuple[str, OperationFailed]] = field(default_factory=list)
@@ -116,6 +120,8 @@ class FibreWork:
         for name in (settings.gripper, settings.probe, *filter(None, [settings.other])):
             work.tool(name)
         rig.vico.camera(settings.camera)
+        if isinstance(places := work.vision.places, PlatformPlaces):
+            work.calibration.book = places.book
         forces.open()
         return work
 
@@ -170,7 +176,12 @@ class FibreWork:
     @property
     def hold_tip_um(self) -> float:
         """Height of the jaws' lower edge when a fibre is held in front of the probe."""
-        return self.probe.tip_um[2] - self.settings.places.hold_above_tip_um
+        tip_um = self.probe.tip_um[2] + self.up_um(self.probe)
+        return tip_um - self.settings.places.hold_above_tip_um
+
+    def up_um(self, tool: ToolSettings) -> float:
+        """Return how much higher above the plate a tip is than its stages say."""
+        return self.calibration.up_um.get(tool.name, 0.0)
 
     # Moving; places are those of a tool's tip
 
@@ -180,7 +191,7 @@ class FibreWork:
         """Return where the axes of a tool stand with its tip at a place."""
         targets = axis_targets(tool, x_um, y_um)
         if z_um is not None:
-            targets[tool.z_axis] = z_um - tool.tip_um[2]
+            targets[tool.z_axis] = z_um - tool.tip_um[2] - self.up_um(tool)
         return targets
 
     def go(self, targets: Mapping[str, float]) -> PatientMove:
@@ -189,7 +200,8 @@ class FibreWork:
 
     def go_up(self, z_um: float) -> PatientMove:
         """Begin to move the gripper to a height; to be yielded."""
-        return self.go({self.gripper.z_axis: z_um - self.gripper.tip_um[2]})
+        tool = self.gripper
+        return self.go({tool.z_axis: z_um - tool.tip_um[2] - self.up_um(tool)})
 
     def tip_now(self, tool: ToolSettings) -> tuple[float, float]:
         """Return where a tool's tip is, as its stages say."""
@@ -199,11 +211,11 @@ class FibreWork:
         return tool.tip_um[0] + x, tool.tip_um[1] + y
 
     def height_now(self) -> float:
-        """Return the height of the gripper's tip, as its stage says."""
+        """Return the height of the gripper's tip above the plate."""
         z = self.mico[self.gripper.z_axis].position_um
         if z is None:
             raise NotAvailable(f"{self.gripper.name}: its height is not known; initialise it")
-        return self.gripper.tip_um[2] + z
+        return self.gripper.tip_um[2] + z + self.up_um(self.gripper)
 
     @property
     def grasp_um(self) -> float:
@@ -218,9 +230,9 @@ class FibreWork:
 
     # Looking
 
-    def picture(self) -> PictureWanted:
+    def picture(self) -> LivePicture:
         """Return the next picture to be exposed; to be yielded."""
-        return PictureWanted(self.vico.camera(self.settings.camera), self.clock)
+        return LivePicture(self.vico.camera(self.settings.camera), self.clock, self.seen)
 
     def mapped(self, picture: Picture, height_um: float = 0.0) -> PixelMap:
         """Return the map of a picture for things at a height above the plate."""
