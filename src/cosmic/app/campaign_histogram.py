@@ -6,16 +6,16 @@ from typing import Final
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
+from cosmic.app.curve_frame import CurveFrame
 from cosmic.autonomy.campaign.board import MeasuredEi
 from cosmic.autonomy.campaign.records import Floats
 from cosmic.autonomy.campaign.report_figures import EI_LABEL, EI_UNIT
 from cosmic.autonomy.campaign.statistics import MeanEi
-from cosmic.frame.gui.palette import OKABE_ITO
-from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
+from cosmic.frame.gui.palette import OKABE_ITO, Palette
+from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.overrides import override
 
 _AXIS_PX: Final = 44
@@ -25,24 +25,16 @@ _MOST_INTERVALS: Final = 200
 """Fibres whose intervals are drawn, the newest; more of them would be a solid block."""
 
 
-class EiHistogram(QWidget):
+class EiHistogram(CurveFrame):
     """Draws the fibres as bars, below them each with its 95 % interval, above them the mean."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._view = pg.GraphicsView()
-        layout = pg.GraphicsLayout()
-        self._view.setCentralItem(layout)
-        layout.layout.setSpacing(2)
-        layout.layout.setContentsMargins(2, 4, 8, 2)
-        self.bars_box, self._count_axis = _strip(layout, 0)
-        self.intervals_box, self._interval_axis = _strip(layout, 1)
-        layout.layout.setRowStretchFactor(0, 3)
-        layout.layout.setRowStretchFactor(1, 1)
-        self._ei_axis = pg.AxisItem("bottom")
-        self._ei_axis.enableAutoSIPrefix(False)
-        self._ei_axis.linkToView(self.intervals_box)
-        layout.addItem(self._ei_axis, row=2, col=1)
+        super().__init__(_AXIS_PX, parent)
+        self.bars_box, self._count_axis = self._add_field("fibres", share=3)
+        self.intervals_box, self._interval_axis = self._add_field("")
+        for box in (self.bars_box, self.intervals_box):
+            box.disableAutoRange()
+        self._ei_axis = self._add_axis_below(f"bending stiffness, {EI_LABEL}")
         self.intervals_box.setXLink(self.bars_box)
         self.bars = pg.BarGraphItem(x0=[], x1=[], height=[])
         self.doubtful = pg.BarGraphItem(x0=[], x1=[], y0=[], height=[])
@@ -54,9 +46,6 @@ class EiHistogram(QWidget):
             self.bars_box.addItem(item)
         for item in (self.intervals, self.values):
             self.intervals_box.addItem(item)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self._view)
         self.setMinimumSize(32 * STEP_PX, 20 * STEP_PX)
         self.setToolTip(
             "Bending stiffness of the fibres: bars above, each with its 95 % interval below, and "
@@ -119,20 +108,8 @@ class EiHistogram(QWidget):
         for item in (self.mean, self.middle, self.intervals, self.values):
             item.setData([], [])
 
-    def _restyle(self) -> None:
-        palette = current_palette()
-        self._view.setBackground(palette.panel)
-        for box in (self.bars_box, self.intervals_box):
-            box.setBackgroundColor(palette.field)
-        for axis, name in (
-            (self._count_axis, "fibres"),
-            (self._interval_axis, ""),
-            (self._ei_axis, f"bending stiffness, {EI_LABEL}"),
-        ):
-            axis.setPen(palette.border_strong)
-            axis.setTextPen(palette.text)
-            axis.setStyle(tickFont=number_font(11), tickLength=4)
-            axis.setLabel(name, color=palette.dim)
+    @override
+    def _colour(self, palette: Palette) -> None:
         self._interval_axis.setStyle(showValues=False, tickLength=0)
         self.bars.setOpts(brush=QColor(_BARS), pen=pg.mkPen(palette.field))
         # Not trusted: hollow, so that it is told apart without colour, too.
@@ -145,12 +122,6 @@ class EiHistogram(QWidget):
         self.values.setSize(4)
         self.values.setPen(pg.mkPen(None))
         self.values.setBrush(QColor(palette.text))
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_shown"):
-            self._restyle()
 
 
 def _edges(logs: Floats) -> Floats:
@@ -176,16 +147,3 @@ def _count_ticks(top: float) -> list[tuple[float, str]]:
     steps = (each * part for each in (size / 10.0, size) for part in (1.0, 2.0, 5.0))
     step = next((each for each in steps if each >= 1.0 and top / each <= 4.0), size)
     return [(float(value), f"{value:g}") for value in np.arange(0.0, top + 0.5 * step, step)]
-
-
-def _strip(layout: pg.GraphicsLayout, row: int) -> tuple[pg.ViewBox, pg.AxisItem]:
-    """Add one field with its axis; it has no menus, which would be windows."""
-    box = pg.ViewBox(enableMenu=False, enableMouse=False)
-    box.disableAutoRange()
-    axis = pg.AxisItem("left")
-    axis.enableAutoSIPrefix(False)
-    axis.setWidth(_AXIS_PX)
-    axis.linkToView(box)
-    layout.addItem(axis, row=row, col=0)
-    layout.addItem(box, row=row, col=1)
-    return box, axis

@@ -3,42 +3,35 @@
 from typing import Final
 
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, Qt
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QWidget
 
+from cosmic.app.curve_frame import CurveFrame
 from cosmic.autonomy.control.trace import ControlTrace
 from cosmic.daqco.gui.plot.units import display_unit
-from cosmic.frame.gui.palette import OKABE_ITO
-from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
+from cosmic.frame.gui.palette import OKABE_ITO, Palette
+from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.overrides import override
 
 SPAN_S: Final = 10.0
 _AXIS_PX: Final = 56
-_GAP_PX: Final = 3
 _WIDTH: Final = 2
 _MOST_POINTS: Final = 1000
 _VALUE: Final = OKABE_ITO["orange"]
 _OUTPUT: Final = OKABE_ITO["sky blue"]
 
 
-class ControlPlot(QWidget):
+class ControlPlot(CurveFrame):
     """Draws a `ControlTrace`; GUI thread."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._view = pg.GraphicsView()
-        layout = pg.GraphicsLayout()
-        self._view.setCentralItem(layout)
-        layout.layout.setSpacing(_GAP_PX)
-        layout.layout.setContentsMargins(2, 4, 8, 2)
-        self.value_box, self._value_axis = _strip(layout, 0)
-        self.output_box, self._output_axis = _strip(layout, 1)
-        layout.layout.setRowStretchFactor(0, 3)
-        layout.layout.setRowStretchFactor(1, 2)
-        self._time_axis = pg.AxisItem("bottom")
-        self._time_axis.enableAutoSIPrefix(False)
-        self._time_axis.linkToView(self.output_box)
-        layout.addItem(self._time_axis, row=2, col=1)
+        super().__init__(_AXIS_PX, parent)
+        self.value_box, self._value_axis = self._add_field("value", share=3)
+        self.output_box, self._output_axis = self._add_field("output", share=2)
+        for box in (self.value_box, self.output_box):
+            box.setXRange(-SPAN_S, 0.0, padding=0.0)
+            box.enableAutoRange(y=True)
+        self._add_axis_below("time before now, s")
         self.value, self.set_point = pg.PlotCurveItem(), pg.PlotCurveItem()
         self.output = pg.PlotCurveItem()
         for box, curve in (
@@ -48,9 +41,6 @@ class ControlPlot(QWidget):
         ):
             box.addItem(curve)
         self._units = ("", "")
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self._view)
         self.setMinimumSize(30 * STEP_PX, 20 * STEP_PX)
         self._restyle()
 
@@ -58,6 +48,9 @@ class ControlPlot(QWidget):
         """Write the units of value and axis at the axes."""
         if (unit, axis_unit) != self._units:
             self._units = (unit, axis_unit)
+            shown, axis_shown = display_unit(unit), display_unit(axis_unit)
+            self._names[self._value_axis] = f"value, {shown}" if shown else "value"
+            self._names[self._output_axis] = f"output, {axis_shown}/s" if axis_shown else "output"
             self._restyle()
 
     def show_trace(self, trace: ControlTrace) -> None:
@@ -76,42 +69,9 @@ class ControlPlot(QWidget):
         for curve in (self.value, self.set_point, self.output):
             curve.setData([], [])
 
-    def _restyle(self) -> None:
-        palette = current_palette()
-        self._view.setBackground(palette.panel)
-        unit, axis_unit = (display_unit(each) for each in self._units)
-        for box in (self.value_box, self.output_box):
-            box.setBackgroundColor(palette.field)
-        for axis, name in (
-            (self._value_axis, f"value, {unit}" if unit else "value"),
-            (self._output_axis, f"output, {axis_unit}/s" if axis_unit else "output"),
-            (self._time_axis, "time before now, s"),
-        ):
-            axis.setPen(palette.border_strong)
-            axis.setTextPen(palette.text)
-            axis.setStyle(tickFont=number_font(11), tickLength=4)
-            axis.setLabel(name, color=palette.dim)
+    @override
+    def _colour(self, palette: Palette) -> None:
         self.value.setPen(pg.mkPen(_VALUE, width=_WIDTH))
         self.output.setPen(pg.mkPen(_OUTPUT, width=_WIDTH))
         # The set point is the text's colour and dashed: told apart without colour, too.
         self.set_point.setPen(pg.mkPen(palette.text, width=1, style=Qt.PenStyle.DashLine))
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_units"):
-            self._restyle()
-
-
-def _strip(layout: pg.GraphicsLayout, row: int) -> tuple[pg.ViewBox, pg.AxisItem]:
-    """Add one field for curves with its axis; it has no menus, which would be windows."""
-    box = pg.ViewBox(enableMenu=False, enableMouse=False)
-    box.setXRange(-SPAN_S, 0.0, padding=0.0)
-    box.enableAutoRange(y=True)
-    axis = pg.AxisItem("left")
-    axis.enableAutoSIPrefix(False)
-    axis.setWidth(_AXIS_PX)
-    axis.linkToView(box)
-    layout.addItem(axis, row=row, col=0)
-    layout.addItem(box, row=row, col=1)
-    return box, axis

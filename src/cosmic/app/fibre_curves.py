@@ -5,12 +5,12 @@ from typing import Final
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
+from cosmic.app.curve_frame import CurveFrame
 from cosmic.autonomy.campaign.board import CardCurve, Mask
-from cosmic.frame.gui.palette import OKABE_ITO
+from cosmic.frame.gui.palette import OKABE_ITO, Palette
 from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
 from cosmic.frame.overrides import override
 
@@ -20,27 +20,13 @@ _POINT_PX: Final = 6
 _AXIS_PX: Final = 52
 
 
-class FibreCurves(QWidget):
+class FibreCurves(CurveFrame):
     """Draws `CardCurve`s: full points out, hollow ones back, lines for the model; GUI thread."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._view = pg.GraphicsView()
-        layout = pg.GraphicsLayout()
-        self._view.setCentralItem(layout)
-        layout.layout.setSpacing(2)
-        layout.layout.setContentsMargins(2, 4, 8, 2)
-        self.box = pg.ViewBox(enableMenu=False, enableMouse=False)
-        self._force_axis, self._way_axis = pg.AxisItem("left"), pg.AxisItem("bottom")
-        self._force_axis.setWidth(_AXIS_PX)
-        for axis, row, column in ((self._force_axis, 0, 0), (self._way_axis, 1, 1)):
-            axis.enableAutoSIPrefix(False)
-            axis.linkToView(self.box)
-            layout.addItem(axis, row=row, col=column)
-        layout.addItem(self.box, row=0, col=1)
-        column_of_all = QVBoxLayout(self)
-        column_of_all.setContentsMargins(0, 0, 0, 0)
-        column_of_all.addWidget(self._view)
+        super().__init__(_AXIS_PX, parent)
+        self.box, _ = self._add_field("force, µN")
+        self._add_axis_below("push beyond the first contact, µm")
         self.setMinimumSize(36 * STEP_PX, 28 * STEP_PX)
         self.setToolTip(
             "Force over push beyond the first contact: full points on the way out, hollow ones on "
@@ -83,25 +69,9 @@ class FibreCurves(QWidget):
         self.labels.append(label)
         self.box.addItem(label, ignoreBounds=True)
 
-    def _restyle(self) -> None:
-        palette = current_palette()
-        self._view.setBackground(palette.panel)
-        self.box.setBackgroundColor(palette.field)
-        for axis, name in (
-            (self._force_axis, "force, µN"),
-            (self._way_axis, "push beyond the first contact, µm"),
-        ):
-            axis.setPen(palette.border_strong)
-            axis.setTextPen(palette.text)
-            axis.setStyle(tickFont=number_font(11), tickLength=4)
-            axis.setLabel(name, color=palette.dim)
-        self._draw()
-
     @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "labels"):
-            self._restyle()
+    def _colour(self, palette: Palette) -> None:
+        self._draw()
 
 
 def _points(curve: CardCurve, which: Mask, colour: str, *, hollow: bool) -> pg.ScatterPlotItem:
