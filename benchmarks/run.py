@@ -47,7 +47,15 @@ NAMES = (
     "procedure_engine",
     "bending",
 )
-ALL = (*NAMES, "collision_oracles", "soak", "acquisition_soak", "campaign", "campaign_faults")
+ALL = (
+    *NAMES,
+    "collision_oracles",
+    "soak",
+    "acquisition_soak",
+    "campaign",
+    "campaign_faults",
+    "campaign_kills",
+)
 ROOT = Path(__file__).resolve().parents[1]
 
 
