@@ -1,5 +1,6 @@
 """Joins what one application does to another, in this process or over a line."""
 
+import cosmic
 from cosmic.app.elsewhere import Elsewhere
 from cosmic.app.hosting import Hosted, Site
 from cosmic.autonomy.couplings import join_teleoperation
@@ -21,7 +22,8 @@ def join_here(own: Hosted, site: Site) -> None:
     if vico is not None and mico is not None:
         join_stage_positions(vico, mico)
         kept_in = vico.settings.calibration
-        join_places(vico, mico, site.path.parent / kept_in if kept_in else None)
+        folder = site.path.parent / kept_in if kept_in else None
+        join_places(vico, mico, folder, cosmic.__version__)
 
 
 def join_stations(

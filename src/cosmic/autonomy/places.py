@@ -7,6 +7,7 @@ from typing import Final
 
 from typing_extensions import override
 
+from cosmic.autonomy.calibrating.book import Book
 from cosmic.autonomy.calibrations import Calibrations
 from cosmic.autonomy.rotation_procedure import RotationProcedure
 from cosmic.autonomy.stage_procedure import StageProcedure
@@ -36,6 +37,15 @@ class PlatformPlaces(Places):
     ----------
     folder : Path or None
         Where calibrations are kept; None: until the end of the program.
+    version : str
+        Of the program, for the book of calibrations.
+
+    Attributes
+    ----------
+    calibrations : Calibrations
+        Maps from platform to picture, and the rotation centre.
+    book : Book
+        All that procedures measure, those maps among it.
 
     Raises
     ------
@@ -44,7 +54,11 @@ class PlatformPlaces(Places):
     """
 
     def __init__(
-        self, vico: VicoApplication, mico: MicoApplicationBase, folder: Path | None
+        self,
+        vico: VicoApplication,
+        mico: MicoApplicationBase,
+        folder: Path | None,
+        version: str = "",
     ) -> None:
         self._vico = vico
         self._manager = mico.manager
@@ -53,6 +67,7 @@ class PlatformPlaces(Places):
         if mistakes := tool_mistakes(vico.settings.tool, axes):
             raise ConfigError("\n".join(mistakes))
         self.calibrations = Calibrations(vico.units, self._tools, folder)
+        self.book = Book(folder, clock=vico.clock, version=version)
 
     # Pixels to places
 
@@ -228,9 +243,11 @@ def tool_mistakes(tools: Sequence[ToolSettings], axes: Collection[str]) -> list[
     ]
 
 
-def join_places(vico: VicoApplication, mico: MicoApplicationBase, folder: Path | None) -> None:
+def join_places(
+    vico: VicoApplication, mico: MicoApplicationBase, folder: Path | None, version: str = ""
+) -> None:
     """Have the pixels of ViCo's cameras mean places on the platform; raises `ConfigError`."""
-    places = PlatformPlaces(vico, mico, folder)
+    places = PlatformPlaces(vico, mico, folder, version)
     for unit in vico.units.values():
         for link in map(unit.chain.algorithm, ("tools", "tips")):
             if isinstance(link, FindTools | FindTips):

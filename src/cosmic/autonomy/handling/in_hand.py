@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.calibrating.book import Book
 from cosmic.autonomy.handling.plate import PlateFrame, Reach
 from cosmic.autonomy.handling.sight import SeenFibre
 from cosmic.autonomy.procedures.operation import OperationFailed
@@ -36,11 +37,17 @@ class Calibration:
         About which place the plate turns.
     probe_off_um : (float, float)
         How far the probe's tip is from where its stages say, in the frame of the gripper.
+    up_um : dict of str to float
+        How much higher above the plate the tip of each tool is than its stages say.
+    book : Book
+        Where it is kept beyond this work.
     """
 
     made: dict[str, Measured] = field(default_factory=dict)
     frame: PlateFrame = field(default_factory=PlateFrame)
     probe_off_um: tuple[float, float] = (0.0, 0.0)
+    up_um: dict[str, float] = field(default_factory=dict)
+    book: Book = field(default_factory=Book)
 
     def fresh(self, name: str, now_s: float, age_s: float) -> bool:
         """Return whether a calibration is there and not too old."""

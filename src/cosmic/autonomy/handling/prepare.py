@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from typing_extensions import override
 
-from cosmic.autonomy.handling.in_hand import Measured
+from cosmic.autonomy.calibrating.calibrated import Calibrated
 from cosmic.autonomy.handling.jaws import in_step, zero_jaws
 from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.sight import map_at
@@ -14,7 +14,6 @@ from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, St
 from cosmic.autonomy.tools import expected, tip_um
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.mico.core.positioner import Confidence
-from cosmic.vico.core.calibration_fit import CalibrationRefused
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.tool_settings import ToolSettings
 from cosmic.vico.core.vision.algorithms import grey
@@ -25,7 +24,6 @@ REACH_PX = 40.0
 OTHER_UP_UM = 5000.0
 OTHER_BACK_UM = 4000.0
 TURN_ON_DEG = 41.0
-POOR = "calibration poor"
 PLATE = "map of the plate"
 HELD = "map where fibres are held"
 TABLE = "rotation centre"
@@ -90,35 +88,6 @@ def retract_probe(work: FibreWork) -> Steps:
     away = work.settings.places.probe_away_y_um
     if y < away - 1.0:
         yield work.go(work.at(work.probe, x, away))
-
-
-class Calibrated(FibreOperation):
-    """A calibration that is made when there is none, or it is too old; refused when poor."""
-
-    key = ""
-
-    @override
-    def steps(self, work: FibreWork) -> Steps:
-        now_s = work.clock.now_s()
-        if work.calibration.fresh(self.key, now_s, work.settings.calibration.age_s):
-            return
-        try:
-            yield from self.measure(work)
-        except (NotAvailable, CalibrationRefused) as exc:
-            raise OperationFailed(POOR, f"{self.key}: {exc}") from exc
-        yield SAFE_POINT
-
-    def measure(self, work: FibreWork) -> Steps:
-        """Measure it, and keep it by `kept`."""
-        raise NotImplementedError
-
-    def kept(self, work: FibreWork, residual: float, unit: str, largest: float) -> None:
-        """Note that it was made, or refuse it."""
-        if not residual <= largest:
-            raise OperationFailed(
-                POOR, f"{self.key}: residual {residual:.3g} {unit}, at most {largest:g} is allowed"
-            )
-        work.calibration.made[self.key] = Measured(work.clock.now_s(), residual, unit)
 
 
 class CalibratePlate(Calibrated):

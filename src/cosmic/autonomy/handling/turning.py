@@ -6,8 +6,9 @@ from typing import Final
 import numpy as np
 from typing_extensions import override
 
+from cosmic.autonomy.calibrating.calibrated import Calibrated
 from cosmic.autonomy.handling.plate import Candidate, PlateFrame
-from cosmic.autonomy.handling.prepare import TABLE, Calibrated, clear_picture
+from cosmic.autonomy.handling.prepare import TABLE, clear_picture
 from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps, Wish

@@ -12,6 +12,7 @@ from cosmic.autonomy.handling.patience import PatientMove
 from cosmic.autonomy.handling.plate import Candidate, Jaws
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.sight import map_at
+from cosmic.autonomy.places import PlatformPlaces
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.autonomy.tools import axis_targets
 from cosmic.daqco.api.daqco import Daqco

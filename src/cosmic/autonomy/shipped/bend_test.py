@@ -1,10 +1,10 @@
 """The bend test: a fibre is taken up, pushed as a cantilever at several spans, and put away."""
 
+from cosmic.autonomy.calibrating.calibrated import POOR
 from cosmic.autonomy.handling.grasp import MISSED, Carry, TestGrasp
 from cosmic.autonomy.handling.initialise import InitialiseAgain
 from cosmic.autonomy.handling.one_span import NO_CONTACT
 from cosmic.autonomy.handling.prepare import (
-    POOR,
     CalibrateHeld,
     CalibratePlate,
     ComparePlaces,

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Final
 
@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.frame.errors import ConfigError
+from cosmic.vico.core.focus_peak import around_peak, rough, vertex
 from cosmic.vico.hw.interface import Frame, FrameStatus, Pixels, Roi
 
 Grey = npt.NDArray[np.integer[Any] | np.floating[Any]]
@@ -20,8 +21,6 @@ LEAST_CONTRAST: Final = 0.03
 PEAK_SHARE: Final = 0.4
 MOST_POSITIONS: Final = 400
 NOISE_TIMES: Final = 6.0
-ROUGHEST: Final = 0.5
-LEAST_SIGNIFICANCE: Final = 3.0
 FINE_REACH: Final = 1.5
 MOST_SWEEPS: Final = 3
 
@@ -234,9 +233,9 @@ class FocusSearch:
         """Fit a parabola to the logarithm of the upper part of the fine sweep."""
         floor = min(measure for _, measure in self._coarse)
         peak = max(measure for _, measure in self._sweep)
-        near = _around_peak(self._sweep, peak - PEAK_SHARE * (peak - floor))
-        found = _vertex(near)
-        if found is None or not found[1] <= self._coarse_step or _rough(self._sweep):
+        near = around_peak(self._sweep, peak - PEAK_SHARE * (peak - floor))
+        found = vertex(near)
+        if found is None or not found[1] <= self._coarse_step or rough(self._sweep):
             self._fail(FocusFault.NOISE, "there is no clear peak; light it better, average frames")
             return
         position, std = found
@@ -247,41 +246,28 @@ class FocusSearch:
         self._answer = FocusAnswer(position, std, None, text, tuple(self._curve))
 
     def _fail(self, fault: FocusFault, advice: str) -> None:
-        text = f"no focus found: {fault.value}; {advice}"
-        self._answer = FocusAnswer(None, None, fault, text, tuple(self._curve))
+        self._answer = _faulty(tuple(self._curve), fault, advice)
 
 
-def _around_peak(sweep: Sequence[tuple[float, float]], least: float) -> list[tuple[float, float]]:
-    """Return the run of points about the best that are at least `least`, and five at least."""
-    best = int(np.argmax([measure for _, measure in sweep]))
-    first = last = best
-    while first > 0 and sweep[first - 1][1] >= least:
-        first -= 1
-    while last < len(sweep) - 1 and sweep[last + 1][1] >= least:
-        last += 1
-    return list(sweep[min(first, max(0, best - 2)) : max(last, best + 2) + 1])
+def peak_of(sweep: Sequence[tuple[float, float]]) -> FocusAnswer:
+    """Return where one sweep through a known focus is sharpest; five points are the fewest.
+
+    With `FocusFault.AT_END` the position is that end, for the next sweep to be made about it.
+    """
+    curve = tuple(sweep)
+    index = max(range(len(curve)), key=lambda each: curve[each][1])
+    least, most = min(each for _, each in curve), curve[index][1]
+    if not most - least > LEAST_CONTRAST * most:
+        return _faulty(curve, FocusFault.FLAT, "light it, put something with edges in view")
+    if index in (0, len(curve) - 1):
+        advice = f"search about {curve[index][0]:g}"
+        return replace(_faulty(curve, FocusFault.AT_END, advice), position=curve[index][0])
+    near = around_peak(curve, most - PEAK_SHARE * (most - least))
+    found = vertex(near)
+    if found is None or rough(curve) or not near[0][0] <= found[0] <= near[-1][0]:
+        return _faulty(curve, FocusFault.NOISE, "there is no clear peak; light it better")
+    return FocusAnswer(*found, None, f"sharpest at {found[0]:.4g} ± {found[1]:.2g}", curve)
 
 
-def _rough(sweep: Sequence[tuple[float, float]]) -> bool:
-    """Return whether neighbours differ as noise does (von Neumann's ratio, 1 for pure noise)."""
-    measures = np.array([measure for _, measure in sweep])
-    return bool(np.mean(np.diff(measures) ** 2) > ROUGHEST * 2.0 * measures.var(ddof=1))
-
-
-def _vertex(points: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
-    """Return the top of the parabola through the logarithms and its standard deviation."""
-    places, measures = np.array(points, dtype=np.float64).T
-    if len(places) < 4 or measures.min() <= 0.0:
-        return None
-    middle, width = places.mean(), np.ptp(places)
-    design = np.vander((places - middle) / width, 3)
-    inverse = np.linalg.pinv(design.T @ design)
-    curve = inverse @ design.T @ np.log(measures)
-    error = np.log(measures) - design @ curve
-    second, first = float(curve[0]), float(curve[1])
-    covariance = inverse * float(error @ error) / (len(places) - 3)
-    if not second < -LEAST_SIGNIFICANCE * math.sqrt(float(covariance[0, 0])):
-        return None
-    slope = np.array([first / (2.0 * second**2), -1.0 / (2.0 * second), 0.0])
-    std = math.sqrt(float(slope @ covariance @ slope))
-    return float(middle - width * first / (2.0 * second)), float(width * std)
+def _faulty(curve: tuple[tuple[float, float], ...], fault: FocusFault, advice: str) -> FocusAnswer:
+    return FocusAnswer(None, None, fault, f"no focus found: {fault.value}; {advice}", curve)

@@ -1,0 +1,1 @@
+"""Calibrations that need several applications, as operations, and where they are kept."""
