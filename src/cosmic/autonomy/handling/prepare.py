@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from typing_extensions import override
 
+from cosmic.autonomy.calibrating.book import Entry
 from cosmic.autonomy.calibrating.calibrated import Calibrated
 from cosmic.autonomy.handling.jaws import in_step, zero_jaws
 from cosmic.autonomy.handling.operation import FibreOperation
@@ -179,9 +180,14 @@ class ComparePlaces(Calibrated):
         yield work.go(work.at(work.probe, beside, before))
         picture = yield work.picture()
         assert isinstance(picture, Picture)
-        work.calibration.probe_off_um = probe_off_um(work, picture)
+        x, y = work.calibration.probe_off_um = probe_off_um(work, picture)
         yield from retract_probe(work)
-        self.kept(work, residual, "px", settings.residual_px)
+        values = {"off_x_um": x, "off_y_um": y}
+        self.kept(work, residual, "px", settings.residual_px, values=values, how="one picture")
+
+    @override
+    def restore(self, work: FibreWork, entry: Entry) -> None:
+        work.calibration.probe_off_um = entry.values["off_x_um"], entry.values["off_y_um"]
 
 
 class TurnOn(FibreOperation):

@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 from typing_extensions import override
 
+from cosmic.autonomy.calibrating.book import Entry
 from cosmic.autonomy.calibrating.calibrated import Calibrated
 from cosmic.autonomy.handling.plate import Candidate, PlateFrame
 from cosmic.autonomy.handling.prepare import TABLE, clear_picture
@@ -34,7 +35,11 @@ class FindRotationCentre(Calibrated):
     def measure(self, work: FibreWork) -> Steps:
         settings = work.settings.calibration
         if not settings.rotation_centre:
-            self.kept(work, 0.0, "um", settings.rotation_std_um)
+            x, y = work.calibration.frame.centre_um
+            values = {"centre_x_um": x, "centre_y_um": y}
+            self.kept(
+                work, 0.0, "um", settings.rotation_std_um, values=values, how="taken as it is"
+            )
             return
         if not work.candidates:
             raise OperationFailed("no fibre", "no clear fibre lies on the plate to be followed")
@@ -49,9 +54,17 @@ class FindRotationCentre(Calibrated):
                 why = str(exc)
                 continue
             _put_in_force(work, PlateFrame(fit.centre_um))
-            self.kept(work, fit.std_um, "um", settings.rotation_std_um)
+            x, y = fit.centre_um
+            values = {"centre_x_um": x, "centre_y_um": y, "residual_um": fit.rms_um}
+            how = f"a fibre followed to {fit.angles} angles"
+            self.kept(work, fit.std_um, "um", settings.rotation_std_um, values=values, how=how)
             return
         raise NotAvailable(why)
+
+    @override
+    def restore(self, work: FibreWork, entry: Entry) -> None:
+        centre_um = entry.values["centre_x_um"], entry.values["centre_y_um"]
+        _put_in_force(work, PlateFrame(centre_um))
 
 
 def _followed(
