@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -52,7 +53,23 @@ class Survey(FibreOperation):
         assert isinstance(picture, Picture)
         mapped = work.mapped(picture)
         look(work, find_seen(picture, mapped))
+        if not work.candidates:
+            raise OperationFailed(NONE_LEFT, none_left(work.skipped))
         yield SAFE_POINT
+
+
+def none_left(skipped: Mapping[str, int]) -> str:
+    """Return what is said where no fibre can be taken up, and what to do.
+
+    Parameters
+    ----------
+    skipped : mapping of str to int
+        Why fibres on the plate are not taken, and how many.
+    """
+    told = ", ".join(f"{count} {why}" for why, count in sorted(skipped.items()))
+    if not told:
+        return "the plate is empty; put a sample there, or look at light and focus"
+    return f"none on the plate can be taken up ({told}); spread them, or put another sample there"
 
 
 def look(work: FibreWork, seen: list[SeenFibre]) -> None:
@@ -166,11 +183,8 @@ class Choose(FibreOperation):
             if work.candidates:
                 work.skipped[OUT_OF_REACH] += len(work.candidates)
             work.candidates = []
-            told = ", ".join(f"{count} {why}" for why, count in sorted(work.skipped.items()))
             cause = LOOK_AGAIN if work.since_survey else NONE_LEFT
-            raise OperationFailed(
-                cause, f"none that can be taken up ({told or 'the plate is empty'})"
-            )
+            raise OperationFailed(cause, none_left(work.skipped))
         work.candidates = [each for each in work.candidates if each is not best.candidate]
         gone = best.candidate.line_um.mean(axis=0)
         work.lines_um = [
