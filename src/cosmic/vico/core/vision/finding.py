@@ -18,11 +18,18 @@ from cosmic.vico.core.vision.measures import (
     kink_angles_deg,
     kink_index,
     longest_extent,
-    unblurred,
 )
 from cosmic.vico.core.vision.profiles import Scene
-from cosmic.vico.core.vision.refine import Course, Neighbours, refine
+from cosmic.vico.core.vision.refine import Course, Neighbours, near_ends, refine
 from cosmic.vico.core.vision.relief import find_relief
+from cosmic.vico.core.vision.section import (
+    APERTURE_PX,
+    FEWEST_ROWS,
+    Section,
+    fit_section,
+    gathered,
+    pooled,
+)
 from cosmic.vico.core.vision.smoothing import arc_lengths, resampled
 
 MOST_FORKS = 400
@@ -114,21 +121,33 @@ def neighbours(scene: Scene, kept: list[Strand], index: int) -> Neighbours:
     return Neighbours(cKDTree(points), margins)
 
 
-def fibre(scene: Scene, course: Course, doubts: list[str]) -> Fibre:
+def section_of(scene: Scene, course: Course) -> Section:
+    """Return the cross section of a fibre; one that is no bar is as wide as half of its height."""
+    reach = 0.5 * course.width + 3.0 * min(course.blur_px, 0.4 * course.width) + 3.0
+    good = course.good & ~near_ends(course)
+    good = good if good.sum() >= FEWEST_ROWS else course.good
+    found = fit_section(gathered(scene, course.line, good, course.ground, reach), course.width)
+    if found is not None:
+        return found
+    blur = max(course.blur_px, APERTURE_PX)
+    return Section(course.width, 0.2 * course.width + 0.2, float(np.log(blur)), 0.5, 0.0)
+
+
+def fibre(scene: Scene, course: Course, section: Section, doubts: list[str]) -> Fibre:
     """Return what a course amounts to."""
     fine = resampled(course.line, 0.5, multiple=4)
     line = fine[::4]
     length = float(arc_lengths(fine)[-1])
     projected, orientation = longest_extent(line)
-    sharp, blur_share = unblurred(course.width, course.blur_px)
-    widths = filled(course.widths, len(line)) * sharp
-    width = float(widths.mean())
+    width = section.width_px
+    widths = filled(course.widths, len(line))
+    widths *= width / float(widths.mean())
     kinks = kink_angles_deg(line, width)
     ends_std = np.array([end.std_px for end in course.ends])
     length_std = length_deviation(course, length)
     if length_std > 0.01 * length:
         doubts.append(checks.IMPRECISE)
-    width_std = width_deviation(course, blur_share)
+    width_std = width_deviation(course, section)
     free = clear_around(scene, line, width)
     contrast = float(np.median(course.contrast[course.good]))
     return Fibre(
@@ -164,10 +183,10 @@ def length_deviation(course: Course, length: float) -> float:
     return float(np.sqrt(ends + (2e-4 * length) ** 2 + (0.004 * hidden) ** 2))
 
 
-def width_deviation(course: Course, blur_share: float) -> float:
+def width_deviation(course: Course, section: Section) -> float:
     """Return the standard deviation of the mean width."""
     spread = float(np.nanstd(course.widths)) / np.sqrt(max(1, int(course.good.sum()) // 4))
-    return float(np.hypot(np.hypot(0.05, spread), 0.3 * blur_share**2 * course.width))
+    return float(np.hypot(np.hypot(0.02, spread), section.width_std_px))
 
 
 def uncertainties(
@@ -231,6 +250,7 @@ def judged(scene: Scene, courses: list[tuple[Strand, Course]], *, crowd: bool) -
     widths = [course.width for _, course in courses]
     apart = checks.continued(lines, widths)
     beside = left_over(scene, lines, widths)
+    sections = pooled([section_of(scene, course) for _, course in courses])
     found = []
     for index, (strand, course) in enumerate(courses):
         doubts = [*strand.doubts, *checks.doubts_of(course)]
@@ -242,7 +262,7 @@ def judged(scene: Scene, courses: list[tuple[Strand, Course]], *, crowd: bool) -
             doubts.append(checks.CONTINUES)
         if index in beside:
             doubts.append(checks.LEFT_OVER)
-        found.append(fibre(scene, course, doubts))
+        found.append(fibre(scene, course, sections[index], doubts))
     return sorted(found, key=lambda each: -each.length_px)
 
 

@@ -1,10 +1,7 @@
 """Length, curl, kinks and pose of a centre line (ISO 16065-1, TAPPI T 271)."""
 
-from functools import cache
-
 import cv2
 import numpy as np
-from scipy.special import erf
 
 from cosmic.vico.core.vision.grey import Floats
 from cosmic.vico.core.vision.smoothing import arc_lengths, directions
@@ -12,42 +9,6 @@ from cosmic.vico.core.vision.smoothing import arc_lengths, directions
 KINK_DEG = 10.0
 # Kibblewhite: a kink of these degrees and more counts so often.
 KINK_WEIGHTS = ((91.0, 4), (46.0, 3), (21.0, 2))
-
-
-# Of a box of width one blurred by a Gaussian: deviation; width at half height; the deviation that
-# its flanks seem to have between a quarter and three quarters of the height.
-_BLURS = np.linspace(0.02, 0.7, 35)
-
-
-def _blurred_boxes() -> tuple[Floats, Floats]:
-    x = np.linspace(0.0, 3.0, 3001)
-    half, flank = [], []
-    for blur in _BLURS:
-        height = 0.5 * (erf((x + 0.5) / (np.sqrt(2) * blur)) - erf((x - 0.5) / (np.sqrt(2) * blur)))
-        height = height / height[0]
-        at = [float(x[int(np.argmax(height < level))]) for level in (0.75, 0.5, 0.25)]
-        half.append(2.0 * at[1])
-        flank.append((at[2] - at[0]) / 1.349)
-    return np.array(half), np.array(flank)
-
-
-@cache
-def blurred_boxes() -> tuple[Floats, Floats]:
-    """Return width at half height, and flank over that width, for each of `_BLURS`."""
-    half, flank = _blurred_boxes()
-    return half, flank / half
-
-
-def unblurred(width: float, flank: float) -> tuple[float, float]:
-    """Return by what to multiply a width at half height to undo blur, and the blur's share of it.
-
-    Blur widens what is narrower than about twice and a half its deviation: half of a lower top.
-    """
-    half, ratio = blurred_boxes()
-    seen = flank / max(width, 1e-6)
-    # Beyond this what is seen is nearly a Gaussian, whatever the width.
-    seen = min(seen, 0.264)
-    return float(1.0 / np.interp(seen, ratio, half)), float(np.interp(seen, ratio, _BLURS))
 
 
 def longest_extent(line: Floats) -> tuple[float, float]:
