@@ -54,7 +54,7 @@ class Rig:
                 platform.policy,
                 rate=platform.clock.rate,
             )
-        self._runs: WeakSet[ProcedureRun[object]] = WeakSet()
+        self._runs: WeakSet[ProcedureRun[object] | Campaign] = WeakSet()
         self._closed = False
 
     @override
@@ -98,7 +98,8 @@ class Rig:
     def campaign(self, recipe: "Recipe | str | Path", folder: str | Path) -> "Campaign":
         """Return a campaign that is ready to start: many fibres by one recipe.
 
-        In a folder that holds a campaign by the same recipe it goes on with that one.
+        In a folder that holds a campaign by the same recipe it goes on with that one. It ends when
+        motion is stopped or the platform closed, and can be gone on with.
 
         Parameters
         ----------
@@ -118,7 +119,9 @@ class Rig:
         """
         from cosmic.app.campaigns import campaign_on  # loads statistics, which takes a second
 
-        return campaign_on(self, self._platform, recipe, folder)
+        campaign = campaign_on(self, self._platform, recipe, folder)
+        self._runs.add(campaign)
+        return campaign
 
     def procedure(self, procedure: Procedure[W], work: W) -> ProcedureRun[W]:
         """Return a run of `procedure` that is ready to begin, in the platform's time.
