@@ -2,31 +2,23 @@
 
 import math
 from threading import Lock
-from typing import Final
 
 from cosmic.autonomy.control.force_servo import ForceGoal, ForceServo
 from cosmic.autonomy.control.handle import ControlHandle, check_inside
 from cosmic.autonomy.control.law import Law, PidLaw
 from cosmic.autonomy.control.loop import ControlLoop
+from cosmic.autonomy.control.parts import LoopParts
 from cosmic.autonomy.control.pid import PidGains
 from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.autonomy.control.sink import AxisSink
-from cosmic.autonomy.control.sources import ChannelSource, PositionSource, Source
+from cosmic.autonomy.control.sources import Source
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.errors import (
     ConfigError,
     NotAvailable,
-    UnknownAxisError,
 )
 from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.api.mico import Mico
-
-MARGIN: Final = 0.5
-CYCLES: Final = 3.0
-"""From a move until its force is seen it takes so many cycles at least."""
-RESPONSE: Final = 4.0
-LEAST_MARGIN_UN: Final = 20.0
-"""Where nobody gives a limit: so far beyond the set point, as a part of it and at least."""
 
 
 class Control:
@@ -70,7 +62,7 @@ class Control:
     @property
     def channels(self) -> dict[str, str]:
         """Channels that can be held, with their units."""
-        return dict(self._daqco.units) if self._daqco is not None else {}
+        return self._parts().channels
 
     @property
     def axes(self) -> dict[str, str]:
@@ -126,16 +118,17 @@ class Control:
         StoppedError
             Motion is stopped.
         """
-        daqco = self._acquisition()
+        parts = self._parts()
+        parts.check_acquisition()
         if direction not in (1, -1):
             raise ConfigError(f"direction must be 1 or -1, got {direction!r}")
-        settings = self._changed(travel_um=travel_um, ramp_un_s=ramp_un_s)
-        low, high = self._limits(channel, setpoint_un, limit_un)
+        settings = parts.settings(travel_um=travel_um, ramp_un_s=ramp_un_s)
+        low, high = parts.force_limits(channel, setpoint_un, limit_un)
         check_inside(channel, "uN", setpoint_un, (low, high))
-        source = self._channel(daqco, channel, settings, (low, high))
+        source = parts.channel(channel, settings, (low, high))
         if source.unit != "uN":
             raise ConfigError(f"{channel} is measured in {source.unit}; a force must be in uN")
-        sink = self._sink(axis, "um", settings, settings.travel_um)
+        sink = parts.force_sink(axis, settings)
         wanted = settings.tolerance(setpoint_un) if tolerance_un is None else tolerance_un
         if not 0.0 < wanted < math.inf:
             raise ConfigError(f"tolerance_un must be a number above 0, got {tolerance_un!r}")
@@ -182,11 +175,12 @@ class Control:
         ConfigError, UnknownAxisError, LimitError, NotAvailable, StoppedError
             As `hold_force`.
         """
-        settings = self._changed()
+        parts = self._parts()
+        settings = parts.settings()
         check_inside(source, "", set_point, limits)
         if not 0.0 < tolerance < math.inf:
             raise ConfigError(f"tolerance must be a number above 0, got {tolerance!r}")
-        origin = self._source(source, settings, limits)
+        origin = parts.source(source, settings, limits)
         sink = AxisSink(self._mico, axis, speed=speed, travel=travel, interval_s=settings.latency_s)
         law = PidLaw(
             set_point,
@@ -217,72 +211,8 @@ class Control:
 
     # Making
 
-    def _acquisition(self) -> Daqco:
-        if self._daqco is None:
-            raise NotAvailable("daqco is not hosted here; a loop has no channels")
-        return self._daqco
-
-    def _changed(self, **changes: float | None) -> ControlSettings:
-        fields = {name: value for name, value in changes.items() if value is not None}
-        try:
-            settings = ControlSettings.model_validate(self.settings.model_dump() | fields)
-        except ValueError as exc:
-            raise ConfigError(f"a loop cannot be made: {exc}") from None
-        # On a fast clock the same cycles are longer: the force comes later, and all goes slower.
-        latency_s = max(settings.latency_s, CYCLES * self._rate / settings.rate_hz)
-        response_s = max(settings.response_s, RESPONSE * latency_s)
-        return settings.model_copy(update={"latency_s": latency_s, "response_s": response_s})
-
-    def _channel(
-        self, daqco: Daqco, name: str, settings: ControlSettings, limits: tuple[float, float]
-    ) -> ChannelSource:
-        low, high = limits
-        return ChannelSource(
-            daqco,
-            name,
-            stale_s=settings.stale_s,
-            pause_s=self.settings.latency_s,
-            low=low,
-            high=high,
-        )
-
-    def _source(self, name: str, settings: ControlSettings, limits: tuple[float, float]) -> Source:
-        if name in self.channels:
-            return self._channel(self._acquisition(), name, settings, limits)
-        if name in self._mico:
-            return PositionSource(self._mico, name, stale_s=settings.stale_s)
-        known = [*self.channels, *self._mico.names]
-        raise ConfigError(f"there is no channel or axis {name!r}; there are {', '.join(known)}")
-
-    def _sink(self, axis: str, unit: str, settings: ControlSettings, travel: float) -> AxisSink:
-        if axis not in self._mico:
-            raise UnknownAxisError(axis, self._mico.names)
-        sink = AxisSink(
-            self._mico,
-            axis,
-            speed=settings.speed_um_s,
-            travel=travel,
-            interval_s=settings.latency_s,
-        )
-        if sink.unit != unit:
-            raise ConfigError(f"{axis} moves in {sink.unit}; a force is held by a linear axis")
-        return sink
-
-    def _limits(
-        self, channel: str, set_point: float, limit_un: float | None
-    ) -> tuple[float, float]:
-        if limit_un is not None:
-            if not 0.0 < limit_un < math.inf:
-                raise ConfigError(f"limit_un must be a number above 0, got {limit_un!r}")
-            return -limit_un, limit_un
-        beyond = max(LEAST_MARGIN_UN, MARGIN * abs(set_point))
-        low, high = min(set_point, 0.0) - beyond, max(set_point, 0.0) + beyond
-        daqco = self._acquisition()
-        for each in daqco.settings.limit:
-            if each.channel == channel:
-                low = max(low, each.low) if each.low is not None else low
-                high = min(high, each.high) if each.high is not None else high
-        return low, high
+    def _parts(self) -> LoopParts:
+        return LoopParts(self._mico, self._daqco, self.settings, rate=self._rate)
 
     def _begin(
         self,
