@@ -25,6 +25,8 @@ _RIGHT: Final = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _CENTRE: Final = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignVCenter
 _SHAPES: Final = {
     NodeState.RUNNING: State.BUSY,
+    NodeState.QUEUED: State.BUSY,
+    NodeState.HOLDING: State.BUSY,
     NodeState.VERIFYING: State.BUSY,
     NodeState.UNDOING: State.BUSY,
     NodeState.DONE: State.OK,
@@ -129,7 +131,7 @@ class ProcedureTree(QTreeWidget):
         item.setText(STATE, view.state.value)
         item.setText(TRY, _count(view))
         item.setText(TIME, time)
-        item.setText(CAUSE, event.cause)
+        item.setText(CAUSE, event.cause or event.text)
         item.setToolTip(CAUSE, f"{event.cause}: {event.text}" if event.cause else "")
         running = view.state in UNDER_WAY
         quiet = view.state is NodeState.WAITING

@@ -15,19 +15,24 @@ from cosmic.autonomy.procedures.operation import (
     UnitOperation,
 )
 from cosmic.autonomy.procedures.procedure import Procedure
+from cosmic.autonomy.procedures.resources import Resource
+from cosmic.autonomy.procedures.sharing import Holding, Role
 from cosmic.autonomy.procedures.tree import NodeEvent, NodeState
 
 __all__ = [
     "SAFE_POINT",
     "Fallback",
     "Guard",
+    "Holding",
     "NodeEvent",
     "NodeState",
     "OperationFailed",
     "Parallel",
     "Procedure",
     "Repeat",
+    "Resource",
     "Retry",
+    "Role",
     "Sequence",
     "Steps",
     "UnitOperation",

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from cosmic.autonomy.procedures.operation import Steps, UnitOperation
+from cosmic.autonomy.procedures.sharing import Role
 from cosmic.autonomy.procedures.tree import OPERATION, Outline
 from cosmic.autonomy.procedures.walk import Part
 
@@ -34,8 +35,10 @@ class Procedure(Generic[W]):
     make_safe_s: float = 20.0
 
 
-def outline_of(part: Part[W]) -> Outline:
-    """Return the shape of the tree under `part`."""
+def outline_of(part: Part[W], role: str = "") -> Outline:
+    """Return the shape of the tree under `part`, which is done for `role`."""
     if isinstance(part, UnitOperation):
-        return Outline(part.name or type(part).__name__, OPERATION)
-    return Outline(part.name, part.kind, tuple(outline_of(each) for each in part.parts))
+        return Outline(part.name or type(part).__name__, OPERATION, role=role)
+    role = part.name if isinstance(part, Role) else role
+    below = tuple(outline_of(each, role) for each in part.parts)
+    return Outline(part.name, part.kind, below, role)

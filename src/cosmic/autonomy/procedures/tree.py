@@ -18,6 +18,9 @@ class NodeState(StrEnum):
 
     WAITING = "waiting"
     RUNNING = "running"
+    QUEUED = "waits its turn"
+    HOLDING = "holds"
+    """What it needs to itself; `text` of the event names it."""
     VERIFYING = "verifying"
     DONE = "done"
     FAILED = "failed"
@@ -29,7 +32,15 @@ class NodeState(StrEnum):
 
 
 ENDS = frozenset({NodeState.DONE, NodeState.FAILED, NodeState.ENDED})
-UNDER_WAY = frozenset({NodeState.RUNNING, NodeState.VERIFYING, NodeState.UNDOING})
+UNDER_WAY = frozenset(
+    {
+        NodeState.RUNNING,
+        NodeState.QUEUED,
+        NodeState.HOLDING,
+        NodeState.VERIFYING,
+        NodeState.UNDOING,
+    }
+)
 OPERATION = "operation"
 """Kind of a part that is no combination of others."""
 
@@ -55,7 +66,9 @@ class NodeEvent:
     duration_s : float
         From start to end, without the time it rested in a pause; 0 until it has ended.
     cause, text : str
-        Why it failed; empty otherwise.
+        Why it failed; `text` may say what it waits for before. Empty otherwise.
+    role : str
+        Whose part it is, of those that do the same side by side; empty where there are none.
     """
 
     path: Path
@@ -69,6 +82,7 @@ class NodeEvent:
     duration_s: float = 0.0
     cause: str = ""
     text: str = ""
+    role: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,11 +132,12 @@ class NodeView:
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """The shape of a tree: name and kind of a part, and the parts below it."""
+    """The shape of a tree: name and kind of a part, whose it is, and the parts below it."""
 
     name: str
     kind: str
     children: "tuple[Outline, ...]" = ()
+    role: str = ""
 
 
 class TreeKeeper:
@@ -143,7 +158,9 @@ class TreeKeeper:
         self._lay_out(outline, ())
 
     def _lay_out(self, outline: Outline, path: Path) -> None:
-        self._events[path] = NodeEvent(path, outline.name, outline.kind, NodeState.WAITING)
+        self._events[path] = NodeEvent(
+            path, outline.name, outline.kind, NodeState.WAITING, role=outline.role
+        )
         for number, child in enumerate(outline.children):
             self._lay_out(child, (*path, number))
 
@@ -176,6 +193,7 @@ class TreeKeeper:
                 attempt,
                 round_,
                 self._clock.now_s(),
+                role=before.role,
             )
         )
 
@@ -203,6 +221,7 @@ class TreeKeeper:
                 max(0.0, now_s - started_s - rested_s),
                 failure.cause if failure is not None else "",
                 failure.text if failure is not None else "",
+                before.role,
             )
         )
 
@@ -212,7 +231,7 @@ class TreeKeeper:
             for place, event in self._events.items():
                 if len(place) > len(path) and place[: len(path)] == path:
                     self._events[place] = NodeEvent(
-                        place, event.name, event.kind, NodeState.WAITING
+                        place, event.name, event.kind, NodeState.WAITING, role=event.role
                     )
 
     def rest(self, *, resting: bool) -> None:

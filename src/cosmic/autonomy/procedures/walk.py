@@ -21,6 +21,7 @@ from cosmic.autonomy.procedures.pending import (
     pending_of,
 )
 from cosmic.autonomy.procedures.reins import OPERATION_END, Reins
+from cosmic.autonomy.procedures.resources import Resource
 from cosmic.autonomy.procedures.tree import NodeState, Path, TreeKeeper
 from cosmic.frame.errors import CosmicError, StoppedError
 
@@ -54,9 +55,10 @@ Part = UnitOperation[W] | Node[W]
 class Begun(Generic[W]):
     """An operation that was begun and may have to be undone."""
 
-    def __init__(self, operation: UnitOperation[W], path: Path) -> None:
+    def __init__(self, operation: UnitOperation[W], path: Path, work: W) -> None:
         self.operation = operation
         self.path = path
+        self.work = work
         self.failed = False
 
 
@@ -68,6 +70,7 @@ class Walk(Generic[W]):
         self.keeper = keeper
         self.reins = reins
         self.begun: list[Begun[W]] = []
+        self.holds: tuple[Resource, ...] = ()
 
     def fork(self) -> Self:
         """Return one for a branch that keeps its own account of what it began."""
@@ -92,7 +95,7 @@ class Walk(Generic[W]):
         undone = False
         text = ""
         try:
-            steps = each.operation.undo(self.work)
+            steps = each.operation.undo(each.work)
             if steps is not None:
                 change(each.path, NodeState.UNDOING)
                 yield from steps
@@ -182,7 +185,7 @@ def perform(part: Part[W], place: Place[W]) -> Course:
 def _operate(operation: UnitOperation[W], place: Place[W]) -> Course:
     walk = place.walk
     operation.precondition(walk.work)
-    entry = Begun(operation, place.path)
+    entry = Begun(operation, place.path, walk.work)
     walk.begun.append(entry)
     try:
         steps = operation.run(walk.work)

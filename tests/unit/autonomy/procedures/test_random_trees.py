@@ -17,6 +17,8 @@ from cosmic.autonomy.procedures.combinators import (
 )
 from cosmic.autonomy.procedures.failures import ProcedureAborted, ProcedureStopped
 from cosmic.autonomy.procedures.operation import SAFE_POINT
+from cosmic.autonomy.procedures.resources import Resource
+from cosmic.autonomy.procedures.sharing import Holding, Role
 from cosmic.autonomy.procedures.tree import ENDS, NodeEvent, NodeState
 from cosmic.autonomy.procedures.walk import Part
 from cosmic.frame.errors import CosmicError
@@ -60,6 +62,10 @@ OPERATIONS = st.builds(
 )
 
 
+PROBE = Resource("the probe")
+NEEDS = st.sampled_from([(), (PROBE,)]).map(lambda some: lambda _work: some)
+
+
 def several(parts: st.SearchStrategy[Part[Work]]) -> st.SearchStrategy[Part[Work]]:
     some = st.lists(parts, min_size=1, max_size=3)
     guards = st.builds(Looks, st.integers(0, 40)).map(lambda looks: looks.hold)
@@ -71,6 +77,8 @@ def several(parts: st.SearchStrategy[Part[Work]]) -> st.SearchStrategy[Part[Work
         st.builds(Retry, parts, st.integers(1, 3), between=st.none() | OPERATIONS),
         st.builds(Guard, parts, guards, st.just("unsafe")),
         st.builds(Repeat, parts, rounds),
+        st.builds(Holding, parts, NEEDS, leaving=st.none() | OPERATIONS, name=st.just("holding")),
+        st.builds(Role, st.just("hand"), parts, st.just(lambda work: work)),
     )
 
 
@@ -107,6 +115,7 @@ def test_what_began_has_ended_once_and_nothing_begins_after_the_end(
         assert run.state == "done"
     assert run.over
     assert not run.work.moving
+    assert PROBE.free
     assert_each_begun_one_ended_once(events)
     undone = (NodeState.UNDONE, NodeState.NOT_UNDONE)
     assert run.tree.state in ENDS or (isinstance(tree, Op) and run.tree.state in undone)
@@ -131,7 +140,7 @@ def assert_each_begun_one_ended_once(events: list[NodeEvent]) -> None:
                 on and path[: len(event.path)] == event.path for path, on in under_way.items()
             ), "a part ends after those below it"
             ended = ended or event.path == ()
-        elif event.state is NodeState.VERIFYING:
+        elif event.state in (NodeState.VERIFYING, NodeState.QUEUED, NodeState.HOLDING):
             assert under_way[event.path]
         else:
             assert not under_way[event.path], "only what has ended is undone"
