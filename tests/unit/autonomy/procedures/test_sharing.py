@@ -7,8 +7,8 @@ import pytest
 from cosmic.autonomy.procedures.combinators import Fallback, Parallel, Repeat, Sequence
 from cosmic.autonomy.procedures.failures import ProcedureStopped
 from cosmic.autonomy.procedures.operation import OperationFailed
-from cosmic.autonomy.procedures.run import ProcedureRun
 from cosmic.autonomy.procedures.resources import Resource
+from cosmic.autonomy.procedures.run import ProcedureRun
 from cosmic.autonomy.procedures.sharing import Holding, Role
 from cosmic.autonomy.procedures.tree import NodeEvent, NodeState
 from cosmic.autonomy.procedures.walk import Part
