@@ -117,3 +117,18 @@ class FibreInHand:
     def curl(self) -> float:
         """Length over projected length, less one."""
         return self.seen.fibre.curl if self.seen is not None else self.reach.candidate.curl
+
+    @property
+    def length_std_um(self) -> float:
+        """Standard deviation of the length; nan where nobody knows."""
+        return (self.seen or self.reach.candidate).length_std_um
+
+    @property
+    def width_std_um(self) -> float:
+        """Standard deviation of the width; nan where nobody knows."""
+        return (self.seen or self.reach.candidate).width_std_um
+
+    @property
+    def curl_std(self) -> float:
+        """Standard deviation of the curl; nan where nobody knows."""
+        return (self.seen or self.reach.candidate).curl_std

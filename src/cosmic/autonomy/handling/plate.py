@@ -35,6 +35,8 @@ class Candidate:
         Centre line on the plate.
     length_um, width_um, curl : float
         As seen in the survey; by them it is known again.
+    length_std_um, width_std_um, curl_std : float
+        Their standard deviations; nan where nobody knows.
     problem : str
         Why it is not taken; empty when it may be.
     """
@@ -45,6 +47,9 @@ class Candidate:
     curl: float
     contrast: float
     problem: str = ""
+    length_std_um: float = math.nan
+    width_std_um: float = math.nan
+    curl_std: float = math.nan
 
     def moved(self, line_um: Floats) -> "Candidate":
         """Return the same fibre on another line."""

@@ -89,12 +89,15 @@ class SeenFibre:
     ----------
     line_um, line_px : ndarray, shape (n, 2)
         Centre line on the platform and on the picture.
+    scale_part : float
+        Standard deviation of the scale, as a part of it.
     """
 
     fibre: Fibre
     line_um: Floats
     line_px: Floats
     scale_um_px: float
+    scale_part: float = 0.0
 
     @property
     def length_um(self) -> float:
@@ -105,6 +108,26 @@ class SeenFibre:
     def width_um(self) -> float:
         """Mean width."""
         return self.fibre.width_px * self.scale_um_px
+
+    @property
+    def length_std_um(self) -> float:
+        """Standard deviation of the length."""
+        return math.hypot(
+            self.fibre.length_std_px * self.scale_um_px, self.scale_part * self.length_um
+        )
+
+    @property
+    def width_std_um(self) -> float:
+        """Standard deviation of the mean width."""
+        return math.hypot(
+            self.fibre.width_std_px * self.scale_um_px, self.scale_part * self.width_um
+        )
+
+    @property
+    def curl_std(self) -> float:
+        """Standard deviation of the curl."""
+        known = self.fibre.uncertainties["curl"]
+        return known if isinstance(known, float) else math.nan
 
 
 def find_seen(picture: Picture, mapped: PixelMap, box: Box | None = None) -> list[SeenFibre]:
@@ -120,7 +143,9 @@ def find_seen(picture: Picture, mapped: PixelMap, box: Box | None = None) -> lis
     found = []
     for fibre in find_fibres(image):
         line_px = fibre.centre_line_px + np.array([left, top], dtype=np.float64)
-        found.append(SeenFibre(fibre, mapped.to_um(line_px), line_px, mapped.scale_um_px))
+        found.append(
+            SeenFibre(fibre, mapped.to_um(line_px), line_px, mapped.scale_um_px, mapped.scale_part)
+        )
     return found
 
 

@@ -34,7 +34,7 @@ SAME_UM = 120.0
 SAME_LENGTH = 0.05
 OWN_UM = 1.0
 SPILLED_LENGTH = 0.004
-SPILLED_WIDTH = 0.08
+SPILLED_WIDTH = 0.15
 SPILLED_CURL = 0.006
 
 
@@ -126,6 +126,9 @@ def _candidate(work: FibreWork, seen: SeenFibre, line_um: Floats) -> Candidate:
         seen.fibre.curl,
         seen.fibre.contrast,
         problem,
+        seen.length_std_um,
+        seen.width_std_um,
+        seen.curl_std,
     )
 
 

@@ -45,6 +45,12 @@ class PixelMap:
         return 1.0 / math.sqrt(abs(_determinant(self.matrix_px_um)))
 
     @property
+    def scale_part(self) -> float:
+        """Standard deviation of the scale, as a part of it."""
+        (xx, _), (_, yy) = self.leverage_um2
+        return self.noise_px * self.scale_um_px * math.sqrt(0.5 * max(xx + yy, 0.0))
+
+    @property
     def rotation_rad(self) -> float:
         """Angle of the platform's x axis in the picture, from right towards down."""
         (a, _), (c, _) = self.matrix_px_um
