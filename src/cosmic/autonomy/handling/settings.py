@@ -190,6 +190,20 @@ class CalibrationSettings(StrictModel):
         Where the gripper is looked at there.
     compare_beside_um, compare_before_um : float
         How far ahead of the jaws, and how far in front of where a fibre is held, the probe stands.
+    heights : bool
+        Heights are measured by focus; otherwise they are taken to be as the platform file says.
+    focus_zoom, focus_wide_zoom : float
+        Magnification at which they are measured, and the one where nothing with edges is in view.
+    focus_x_um, focus_y_um : float
+        Where tips stand meanwhile: in the middle of the picture.
+    focus_um_count : float
+        About what a count of the focus is worth; what it is worth is measured.
+    focus_reach_um, focus_frames : float, int
+        How far a sweep goes to both sides, and how many pictures it has.
+    lying_um : float
+        How high above the plate that is in focus which lies on it.
+    height_um : float
+        Largest standard deviation of a height.
     tries : int
         How often each is tried; between two tries the table turns, for what lies below may hide
         the tools.
@@ -206,6 +220,16 @@ class CalibrationSettings(StrictModel):
     compare_x_um: float = -500.0
     compare_beside_um: float = 700.0
     compare_before_um: float = 250.0
+    heights: bool = True
+    focus_zoom: float = Field(5.0, gt=0.0)
+    focus_wide_zoom: float = Field(2.0, gt=0.0)
+    focus_x_um: float = 0.0
+    focus_y_um: float = 0.0
+    focus_um_count: float = Field(0.375, gt=0.0)
+    focus_reach_um: float = Field(120.0, gt=0.0)
+    focus_frames: int = Field(9, ge=5, le=99)
+    lying_um: float = Field(4.0, ge=0.0)
+    height_um: float = Field(12.0, gt=0.0)
     tries: int = Field(5, ge=1, le=20)
 
 

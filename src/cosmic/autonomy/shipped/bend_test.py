@@ -1,6 +1,7 @@
 """The bend test: a fibre is taken up, pushed as a cantilever at several spans, and put away."""
 
 from cosmic.autonomy.calibrating.calibrated import POOR
+from cosmic.autonomy.calibrating.heights import HeightByFocus, HeightsAsFiled
 from cosmic.autonomy.handling.grasp import MISSED, Carry, TestGrasp
 from cosmic.autonomy.handling.initialise import InitialiseAgain
 from cosmic.autonomy.handling.one_span import NO_CONTACT
@@ -68,6 +69,7 @@ def beginning(settings: HandlingSettings) -> tuple[Part[FibreWork], ...]:
             InitialiseAgain(),
             ClearUp(),
             MakeReady(),
+            Fallback("heights", HeightByFocus(), HeightsAsFiled()),
             *(
                 Retry(each, settings.calibration.tries, only={POOR}, between=TurnOn())
                 for each in (CalibratePlate(), CalibrateHeld(), ComparePlaces())

@@ -1,0 +1,210 @@
+"""Heights by focus: how high above the plate the tips of gripper and probe really are."""
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass
+
+from typing_extensions import override
+
+from cosmic.autonomy.calibrating.book import Entry
+from cosmic.autonomy.calibrating.calibrated import Calibrated, Holds
+from cosmic.autonomy.calibrating.focusing import (
+    Found,
+    find_focus_near,
+    focus_now,
+    seek_from_below,
+)
+from cosmic.autonomy.handling.operation import FibreOperation
+from cosmic.autonomy.handling.prepare import clear_picture, retract_probe, zoom_to
+from cosmic.autonomy.handling.work import FibreWork
+from cosmic.autonomy.procedures.operation import Steps, Wish
+from cosmic.autonomy.tools import tip_um
+from cosmic.frame.errors import NotAvailable
+from cosmic.vico.core.calibration_fit import CalibrationRefused
+from cosmic.vico.core.tool_settings import ToolSettings
+
+HEIGHTS = "heights over the plate"
+LOW_PART = 0.55
+"""Of the height at which fibres are held: where the tip is looked at a second time."""
+FIELD_POWER = 1.5
+"""The depth of field grows with the magnification to the minus this."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A tip in focus.
+
+    Attributes
+    ----------
+    stage_um : float
+        Its height, as its stages say.
+    """
+
+    stage_um: float
+    counts: float
+    std_counts: float
+
+
+class HeightsAsFiled(FibreOperation):
+    """Heights are taken to be as the platform file says, where they cannot be measured."""
+
+    name = "take heights from the file"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        work.calibration.up_um.clear()
+        yield from zoom_to(work, work.settings.zoom)
+
+
+class HeightByFocus(Calibrated):
+    """The lens goes through the focus on the plate, on the gripper's tip twice, on the probe's.
+
+    The tip is nowhere near the plate meanwhile: how high it is does not have to be known before.
+    What a count of the focus is worth comes from the two heights of the tip.
+    """
+
+    name = "heights by focus"
+    key = HEIGHTS
+
+    @override
+    def measure(self, work: FibreWork) -> Steps:
+        settings = work.settings.calibration
+        if not settings.heights:
+            return
+        begun = focus_now(work)
+        try:
+            yield from self._at(work, settings.focus_zoom, begun)
+        except CalibrationRefused:
+            # Nothing with edges may lie in so small a field: a wider one, and less sure.
+            yield from self._at(work, settings.focus_wide_zoom, begun)
+
+    def _at(self, work: FibreWork, zoom: float, begun_counts: float) -> Steps:
+        try:
+            yield from clear_picture(work)
+            yield from zoom_to(work, zoom)
+            plate = yield from _plate(work, zoom, begun_counts)
+            high = work.hold_tip_um
+            tips = []
+            for height in (high, LOW_PART * high):
+                tips.append((yield from _gripper(work, zoom, plate[0], height)))
+            yield from clear_picture(work)
+            probe = yield from _probe(work, zoom, plate[0])
+            yield from retract_probe(work)
+        finally:
+            work.zoomed = None
+        yield from seek_from_below(work, begun_counts)
+        self._keep(work, zoom, plate, (tips[0], tips[1]), probe)
+        yield from zoom_to(work, work.settings.zoom)
+
+    def _keep(
+        self,
+        work: FibreWork,
+        zoom: float,
+        plate: tuple[float, float],
+        tips: tuple[Seen, Seen],
+        probe: Seen,
+    ) -> None:
+        settings = work.settings.calibration
+        high, low = tips
+        counts_um = (high.counts - low.counts) / (high.stage_um - low.stage_um)
+        usual = 1.0 / settings.focus_um_count
+        if not 0.7 * usual <= counts_um <= 1.4 * usual:
+            raise CalibrationRefused(
+                f"the focus goes {counts_um:.2f} counts for each um of the tip, not about "
+                f"{usual:.2f}: something else was in focus"
+            )
+        ups = {
+            work.gripper.name: over_um(low, plate[0], counts_um, settings.lying_um) - low.stage_um,
+            work.probe.name: over_um(probe, plate[0], counts_um, settings.lying_um)
+            + work.probe.width_um / 2.0
+            - probe.stage_um,
+        }
+        std_um = math.hypot(plate[1], low.std_counts, 0.5 * high.std_counts) / counts_um
+        work.calibration.up_um |= ups
+        values = {
+            "up_um": ups[work.gripper.name],
+            "probe_up_um": ups[work.probe.name],
+            "plate_um": -ups[work.gripper.name],
+            "plate_counts": plate[0],
+            "counts_um": counts_um,
+            "zoom": zoom,
+        }
+        how = f"{settings.focus_frames} pictures a sweep at {zoom:g}x"
+        self.kept(work, std_um, "um", settings.height_um, values=values, how=how)
+
+    @override
+    def restore(self, work: FibreWork, entry: Entry) -> None:
+        work.calibration.up_um |= {
+            work.gripper.name: entry.values["up_um"],
+            work.probe.name: entry.values["probe_up_um"],
+        }
+
+    @override
+    def made_with(self, work: FibreWork) -> str:
+        tip = ", ".join(f"{each:g}" for each in work.probe.tip_um)
+        return f"{super().made_with(work)}, {work.probe.name} at {tip}"
+
+    @override
+    def check(self, work: FibreWork, entry: Entry) -> Holds:
+        """Focus on the plate and on the tip once, and see that they are as far apart as before."""
+        zoom, begun = entry.values["zoom"], focus_now(work)
+        try:
+            yield from clear_picture(work)
+            yield from zoom_to(work, zoom)
+            plate = yield from _plate(work, zoom, begun)
+            tip = yield from _gripper(work, zoom, plate[0], LOW_PART * work.hold_tip_um)
+            yield from clear_picture(work)
+        finally:
+            work.zoomed = None
+        yield from seek_from_below(work, begun)
+        yield from zoom_to(work, work.settings.zoom)
+        settings = work.settings.calibration
+        over = over_um(tip, plate[0], entry.values["counts_um"], settings.lying_um)
+        off = over - tip.stage_um - entry.values["up_um"]
+        return bool(abs(off) <= settings.height_um)
+
+
+def over_um(tip: Seen, plate_counts: float, counts_um: float, lying_um: float) -> float:
+    """Return how high above the plate a tip is, by where both are in focus."""
+    return (tip.counts - plate_counts) / counts_um + lying_um
+
+
+def _reach_counts(work: FibreWork, zoom: float) -> float:
+    settings = work.settings.calibration
+    wider = math.pow(settings.focus_zoom / zoom, FIELD_POWER)
+    return settings.focus_reach_um * wider / settings.focus_um_count
+
+
+def _plate(work: FibreWork, zoom: float, about: float) -> Found:
+    reach = _reach_counts(work, zoom)
+    return (yield from find_focus_near(work, about, reach, "the plate and what lies on it"))
+
+
+def _gripper(
+    work: FibreWork, zoom: float, plate_counts: float, height_um: float
+) -> Generator[Wish, object, Seen]:
+    settings = work.settings.calibration
+    tool = work.gripper
+    yield work.go_up(max(height_um, work.height_now()))
+    yield work.go(work.at(tool, settings.focus_x_um, settings.focus_y_um))
+    yield work.go_up(height_um)
+    return (yield from _seen(work, tool, zoom, plate_counts))
+
+
+def _probe(work: FibreWork, zoom: float, plate_counts: float) -> Generator[Wish, object, Seen]:
+    settings = work.settings.calibration
+    yield work.go(work.at(work.probe, settings.focus_x_um, settings.focus_y_um))
+    return (yield from _seen(work, work.probe, zoom, plate_counts))
+
+
+def _seen(
+    work: FibreWork, tool: ToolSettings, zoom: float, plate_counts: float
+) -> Generator[Wish, object, Seen]:
+    positions = {name: work.mico[name].position_um or 0.0 for name in tool.axes}
+    tip = tip_um(tool, positions)
+    if tip is None:
+        raise NotAvailable(f"{tool.name}: where it stands is not known")
+    about = plate_counts + tip[2] / work.settings.calibration.focus_um_count
+    reach = _reach_counts(work, zoom)
+    found, std = yield from find_focus_near(work, about, reach, f"the tip of {tool.shown}")
+    return Seen(tip[2], found, std)
