@@ -76,7 +76,12 @@ TROUBLES = (
     Trouble("camera frozen", lasts_s=3.0),
     Trouble("controller lost_completed", at="carry to the probe", lasts_s=3.0),
     Trouble("controller doubled_completed", at="carry to the probe"),
-    Trouble("controller end_stop", at="carry to the probe", lasts_s=1.0),
+    Trouble(
+        "controller end_stop",
+        at="carry to the probe",
+        where=(("device", 0), ("channel", 0)),
+        lasts_s=1.0,
+    ),
     Trouble("controller unplugged", at="carry to the probe", where=(("device", 0),)),
 )
 

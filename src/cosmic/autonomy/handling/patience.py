@@ -1,17 +1,29 @@
-"""Movements that are ordered again where the gate had no answer, or the axis did not come on."""
+"""Movements that are ordered again: without an answer of the gate, stuck, or with an obstacle."""
 
-from collections.abc import Callable
+import logging
+from collections.abc import Callable, Iterable
 from typing import Final, Protocol
 
 from typing_extensions import override
 
 from cosmic.autonomy.procedures.operation import Awaited
 from cosmic.frame.clock import WALL
-from cosmic.frame.errors import CosmicError, DeviceTimeout, MoveRefused
+from cosmic.frame.errors import CosmicError, DeviceError, DeviceFault, DeviceTimeout, MoveRefused
 from cosmic.frame.verdict import Reason
+from cosmic.mico.api.mico import Mico
+
+logger = logging.getLogger(__name__)
 
 TRIES: Final = 5
+UNANSWERED: Final = 20
+"""Orders that the gate may leave without an answer: on a busy machine it takes long to restart."""
+BUMPS: Final = 3
+"""How often an axis may run into something, and go back from it, on one way."""
 APART_WALL_S: Final = 0.5
+BUMP_WALL_S: Final = 1.0
+BACK_UM: Final = 50.0
+BACK_DEG: Final = 0.5
+"""How far an axis goes back from what it ran into."""
 POLL_WALL_S: Final = 0.002
 
 
@@ -39,6 +51,9 @@ class PatientMove:
     to_a_place : bool
         It leads to a place, whatever it begins from: where an axis has not come on, it is ordered
         again as well.
+    back : callable or None
+        Orders a little of the way back, or returns None. Where an axis runs into something, as it
+        does at the end of its travel, this is done, and some times the way is tried again.
 
     Raises
     ------
@@ -46,10 +61,18 @@ class PatientMove:
         The gate answered, and said no.
     """
 
-    def __init__(self, order: Callable[[], Moving], *, to_a_place: bool = False) -> None:
+    def __init__(
+        self,
+        order: Callable[[], Moving],
+        *,
+        to_a_place: bool = False,
+        back: Callable[[], Moving | None] | None = None,
+    ) -> None:
         self._order = order
         self._to_a_place = to_a_place
-        self._left = TRIES
+        self._back = back
+        self._backing: Moving | None = None
+        self._left, self._unanswered, self._bumps = TRIES - 1, UNANSWERED - 1, BUMPS
         self._again_wall_s = 0.0
         self._movement: Moving | None = None
         self._refusal: CosmicError | None = None
@@ -57,41 +80,56 @@ class PatientMove:
         self._begin()
 
     def _begin(self) -> None:
-        self._left -= 1
         try:
             self._movement = self._order()
         except MoveRefused as refusal:
-            self._refused(refusal)
+            if refusal.verdict.reason is not Reason.NO_ANSWER or self._unanswered <= 0:
+                raise
+            self._unanswered -= 1
+            self._later(refusal, APART_WALL_S)
 
-    def _refused(self, refusal: MoveRefused) -> None:
-        if refusal.verdict.reason is not Reason.NO_ANSWER or self._left <= 0:
-            raise refusal
-        self._movement, self._refusal = None, refusal
-        self._again_wall_s = WALL.now_s() + APART_WALL_S
+    def _later(self, trouble: CosmicError, apart_wall_s: float) -> None:
+        self._movement, self._refusal = None, trouble
+        self._again_wall_s = WALL.now_s() + apart_wall_s
 
     @property
     def done(self) -> bool:
         """It has ended, well or not."""
         if self._cancelled:
-            return self._movement is None or self._movement.done
+            return all(each is None or each.done for each in (self._movement, self._backing))
+        if self._backing is not None and not self._backing.done:
+            return False
         if self._movement is None and WALL.now_s() >= self._again_wall_s:
+            self._backing = None
             try:
                 self._begin()
             except MoveRefused as refusal:
                 self._refusal, self._cancelled = refusal, True
                 return True
-        return self._movement is not None and self._movement.done and not self._stuck()
+        return self._movement is not None and self._movement.done and not self._goes_on()
 
-    def _stuck(self) -> bool:
-        """Return whether an axis did not come on, and have it ordered again."""
-        if not self._to_a_place or self._left <= 0 or self._movement is None:
+    def _goes_on(self) -> bool:
+        """Return whether what ended the movement is no reason to end; it is ordered again then."""
+        error = None if self._movement is None else self._movement.exception()
+        if not self._to_a_place or not isinstance(error, DeviceError):
             return False
-        error = self._movement.exception()
-        if not isinstance(error, DeviceTimeout):
-            return False
-        self._refusal = error
-        self._movement, self._again_wall_s = None, WALL.now_s() + APART_WALL_S
-        return True
+        if isinstance(error, DeviceTimeout) and self._left > 0:
+            self._left -= 1
+            self._later(error, APART_WALL_S)
+            return True
+        if error.fault is DeviceFault.END_STOP and self._back is not None and self._bumps > 0:
+            self._bumps -= 1
+            self._back_away(error)
+            return True
+        return False
+
+    def _back_away(self, error: DeviceError) -> None:
+        logger.warning("%s; it goes back a little, and on again", error)
+        self._later(error, BUMP_WALL_S)
+        try:
+            self._backing = self._back() if self._back is not None else None
+        except CosmicError as exc:
+            logger.warning("there is no way back: %s", exc)
 
     def wait(self, timeout_s: float | None = None) -> object:
         """Wait for the end, and return what the movement returns; raises what ended it."""
@@ -109,5 +147,27 @@ class PatientMove:
     def cancel(self) -> None:
         """End it; what it has set in motion stops."""
         self._cancelled = True
-        if self._movement is not None:
-            self._movement.cancel()
+        for each in (self._movement, self._backing):
+            if each is not None:
+                each.cancel()
+
+
+def way_back(mico: Mico, names: Iterable[str]) -> Callable[[], Moving | None]:
+    """Return what orders a little of the way back to where these axes stand now."""
+    began = {name: _place(mico, name) for name in names}
+
+    def order() -> Moving | None:
+        targets = {}
+        for name, start in began.items():
+            now = _place(mico, name)
+            if start is not None and now is not None:
+                most = BACK_DEG if mico[name].unit == "deg" else BACK_UM
+                targets[name] = now + min(max(start - now, -most), most)
+        return mico.move(targets, wait=False) if targets else None
+
+    return order
+
+
+def _place(mico: Mico, name: str) -> float | None:
+    axis = mico[name]
+    return axis.angle_deg if axis.unit == "deg" else axis.position_um

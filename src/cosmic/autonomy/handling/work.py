@@ -8,7 +8,7 @@ from typing import Protocol
 from cosmic.autonomy.handling.force import ForceWatch
 from cosmic.autonomy.handling.in_hand import Calibration, FibreInHand
 from cosmic.autonomy.handling.live import LastSeen, LivePicture
-from cosmic.autonomy.handling.patience import PatientMove
+from cosmic.autonomy.handling.patience import PatientMove, way_back
 from cosmic.autonomy.handling.plate import Candidate, Jaws
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.sight import map_at
@@ -197,7 +197,11 @@ class FibreWork:
 
     def go(self, targets: Mapping[str, float]) -> PatientMove:
         """Begin to move; to be yielded."""
-        return PatientMove(lambda: self.mico.move(dict(targets), wait=False), to_a_place=True)
+        return PatientMove(
+            lambda: self.mico.move(dict(targets), wait=False),
+            to_a_place=True,
+            back=way_back(self.mico, targets),
+        )
 
     def go_up(self, z_um: float) -> PatientMove:
         """Begin to move the gripper to a height; to be yielded."""
