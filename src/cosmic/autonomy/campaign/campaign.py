@@ -94,7 +94,6 @@ class Campaign(CampaignSteering):
         self._broken: CosmicError | None = None
         self._stuck = 0
         self._end_reason = ""
-        self._operation = ""
         self._thread: RunThread | None = None
 
     # What is known of it
@@ -108,11 +107,6 @@ class Campaign(CampaignSteering):
     def end_reason(self) -> str:
         """Why it ended; empty before."""
         return self._end_reason
-
-    @property
-    def operation(self) -> str:
-        """The operation under way, in words."""
-        return self._operation
 
     @property
     def fibres(self) -> tuple[FibreRecord, ...]:
@@ -265,7 +259,7 @@ class Campaign(CampaignSteering):
         if fibre is None:
             raise failure
         fibre.failure = fibre.failure or failure
-        self._keeper.keep(fibre)
+        self._insist(lambda: self._keeper.keep(fibre))
         self.work.fibre = None
         self.work.surveyed = False
         self._stuck += 1
@@ -276,13 +270,13 @@ class Campaign(CampaignSteering):
     def _keep_cut_off(self, taken: int, reason: str) -> None:
         """Keep the fibre of a run that was cut off: one that was done with by then is no less."""
         if not self._keep_last(taken):
-            self._keeper.keep(self.work.fibre, interrupted=reason)
+            self._insist(lambda: self._keeper.keep(self.work.fibre, interrupted=reason))
 
     def _keep_last(self, taken: int) -> bool:
         """Keep the fibre that was done with in this run; returns whether there was one."""
         if len(self.work.finished) <= taken:
             return False
-        self._keeper.keep(self.work.finished[-1])
+        self._insist(lambda: self._keeper.keep(self.work.finished[-1]))
         self._stuck = 0
         self._tell()
         return True

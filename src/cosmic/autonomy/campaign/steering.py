@@ -1,16 +1,26 @@
 """Pause, step and abort of a campaign, whatever it is at."""
 
+import logging
 from collections.abc import Callable
 from enum import StrEnum
 from threading import Condition
 from typing import Final
 
+from cosmic.autonomy.campaign.store_files import NotWrittenError
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.run import ProcedureRun
 from cosmic.autonomy.procedures.run_state import RunState
+from cosmic.frame.clock import WALL
 from cosmic.frame.listeners import tell
 
+logger = logging.getLogger(__name__)
+
 _POLL_S: Final = 0.2
+AGAIN_WALL_S: Final = 2.0
+"""How often it is tried to write what could not be written."""
+PATIENCE_WALL_S: Final = 600.0
+"""How long that is tried."""
+WAITING: Final = "waits for room on the disk"
 
 
 class CampaignPhase(StrEnum):
@@ -36,12 +46,18 @@ class CampaignSteering:
         self._phase = CampaignPhase.READY
         self._run: ProcedureRun[FibreWork] | None = None
         self._abort: str | None = None
+        self._operation = ""
         self._listeners: tuple[Callable[[], object], ...] = ()
 
     @property
     def phase(self) -> CampaignPhase:
         """What it is at."""
         return self._phase
+
+    @property
+    def operation(self) -> str:
+        """The operation under way, in words."""
+        return self._operation
 
     @property
     def over(self) -> bool:
@@ -124,6 +140,31 @@ class CampaignSteering:
         with self._changed:
             while self._phase is CampaignPhase.PAUSED and self._abort is None:
                 self._changed.wait(_POLL_S)
+
+    def _insist(self, write: Callable[[], None]) -> None:
+        """Write what must not be lost; where that fails, again and again while it may yet succeed.
+
+        Raises
+        ------
+        NotWrittenError
+            It was not written in `PATIENCE_WALL_S`, or before the end was wanted.
+        """
+        until_s = WALL.now_s() + PATIENCE_WALL_S
+        before = self._operation
+        while True:
+            try:
+                write()
+                break
+            except NotWrittenError as exc:
+                if self._abort is not None or WALL.now_s() >= until_s:
+                    raise NotWrittenError(f"the last fibre is not kept: {exc}") from exc
+                if self._operation != WAITING:
+                    self._operation = WAITING
+                    logger.error("%s; it is tried again every %g s", exc, AGAIN_WALL_S)
+                    self._tell()
+            with self._changed:
+                self._changed.wait(AGAIN_WALL_S)
+        self._operation = before
 
     def _on_run_changed(self) -> None:
         run = self._run

@@ -14,12 +14,16 @@ FIBRES: Final = "fibres"
 PART: Final = ".part"
 
 
+class NotWrittenError(CampaignError):
+    """The disk did not take it: there may be room later."""
+
+
 def write_whole(path: Path, data: bytes) -> None:
     """Write a file under another name, see that it is on the disk, and give it its name.
 
     Raises
     ------
-    CampaignError
+    NotWrittenError
         It cannot be written; nothing of it is left.
     """
     part = path.with_name(path.name + PART)
@@ -32,7 +36,7 @@ def write_whole(path: Path, data: bytes) -> None:
     except OSError as exc:
         with suppress(OSError):
             part.unlink(missing_ok=True)
-        raise CampaignError(
+        raise NotWrittenError(
             f"{path} cannot be written: {exc.strerror or exc}; what was finished before is kept: "
             "make room, and start the campaign again in the same folder"
         ) from exc
@@ -43,7 +47,7 @@ def write_through(folder: Path) -> None:
 
     Raises
     ------
-    CampaignError
+    NotWrittenError
         They cannot be written.
     """
     if os.name != "posix":
@@ -55,7 +59,7 @@ def write_through(folder: Path) -> None:
         finally:
             os.close(opened)
     except OSError as exc:
-        raise CampaignError(f"{folder} cannot be written: {exc.strerror or exc}") from exc
+        raise NotWrittenError(f"{folder} cannot be written: {exc.strerror or exc}") from exc
 
 
 def remove_parts(folder: Path) -> None:

@@ -10,7 +10,7 @@ from threading import RLock
 from typing import Final
 
 from cosmic.autonomy.campaign.records import CampaignError, CampaignInfo
-from cosmic.autonomy.campaign.store_files import DATABASE, PART, FolderLock
+from cosmic.autonomy.campaign.store_files import DATABASE, PART, FolderLock, NotWrittenError
 from cosmic.autonomy.campaign.store_rows import Row, insert
 from cosmic.autonomy.campaign.store_schema import SCHEMA_VERSION, TABLES
 
@@ -122,8 +122,8 @@ def _lay_out(file: Path, info: CampaignInfo) -> None:
     part.replace(file)
 
 
-def _failure(file: Path, error: sqlite3.Error) -> CampaignError:
-    return CampaignError(
+def _failure(file: Path, error: sqlite3.Error) -> NotWrittenError:
+    return NotWrittenError(
         f"{file} cannot be written: {error}; what was finished before is kept: make room, and "
         "start the campaign again in the same folder"
     )
