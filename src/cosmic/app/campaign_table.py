@@ -19,7 +19,14 @@ from cosmic.app.procedure_tree_sign import SIGN_PX, state_pixmap
 from cosmic.autonomy.campaign.board import BoardRow
 from cosmic.autonomy.campaign.records import Outcome
 from cosmic.autonomy.campaign.report_figures import EI_LABEL
-from cosmic.autonomy.campaign.report_words import NONE, interval, number, stiffness
+from cosmic.autonomy.campaign.report_words import (
+    NONE,
+    interval,
+    number,
+    stiffness,
+    width_words,
+    with_interval,
+)
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.theme import STEP_PX, State, number_font
 from cosmic.frame.overrides import override
@@ -134,6 +141,10 @@ def _alignment(column: int) -> int:
 
 
 def _tip(row: BoardRow, column: int) -> str | None:
+    if column == WIDTH:
+        return f"{width_words(row.shape)} µm (95 %)"
+    if column == LENGTH:
+        return f"{with_interval(row.shape.length_um, row.shape.length_std_um)} µm (95 %)"
     return row.cause if column == CAUSE and row.cause else None
 
 

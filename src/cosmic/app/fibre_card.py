@@ -21,14 +21,21 @@ from cosmic.app.fibre_picture import FibrePicture
 from cosmic.app.procedure_tree_sign import StateSign
 from cosmic.autonomy.campaign.board import CardCurve, CardData
 from cosmic.autonomy.campaign.report_figures import EI_LABEL
-from cosmic.autonomy.campaign.report_words import NONE, interval, number, stiffness
+from cosmic.autonomy.campaign.report_words import (
+    NONE,
+    TWO_SIDED,
+    interval,
+    number,
+    stiffness,
+    width_words,
+    with_interval,
+)
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.theme import STEP_PX, number_font
 from cosmic.frame.overrides import override
 
-_TWO_SIDED: Final = 1.96
 _WIDE_PX: Final = 90 * STEP_PX
 """From this width on picture and curves stand side by side."""
 
@@ -203,16 +210,13 @@ def _numbers(card: CardData) -> list[tuple[str, str]]:
         trusted = "" if ei.trusted else ", not trusted"
         words = f"{stiffness(ei.ei_n_m2)} ({told}) {EI_LABEL}{trusted}"
         rows.append(("stiffness (95 %)", words))
-    length = number(shape.length_um)
-    if length != NONE and math.isfinite(shape.length_std_um):
-        length = f"{length} ± {number(_TWO_SIDED * shape.length_std_um)}"
     rows += [
-        ("length (95 %)", f"{length} µm"),
-        ("width", f"{number(shape.width_um, 1)} µm"),
-        ("curl", number(shape.curl, 3)),
+        ("length (95 %)", f"{with_interval(shape.length_um, shape.length_std_um)} µm"),
+        ("width (95 %)", f"{width_words(shape)} µm"),
+        ("curl (95 %)", with_interval(shape.curl, shape.curl_std, 3)),
     ]
     if math.isfinite(card.clamp_offset_um):
-        spread = number(_TWO_SIDED * card.clamp_offset_std_um, 1)
+        spread = number(TWO_SIDED * card.clamp_offset_std_um, 1)
         offset = f"{number(card.clamp_offset_um, 1)} ± {spread} µm"
         rows.append(("clamp offset (95 %)", offset))
     if math.isfinite(card.peak_force_un):
@@ -228,7 +232,7 @@ def _span_rows(curves: tuple[CardCurve, ...]) -> list[list[str]]:
         return []
     rows = [["span, µm", "stiffness (95 %), µN/µm", "notes"]]
     for curve in curves:
-        k_un_um, spread = number(curve.k_un_um, 3), number(_TWO_SIDED * curve.k_std_un_um, 3)
+        k_un_um, spread = number(curve.k_un_um, 3), number(TWO_SIDED * curve.k_std_un_um, 3)
         notes = [*curve.flags, *([] if curve.used else ["not used"])]
         rows.append(
             [

@@ -77,7 +77,6 @@ def record_of(
         Why the treatment was cut off; empty when it was not.
     """
     outcome, cause, text = _outcome(fibre, measures=measures, interrupted=interrupted)
-    seen = fibre.seen
     return FibreRecord(
         number=number,
         outcome=outcome,
@@ -86,11 +85,11 @@ def record_of(
         found=pose_of(fibre.reach.candidate),
         shape=Shape(
             length_um=fibre.length_um,
-            length_std_um=math.nan
-            if seen is None
-            else seen.fibre.length_std_px * seen.length_um / seen.fibre.length_px,
+            length_std_um=fibre.length_std_um,
             width_um=fibre.width_um,
+            width_std_um=fibre.width_std_um,
             curl=fibre.curl,
+            curl_std=fibre.curl_std,
         ),
         cause=cause,
         text=text,

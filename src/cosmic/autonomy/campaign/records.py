@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,10 @@ from cosmic.frame.errors import CosmicError
 Floats = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 Value = str | int | float | bool | None
+
+
+UNRESOLVED: Final = 0.12
+"""A width that is known no better than to this part of it was not resolved."""
 
 
 class CampaignError(CosmicError):
@@ -54,12 +59,21 @@ class Shape:
     ----------
     curl : float
         Length over the distance of the ends, less one.
+    length_std_um, width_std_um, curl_std : float
+        Standard deviations.
     """
 
     length_um: float = math.nan
     length_std_um: float = math.nan
     width_um: float = math.nan
     curl: float = math.nan
+    width_std_um: float = math.nan
+    curl_std: float = math.nan
+
+    @property
+    def width_resolved(self) -> bool:
+        """Whether the picture shows the width, and not only that it is small."""
+        return self.width_std_um <= UNRESOLVED * self.width_um
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """What a report shows of one fibre."""
 
+import math
 from html import escape
 from typing import Any, Final
 
@@ -7,10 +8,17 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.autonomy.campaign.records import FibreRecord, Picture
+from cosmic.autonomy.campaign.records import FibreRecord, Picture, Shape
 from cosmic.autonomy.campaign.report_figures import EI_LABEL, force_figure, stiffness_figure
 from cosmic.autonomy.campaign.report_markup import ShowPng, ShowSvg, table
-from cosmic.autonomy.campaign.report_words import interval, number, outcome_words, stiffness
+from cosmic.autonomy.campaign.report_words import (
+    interval,
+    number,
+    outcome_words,
+    stiffness,
+    width_words,
+    with_interval,
+)
 
 PICTURE_PX: Final = 360
 ASPECT: Final = 4.0 / 3.0
@@ -35,8 +43,18 @@ def card(record: FibreRecord, svg: ShowSvg, png: ShowPng) -> str:
         parts.append(
             f'<table class="plain"><tr>{cells}</tr>{f"<tr>{more}</tr>" if more else ""}</table>'
         )
-    parts.append(_numbers(record))
+    parts += [_shape(record.shape), _numbers(record)]
     return "\n".join(parts)
+
+
+def _shape(shape: Shape) -> str:
+    """Return what the picture says, with 95 % intervals."""
+    if not math.isfinite(shape.length_um):
+        return ""
+    length = with_interval(shape.length_um, shape.length_std_um)
+    curl = with_interval(shape.curl, shape.curl_std, 3)
+    told = f"Length {length} µm, width {width_words(shape)} µm, curl {curl} (95 %)."
+    return f"<p>{escape(told)}</p>"
 
 
 def _numbers(record: FibreRecord) -> str:

@@ -27,6 +27,8 @@ from cosmic.autonomy.campaign.report_words import (
     proves,
     stiffness,
     when,
+    width_words,
+    with_interval,
 )
 
 SHORTEST_S: Final = 0.05
@@ -144,9 +146,9 @@ def _fibres(fibres: Sequence[FibreRecord]) -> str:
         "outcome",
         f"EI, {EI_LABEL}",
         "95 % interval",
-        "length, µm",
-        "width, µm",
-        "curl",
+        "length, µm (95 %)",
+        "width, µm (95 %)",
+        "curl (95 %)",
         "peak, µN",
         "time, s",
     )
@@ -160,9 +162,9 @@ def _fibre_row(each: FibreRecord) -> tuple[str, ...]:
         outcome_words(each),
         NONE if result is None else stiffness(result.ei_n_m2),
         NONE if result is None else interval(result.ei_low_n_m2, result.ei_high_n_m2),
-        number(each.shape.length_um),
-        number(each.shape.width_um),
-        number(each.shape.curl, 3),
+        with_interval(each.shape.length_um, each.shape.length_std_um),
+        width_words(each.shape),
+        with_interval(each.shape.curl, each.shape.curl_std, 3),
         number(each.peak_force_un, 1),
         number(each.duration_s),
     )

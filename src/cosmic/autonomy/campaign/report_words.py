@@ -3,11 +3,13 @@
 import math
 from typing import Final
 
-from cosmic.autonomy.campaign.records import CampaignInfo, FibreRecord
+from cosmic.autonomy.campaign.records import CampaignInfo, FibreRecord, Shape
 from cosmic.autonomy.campaign.report_figures import EI_UNIT
 from cosmic.autonomy.campaign.statistics import MeanEi
 
 NONE: Final = "–"
+TWO_SIDED: Final = 1.96
+"""Standard deviations in half of a 95 % interval."""
 TWIN: Final = "digital twin"
 
 PROVES_ON_TWIN: Final = (
@@ -42,6 +44,20 @@ def number(value: float, digits: int = 0) -> str:
     """Return a number; a dash where there is none."""
     # The sum turns a rounded -0 into 0.
     return f"{round(value, digits) + 0.0:.{digits}f}" if math.isfinite(value) else NONE
+
+
+def with_interval(value: float, std: float, digits: int = 0) -> str:
+    """Return a number with half of its 95 % interval, as far as there are any."""
+    if not (math.isfinite(value) and math.isfinite(std)):
+        return number(value, digits)
+    return f"{number(value, digits)} ± {number(TWO_SIDED * std, digits)}"
+
+
+def width_words(shape: Shape) -> str:
+    """Return a width with its 95 % interval; one that was not resolved says so."""
+    told = with_interval(shape.width_um, shape.width_std_um, 1)
+    unknown = not math.isfinite(shape.width_std_um) or shape.width_resolved
+    return told if unknown else f"{told} (not resolved)"
 
 
 def stiffness(value_n_m2: float) -> str:

@@ -44,7 +44,14 @@ SPAN_NUMBERS: Final = (
     "peak_un",
     "chi2",
 )
-SHAPE_NUMBERS: Final = ("length_um", "length_std_um", "width_um", "curl")
+SHAPE_NUMBERS: Final = (
+    "length_um",
+    "length_std_um",
+    "width_um",
+    "width_std_um",
+    "curl",
+    "curl_std",
+)
 REGION_NUMBERS: Final = (
     "region_left_px",
     "region_top_px",

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-SCHEMA_VERSION: Final = 1
+SCHEMA_VERSION: Final = 2
 
 TABLES: Final = """
 CREATE TABLE campaign (
@@ -26,7 +26,8 @@ CREATE TABLE fibre (
     began_s REAL NOT NULL, ended_s REAL,
     found_x_plate_um REAL, found_y_plate_um REAL, found_angle_deg REAL,
     left_x_plate_um REAL, left_y_plate_um REAL, left_angle_deg REAL,
-    length_um REAL, length_std_um REAL, width_um REAL, curl REAL,
+    length_um REAL, length_std_um REAL, width_um REAL, width_std_um REAL,
+    curl REAL, curl_std REAL,
     cause TEXT NOT NULL DEFAULT '', text TEXT NOT NULL DEFAULT '',
     attempts INTEGER, peak_force_un REAL,
     ei_n_m2 REAL, ei_low_n_m2 REAL, ei_high_n_m2 REAL,
