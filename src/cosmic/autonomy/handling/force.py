@@ -60,6 +60,11 @@ class ForceWatch:
         self._forget: Callable[[], None] | None = None
 
     @property
+    def running(self) -> bool:
+        """Samples are being acquired."""
+        return self._daqco.running
+
+    @property
     def problem(self) -> str:
         """Why no samples come, as far as acquisition knows."""
         return self._daqco.problem or "acquisition says nothing about it"
@@ -145,6 +150,7 @@ class ForceWanted:
         ahead_s = max(0.0, self._until_s - clock.now_s()) / (clock.rate or 1.0)
         self._late_wall_s = WALL.now_s() + ahead_s + LIMIT_WALL_S
         self._mean: ForceMean | None = None
+        self._ran = watch.running
         self._callbacks: list[Callable[[ForceWanted], object]] = []
         self._forget: Callable[[], None] | None = None
 
@@ -153,7 +159,14 @@ class ForceWanted:
         """Sampled whole, or given up."""
         if self._mean is None:
             self._mean = self._watch.between(self._since_s, self._until_s)
-        return self._mean is not None or WALL.now_s() > self._late_wall_s
+        if self._mean is not None or WALL.now_s() > self._late_wall_s:
+            return True
+        return self._ended()
+
+    def _ended(self) -> bool:
+        """Return whether acquisition ran when this was wanted, and has ended since."""
+        self._ran = self._ran or self._watch.running
+        return self._ran and not self._watch.running
 
     def add_callback(self, callback: Callable[["ForceWanted"], object]) -> None:
         """Call `callback(self)` at the end, in the thread of the acquisition."""
@@ -185,8 +198,8 @@ class ForceWanted:
             self._watch.wait_for_chunk(min(left_s, 0.05))
         if self._mean is None:
             raise NotAvailable(
-                f"no samples of the force for {LIMIT_WALL_S:g} s: {self._watch.problem}; look "
-                "whether acquisition runs"
+                f"no samples of the force came: {self._watch.problem}; look whether acquisition "
+                "runs"
             )
         return self._mean
 

@@ -7,6 +7,7 @@ from typing_extensions import override
 from cosmic.autonomy.bending.fit import fit_bending
 from cosmic.autonomy.bending.plan import DRY_EI_N_M2, SpanLimits, guess_ei, plan_spans
 from cosmic.autonomy.bending.result import BendingError
+from cosmic.autonomy.handling.force_ready import ready_force
 from cosmic.autonomy.handling.grasp import shape_of
 from cosmic.autonomy.handling.in_hand import FibreInHand
 from cosmic.autonomy.handling.one_span import NO_CONTACT, OneSpan
@@ -35,8 +36,7 @@ class PushSpans(FibreOperation):
             plan_spans(fibre.free_um, limits=span_limits(work))
         except BendingError as exc:
             raise OperationFailed(TOO_SHORT, str(exc)) from exc
-        if not work.daqco.running:
-            work.daqco.start()
+        yield from ready_force(work)
         arm(work, armed=True)
         try:
             yield from self._spans(work, fibre)

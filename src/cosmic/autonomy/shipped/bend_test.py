@@ -2,6 +2,7 @@
 
 from cosmic.autonomy.calibrating.calibrated import POOR
 from cosmic.autonomy.calibrating.heights import HeightByFocus, HeightsAsFiled
+from cosmic.autonomy.handling.force_ready import SeeForce
 from cosmic.autonomy.handling.grasp import MISSED, Carry, TestGrasp
 from cosmic.autonomy.handling.initialise import InitialiseAgain
 from cosmic.autonomy.handling.one_span import NO_CONTACT
@@ -56,13 +57,13 @@ def build_bend_test(settings: HandlingSettings | None = None) -> Procedure[Fibre
     )
     return Procedure(
         "bend test",
-        Sequence("bend test", *beginning(settings), one_fibre(settings, measured)),
+        Sequence("bend test", *beginning(settings, SeeForce()), one_fibre(settings, measured)),
         make_safe=make_safe,
     )
 
 
-def beginning(settings: HandlingSettings) -> tuple[Part[FibreWork], ...]:
-    """Return what comes before a fibre; little of it where all is fresh."""
+def beginning(settings: HandlingSettings, *more: Part[FibreWork]) -> tuple[Part[FibreWork], ...]:
+    """Return what comes before a fibre, `more` included; little of it where all is fresh."""
     return (
         Sequence(
             "prepare",
@@ -76,6 +77,7 @@ def beginning(settings: HandlingSettings) -> tuple[Part[FibreWork], ...]:
             ),
             Survey(),
             FindRotationCentre(),
+            *more,
         ),
         Retry(Sequence[FibreWork]("choose", Survey(), Choose()), 2, only={LOOK_AGAIN}),
     )

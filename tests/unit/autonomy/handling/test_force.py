@@ -18,6 +18,7 @@ class Daqco:
 
     channels = ("aux", "force")
     problem = "the board is gone"
+    running = True
 
     def __init__(self) -> None:
         self.receiver: Any = None

@@ -187,7 +187,7 @@ def test_the_limit_is_armed_while_the_probe_pushes_and_not_longer():
 def test_an_abort_in_the_middle_of_a_push_disarms_it_too():
     bench = Bench(5e-11)
     steps = PushSpans().run(bench)
-    next(steps)
+    steps.send(next(steps).wait())  # type: ignore[union-attr]
     steps.close()
     assert bench.daqco.armed == [True, False]  # type: ignore[attr-defined]
 
