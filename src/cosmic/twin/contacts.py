@@ -37,7 +37,8 @@ class Contacts:
     ----------
     tell : callable
         Told "contact" when two bodies meet and "contact over" when they have parted, with the
-        names of both, the greatest depth, and whether it was meant: jaws land on the plate.
+        names of both, the greatest depth, and whether it was meant: jaws land on the plate, and
+        the probe feels for a jaw.
 
     Raises
     ------
@@ -120,8 +121,10 @@ class Contacts:
 
     def _over(self, pair: tuple[str, str]) -> None:
         depth = self._now.pop(pair)
-        landed = self._plate in pair and bool(self._jaws & set(pair))
-        meant = landed and depth <= self._settings.handling.landing_um
+        jaw, handling = bool(self._jaws & set(pair)), self._settings.handling
+        landed = jaw and self._plate in pair and depth <= handling.landing_um
+        felt = jaw and self._settings.geometry.probe in pair and depth <= handling.touch_um
+        meant = landed or felt
         self._tell("contact over", bodies=pair, depth_um=depth, meant=meant)
 
     # ------------------------------------------------------------------ bodies

@@ -53,6 +53,8 @@ class HandlingSettings(StrictModel):
         How far a tip really is from where its drawing has it; standard deviation.
     landing_um : float
         Jaws may press on the plate so deep without harm.
+    touch_um : float
+        The probe may press on a jaw so far without harm to its sensor.
     """
 
     default_faults: bool = False
@@ -88,6 +90,7 @@ class HandlingSettings(StrictModel):
     drift_period_s: float = Field(default=3600.0, gt=0.0)
     tool_offset_um: float = Field(default=4.0, ge=0.0, le=500.0)
     landing_um: float = Field(default=5.0, ge=0.0)
+    touch_um: float = Field(default=0.2, ge=0.0)
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:

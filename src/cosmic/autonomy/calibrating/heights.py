@@ -69,8 +69,6 @@ class HeightByFocus(Calibrated):
     @override
     def measure(self, work: FibreWork) -> Steps:
         settings = work.settings.calibration
-        if not settings.heights:
-            return
         begun = focus_now(work)
         try:
             yield from self._at(work, settings.focus_zoom, begun)

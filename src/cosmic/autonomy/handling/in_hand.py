@@ -37,6 +37,8 @@ class Calibration:
         About which place the plate turns.
     probe_off_um : (float, float)
         How far the probe's tip is from where its stages say, in the frame of the gripper.
+    touching : bool
+        The probe has gone to a jaw, and not come back yet.
     up_um : dict of str to float
         How much higher above the plate the tip of each tool is than its stages say.
     book : Book
@@ -46,6 +48,7 @@ class Calibration:
     made: dict[str, Measured] = field(default_factory=dict)
     frame: PlateFrame = field(default_factory=PlateFrame)
     probe_off_um: tuple[float, float] = (0.0, 0.0)
+    touching: bool = False
     up_um: dict[str, float] = field(default_factory=dict)
     book: Book = field(default_factory=Book)
 

@@ -29,6 +29,8 @@ PLATE = "map of the plate"
 HELD = "map where fibres are held"
 TABLE = "rotation centre"
 PROBE = "probe against gripper"
+CONTACT = "touch"
+"""What the scene file calls it: only while it lasts may probe and jaws touch."""
 
 
 class MakeReady(FibreOperation):
@@ -87,8 +89,15 @@ def retract_probe(work: FibreWork) -> Steps:
     """Take the probe away from where fibres are held and lie."""
     x, y = work.tip_now(work.probe)
     away = work.settings.places.probe_away_y_um
-    if y < away - 1.0:
+    if not y < away - 1.0:
+        return
+    if not work.calibration.touching:
         yield work.go(work.at(work.probe, x, away))
+        return
+    # It was on its way to a jaw, and may stand at one.
+    with work.mico.collision.contact(CONTACT):
+        yield work.go(work.at(work.probe, x, away))
+    work.calibration.touching = False
 
 
 class CalibratePlate(Calibrated):

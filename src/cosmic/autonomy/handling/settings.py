@@ -204,6 +204,26 @@ class CalibrationSettings(StrictModel):
         How high above the plate that is in focus which lies on it.
     height_um : float
         Largest standard deviation of a height.
+    touch : bool
+        The probe feels for the jaws before fibres are handled; otherwise only the picture says
+        where it is.
+    touch_behind_um, touch_below_um : float
+        How far behind the tips of the jaws, and above their lower edge, the probe touches.
+    touch_closing_um : float
+        How much further than their travel the jaws are closed before.
+    touch_stand_off_um : float
+        How far before the jaw, as the picture shows it, the small steps begin.
+    touch_step_v, touch_step_um : float
+        Amplitude of these steps, and how long one may be: even a rigid jaw must be felt before the
+        force is too high.
+    touch_un, touch_average_s : float
+        Force that means contact, and the time over which it is averaged after each step.
+    touches : int
+        How often the jaw is touched.
+    touch_off_um : float
+        How far touch and picture may disagree.
+    touch_std_um : float
+        Largest standard deviation of the place found by touch.
     tries : int
         How often each is tried; between two tries the table turns, for what lies below may hide
         the tools.
@@ -230,6 +250,18 @@ class CalibrationSettings(StrictModel):
     focus_frames: int = Field(9, ge=5, le=99)
     lying_um: float = Field(4.0, ge=0.0)
     height_um: float = Field(12.0, gt=0.0)
+    touch: bool = False
+    touch_behind_um: float = Field(300.0, gt=50.0)
+    touch_below_um: float = 60.0
+    touch_closing_um: float = Field(100.0, ge=0.0)
+    touch_stand_off_um: float = Field(10.0, gt=0.0, le=100.0)
+    touch_step_v: float = Field(15.0, ge=15.0, le=40.0)
+    touch_step_um: float = Field(0.15, gt=0.0, le=1.0)
+    touch_un: float = Field(2.0, gt=0.0)
+    touch_average_s: float = Field(0.01, gt=0.0)
+    touches: int = Field(3, ge=1, le=20)
+    touch_off_um: float = Field(10.0, gt=0.0)
+    touch_std_um: float = Field(0.5, gt=0.0)
     tries: int = Field(5, ge=1, le=20)
 
 

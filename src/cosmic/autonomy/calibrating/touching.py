@@ -1,0 +1,148 @@
+"""Touch: the probe feels for a jaw, so that probe and gripper are in one frame."""
+
+from collections.abc import Generator
+from typing import Final
+
+import numpy as np
+from typing_extensions import override
+
+from cosmic.autonomy.calibrating.book import Entry
+from cosmic.autonomy.calibrating.calibrated import Calibrated
+from cosmic.autonomy.handling.force import ForceMean
+from cosmic.autonomy.handling.jaws import move_jaws
+from cosmic.autonomy.handling.patience import PatientMove
+from cosmic.autonomy.handling.prepare import CONTACT, PROBE, retract_probe
+from cosmic.autonomy.handling.push import arm
+from cosmic.autonomy.handling.work import FibreWork
+from cosmic.autonomy.procedures.operation import Steps, Wish
+from cosmic.frame.errors import NotAvailable
+from cosmic.vico.core.calibration_fit import CalibrationRefused
+
+TOUCH: Final = "probe touches gripper"
+BACK_UM: Final = 2.0
+FAR_UM: Final = 300.0
+
+
+class TouchJaw(Calibrated):
+    """The probe comes up to the outside of the closed jaws, a step at a time, until it is felt.
+
+    No step is so long that even a rigid jaw could bring the force near what the sensor bears. Where
+    the jaw is must be known from a picture before: the first steps begin close to it. Only the
+    direction in which the probe feels can be touched in.
+    """
+
+    name = "touch the jaws with the probe"
+    key = TOUCH
+
+    @override
+    def measure(self, work: FibreWork) -> Steps:
+        settings = work.settings.calibration
+        if PROBE not in work.calibration.made:
+            raise NotAvailable("see probe and gripper on one picture before they touch")
+        if not work.daqco.running:
+            work.daqco.start()
+        yield from move_jaws(work, -(work.settings.grasp.full_um + settings.touch_closing_um))
+        work.gap_um = 0.0
+        try:
+            found = yield from self._touched(work)
+        finally:
+            arm(work, armed=False)
+        yield from move_jaws(work, work.settings.grasp.gap_um)
+        self._keep(work, found)
+
+    def _touched(self, work: FibreWork) -> Generator[Wish, object, list[float]]:
+        """Return by how much the probe's tip is elsewhere than its stage says, touch by touch."""
+        settings, places = work.settings.calibration, work.settings.places
+        side = -1.0 if work.probe.forward[1] > 0.0 else 1.0
+        yield from retract_probe(work)
+        below = work.hold_tip_um + places.hold_above_tip_um - settings.touch_below_um
+        yield work.go_up(max(below, work.height_now(), places.travel_um))
+        yield work.go(work.at(work.gripper, places.hold_x_um, places.hold_y_um))
+        yield work.go_up(below)
+        hold_x, hold_y = work.tip_now(work.gripper)
+        off_x, off_y = work.calibration.probe_off_um
+        x = hold_x - settings.touch_behind_um * work.jaws.forward - off_x
+        face = hold_y + side * work.gripper.width_um
+        work.calibration.touching = True
+        with work.mico.collision.contact(CONTACT):
+            yield work.go({work.probe.x_axis: x - work.probe.tip_um[0]})
+            arm(work, armed=True)
+            near = face - off_y + side * settings.touch_stand_off_um
+            yield self._to(work, near + side * FAR_UM)
+            base = yield from _mean_un(work, 0.1)
+            yield self._to(work, near)
+            found = []
+            for _ in range(settings.touches):
+                at = yield from self._feel(work, side, base)
+                found.append(face - at)
+                yield self._to(work, at + side * BACK_UM)
+            # The gate takes the jaws to be anywhere in their travel: out of it in here too.
+            yield from retract_probe(work)
+        return found
+
+    @override
+    def undo(self, work: FibreWork) -> Steps:
+        yield from retract_probe(work)
+
+    @staticmethod
+    def _to(work: FibreWork, y_um: float) -> PatientMove:
+        return work.go({work.probe.y_axis: y_um - work.probe.tip_um[1]})
+
+    def _feel(self, work: FibreWork, side: float, base_un: float) -> Generator[Wish, object, float]:
+        """Make small steps until something is felt, and return the place of the tip then."""
+        settings, axis = work.settings.calibration, work.mico[work.probe.y_axis]
+        _, begun = work.tip_now(work.probe)
+        before = begun
+        while abs(before - begun) < 2.0 * settings.touch_stand_off_um + settings.touch_off_um:
+            yield PatientMove(
+                lambda: axis.steps(
+                    -round(side), amplitude_v=settings.touch_step_v, frequency_hz=100, wait=False
+                )
+            )
+            force = yield from _mean_un(work, settings.touch_average_s)
+            _, here = work.tip_now(work.probe)
+            if abs(here - before) > settings.touch_step_um:
+                raise CalibrationRefused(
+                    f"a step of the probe went {abs(here - before):.2f} um, at most "
+                    f"{settings.touch_step_um:g} are safe; lower touch_step_v"
+                )
+            if abs(force - base_un) > settings.touch_un:
+                return 0.5 * (before + here)
+            before = here
+        raise CalibrationRefused(
+            f"nothing was felt within {abs(before - begun):.0f} um of where the picture shows the "
+            "jaw; look whether the sensor works, and the jaws are closed"
+        )
+
+    def _keep(self, work: FibreWork, found: list[float]) -> None:
+        settings = work.settings.calibration
+        off_x, seen_y = work.calibration.probe_off_um
+        felt_y = float(np.mean(found))
+        spread = float(np.std(found, ddof=1)) if len(found) > 1 else settings.touch_step_um
+        std_um = max(spread, settings.touch_step_um / np.sqrt(12.0)) / np.sqrt(len(found))
+        apart = felt_y - seen_y
+        if not abs(apart) <= settings.touch_off_um:
+            raise CalibrationRefused(
+                f"touch and picture disagree by {apart:.1f} um, at most {settings.touch_off_um:g} "
+                "um are allowed; look whether a tip is bent, and calibrate the picture anew"
+            )
+        work.calibration.probe_off_um = off_x, felt_y
+        values = {"off_y_um": felt_y, "seen_y_um": seen_y, "apart_um": apart, "spread_um": spread}
+        how = f"{len(found)} touches"
+        self.kept(work, float(std_um), "um", settings.touch_std_um, values=values, how=how)
+
+    @override
+    def restore(self, work: FibreWork, entry: Entry) -> None:
+        off_x, _ = work.calibration.probe_off_um
+        work.calibration.probe_off_um = off_x, entry.values["off_y_um"]
+
+    @override
+    def made_with(self, work: FibreWork) -> str:
+        tip = ", ".join(f"{each:g}" for each in work.probe.tip_um)
+        return f"{work.gripper.name} against {work.probe.name} at {tip}"
+
+
+def _mean_un(work: FibreWork, seconds: float) -> Generator[Wish, object, float]:
+    mean = yield work.forces.wanted(seconds)
+    assert isinstance(mean, ForceMean)
+    return mean.mean_un
