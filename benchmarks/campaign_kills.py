@@ -48,6 +48,9 @@ EARLY: Final = 0.15
 LIMIT_S: Final = 600.0
 ORPHAN_S: Final = 10.0
 POLL_S: Final = 0.001
+INITIALISE: Final = "initialise again"
+SHORTEST_S: Final = 1.0
+"""Whoever is through with it sooner has not initialised anything."""
 MOST_LIVES: Final = 30
 DONE: Final = "no fibre"
 KINDS: Final = ("moment", "moment", "moment", "file", "commit", "report")
@@ -194,7 +197,7 @@ class Victim:
 
     def _times(self) -> None:
         """Take how long it took to move, and to work on a fibre, and whether it initialised."""
-        runs = _rows(self._out, "SELECT number, begin_s FROM run ORDER BY number")
+        runs = _rows(self._out, "SELECT number, begin_s, end_s FROM run ORDER BY number")
         lines = _rows(
             self._out, "SELECT number, fibre, time_s, operation FROM journal ORDER BY number"
         )
@@ -204,9 +207,10 @@ class Victim:
         if not new or not opened or len(runs) < 2:
             return
         begin_s = runs[-1][1]
-        first = next((each for each in new if each[3] != "prepare"), new[0])
-        self._tally.trusted += first[3] != "initialise again"
-        self._tally.moving_s.append(first[2] - begin_s)
+        after_s = new[1][2] if len(new) > 1 else math.inf
+        believed = new[0][3] != INITIALISE or after_s - new[0][2] < SHORTEST_S
+        self._tally.trusted += believed and runs[-2][2] is None
+        self._tally.moving_s.append(new[0][2] - begin_s)
         working = next((each[2] for each in new if each[1] is not None), None)
         if working is not None:
             self._tally.working_s.append(working - begin_s)
