@@ -94,7 +94,8 @@ class Carry(FibreOperation):
     def steps(self, work: FibreWork) -> Steps:
         fibre, places = work.in_hand(), work.settings.places
         yield work.go_up(work.hold_tip_um)
-        yield work.go(work.at(work.gripper, places.hold_x_um, places.hold_y_um, work.hold_tip_um))
+        x = places.hold_x_um * work.jaws.forward
+        yield work.go(work.at(work.gripper, x, places.hold_y_um, work.hold_tip_um))
         picture = yield work.picture()
         assert isinstance(picture, Picture)
         fibre.pictures["held"] = picture

@@ -78,6 +78,12 @@ class FibreInHand:
         How often it was held at another height because it was not met.
     looks : int
         How often something was seen at the jaws that had opened.
+    hand : str
+        Which gripper holds it, where two are at work; empty otherwise.
+    probe_from_s, probe_until_s : float or None
+        When it had the probe to itself, where two hands are at work.
+    stuck : bool
+        It could not be put away.
     contacts : list of (float, float)
         Where along it, from the jaws, the probe has met it, and how far from where foreseen.
     """
@@ -105,6 +111,10 @@ class FibreInHand:
     done_s: float = 0.0
     put_away: bool = False
     failure: OperationFailed | None = None
+    hand: str = ""
+    probe_from_s: float | None = None
+    probe_until_s: float | None = None
+    stuck: bool = False
 
     @property
     def length_um(self) -> float:

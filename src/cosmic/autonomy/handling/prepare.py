@@ -178,11 +178,11 @@ class ComparePlaces(Calibrated):
 
     def _compare(self, work: FibreWork) -> Steps:
         places, settings = work.settings.places, work.settings.calibration
-        hold = places.hold_x_um, places.hold_y_um, work.hold_tip_um
+        hold = places.hold_x_um * work.jaws.forward, places.hold_y_um, work.hold_tip_um
         residual = yield from calibrate_at(work, settings.compare_x_um, *hold[1:])
         yield work.go(work.at(work.gripper, *hold[:2]))
         yield work.go_up(hold[2])
-        beside = places.hold_x_um + settings.compare_beside_um * work.jaws.forward
+        beside = hold[0] + settings.compare_beside_um * work.jaws.forward
         before = places.hold_y_um + settings.compare_before_um
         # Aside while it is far back, then straight ahead: nothing is beside its way.
         yield work.go({work.probe.x_axis: beside - work.probe.tip_um[0]})

@@ -37,11 +37,14 @@ class PushSpans(FibreOperation):
         except BendingError as exc:
             raise OperationFailed(TOO_SHORT, str(exc)) from exc
         yield from ready_force(work)
+        if work.beside_another and not fibre.peak_un:
+            work.forces.take_peak_un()  # was that of the fibre before
         arm(work, armed=True)
         try:
             yield from self._spans(work, fibre)
         finally:
             arm(work, armed=False)
+            fibre.peak_un = max(fibre.peak_un, work.forces.take_peak_un())
 
     @staticmethod
     def _spans(work: FibreWork, fibre: FibreInHand) -> Steps:
@@ -55,7 +58,6 @@ class PushSpans(FibreOperation):
             width = push.fit.model_copy(update={"fibre_width_um": fibre.width_um})
             fibre.ei_guess_n_m2 = guess_ei(fibre.spans, settings=width) or fibre.ei_guess_n_m2
             yield SAFE_POINT
-        fibre.peak_un = work.forces.take_peak_un()
 
 
 def span_limits(work: FibreWork) -> SpanLimits:

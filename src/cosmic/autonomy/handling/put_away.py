@@ -31,7 +31,8 @@ class ToBin(FibreOperation):
     @override
     def steps(self, work: FibreWork) -> Steps:
         places = work.settings.places
-        yield from retract_probe(work)
+        if not work.beside_another:  # who may have the probe just then
+            yield from retract_probe(work)
         yield work.go_up(max(places.travel_um, work.height_now()))
         if work.in_hand().bending is not None:
             yield from self._look_on_the_way(work)

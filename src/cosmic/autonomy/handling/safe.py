@@ -6,8 +6,11 @@ from cosmic.autonomy.procedures.operation import Steps
 
 
 def make_safe(work: FibreWork) -> Steps:
-    """Take the probe back and the gripper up; nothing is opened, for a fibre may be held."""
-    work.ready, work.surveyed, work.zoomed = False, False, None
+    """Take the probe back and grippers up; nothing is opened, for a fibre may be held."""
+    work.surveyed, work.zoomed = False, None
+    for hand in work.hands:
+        hand.ready = False
     yield from retract_probe(work)
     with work.mico.collision.contact("grasp"):
-        yield work.go_up(max(work.settings.places.travel_um, work.height_now()))
+        for hand in work.hands:
+            yield hand.go_up(max(hand.settings.places.travel_um, hand.height_now()))

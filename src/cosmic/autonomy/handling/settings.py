@@ -6,6 +6,7 @@ from pydantic import Field
 
 from cosmic.autonomy.bending.plan import SpanLimits
 from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.autonomy.handling.pair_settings import PairSettings
 from cosmic.frame.config import StrictModel
 
 
@@ -24,7 +25,8 @@ class PlaceSettings(StrictModel):
     test_um, test_aside_um : float
         How high and how far aside a grasped fibre is carried to see whether it follows.
     hold_x_um, hold_y_um : float
-        Where a fibre is held while the probe pushes it; the height is that of the probe.
+        Where a fibre is held while the probe pushes it, x in the direction the gripper points to;
+        the height is that of the probe.
     hold_above_tip_um : float
         How much higher than the jaws' lower edge they hold a fibre.
     bin_x_um, bin_y_um, bin_um : float
@@ -295,3 +297,4 @@ class HandlingSettings(StrictModel):
     grasp: GraspSettings = Field(default_factory=GraspSettings)
     push: PushSettings = Field(default_factory=PushSettings)
     calibration: CalibrationSettings = Field(default_factory=CalibrationSettings)
+    pair: PairSettings = Field(default_factory=PairSettings)

@@ -180,14 +180,10 @@ class Choose(FibreOperation):
     @override
     def steps(self, work: FibreWork) -> Steps:
         angle = work.table_deg
-        ways = [way for each in work.candidates for way in self._ways(work, each, angle)]
-        best = min(ways, key=lambda each: (each.under, abs(each.angle_deg - angle)), default=None)
+        ways = [way for each in work.candidates for way in ways_of(work, each, angle)]
+        best = min(ways, key=lambda each: self.rank(work, each, angle), default=None)
         if best is None:
-            if work.candidates:
-                work.skipped[OUT_OF_REACH] += len(work.candidates)
-            work.candidates = []
-            cause = LOOK_AGAIN if work.since_survey else NONE_LEFT
-            raise OperationFailed(cause, none_left(work.skipped))
+            raise self.none(work)
         work.candidates = [each for each in work.candidates if each is not best.candidate]
         gone = best.candidate.line_um.mean(axis=0)
         work.lines_um = [
@@ -195,21 +191,35 @@ class Choose(FibreOperation):
         ]
         work.numbers += 1
         work.since_survey += 1
-        work.forces.take_peak_un()
         work.fibre = FibreInHand(work.numbers, best, found_s=work.clock.now_s())
+        if work.beside_another:
+            work.fibre.hand = work.settings.gripper
+        else:
+            work.forces.take_peak_un()
         yield SAFE_POINT
 
-    @staticmethod
-    def _ways(work: FibreWork, candidate: Candidate, angle_deg: float) -> list[Reach]:
-        own = candidate.line_um.mean(axis=0)
-        others = [
-            line for line in work.lines_um if np.linalg.norm(line.mean(axis=0) - own) > OWN_UM
-        ]
-        return reaches(
-            candidate,
-            work.calibration.frame,
-            work.jaws,
-            work.settings.grasp,
-            Neighbours(others),
-            angle_deg,
-        )
+    def rank(self, work: FibreWork, way: Reach, angle_deg: float) -> tuple[float, ...]:  # noqa: ARG002
+        """Return by what the best way is known: the smallest."""
+        return way.under, abs(way.angle_deg - angle_deg)
+
+    def none(self, work: FibreWork) -> OperationFailed:
+        """Return what it fails with where none can be taken."""
+        if work.candidates:
+            work.skipped[OUT_OF_REACH] += len(work.candidates)
+        work.candidates = []
+        cause = LOOK_AGAIN if work.since_survey else NONE_LEFT
+        return OperationFailed(cause, none_left(work.skipped))
+
+
+def ways_of(work: FibreWork, candidate: Candidate, angle_deg: float) -> list[Reach]:
+    """Return the ways to take a candidate, the best first."""
+    own = candidate.line_um.mean(axis=0)
+    others = [line for line in work.lines_um if np.linalg.norm(line.mean(axis=0) - own) > OWN_UM]
+    return reaches(
+        candidate,
+        work.calibration.frame,
+        work.jaws,
+        work.settings.grasp,
+        Neighbours(others),
+        angle_deg,
+    )

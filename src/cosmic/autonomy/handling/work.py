@@ -2,15 +2,17 @@
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+from cosmic.autonomy.handling.bench import Bench, OfBench
 from cosmic.autonomy.handling.force import ForceWatch
 from cosmic.autonomy.handling.in_hand import Calibration, FibreInHand
 from cosmic.autonomy.handling.live import LastSeen, LivePicture
 from cosmic.autonomy.handling.patience import PatientMove, way_back
 from cosmic.autonomy.handling.plate import Candidate, Jaws
 from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.handling.sides import of_hand
 from cosmic.autonomy.handling.sight import map_at
 from cosmic.autonomy.places import PlatformPlaces
 from cosmic.autonomy.procedures.operation import OperationFailed
@@ -49,26 +51,14 @@ class Handles(Protocol):
 
 @dataclass(slots=True, eq=False)
 class FibreWork:
-    """Everything that operations on fibres share; belongs to the thread of the run.
+    """What one hand works with, and what it shares with others; belongs to the run's thread.
 
     Attributes
     ----------
-    candidates : list of Candidate
-        Of the last survey, less those that were taken; on the plate.
-    given_up : list of Candidate
-        Those on which grasping failed: they are not tried a second time.
-    spilled : list of FibreInHand
-        Those that were measured, and fell on the way to the bin: they lie on the plate again.
-    skipped : Counter of str
-        Why fibres of the last survey are not taken, and how many.
+    bench : Bench
+        What hands share. All of it that an operation uses can be had from here as well.
     fibre : FibreInHand or None
         The one in hand.
-    finished : list of FibreInHand
-        Those that were put away.
-    distrusted : bool
-        Positions are not to be believed before the platform was initialised again.
-    seen : LastSeen
-        By which a frozen camera is known.
     gap_um : float or None
         Opening of the jaws, as steps since they were closed say; None before.
     stray_um : float
@@ -84,24 +74,26 @@ class FibreWork:
     clock: Clock
     forces: ForceWatch
     calibration: Calibration = field(default_factory=Calibration)
-    candidates: list[Candidate] = field(default_factory=list)
-    lines_um: list[Floats] = field(default_factory=list)
-    given_up: list[Candidate] = field(default_factory=list)
-    spilled: list[FibreInHand] = field(default_factory=list)
-    skipped: Counter[str] = field(default_factory=Counter)
+    bench: Bench = field(default_factory=Bench)
     ready: bool = False
-    zoomed: float | None = None
-    surveyed: bool = False
-    since_survey: int = 0
-    survey_deg: float = 0.0
     fibre: FibreInHand | None = None
-    finished: list[FibreInHand] = field(default_factory=list)
-    numbers: int = 0
-    distrusted: bool = False
-    seen: LastSeen = field(default_factory=LastSeen)
     gap_um: float | None = None
     stray_um: float = 0.0
     failures: list[tuple[str, OperationFailed]] = field(default_factory=list)
+
+    candidates = OfBench[list[Candidate]]()
+    lines_um = OfBench[list[Floats]]()
+    given_up = OfBench[list[Candidate]]()
+    spilled = OfBench[list[FibreInHand]]()
+    skipped = OfBench[Counter[str]]()
+    zoomed = OfBench[float | None]()
+    surveyed = OfBench[bool]()
+    since_survey = OfBench[int]()
+    survey_deg = OfBench[float]()
+    finished = OfBench[list[FibreInHand]]()
+    numbers = OfBench[int]()
+    distrusted = OfBench[bool]()
+    seen = OfBench[LastSeen]()
 
     @classmethod
     def on(cls, rig: Handles, settings: HandlingSettings | None = None) -> "FibreWork":
@@ -129,6 +121,32 @@ class FibreWork:
     def close(self) -> None:
         """Let go of the force channel."""
         self.forces.close()
+
+    # Several hands
+
+    def hand(self, name: str) -> "FibreWork":
+        """Return the work of one of two hands, each of which stays on its own side."""
+        hands = self.bench.hands
+        if name not in hands:
+            self.tool(name)
+            hands[name] = replace(
+                self,
+                settings=of_hand(self.settings, name),
+                calibration=Calibration(book=self.calibration.book),
+                fibre=None,
+                failures=[],
+            )
+        return hands[name]
+
+    @property
+    def hands(self) -> "tuple[FibreWork, ...]":
+        """All that work: this one, where it is alone."""
+        return tuple(self.bench.hands.values()) or (self,)
+
+    @property
+    def beside_another(self) -> bool:
+        """True where another hand may be at work at the same time."""
+        return len(self.bench.hands) > 1
 
     # What the platform has
 
@@ -242,7 +260,8 @@ class FibreWork:
     def mapped(self, picture: Picture, height_um: float = 0.0) -> PixelMap:
         """Return the map of a picture for things at a height above the plate."""
         plate_um = self.vision.settings.plate_um
-        return map_at(self.vision.places, picture, plate_um + height_um)
+        tool = self.settings.gripper if self.beside_another else None
+        return map_at(self.vision.places, picture, plate_um + height_um, tool)
 
     def mapped_near(self, picture: Picture, height_um: float) -> PixelMap:
         """Return the map of whichever of the two heights measured is nearer."""

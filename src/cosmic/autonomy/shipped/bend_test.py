@@ -49,15 +49,9 @@ PUSHES = 3
 def build_bend_test(settings: HandlingSettings | None = None) -> Procedure[FibreWork]:
     """Return the procedure for one fibre; run it again for the next, on the same work."""
     settings = settings or HandlingSettings()
-    measured = Retry(
-        Sequence[FibreWork]("measure", PushSpans(), FitSpans()),
-        PUSHES,
-        only={NO_CONTACT, NOT_TRUSTED},
-        between=StepBack(),
-    )
     return Procedure(
         "bend test",
-        Sequence("bend test", *beginning(settings, SeeForce()), one_fibre(settings, measured)),
+        Sequence("bend test", *beginning(settings, SeeForce()), one_fibre(settings, measured())),
         make_safe=make_safe,
     )
 
@@ -70,11 +64,7 @@ def beginning(settings: HandlingSettings, *more: Part[FibreWork]) -> tuple[Part[
             InitialiseAgain(),
             ClearUp(),
             MakeReady(),
-            Fallback("heights", HeightByFocus(), HeightsAsFiled()),
-            *(
-                Retry(each, settings.calibration.tries, only={POOR}, between=TurnOn())
-                for each in (CalibratePlate(), CalibrateHeld(), ComparePlaces())
-            ),
+            *calibrated(settings),
             Survey(),
             FindRotationCentre(),
             *more,
@@ -83,18 +73,43 @@ def beginning(settings: HandlingSettings, *more: Part[FibreWork]) -> tuple[Part[
     )
 
 
-def one_fibre(settings: HandlingSettings, measured: Part[FibreWork]) -> Part[FibreWork]:
-    """Return the way of one fibre from the plate by `measured` to the bin, whatever happens."""
-    grasped = Retry(
+def calibrated(settings: HandlingSettings) -> tuple[Part[FibreWork], ...]:
+    """Return what is calibrated of a hand before it sees any fibre."""
+    return (
+        Fallback("heights", HeightByFocus(), HeightsAsFiled()),
+        *(
+            Retry(each, settings.calibration.tries, only={POOR}, between=TurnOn())
+            for each in (CalibratePlate(), CalibrateHeld(), ComparePlaces())
+        ),
+    )
+
+
+def one_fibre(settings: HandlingSettings, treated: Part[FibreWork]) -> Part[FibreWork]:
+    """Return the way of one fibre from the plate by `treated` to the bin, whatever happens."""
+    return Fallback(
+        "one fibre",
+        Sequence("fibre", Turn(), grasped(settings), Carry(), treated, put_away(), Finish()),
+        Sequence("give up", NoteFailure(), put_away(), GiveUp()),
+    )
+
+
+def measured() -> Part[FibreWork]:
+    """Return the measurement of a fibre that is held before the probe."""
+    return Retry(
+        Sequence[FibreWork]("measure", PushSpans(), FitSpans()),
+        PUSHES,
+        only={NO_CONTACT, NOT_TRUSTED},
+        between=StepBack(),
+    )
+
+
+def grasped(settings: HandlingSettings) -> Part[FibreWork]:
+    """Return the grasp of a fibre that the table has turned into place."""
+    return Retry(
         Sequence[FibreWork]("grasp", FindAgain(), Approach(), Refine(), CloseJaws(), TestGrasp()),
         settings.grasp.tries,
         only={MISSED, TIP_NOT_SEEN},
         between=Shift(),
-    )
-    return Fallback(
-        "one fibre",
-        Sequence("fibre", Turn(), grasped, Carry(), measured, put_away(), Finish()),
-        Sequence("give up", NoteFailure(), put_away(), GiveUp()),
     )
 
 
