@@ -7,6 +7,7 @@ import pytest
 
 from cosmic.autonomy.handling.force import ForceMean
 from cosmic.autonomy.handling.force_ready import APART_S, LOOKS, SeeForce
+from cosmic.autonomy.handling.in_hand import Calibration
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed
 from cosmic.frame.errors import DeviceError, NotAvailable
@@ -33,6 +34,7 @@ class Work:
 
     def __init__(self, *felt: float | Exception) -> None:
         self.settings = HandlingSettings()
+        self.calibration = Calibration()
         self.daqco = Daqco()
         self.forces = self
         self.failures: list[tuple[str, OperationFailed]] = []
