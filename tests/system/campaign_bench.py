@@ -155,3 +155,10 @@ def wait_for(condition: Callable[[], bool], what: str, timeout_s: float = 240.0)
     while not condition():
         assert WALL.now_s() < until_s, f"{what}: not within {timeout_s:g} s"
         WALL.sleep(0.002)
+
+
+def wait_for_operation(campaign: Campaign, operation: str, timeout_s: float = 120.0) -> None:
+    """Wait until a campaign that runs is at an operation."""
+    strike = Strike(campaign, operation, lambda: None)
+    wait_for(lambda: strike.struck.is_set() or campaign.over, operation, timeout_s)
+    assert not campaign.over, campaign.end_reason

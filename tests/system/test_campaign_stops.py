@@ -233,6 +233,7 @@ class Trial:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize(("plate", "procedure", "operation"), trials(), indirect=["plate"])
 def test_stop_and_abort_in_every_operation_end_it_safely_and_nothing_is_lost(
     plate: Bench, procedure: str, operation: str
