@@ -5,6 +5,9 @@ two were measured, without a hand. Safe: the campaign ended by itself and said w
 no body ran into another that should not, and no force came near the sensor's end; scored from the
 twin's truth.
 
+What would last for ever, such as a plug pulled out, is cleared after some seconds, as a loose
+contact or an overload is: nothing recovers alone from what only a hand can mend.
+
     python -m benchmarks.campaign_faults          # about 15 minutes on two quiet cores
 """
 
@@ -68,9 +71,9 @@ TROUBLES = (
     Trouble("light_dimmed"),
     Trouble("zoom_lost_steps"),
     Trouble("sensor_drift", where=(("amount", 0.2),)),
-    Trouble("sensor_saturated", at="push the spans"),
+    Trouble("sensor_saturated", at="push the spans", lasts_s=3.0),
     Trouble("board overrun", at="push the spans"),
-    Trouble("board unplugged", at="push the spans"),
+    Trouble("board unplugged", at="push the spans", lasts_s=3.0),
     Trouble("camera lost", where=(("share", 0.3),)),
     Trouble("camera incomplete", where=(("share", 0.3),)),
     Trouble("camera frozen", lasts_s=3.0),
@@ -82,7 +85,7 @@ TROUBLES = (
         where=(("device", 0), ("channel", 0)),
         lasts_s=1.0,
     ),
-    Trouble("controller unplugged", at="carry to the probe", where=(("device", 0),)),
+    Trouble("controller unplugged", at="carry to the probe", where=(("device", 0),), lasts_s=3.0),
 )
 
 
