@@ -14,7 +14,6 @@ import cosmic
 import cosmic.app.platform as platform_module
 from cosmic.app.rig import Rig
 from cosmic.autonomy.campaign.campaign import Campaign
-from cosmic.autonomy.handling.in_hand import Calibration
 from cosmic.autonomy.procedures.run import ProcedureRun
 from cosmic.autonomy.procedures.tree import OPERATION, NodeEvent, NodeState
 from cosmic.frame.clock import WALL
@@ -64,7 +63,6 @@ class Bench:
     rig: Rig
     scene: Scene
     home: Path
-    calibration: Calibration | None = None
     names: Iterator[int] = field(default_factory=lambda: iter(range(10**6)))
 
     def recipe(self, procedure: str = "bend test", good: int = 1, more: str = "") -> Path:
@@ -73,13 +71,12 @@ class Bench:
         return path
 
     def campaign(self, recipe: Path, folder: str, *, forget: tuple[str, ...] = ()) -> Campaign:
-        """Return a campaign that knows the calibrations of before, but for those to be made."""
+        """Return a campaign in a folder; `forget` names calibrations to be made anew."""
         campaign = self.rig.campaign(recipe, self.home / folder)
-        if self.calibration is not None:
-            campaign.work.calibration = self.calibration
-        self.calibration = campaign.work.calibration
-        for name in forget:
-            self.calibration.made.pop(name, None)
+        book = campaign.work.calibration.book
+        for entry in book.entries:
+            if entry.name in forget:
+                book.refuse(entry, "forgotten by the test")
         return campaign
 
     @property

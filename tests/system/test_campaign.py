@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-import cosmic
 from cosmic.app.campaign_output import gui_application, write_output
 from cosmic.app.rig import Rig
 from cosmic.autonomy.campaign.campaign import Campaign
@@ -16,13 +15,14 @@ from cosmic.autonomy.campaign.steering import CampaignPhase
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.frame.errors import ConfigError
 from cosmic.twin.truth import TruthRecord, read_truth
-from unit.mico.rigs import wait_until
+from system.campaign_bench import Bench, bench
+from system.campaign_trial import Trial
 
 RATE = 10.0
 RECIPE = """
 procedure = "{procedure}"
 [sample]
-name = "three-dry"
+name = "easy"
 [stop]
 count = {count}
 """
@@ -40,9 +40,14 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def rig(home: Path) -> Iterator[Rig]:
-    with cosmic.connect(rate=RATE, sample="three-dry", seed=1, truth=home / "truth.jsonl") as rig:
-        yield rig
+def plate(home: Path) -> Iterator[Bench]:
+    with bench(home, rate=RATE) as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def rig(plate: Bench) -> Rig:
+    return plate.rig
 
 
 @pytest.fixture(scope="module")
@@ -114,21 +119,15 @@ def test_a_wrong_recipe_is_refused_with_file_key_and_reason(rig: Rig, home: Path
     assert not (home / "never").exists()
 
 
+@pytest.mark.parametrize("operation", ["close the gripper", "carry to the probe", "push the spans"])
 def test_stop_ends_a_campaign_and_its_fibre_can_be_gone_on_with(
-    done: Campaign, rig: Rig, home: Path
+    done: Campaign, plate: Bench, operation: str
 ) -> None:
-    campaign = rig.campaign(recipe(home, 1, "transport"), home / "stopped")
-    campaign.start()
-    wait_until(lambda: campaign.operation == "carry to the probe", timeout_s=60.0)
-    rig.stop("a hand on the button")
-    wait_until(lambda: campaign.over, timeout_s=10.0)
-    campaign.join()
-    assert "a hand on the button" in campaign.end_reason
-    assert not any(axis.details.in_motion for axis in rig.mico)
-    (record,) = CampaignReader(home / "stopped").fibres()
-    assert record.outcome is Outcome.INTERRUPTED
-    rig.reset_stop()
-    again = rig.campaign(recipe(home, 1, "transport"), home / "stopped")
+    assert done.over
+    trial = Trial(plate, "bend test", operation)
+    trial.stop(moving=True)
+    assert [each.outcome for each in trial.fibres()] == [Outcome.INTERRUPTED]
+    again = plate.campaign(trial.recipe, trial.folder)
     assert again.phase is CampaignPhase.READY
     again.abort("not now")
     assert (again.phase, again.end_reason) == (CampaignPhase.ENDED, "not now")
