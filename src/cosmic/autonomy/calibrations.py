@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Lock
 from typing import Final
@@ -10,7 +10,7 @@ from typing import Final
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.core.calibration import Calibration, Plane, RotationCentre
 from cosmic.vico.core.calibration_store import load_calibration, save_calibration
-from cosmic.vico.core.pixel_map import PixelMap
+from cosmic.vico.core.pixel_map import Pair, PixelMap
 
 logger = logging.getLogger(__name__)
 
@@ -71,6 +71,13 @@ class Calibrations:
         """Put a map in force and keep it; raises `ConfigError` where it cannot be written."""
         self._put(camera, tool, self.get(camera, tool).with_plane(plane))
 
+    def shift(self, camera: str, tool: str, by_um: Pair) -> None:
+        """Move all maps made with a tool, whose tip has moved; raises as `add_plane`."""
+        known = self.get(camera, tool)
+        if known.planes and any(by_um):
+            moved = tuple(_moved(each, by_um) for each in known.planes)
+            self._put(camera, tool, replace(known, planes=moved))
+
     def set_rotation(self, camera: str, rotation: RotationCentre) -> None:
         """Put a rotation centre in force and keep it; raises as `add_plane`."""
         self._put(camera, "", self.get(camera, "").with_rotation(rotation))
@@ -113,6 +120,12 @@ class Calibrations:
         if self._folder is None:
             return None
         return self._folder / (f"{camera}-{tool}.toml" if tool else f"{camera}.toml")
+
+
+def _moved(plane: Plane, by_um: Pair) -> Plane:
+    x_um, y_um = plane.fit.map.centre_um
+    centre_um = x_um + by_um[0], y_um + by_um[1]
+    return replace(plane, fit=replace(plane.fit, map=replace(plane.fit.map, centre_um=centre_um)))
 
 
 def _title(camera: str, tool: str) -> str:

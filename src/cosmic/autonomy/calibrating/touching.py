@@ -57,7 +57,7 @@ class TouchJaw(Calibrated):
         yield from retract_probe(work)
         below = work.hold_tip_um + places.hold_above_tip_um - settings.touch_below_um
         yield work.go_up(max(below, work.height_now(), places.travel_um))
-        yield work.go(work.at(work.gripper, places.hold_x_um, places.hold_y_um))
+        yield work.go(work.at(work.gripper, places.hold_x_um * work.jaws.forward, places.hold_y_um))
         yield work.go_up(below)
         hold_x, hold_y = work.tip_now(work.gripper)
         off_x, off_y = work.calibration.probe_off_um

@@ -37,6 +37,10 @@ class Calibration:
         About which place the plate turns.
     probe_off_um : (float, float)
         How far the probe's tip is from where its stages say, in the frame of the gripper.
+    seen_off_um : (float, float)
+        The same as a picture showed it last: a touch tells it better, drift is told from this.
+    drift_looked_at : int
+        How many fibres were done with when drift was looked at last.
     touching : bool
         The probe has gone to a jaw, and not come back yet.
     up_um : dict of str to float
@@ -48,6 +52,8 @@ class Calibration:
     made: dict[str, Measured] = field(default_factory=dict)
     frame: PlateFrame = field(default_factory=PlateFrame)
     probe_off_um: tuple[float, float] = (0.0, 0.0)
+    seen_off_um: tuple[float, float] = (0.0, 0.0)
+    drift_looked_at: int = 0
     touching: bool = False
     up_um: dict[str, float] = field(default_factory=dict)
     book: Book = field(default_factory=Book)

@@ -177,26 +177,36 @@ class ComparePlaces(Calibrated):
         yield from zoom_to(work, work.settings.zoom)
 
     def _compare(self, work: FibreWork) -> Steps:
-        places, settings = work.settings.places, work.settings.calibration
-        hold = places.hold_x_um * work.jaws.forward, places.hold_y_um, work.hold_tip_um
-        residual = yield from calibrate_at(work, settings.compare_x_um, *hold[1:])
-        yield work.go(work.at(work.gripper, *hold[:2]))
-        yield work.go_up(hold[2])
-        beside = hold[0] + settings.compare_beside_um * work.jaws.forward
-        before = places.hold_y_um + settings.compare_before_um
-        # Aside while it is far back, then straight ahead: nothing is beside its way.
-        yield work.go({work.probe.x_axis: beside - work.probe.tip_um[0]})
-        yield work.go(work.at(work.probe, beside, before))
+        hold_y, settings = work.settings.places.hold_y_um, work.settings.calibration
+        residual = yield from calibrate_at(work, settings.compare_x_um, hold_y, work.hold_tip_um)
+        yield from beside_jaws(work)
         picture = yield work.picture()
         assert isinstance(picture, Picture)
         x, y = work.calibration.probe_off_um = probe_off_um(work, picture)
+        work.calibration.seen_off_um = x, y
         yield from retract_probe(work)
-        values = {"off_x_um": x, "off_y_um": y}
+        values = {"off_x_um": x, "off_y_um": y, "seen_x_um": x, "seen_y_um": y}
         self.kept(work, residual, "px", settings.residual_px, values=values, how="one picture")
 
     @override
     def restore(self, work: FibreWork, entry: Entry) -> None:
-        work.calibration.probe_off_um = entry.values["off_x_um"], entry.values["off_y_um"]
+        known, values = work.calibration, entry.values
+        known.probe_off_um = values["off_x_um"], values["off_y_um"]
+        known.seen_off_um = values["seen_x_um"], values["seen_y_um"]
+
+
+def beside_jaws(work: FibreWork) -> Steps:
+    """Hold the jaws where fibres are pushed, and the probe beside them: both in one picture."""
+    places, settings = work.settings.places, work.settings.calibration
+    hold_x = places.hold_x_um * work.jaws.forward
+    yield work.go_up(max(places.travel_um, work.height_now()))
+    yield work.go(work.at(work.gripper, hold_x, places.hold_y_um))
+    yield work.go_up(work.hold_tip_um)
+    beside = hold_x + settings.compare_beside_um * work.jaws.forward
+    before = places.hold_y_um + settings.compare_before_um
+    # Aside while it is far back, then straight ahead: nothing is beside its way.
+    yield work.go({work.probe.x_axis: beside - work.probe.tip_um[0]})
+    yield work.go(work.at(work.probe, beside, before))
 
 
 class TurnOn(FibreOperation):

@@ -1,18 +1,10 @@
 """The bend test: a fibre is taken up, pushed as a cantilever at several spans, and put away."""
 
-from cosmic.autonomy.calibrating.calibrated import POOR
-from cosmic.autonomy.calibrating.heights import HeightByFocus, HeightsAsFiled
 from cosmic.autonomy.handling.force_ready import SeeForce
 from cosmic.autonomy.handling.grasp import MISSED, Carry, TestGrasp
 from cosmic.autonomy.handling.initialise import InitialiseAgain
 from cosmic.autonomy.handling.one_span import NO_CONTACT
-from cosmic.autonomy.handling.prepare import (
-    CalibrateHeld,
-    CalibratePlate,
-    ComparePlaces,
-    MakeReady,
-    TurnOn,
-)
+from cosmic.autonomy.handling.prepare import MakeReady
 from cosmic.autonomy.handling.push import NOT_TRUSTED, FitSpans, PushSpans, StepBack
 from cosmic.autonomy.handling.put_away import (
     ADHESION,
@@ -41,6 +33,7 @@ from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.combinators import Fallback, Retry, Sequence
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.walk import Part
+from cosmic.autonomy.shipped.calibrate import calibrated
 
 RELEASES = 4
 PUSHES = 3
@@ -70,17 +63,6 @@ def beginning(settings: HandlingSettings, *more: Part[FibreWork]) -> tuple[Part[
             *more,
         ),
         Retry(Sequence[FibreWork]("choose", Survey(), Choose()), 2, only={LOOK_AGAIN}),
-    )
-
-
-def calibrated(settings: HandlingSettings) -> tuple[Part[FibreWork], ...]:
-    """Return what is calibrated of a hand before it sees any fibre."""
-    return (
-        Fallback("heights", HeightByFocus(), HeightsAsFiled()),
-        *(
-            Retry(each, settings.calibration.tries, only={POOR}, between=TurnOn())
-            for each in (CalibratePlate(), CalibrateHeld(), ComparePlaces())
-        ),
     )
 
 

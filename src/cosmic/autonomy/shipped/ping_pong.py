@@ -42,7 +42,8 @@ from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.resources import Resource
 from cosmic.autonomy.procedures.sharing import Holding, Role
 from cosmic.autonomy.procedures.walk import Part
-from cosmic.autonomy.shipped.bend_test import RELEASES, calibrated, grasped, measured
+from cosmic.autonomy.shipped.bend_test import RELEASES, grasped, measured
+from cosmic.autonomy.shipped.calibrate import calibrated
 
 HANDS = ("left", "right")
 

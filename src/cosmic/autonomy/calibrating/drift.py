@@ -1,0 +1,177 @@
+"""Drift: the tips are looked for again now and then, and what moved is put right."""
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+from typing import Final
+
+from typing_extensions import override
+
+from cosmic.autonomy.calibrating.book import Entry
+from cosmic.autonomy.handling.operation import FibreOperation
+from cosmic.autonomy.handling.plate import PlateFrame
+from cosmic.autonomy.handling.prepare import (
+    HELD,
+    PLATE,
+    PROBE,
+    beside_jaws,
+    retract_probe,
+    see_tip,
+    zoom_to,
+)
+from cosmic.autonomy.handling.work import FibreWork
+from cosmic.autonomy.places import PlatformPlaces
+from cosmic.autonomy.procedures.operation import SAFE_POINT, Steps, Wish
+from cosmic.autonomy.tools import tip_um
+from cosmic.frame.errors import NotAvailable
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.tool_settings import ToolSettings
+from cosmic.vico.core.vision.tool_types import GripperTips, NotSeen
+
+DRIFT: Final = "drift of the tips"
+TIMES_STD: Final = 3.0
+"""What is less than so many standard deviations is noise."""
+
+Off = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class TipSeen:
+    """How far a tip is seen from where its stages and the map say.
+
+    Attributes
+    ----------
+    std_um : float
+        Of a coordinate: of the tip on the picture and of the map there.
+    """
+
+    off_um: Off
+    std_um: float
+
+
+def tip_off(work: FibreWork, picture: Picture, tool: ToolSettings) -> TipSeen:
+    """Return how far a tip is from where it should be seen; raises `NotAvailable`."""
+    found = see_tip(work, picture, tool)
+    if isinstance(found, NotSeen):
+        raise NotAvailable(f"{tool.shown} was not seen: {found.reason}")
+    believed = tip_um(tool, picture.circumstances.positions)
+    if believed is None:
+        raise NotAvailable(f"{tool.name}: where it stands is not known")
+    mapped = work.mapped(picture, believed[2])
+    seen_px = found.hold_px if isinstance(found, GripperTips) else found.tip_px
+    x, y = mapped.to_um(seen_px).tolist()
+    std_um = math.hypot(found.std_px * mapped.scale_um_px, float(mapped.std_um(seen_px)))
+    return TipSeen((x - believed[0], y - believed[1]), std_um)
+
+
+def shift_maps(work: FibreWork, off_um: Off) -> None:
+    """Have the maps made by the gripper follow its tip, which is now off by so much.
+
+    What lies on the plate keeps its place there: the rotation centre goes along.
+    """
+    places = work.vision.places
+    if not isinstance(places, PlatformPlaces):
+        raise NotAvailable("micromanipulation is not hosted here: there are no maps")
+    camera = work.settings.camera or work.vision.first_camera
+    places.calibrations.shift(camera, work.gripper.name, (-off_um[0], -off_um[1]))
+    x, y = work.calibration.frame.centre_um
+    work.calibration.frame = PlateFrame((x - off_um[0], y - off_um[1]))
+
+
+class CheckDrift(FibreOperation):
+    """Gripper and probe are seen on one picture again, every so many fibres.
+
+    What has moved by more than the setting, and by more than can be noise, is followed: maps,
+    rotation centre and the probe's place. What has moved far, or is not seen, is measured anew.
+    """
+
+    name = "check the drift"
+
+    @override
+    def steps(self, work: FibreWork) -> Steps:
+        known, settings = work.calibration, work.settings.calibration
+        due = len(work.finished) - known.drift_looked_at >= settings.drift_fibres
+        if not settings.drift_fibres or not due or PROBE not in known.made:
+            return
+        known.drift_looked_at = len(work.finished)
+        try:
+            gripper, probe = yield from look_at_both(work)
+        except NotAvailable:
+            distrust(work)
+            return
+        follow(work, gripper, probe)
+        yield SAFE_POINT
+
+
+def look_at_both(work: FibreWork) -> Generator[Wish, object, tuple[TipSeen, TipSeen]]:
+    """Hold both tips where fibres are pushed, and look at them; raises `NotAvailable`."""
+    try:
+        yield from zoom_to(work, work.settings.calibration.compare_zoom)
+        yield from beside_jaws(work)
+        picture = yield work.picture()
+        assert isinstance(picture, Picture)
+        yield from retract_probe(work)
+    finally:
+        work.zoomed = None
+    yield from zoom_to(work, work.settings.zoom)
+    return tip_off(work, picture, work.gripper), tip_off(work, picture, work.probe)
+
+
+def follow(work: FibreWork, gripper: TipSeen, probe: TipSeen) -> None:
+    """Put right what has moved, and note it."""
+    known, settings = work.calibration, work.settings.calibration
+    off = probe.off_um[0] - gripper.off_um[0], probe.off_um[1] - gripper.off_um[1]
+    before = known.seen_off_um
+    moved = off[0] - before[0], off[1] - before[1]
+    if not max(math.hypot(*gripper.off_um), math.hypot(*moved)) <= settings.drift_far_um:
+        distrust(work)
+        return
+    limit_um = max(settings.drift_um, TIMES_STD * gripper.std_um)
+    both_um = max(settings.drift_um, TIMES_STD * math.hypot(gripper.std_um, probe.std_um))
+    if math.hypot(*gripper.off_um) > limit_um:
+        shift_maps(work, gripper.off_um)
+    if math.hypot(*moved) > both_um:
+        x, y = known.probe_off_um
+        known.probe_off_um = x + moved[0], y + moved[1]
+        known.seen_off_um = off
+    _note(work, gripper, moved, limit_um)
+
+
+def distrust(work: FibreWork) -> None:
+    """Have everything that rests on where the tips are measured anew."""
+    for key in (PLATE, HELD, PROBE):
+        work.calibration.made.pop(key, None)
+        work.calibration.book.forget(key, work.gripper.name)
+
+
+def _note(work: FibreWork, gripper: TipSeen, moved: Off, limit_um: float) -> None:
+    book, now_s = work.calibration.book, work.clock.now_s()
+    for key in (PLATE, HELD, PROBE):
+        entry = book.get(key, work.gripper.name)
+        if entry is not None:
+            values = dict(entry.values)
+            if key == PROBE:
+                values["off_x_um"], values["off_y_um"] = work.calibration.probe_off_um
+                values["seen_x_um"], values["seen_y_um"] = work.calibration.seen_off_um
+            book.confirm(replace(entry, values=values), now_s)
+    book.put(
+        Entry(
+            DRIFT,
+            work.gripper.name,
+            {
+                "gripper_x_um": gripper.off_um[0],
+                "gripper_y_um": gripper.off_um[1],
+                "probe_x_um": moved[0],
+                "probe_y_um": moved[1],
+                "followed_from_um": limit_um,
+            },
+            gripper.std_um,
+            "um",
+            work.settings.calibration.drift_far_um,
+            book.now(),
+            now_s,
+            book.session,
+            zoom=work.settings.calibration.compare_zoom,
+            how="one picture of both tips",
+        )
+    )

@@ -1,0 +1,73 @@
+"""Calibration: before fibres are handled, and everything there is on its own."""
+
+from cosmic.autonomy.calibrating.calibrated import POOR
+from cosmic.autonomy.calibrating.drift import CheckDrift
+from cosmic.autonomy.calibrating.heights import HeightByFocus, HeightsAsFiled
+from cosmic.autonomy.calibrating.touching import TouchJaw
+from cosmic.autonomy.calibrating.zooms import CalibrateZooms
+from cosmic.autonomy.handling.initialise import InitialiseAgain
+from cosmic.autonomy.handling.operation import FibreOperation
+from cosmic.autonomy.handling.prepare import (
+    CalibrateHeld,
+    CalibratePlate,
+    ComparePlaces,
+    MakeReady,
+    TurnOn,
+)
+from cosmic.autonomy.handling.put_away import ClearUp
+from cosmic.autonomy.handling.safe import make_safe
+from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.handling.survey import Survey
+from cosmic.autonomy.handling.turning import FindRotationCentre
+from cosmic.autonomy.handling.work import FibreWork
+from cosmic.autonomy.procedures.combinators import Fallback, Retry, Sequence
+from cosmic.autonomy.procedures.procedure import Procedure
+from cosmic.autonomy.procedures.walk import Part
+
+
+def calibrated(settings: HandlingSettings) -> tuple[Part[FibreWork], ...]:
+    """Return what is calibrated of a hand before it sees any fibre; nothing where all is fresh."""
+    chosen = settings.calibration
+    heights = Fallback("heights", HeightByFocus(), HeightsAsFiled())
+    return (
+        CheckDrift(),
+        *((heights,) if chosen.heights else ()),
+        *(_tried(settings, each) for each in (CalibratePlate(), CalibrateHeld(), ComparePlaces())),
+        *((_tried(settings, TouchJaw()),) if chosen.touch else ()),
+    )
+
+
+def build_calibrate(
+    settings: HandlingSettings | None = None, *, zooms: bool = True
+) -> Procedure[FibreWork]:
+    """Return the procedure that calibrates everything that is not fresh.
+
+    Parameters
+    ----------
+    zooms : bool
+        The map at every step of the lens as well; fibres are handled without most of them.
+    """
+    settings = settings or HandlingSettings()
+    everything: tuple[FibreOperation, ...] = (
+        CalibratePlate(),
+        CalibrateHeld(),
+        ComparePlaces(),
+        TouchJaw(),
+        *((CalibrateZooms(),) if zooms else ()),
+    )
+    root = Sequence(
+        "calibrate",
+        InitialiseAgain(),
+        ClearUp(),
+        MakeReady(),
+        HeightByFocus(),
+        *(_tried(settings, each) for each in everything),
+        Survey(),
+        FindRotationCentre(),
+    )
+    return Procedure("calibrate", root, make_safe=make_safe)
+
+
+def _tried(settings: HandlingSettings, part: FibreOperation) -> Part[FibreWork]:
+    """Return an operation tried several times: what lies below may hide a tool."""
+    return Retry(part, settings.calibration.tries, only={POOR}, between=TurnOn())
