@@ -1,0 +1,111 @@
+"""Campaigns whose program was killed or whose sensor fails: on again, or safe and told why."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import cosmic
+from cosmic.app.rig import Rig
+from cosmic.autonomy.campaign.records import Outcome, Pose
+from cosmic.autonomy.campaign.steering import CampaignPhase
+from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.mico.core.positioner import Confidence
+from unit.autonomy.campaign.sample_records import INFO
+from unit.mico.rigs import wait_until
+
+RATE = 20.0
+AXES = ("left.x", "left.y", "left.z", "right.z", "probe.x", "probe.y", "table.rotation")
+RECIPE = """
+procedure = "{procedure}"
+[sample]
+name = "three-dry"
+[stop]
+count = 1
+"""
+
+
+def recipe(folder: Path, procedure: str = "transport") -> Path:
+    path = folder / "one.toml"
+    path.write_text(RECIPE.format(procedure=procedure), encoding="utf-8")
+    return path
+
+
+def cut_off(folder: Path, text: str) -> None:
+    """Leave a campaign as a killed program leaves it, with a fibre in hand."""
+    with CampaignStore.create(folder, replace(INFO, recipe_text=text)) as store:
+        number = store.begin_fibre(Pose(0.0, 0.0, 0.0), time_s=1.0)
+        store.note("carry to the probe", "begins", time_s=2.0, fibre=number)
+
+
+@pytest.fixture(scope="module")
+def rig() -> Iterator[Rig]:
+    with cosmic.connect(rate=RATE, sample="three-dry", cold=True) as rig:
+        yield rig
+
+
+def test_after_an_end_without_warning_no_position_is_believed(rig: Rig, tmp_path: Path) -> None:
+    path, folder = recipe(tmp_path), tmp_path / "out"
+    cut_off(folder, path.read_text(encoding="utf-8"))
+    assert rig.mico["left.x"].details.confidence is Confidence.UNKNOWN
+    campaign = rig.campaign(path, folder)
+    campaign.start()
+    wait_until(lambda: campaign.over or campaign.operation == "make ready", timeout_s=60.0)
+    campaign.abort("seen")
+    campaign.join()
+    assert {rig.mico[name].details.confidence for name in AXES} == {Confidence.KNOWN}
+    reader = CampaignReader(folder)
+    assert [each.outcome for each in reader.fibres()] == [Outcome.INTERRUPTED]
+    begun = [each.operation for each in reader.journal()]
+    assert begun[:3] == ["carry to the probe", "initialise again", "clear up"]
+
+
+def test_a_campaign_that_ended_in_order_goes_on_without_it(rig: Rig, tmp_path: Path) -> None:
+    path, folder = recipe(tmp_path), tmp_path / "out"
+    text = path.read_text(encoding="utf-8")
+    with CampaignStore.create(folder, replace(INFO, recipe_text=text)) as store:
+        store.end("ended by the operator", time_s=5.0)
+    campaign = rig.campaign(path, folder)
+    assert not CampaignReader(folder).cut_off()
+    campaign.abort("seen")
+
+
+@pytest.mark.slow
+def test_a_sensor_that_stays_at_its_end_lets_no_fibre_be_taken_and_is_told(tmp_path: Path) -> None:
+    with cosmic.connect(rate=RATE, sample="three-dry", seed=2) as rig:
+        rig.faults.inject("sensor_saturated")
+        campaign = rig.campaign(recipe(tmp_path, "bend test"), tmp_path / "out")
+        campaign.run_here()
+        assert campaign.phase is CampaignPhase.FAILED
+        assert "force sensor" in campaign.end_reason
+        assert "cable" in campaign.end_reason, "it says what to look at"
+        assert rig.stopped is None
+        assert CampaignReader(tmp_path / "out").fibres() == ()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="no SIGKILL there")
+def test_a_campaign_that_was_killed_goes_on_and_has_its_fibre_once(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "cosmic", "campaign", str(recipe(tmp_path)), "--out", str(out)]
+    command += ["--rate", "8"]
+
+    def carried() -> bool:
+        reader = CampaignReader(out)
+        journal = reader.journal() if reader.version() else ()
+        return any(each.operation == "carry to the probe" for each in journal)
+
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL) as program:
+        try:
+            wait_until(carried, timeout_s=240.0)
+        finally:
+            program.send_signal(signal.SIGKILL)
+    subprocess.run(command, check=True, timeout=300.0, capture_output=True)
+    outcomes = [each.outcome for each in CampaignReader(out).fibres()]
+    assert outcomes == [Outcome.INTERRUPTED, Outcome.GOOD]
