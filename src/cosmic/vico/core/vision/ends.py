@@ -6,7 +6,7 @@ from enum import StrEnum
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from cosmic.vico.core.vision.grey import Floats
+from cosmic.vico.core.vision.grey import Floats, middle
 from cosmic.vico.core.vision.profiles import Flags, Scene, sample, within
 from cosmic.vico.core.vision.smoothing import directions
 
@@ -69,7 +69,7 @@ def find_end(scene: Scene, line: Floats, level: Level) -> End:
 def plateau(mean: Floats) -> float:
     """Return the height of the fibre before its end."""
     first = mean[: max(3, len(mean) // 5)]
-    return float(np.median(first))
+    return middle(first)
 
 
 def leaving(line: Floats, width: float) -> Floats:
@@ -100,7 +100,7 @@ def crossing(along: Floats, mean: Floats, inside: Flags, height: float, level: L
     limit = int(outside[0]) if len(outside) else len(along)
     for index in falls:
         beyond = scaled[index + 1 : index + 1 + max(4, int(level.width))]
-        if float(np.median(beyond)) > 0.45:
+        if middle(beyond) > 0.45:
             continue
         if index + 1 >= limit:
             break

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from skimage.morphology import skeletonize
 
-from cosmic.vico.core.vision.grey import Floats, Floats32, Mask
+from cosmic.vico.core.vision.grey import Floats, Floats32, Mask, middle
 from cosmic.vico.core.vision.smoothing import arc_lengths
 
 FREE = -1
@@ -63,7 +63,7 @@ class Graph:
     def half_width(self, points: Floats) -> float:
         """Return the typical half width along points."""
         columns, rows = np.round(points).astype(int).T
-        return float(np.median(self.half_widths[rows, columns]))
+        return middle(self.half_widths[rows, columns])
 
 
 def skeleton_of(mask: Mask) -> Mask:
@@ -137,7 +137,7 @@ def touched(pixel: tuple[int, int], labels: npt.NDArray[np.int32]) -> list[int]:
     """Return the nodes next to a pixel, from zero."""
     row, column = pixel
     window = labels[max(0, row - 1) : row + 2, max(0, column - 1) : column + 2]
-    return [int(label) - 1 for label in np.unique(window) if label > 0]
+    return [label - 1 for label in sorted(set(window.ravel().tolist())) if label > 0]
 
 
 def with_nodes(each: Branch, nodes: list[Floats]) -> None:

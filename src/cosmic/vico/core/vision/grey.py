@@ -45,3 +45,12 @@ def grey_picture(image: npt.NDArray[np.generic]) -> Pixels:
     if pixels.ndim == LAYERS:
         pixels = cast("Pixels", cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY))
     return pixels
+
+
+def middle(values: npt.NDArray[np.floating]) -> float:
+    """Return the median of some numbers, at least one; for few it is quicker than numpy's."""
+    half = values.size // 2
+    if values.size % 2:
+        return float(np.partition(values, half, axis=None)[half])
+    pair = np.partition(values, (half - 1, half), axis=None)[half - 1 : half + 1]
+    return 0.5 * (float(pair[0]) + float(pair[1]))

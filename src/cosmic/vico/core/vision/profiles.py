@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
-from cosmic.vico.core.vision.grey import Floats, Floats32
+from cosmic.vico.core.vision.grey import Floats, Floats32, middle
 from cosmic.vico.core.vision.smoothing import directions
 
 Flags = npt.NDArray[np.bool_]
@@ -142,9 +142,9 @@ def ground_of(values: Floats32, free: Flags, across: Floats32) -> tuple[Floats32
     sides = []
     seen = []
     for side in (across < 0, across > 0):
-        part = free & side[None, :]
+        part = (free & side[None, :]).astype(np.float32)
         number = part.sum(axis=1)
-        total = np.where(part, values, np.float32(0.0)).sum(axis=1, dtype=np.float64)
+        total = np.einsum("ij,ij->i", values, part).astype(np.float64)
         sides.append(gaussian_filter1d(total, 6.0, mode="nearest"))
         seen.append(gaussian_filter1d(number.astype(float), 6.0, mode="nearest"))
     levels = [total / np.maximum(count, 1e-9) for total, count in zip(sides, seen, strict=True)]
@@ -160,7 +160,7 @@ def ground_of(values: Floats32, free: Flags, across: Floats32) -> tuple[Floats32
     ground = low + (high - low) * share
     thin = max(1, len(values) // 60)
     spread = np.abs(values[::thin] - ground[::thin])[free[::thin]]
-    noise = 1.4826 * float(np.median(spread)) if len(spread) else 0.0
+    noise = 1.4826 * middle(spread) if len(spread) else 0.0
     return ground, np.abs(levels[1] - levels[0]), noise
 
 
@@ -191,8 +191,8 @@ def typical_section(height: Floats32, good: Flags) -> Floats:
     """Return the median cross section, 1 at its highest."""
     rows = height[good] if good.any() else height
     rows = rows[:: len(rows) // 100 + 1]
-    middle = np.median(rows, axis=0)
-    return np.asarray(middle / max(float(middle.max()), 1e-9))
+    typical = np.median(rows, axis=0)
+    return np.asarray(typical / max(float(typical.max()), 1e-9))
 
 
 def level_crossing(mean: Floats, across: Floats32, level: float, side: int) -> float:

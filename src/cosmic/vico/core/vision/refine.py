@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cosmic.vico.core.vision.ends import End, EndKind, Level, find_end
-from cosmic.vico.core.vision.grey import Floats, Floats32
+from cosmic.vico.core.vision.grey import Floats, Floats32, middle
 from cosmic.vico.core.vision.joining import Strand
 from cosmic.vico.core.vision.profiles import (
     Edges,
@@ -137,9 +137,10 @@ def move(
     rest = np.linalg.norm(target - line, axis=1)
     used = weights > 0
     if used.sum() > 8:
-        limit = 4.0 * 1.4826 * float(np.median(rest[used])) + 0.1
+        typical = middle(rest[used])
+        limit = 4.0 * 1.4826 * typical + 0.1
         line = smooth(target, np.where(rest > limit, 0.0, weights), wave)
-        course.scatter_px = float(np.median(rest[used])) * 1.2
+        course.scatter_px = 1.2 * typical
     course.line = line
 
 
@@ -150,7 +151,7 @@ def measure(scene: Scene, course: Course, neighbours: Neighbours) -> bool:
     reach = 1.2 * course.width + 6.0 + margin
     profiles = cross_sections(scene, course.line, course.width, reach, margin)
     free = ~excluded(course, neighbours)
-    typical = float(np.median(profiles.height[::4, np.abs(profiles.across) < 0.4 * course.width]))
+    typical = middle(profiles.height[::4, np.abs(profiles.across) < 0.4 * course.width])
     ratio = profiles.noise / max(typical, 1e-6)
     height = along(profiles, float(np.clip(6 * ratio, 0.8, 4.0)))
     if not free.any():
@@ -181,7 +182,7 @@ def near_ends(course: Course) -> Flags:
 
 def take(course: Course, edges: Edges, widths: Floats, good: Flags, profiles: Profiles) -> None:
     """Keep what the cross sections say."""
-    typical = float(np.median(widths[good]))
+    typical = middle(widths[good])
     course.width = typical
     course.good = good & (np.abs(widths - typical) < 0.6 * typical + 1.0)
     course.widths = np.where(course.good, widths, np.nan)
@@ -204,11 +205,11 @@ def both_ends(scene: Scene, course: Course, strand: Strand, extra: float) -> lis
         (course.line, course.contrast, course.ground),
     ):
         count = max(4, int(3 * course.width / STEP_PX))
-        height = float(np.median(contrast[-count:]))
+        height = middle(contrast[-count:])
         level = Level(
             width=course.width,
             contrast=height,
-            ground=float(np.median(ground[-count:])),
+            ground=middle(ground[-count:]),
             noise=course.noise,
             search_px=1.5 * course.width + 4.0 + extra,
         )

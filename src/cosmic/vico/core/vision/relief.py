@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from cosmic.vico.core.vision.grey import Floats32, Mask
+from cosmic.vico.core.vision.grey import Floats32, Mask, middle
 from cosmic.vico.hw.interface import Pixels
 
 # Wider bodies are tools, not fibres: the ground is what remains of them. Full-size pixels.
@@ -140,12 +140,12 @@ def level_step(image: Pixels) -> float:
 
 def stands_out(found: Floats32) -> Floats32:
     """Return a hat without the offset that noise gives it."""
-    return np.asarray(found - np.median(found[::3, ::3]), dtype=np.float32)
+    return np.asarray(found - np.float32(middle(found[::3, ::3])), dtype=np.float32)
 
 
 def threshold(height: Floats32, floor: float) -> float:
     """Return above what something stands out from noise."""
-    noise = 1.4826 * float(np.median(np.abs(height[::3, ::3])))
+    noise = 1.4826 * middle(np.abs(height[::3, ::3]))
     return max(NOISE_TIMES * noise, floor)
 
 

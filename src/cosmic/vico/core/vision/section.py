@@ -127,15 +127,22 @@ def _summed(
     full = 2 * seen.sum(axis=0) > shape[0]
     if not full.any():
         return Samples(*np.empty((3, 0)))
-    mean = np.where(seen, total / np.maximum(count, 1), np.nan)[:, full]
-    place = np.bincount(at, away, size).reshape(shape)[:, full].sum(axis=0)
-    middle = np.median if seen[:, full].all() else np.nanmedian
-    typical = middle(mean, axis=0)
-    scatter = 1.4826 * middle(np.abs(mean - typical), axis=0)
+    seen, count, total = seen[:, full], count[:, full], total[:, full]
+    mean = np.where(seen, total / np.maximum(count, 1), np.nan)
+    typical = _middle(mean, seen)
     # The scatter of few parts is itself uncertain; that of all bins is not.
+    scatter = 1.4826 * _middle(np.abs(mean - typical), seen)
     scatter = np.maximum(scatter, float(np.median(scatter)))
-    std = 1.25 * scatter / math.sqrt(shape[0])
-    return Samples(place / count[:, full].sum(axis=0), np.asarray(typical), std)
+    place = np.bincount(at, away, size).reshape(shape)[:, full].sum(axis=0)
+    return Samples(place / count.sum(axis=0), typical, 1.25 * scatter / math.sqrt(shape[0]))
+
+
+def _middle(values: Floats, seen: Flags) -> Floats:
+    """Return the median of each column of what was seen; the rest is NaN."""
+    ordered, count = np.sort(values, axis=0), seen.sum(axis=0)
+    columns = np.arange(values.shape[1])
+    pair = ordered[(count - 1) // 2, columns] + ordered[count // 2, columns]
+    return np.asarray(0.5 * pair)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -200,7 +207,7 @@ def fit_section(samples: Samples, width: float) -> Section | None:
         gain = now.cost - then.cost
         if gain >= 0.0:
             now, damping = then, 0.2 * damping
-            if gain < 1e-3 * now.cost + 1e-3:
+            if gain < 1e-3 * now.cost + 1e-2:
                 break
         else:
             damping *= 8.0

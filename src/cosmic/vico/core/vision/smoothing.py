@@ -1,7 +1,6 @@
 """A curve through uncertain points: as smooth as they allow, across gaps as well."""
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.linalg import solveh_banded
 
 from cosmic.vico.core.vision.grey import Floats
@@ -35,12 +34,17 @@ def smooth(values: Floats, weights: Floats, wave: float) -> Floats:
 
 def arc_lengths(line: Floats) -> Floats:
     """Return the length from the start to each point, along the chords."""
-    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)])
+    steps = line[1:] - line[:-1]
+    found = np.zeros(len(line))
+    np.cumsum(np.sqrt(np.einsum("ij,ij->i", steps, steps)), out=found[1:])
+    return found
 
 
 def resampled(line: Floats, step: float, multiple: int = 1) -> Floats:
-    """Return points about `step` apart along a spline; a multiple of intervals if asked for."""
+    """Return points about `step` apart along a smooth curve through the points of a line.
+
+    The number of intervals is a multiple of `multiple`.
+    """
     s = arc_lengths(line)
     keep = np.concatenate([[True], np.diff(s) > 1e-6])
     s, line = s[keep], line[keep]
@@ -50,11 +54,30 @@ def resampled(line: Floats, step: float, multiple: int = 1) -> Floats:
     at = np.linspace(0.0, float(s[-1]), count)
     if len(line) < ORDER + 1:
         return np.column_stack([np.interp(at, s, line[:, axis]) for axis in (0, 1)])
-    return np.asarray(CubicSpline(s, line)(at))
+    return _curve(s, line, at)
+
+
+def _curve(s: Floats, line: Floats, at: Floats) -> Floats:
+    """Return a cubic through points at `s` with the slopes of parabolas (Catmull, Rom)."""
+    gap = np.diff(s)[:, None]
+    chord = np.diff(line, axis=0) / gap
+    slope = np.empty_like(line)
+    slope[1:-1] = (gap[1:] * chord[:-1] + gap[:-1] * chord[1:]) / (gap[1:] + gap[:-1])
+    slope[0] = 2.0 * chord[0] - slope[1]
+    slope[-1] = 2.0 * chord[-1] - slope[-2]
+    index = np.clip(np.searchsorted(s, at, side="right") - 1, 0, len(gap) - 1)
+    width = gap[index]
+    part = (at - s[index])[:, None] / width
+    rest = 1.0 - part
+    first, last, way = line[index], line[index + 1], chord[index]
+    bend = rest * (slope[index] - way) - part * (slope[index + 1] - way)
+    return np.asarray(rest * first + part * last + part * rest * width * bend)
 
 
 def directions(line: Floats) -> Floats:
     """Return the unit tangent at each point."""
-    tangent = np.gradient(line, axis=0)
-    norm = np.linalg.norm(tangent, axis=1, keepdims=True)
-    return np.asarray(tangent / np.maximum(norm, 1e-9))
+    tangent = np.empty_like(line)
+    tangent[1:-1] = line[2:] - line[:-2]
+    tangent[0], tangent[-1] = line[1] - line[0], line[-1] - line[-2]
+    norm = np.sqrt(np.einsum("ij,ij->i", tangent, tangent))
+    return np.asarray(tangent / np.maximum(norm, 1e-9)[:, None])
