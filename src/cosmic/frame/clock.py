@@ -7,9 +7,13 @@ faster than the wall. Dead-man, lease, stale-data and thread limits use `WALL`.
 import threading
 import time
 from abc import abstractmethod
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from typing import Final, Protocol
 
 from typing_extensions import override
+
+from cosmic.frame.pace import Pace, PacedWorker, Worker
 
 
 class Clock(Protocol):
@@ -35,9 +39,37 @@ class Clock(Protocol):
     def sleep(self, duration_s: float) -> None:
         """Block the calling thread for `duration_s` of this clock's time."""
 
+    def wall_s(self) -> float:
+        """Return the time of the wall, for what is done so often by it; a test moves both."""
+        return time.monotonic()
+
+    def worker(self, *, leads: bool = False) -> Worker:  # noqa: ARG002 - for clocks with a rate
+        """Return somebody whose work takes wall time, whatever the rate.
+
+        Parameters
+        ----------
+        leads : bool
+            A procedure: from now on until it is closed, this clock runs at its rate only while
+            all workers are idle.
+        """
+        return Worker()
+
+    @contextmanager
+    def at_work(self) -> Generator[None]:
+        """Have what is done inside take wall time, while a procedure is under way."""
+        worker = self.worker()
+        worker.busy()
+        try:
+            yield
+        finally:
+            worker.close()
+
 
 class RatedClock(Clock):
     """A clock that runs `rate` times as fast as the wall.
+
+    While a procedure is under way that is the most: it runs as the wall does while a worker is
+    busy, and from when a thread that waits is due until it goes on. See `cosmic.frame.pace`.
 
     Raises
     ------
@@ -50,6 +82,8 @@ class RatedClock(Clock):
             raise ValueError(f"a clock's rate must lie between 0 and 1e6, got {rate!r}")
         self._rate = rate
         self._start_s = time.monotonic()
+        # Nobody can be hurried by a clock that is no faster than the wall.
+        self._pace = Pace(rate, time.monotonic) if rate > 1.0 else None
 
     @property
     @override
@@ -58,18 +92,39 @@ class RatedClock(Clock):
 
     @override
     def now_s(self) -> float:
+        if self._pace is not None:
+            return self._pace.now_s()
         return (time.monotonic() - self._start_s) * self._rate
 
     @override
     def wait(self, condition: threading.Condition, until_s: float) -> None:
-        left_s = (until_s - self.now_s()) / self._rate
-        if left_s > 0.0:
-            condition.wait(min(left_s, threading.TIMEOUT_MAX))
+        with self._waiting(until_s) as look_s:
+            wait_s = look_s()
+            if wait_s > 0.0:
+                condition.wait(min(wait_s, threading.TIMEOUT_MAX))
 
     @override
     def sleep(self, duration_s: float) -> None:
-        if duration_s > 0.0:
-            time.sleep(duration_s / self._rate)
+        with self._waiting(self.now_s() + duration_s) as look_s:
+            while (wait_s := look_s()) > 0.0:
+                time.sleep(min(wait_s, threading.TIMEOUT_MAX))
+
+    @contextmanager
+    def _waiting(self, until_s: float) -> Generator[Callable[[], float]]:
+        """Yield what tells for how long to wait at least, in wall time."""
+        pace = self._pace
+        if pace is None:
+            yield lambda: (until_s - self.now_s()) / self._rate
+            return
+        token = object()
+        try:
+            yield lambda: pace.begin_wait(token, until_s)
+        finally:
+            pace.end_wait(token)
+
+    @override
+    def worker(self, *, leads: bool = False) -> Worker:
+        return Worker() if self._pace is None else PacedWorker(self._pace, leads=leads)
 
 
 class WallClock(RatedClock):
@@ -104,6 +159,10 @@ class ManualClock(Clock):
     def now_s(self) -> float:
         with self._lock:
             return self._now_s
+
+    @override
+    def wall_s(self) -> float:
+        return self.now_s()
 
     def advance(self, duration_s: float) -> None:
         """Move the time forward by `duration_s` and wake whoever waits."""

@@ -251,7 +251,8 @@ class ProcedureRun(Generic[W]):
     def _carry_out(self) -> None:
         self._ident = threading.get_ident()
         try:
-            self._conductor.carry_out()
+            with self._reins.held():
+                self._conductor.carry_out()
         except ProcedureAborted as exc:
             self._end(RunState.ABORTED, exc)
         except CosmicError as exc:

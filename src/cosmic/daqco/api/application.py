@@ -33,6 +33,8 @@ logger = logging.getLogger(__name__)
 T = TypeVar("T")
 
 FIRST_DATA_S: Final = 1.0
+MORE_CHUNKS: Final = 5.0
+"""How many times more chunks a simulation at a rate makes, on the wall; then they grow."""
 
 
 class SilenceWatch(WorkerThread):
@@ -211,8 +213,9 @@ class DaqcoApplication(TaskApplication):
                 self._core.request_end()
                 self._core.join()
             settings = self._settings
-            # Chunks as long on the wall as they were asked for, however fast a simulation runs.
-            chunk_s = settings.chunk_s * max(1.0, self.clock.rate or 1.0)
+            # Many more of them on the wall than were asked for would be too many, however fast a
+            # simulation runs; but who waits for samples waits for their chunk.
+            chunk_s = settings.chunk_s * max(1.0, self.clock.rate / MORE_CHUNKS)
             plan = make_plan(settings.channel, settings.rate_hz, chunk_s, self._infos)
             for name in plan.boards:
                 if name not in self._boards:

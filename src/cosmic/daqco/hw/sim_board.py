@@ -81,6 +81,7 @@ class SimulatedBoard(Board):
         self._setup: _Setup | None = None
         self._run: _Run | None = None
         self._closed = False
+        self._receiver = clock.worker()
 
     @property
     @override
@@ -135,6 +136,7 @@ class SimulatedBoard(Board):
     def stop(self) -> None:
         with self._faults.changed:
             self._run = None
+            self._receiver.idle()
             self._faults.changed.notify_all()
 
     @override
@@ -156,7 +158,9 @@ class SimulatedBoard(Board):
                 now_s = self._clock.now_s()
                 due_s = self._due_s(run)
                 if due_s <= now_s:
+                    self._receiver.busy()  # until it has handed the chunk on, and comes again
                     return run
+                self._receiver.idle()
                 left_s = end_s - WALL.now_s()
                 if left_s <= 0.0:
                     return None
@@ -180,6 +184,7 @@ class SimulatedBoard(Board):
             self._check_overrun(run)
         except DeviceError:
             self._run = None
+            self._receiver.idle()
             raise
 
     def _check_overrun(self, run: _Run) -> None:

@@ -4,7 +4,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from queue import Empty, SimpleQueue
+from queue import Empty
 from threading import Lock
 from typing import Final
 
@@ -21,6 +21,7 @@ from cosmic.frame.errors import (
     refusal,
 )
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.inbox import Inbox
 from cosmic.frame.threads import WorkerThread
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.core.data_container import DeviceDataContainer
@@ -92,7 +93,7 @@ class Device(WorkerThread):
         self._controller = controller
         self.container = container
         self._settings = settings
-        self._inbox: SimpleQueue[_Message] = SimpleQueue()
+        self._inbox: Inbox[_Message] = Inbox(clock)
         self._intake = Lock()
         self._open = False
         self._nudged = False
@@ -247,7 +248,7 @@ class Device(WorkerThread):
         timeout_s = self._pause_s()
         for _ in range(MOST_AT_ONCE):
             try:
-                message = self._inbox.get(timeout=timeout_s)
+                message = self._inbox.get(timeout_s)
             except Empty:
                 return
             self._guarded(partial(self._take, message))
@@ -395,6 +396,7 @@ class Device(WorkerThread):
                 if message.grant is not None:
                     self._context.gate.release(message.grant)
                 message.movement.fail(error)
+        self._inbox.close()
 
     # Telling
 

@@ -158,7 +158,7 @@ def _asynchronous(session: Session, base: str, operation: Operation) -> Body:
             device.advance(now_s)
             values, status = _run(operation, channel, now_s, args)
             if status >= _FIRST_HARDWARE_ERROR:
-                channel.post_error(status, now_s)
+                channel.reports.error(status, now_s)
             elif operation.packet:
                 data = operation.data(args, values)
                 device.post((operation.packet, channel_index, *data), now_s)
@@ -267,8 +267,8 @@ def _receive(
     if not packet:
         return SA_INVALID_PARAMETER_ERROR
     opened = session.serial_number()
-    # The time-out counts on the wall, so that listeners do not spin on a fast clock; on a clock
-    # that a test moves, the test's time and the wall's both end it, so that nothing ever hangs.
+    # The time-out counts on the wall, so that listeners do not spin on a fast clock; the clock's
+    # time ends it as well, for a test may move that.
     deadline_s = clock.now_s() + timeout_ms / 1e3 * (clock.rate or 1.0)
     wall_s = WALL.now_s() + timeout_ms / 1e3
     with device.changed:
@@ -282,7 +282,7 @@ def _receive(
             head = device.queue.head(now_s)
             if head is not None and channel in (None, head[1]):
                 break
-            if now_s >= deadline_s or (not clock.rate and WALL.now_s() >= wall_s):
+            if now_s >= deadline_s or WALL.now_s() >= wall_s:
                 head = _NOTHING_CAME
                 break
             clock.wait(device.changed, min(deadline_s, device.next_event_s(now_s)))

@@ -76,6 +76,7 @@ class SimulatedCamera(Camera):
         self._underrun = 0
         self._counters = CameraCounters()
         self._last: Frame | None = None
+        self._receiver = clock.worker()
         width, height = info.sensor_px
         self._settings = CameraSettings(
             exposure_s=optics.settings.picture.full_exposure_s,
@@ -172,6 +173,7 @@ class SimulatedCamera(Camera):
     def stop(self) -> None:
         with self._faults.changed:
             self._run = None
+            self._receiver.idle()
             self._faults.changed.notify_all()
 
     @override
@@ -197,7 +199,9 @@ class SimulatedCamera(Camera):
                 if exposure is not None and due_s <= now_s:
                     run.take()
                     self._underrun = run.underrun
+                    self._receiver.busy()  # until it has handed the frame on, and comes again
                     return run, exposure
+                self._receiver.idle()
                 left_s = end_s - WALL.now_s()
                 if left_s <= 0.0:
                     return None, None
@@ -239,15 +243,16 @@ class SimulatedCamera(Camera):
         if before is not None:
             data = before.data
         else:
-            data = self._optics.render(
-                exposure.exposed_s + 0.5 * settings.exposure_s,
-                exposure_s=settings.exposure_s,
-                gain_db=settings.gain_db,
-                roi=settings.roi,
-                binning=settings.binning,
-                bits=8 if settings.pixel_format is PixelFormat.MONO8 else 16,
-                view=self._view,
-            )
+            with self._clock.at_work():
+                data = self._optics.render(
+                    exposure.exposed_s + 0.5 * settings.exposure_s,
+                    exposure_s=settings.exposure_s,
+                    gain_db=settings.gain_db,
+                    roi=settings.roi,
+                    binning=settings.binning,
+                    bits=8 if settings.pixel_format is PixelFormat.MONO8 else 16,
+                    view=self._view,
+                )
         if not whole:
             data = data.copy()
             data[round(MISSING_FROM * settings.roi.height_px) :] = 0
@@ -272,6 +277,7 @@ class SimulatedCamera(Camera):
             self._check_there("receive")
         except DeviceError:
             self._run = None
+            self._receiver.idle()
             raise
 
     def _check_there(self, call: str) -> None:

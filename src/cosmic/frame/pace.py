@@ -1,0 +1,149 @@
+"""How fast a simulated time runs: many times as fast as the wall, but not while somebody thinks.
+
+What takes time on the simulated platform may be over sooner on the wall. What takes computing time
+may not: it takes as long on a real platform, and does not become longer there because the rest is
+hurried. So while a procedure is under way the time runs at its rate only as long as everybody
+waits for it, and as the wall does while somebody is at work.
+"""
+
+import math
+import threading
+from collections.abc import Callable
+from typing import Final
+
+from typing_extensions import override
+
+LOOK_S: Final = 0.005
+"""How often somebody who waits looks again where the pace may change meanwhile, wall time."""
+WINDOW_S: Final = 0.05
+"""Over how long the pace that was reached is counted, wall time."""
+
+
+class Worker:
+    """Somebody whose work takes wall time; any thread. This one works on a clock without a rate."""
+
+    def busy(self) -> None:
+        """Say that it is at work; harmless the second time."""
+        return
+
+    def idle(self) -> None:
+        """Say that it waits; harmless the second time."""
+        return
+
+    def close(self) -> None:
+        """Say that there will be no more of it."""
+        return
+
+
+class Pace:
+    """A time that runs `rate` times as fast as the wall, and never slower than the smaller of both.
+
+    It is bound to the wall only while there is a worker that leads: one who waits for the time,
+    and whose next step depends on when it comes. Then it runs like the wall while a worker is
+    busy, and from when one who waits is due until that one goes on.
+
+    Parameters
+    ----------
+    rate : float
+        Seconds for each second of the wall.
+    wall_s : callable
+        Tells the time of the wall.
+    """
+
+    def __init__(self, rate: float, wall_s: Callable[[], float]) -> None:
+        self._rate = rate
+        self._read_wall_s = wall_s
+        self._lock = threading.Lock()
+        self._wall_s = wall_s()
+        self._now_s = 0.0
+        self._leading = 0
+        self._busy = 0
+        self._due_s: dict[object, float] = {}
+        self._reached = rate
+        self._window = (self._wall_s, 0.0)
+
+    def now_s(self) -> float:
+        """Return the time."""
+        with self._lock:
+            return self._settle()
+
+    def begin_wait(self, token: object, until_s: float) -> float:
+        """Note that somebody waits for `until_s`; return how long to wait, in wall time.
+
+        Who waits too long keeps the time from hurrying on, no more; who wakes too early, waits on.
+        """
+        with self._lock:
+            left_s = until_s - self._settle()
+            if left_s <= 0.0:
+                return 0.0
+            self._due_s[token] = until_s
+            wait_s = left_s / self._rate
+            if self._leading and (self._busy or min(self._due_s.values()) < until_s):
+                wait_s = max(wait_s, min(left_s / self._reached, LOOK_S))
+            return wait_s
+
+    def end_wait(self, token: object) -> None:
+        """Note that it goes on."""
+        with self._lock:
+            self._settle()
+            self._due_s.pop(token, None)
+
+    def change(self, *, busy: int = 0, leading: int = 0) -> None:
+        """Count workers in and out."""
+        with self._lock:
+            self._settle()
+            self._busy += busy
+            self._leading += leading
+
+    def _settle(self) -> float:
+        """Bring the time up to the wall, with what was in force since the last time; locked."""
+        wall_s = self._read_wall_s()
+        passed_s, self._wall_s = wall_s - self._wall_s, wall_s
+        fast_s = passed_s
+        if self._leading:
+            ahead_s = min(self._due_s.values(), default=math.inf) - self._now_s
+            fast_s = 0.0 if self._busy else min(passed_s, max(0.0, ahead_s / self._rate))
+        self._now_s += fast_s * self._rate + (passed_s - fast_s)
+        began_s, then_s = self._window
+        if wall_s - began_s >= WINDOW_S:
+            self._reached = max(1.0, (self._now_s - then_s) / (wall_s - began_s))
+            self._window = (wall_s, self._now_s)
+        return self._now_s
+
+
+class PacedWorker(Worker):
+    """A worker that a `Pace` waits for.
+
+    Parameters
+    ----------
+    leads : bool
+        It is why the time is bound to the wall; see `Pace`.
+    """
+
+    def __init__(self, pace: Pace, *, leads: bool) -> None:
+        self._pace = pace
+        self._leads = leads
+        self._lock = threading.Lock()
+        self._busy = self._closed = False
+        pace.change(leading=leads)
+
+    @override
+    def busy(self) -> None:
+        self._become(busy=True)
+
+    @override
+    def idle(self) -> None:
+        self._become(busy=False)
+
+    @override
+    def close(self) -> None:
+        with self._lock:
+            if not self._closed:
+                self._pace.change(busy=-self._busy, leading=-self._leads)
+            self._closed, self._busy = True, False
+
+    def _become(self, *, busy: bool) -> None:
+        with self._lock:
+            if not self._closed and busy is not self._busy:
+                self._busy = busy
+                self._pace.change(busy=1 if busy else -1)

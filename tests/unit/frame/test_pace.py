@@ -1,0 +1,161 @@
+"""A hurried clock lets a procedure think as long as it would on a real platform."""
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from cosmic.frame.clock import WALL, Clock, ManualClock, RatedClock
+from cosmic.frame.inbox import Inbox
+from cosmic.frame.pace import Pace, PacedWorker
+
+RATE = 20.0
+
+
+class Bench:
+    """A pace whose wall a test moves."""
+
+    def __init__(self) -> None:
+        self.wall_s = 100.0
+        self.pace = Pace(RATE, lambda: self.wall_s)
+        self.workers: list[PacedWorker] = []
+
+    def worker(self, *, leads: bool = False) -> PacedWorker:
+        self.workers.append(PacedWorker(self.pace, leads=leads))
+        return self.workers[-1]
+
+    def passes(self, wall_s: float) -> float:
+        """Return how much time passes in so much wall time."""
+        before_s = self.pace.now_s()
+        self.wall_s += wall_s
+        return self.pace.now_s() - before_s
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def test_without_a_procedure_time_runs_at_its_rate_whoever_works(bench: Bench) -> None:
+    bench.worker().busy()
+    bench.pace.begin_wait("somebody", 1.0)
+    assert bench.passes(2.0) == pytest.approx(40.0)
+
+
+def test_a_procedure_hurries_while_it_waits_and_thinks_at_leisure(bench: Bench) -> None:
+    procedure = bench.worker(leads=True)
+    procedure.busy()
+    assert bench.passes(2.0) == pytest.approx(2.0)
+    procedure.idle()
+    assert bench.passes(2.0) == pytest.approx(40.0)
+    procedure.busy()
+    procedure.busy()
+    procedure.idle()
+    procedure.close()
+    procedure.busy()  # one that is over holds nobody up
+    assert bench.passes(2.0) == pytest.approx(40.0)
+
+
+def test_all_who_work_are_waited_for_while_a_procedure_is_under_way(bench: Bench) -> None:
+    bench.worker(leads=True)
+    one, other = bench.worker(), bench.worker()
+    one.busy()
+    other.busy()
+    one.idle()
+    assert bench.passes(1.0) == pytest.approx(1.0)
+    other.close()
+    assert bench.passes(1.0) == pytest.approx(RATE)
+
+
+def test_whoever_wakes_late_is_waited_for(bench: Bench) -> None:
+    bench.worker(leads=True)
+    assert bench.pace.begin_wait("a", 10.0) == pytest.approx(0.5)
+    bench.pace.begin_wait("b", 30.0)
+    assert bench.passes(1.5) == pytest.approx(10.0 + 1.0)  # due after 0.5 s of the wall
+    bench.pace.end_wait("a")
+    assert bench.passes(0.5) == pytest.approx(10.0)
+
+
+def test_a_wait_for_what_has_passed_is_none(bench: Bench) -> None:
+    assert bench.pace.begin_wait("a", 0.0) == 0.0
+    bench.worker(leads=True)
+    assert bench.passes(1.0) == pytest.approx(RATE)
+
+
+@pytest.fixture
+def clock() -> Iterator[Clock]:
+    clock = RatedClock(1000.0)
+    leading = clock.worker(leads=True)
+    yield clock
+    leading.close()
+
+
+def test_what_is_done_at_work_takes_wall_time(clock: Clock) -> None:
+    with clock.at_work():
+        own_s, wall_s = clock.now_s(), WALL.now_s()
+        clock.sleep(0.02)
+        own_s, wall_s = clock.now_s() - own_s, WALL.now_s() - wall_s
+    assert own_s == pytest.approx(wall_s, abs=0.001)
+    own_s, wall_s = clock.now_s(), WALL.now_s()
+    clock.sleep(20.0)
+    assert WALL.now_s() - wall_s < 10.0
+
+
+def test_a_wait_ends_when_it_is_due_whatever_the_pace_was_meanwhile(clock: Clock) -> None:
+    condition, worker = threading.Condition(), clock.worker()
+    until_s = clock.now_s() + 20.0
+    turns = 0
+    with condition:
+        while clock.now_s() < until_s:
+            turns += 1
+            (worker.busy if turns % 2 else worker.idle)()
+            clock.wait(condition, until_s)
+    assert clock.now_s() >= until_s
+
+
+def test_time_never_goes_back_while_its_pace_changes(clock: Clock) -> None:
+    over = threading.Event()
+
+    def change() -> None:
+        while not over.is_set():
+            with clock.at_work():
+                clock.sleep(1e-5)
+
+    thread = threading.Thread(target=change)
+    thread.start()
+    times = [clock.now_s() for _ in range(5000)]
+    over.set()
+    thread.join()
+    assert times == sorted(times)
+
+
+@pytest.mark.parametrize("clock", [RatedClock(), RatedClock(0.5), ManualClock()])
+def test_clocks_no_faster_than_the_wall_know_no_work(clock: Clock) -> None:
+    worker = clock.worker(leads=True)
+    with clock.at_work():
+        worker.busy()
+        before_s = clock.now_s()
+    worker.close()
+    assert clock.now_s() >= before_s
+
+
+def test_what_is_put_into_an_inbox_is_work_until_its_thread_waits_for_more() -> None:
+    clock = RatedClock(1000.0)
+    leading, inbox = clock.worker(leads=True), Inbox[int](clock)
+
+    def passes() -> float:
+        own_s, wall_s = clock.now_s(), WALL.now_s()
+        while WALL.now_s() < wall_s + 0.01:
+            clock.now_s()
+        return (clock.now_s() - own_s) / (WALL.now_s() - wall_s)
+
+    assert passes() > 100.0
+    inbox.put(7)
+    assert passes() == pytest.approx(1.0, abs=0.1)
+    assert inbox.get(0.0) == 7
+    assert passes() == pytest.approx(1.0, abs=0.1)
+    threading.Thread(target=lambda: inbox.put(8)).start()
+    assert inbox.get(5.0) == 8
+    inbox.close()
+    assert passes() > 100.0
+    leading.close()
