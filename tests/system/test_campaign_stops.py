@@ -56,7 +56,9 @@ def operations_of(part: Part) -> Iterator[UnitOperation]:
 def all_operations() -> dict[str, tuple[str, Way]]:
     """Return each operation with the first procedure that has it, and how it is come to."""
     found: dict[str, tuple[str, Way]] = {}
-    for procedure, shipped in PROCEDURES.items():
+    # What two hands do in turn is stopped in test_two_hands.py.
+    alone = {name: each for name, each in PROCEDURES.items() if each.hands == 1}
+    for procedure, shipped in alone.items():
         for each in operations_of(shipped.build(HandlingSettings()).root):
             way = Way((each.key,)) if isinstance(each, Calibrated) else Way()
             found.setdefault(each.name, (procedure, PROVOKED.get(each.name, way)))

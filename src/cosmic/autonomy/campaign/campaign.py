@@ -2,7 +2,8 @@
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 from cosmic.autonomy.campaign.keeper import Keeper, skip_known
@@ -13,6 +14,7 @@ from cosmic.autonomy.campaign.statistics import CampaignProgress
 from cosmic.autonomy.campaign.steering import OVER, CampaignPhase, CampaignSteering
 from cosmic.autonomy.campaign.stop_rule import StopRule
 from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.campaign.store_files import NotWrittenError
 from cosmic.autonomy.handling.survey import NONE_LEFT
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.failures import STOPPED, ProcedureAborted
@@ -92,7 +94,10 @@ class Campaign(CampaignSteering):
             work, store, measures=doing.measures, pictures=recipe.file.output.pictures
         )
         self._broken: CosmicError | None = None
+        self._unwritten = False
+        self._kept = 0
         self._stuck = 0
+        work.bench.enough = self._enough
         self._end_reason = ""
         self._thread: RunThread | None = None
 
@@ -240,55 +245,85 @@ class Campaign(CampaignSteering):
         except ProcedureAborted as exc:
             if self._broken is not None:
                 raise self._broken from exc
-            self._keep_cut_off(taken, str(exc))
+            self._keep_cut_off(str(exc))
             return self._abort or str(exc)
         except OperationFailed as exc:
             return self._after_failure(exc, taken)
-        self._keep_last(taken)
+        self._keep_finished()
         return ""
 
     def _after_failure(self, failure: OperationFailed, taken: int) -> str:
+        if failure.cause == STOPPED:
+            self._keep_cut_off(str(failure))
+            return str(failure)
+        self._keep_finished()
         if failure.cause == NONE_LEFT:
             return str(failure)
-        if failure.cause == STOPPED:
-            self._keep_cut_off(taken, str(failure))
-            return str(failure)
-        if self._keep_last(taken):
+        if len(self.work.finished) > taken:
             return ""
-        fibre = self.work.fibre
-        if fibre is None:
+        held = [each for each in self.work.hands if each.fibre is not None]
+        if not held:
             raise failure
-        fibre.failure = fibre.failure or failure
-        self._insist(lambda: self._keeper.keep(fibre))
-        self.work.fibre = None
+        for hand in held:
+            self._keep_held(hand, failure)
         self.work.surveyed = False
         self._stuck += 1
         if self._stuck >= MOST_STUCK:
             return f"{self._stuck} fibres in a row could not be put away, the last: {failure}"
         return ""
 
-    def _keep_cut_off(self, taken: int, reason: str) -> None:
-        """Keep the fibre of a run that was cut off: one that was done with by then is no less."""
-        if not self._keep_last(taken):
-            self._insist(lambda: self._keeper.keep(self.work.fibre, interrupted=reason))
+    def _keep_held(self, hand: FibreWork, failure: OperationFailed) -> None:
+        """Keep a fibre that could not be put away."""
+        fibre, hand.fibre = hand.fibre, None
+        if fibre is not None:
+            fibre.failure = fibre.failure or failure
+            self._insist(lambda: self._keeper.keep(fibre))
 
-    def _keep_last(self, taken: int) -> bool:
-        """Keep the fibre that was done with in this run; returns whether there was one."""
-        if len(self.work.finished) <= taken:
-            return False
-        self._insist(lambda: self._keeper.keep(self.work.finished[-1]))
-        self._stuck = 0
-        self._tell()
-        return True
+    def _keep_cut_off(self, reason: str) -> None:
+        """Keep the fibres of a run that was cut off: one that was done with by then is no less."""
+        self._keep_finished()
+        for fibre in self._keeper.in_work:
+            self._insist(partial(self._keeper.keep, fibre, interrupted=reason))
+
+    def _keep_finished(self) -> None:
+        """Keep the fibres that were done with and are not kept yet."""
+        while self._kept < len(self.work.finished):
+            fibre = self.work.finished[self._kept]
+            self._insist(partial(self._keeper.keep, fibre))
+            self._kept += 1
+            self._stuck = 0
+            self._tell()
+        self._unwritten = False
+
+    def _enough(self) -> bool:
+        """Tell whether no further fibre is to be begun, if those in work become good ones."""
+        now, more = self.progress, len(self._keeper.in_work)
+        then = replace(now, done=now.done + more, good=now.good + more)
+        return self._unwritten or self._abort is not None or bool(self._rule.reason(then))
 
     # What happens meanwhile
 
     def _on_event(self, event: NodeEvent) -> None:
         if event.kind == OPERATION and event.state is NodeState.RUNNING:
-            self._operation = event.name
+            self._operation = f"{event.role}: {event.name}" if event.role else event.name
         try:
             self._keeper.note(event)
+            if event.role and not self._unwritten:
+                self._keep_meanwhile()
         except CosmicError as exc:  # what cannot be written down must not be done
             self._broken = exc
             if self._run is not None:
                 self._run.abort(str(exc))
+
+    def _keep_meanwhile(self) -> None:
+        """Keep what one hand is done with, while the other goes on."""
+        while self._kept < len(self.work.finished):
+            try:
+                self._keeper.keep(self.work.finished[self._kept])
+            except NotWrittenError as exc:
+                # Once both hands are done with theirs, it is tried again.
+                logger.error("%s; no further fibre is begun", exc)
+                self._unwritten = True
+                return
+            self._kept += 1
+            self._tell()

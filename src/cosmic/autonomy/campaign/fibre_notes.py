@@ -31,6 +31,18 @@ def pose_of(candidate: Candidate) -> Pose:
     return Pose(x, y, math.degrees(math.atan2(y1 - y0, x1 - x0)))
 
 
+def felt_s(fibre: FibreInHand) -> tuple[float, float] | None:
+    """Return from when until when the force was that of this fibre; None: all the time.
+
+    Of two hands one has the probe, and its fibre the force.
+    """
+    if not fibre.hand:
+        return None
+    if fibre.probe_from_s is None:
+        return math.inf, math.inf
+    return fibre.probe_from_s, fibre.probe_until_s or math.inf
+
+
 def operations_of(events: Sequence[NodeEvent]) -> tuple[OperationRecord, ...]:
     """Return the tries of operations that have ended, in their order."""
     return tuple(

@@ -1,11 +1,12 @@
 """Keeps what becomes of the fibres of a campaign, while they are treated."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from cosmic.autonomy.campaign.fibre_notes import pose_of, record_of
+from cosmic.autonomy.campaign.fibre_notes import felt_s, pose_of, record_of
 from cosmic.autonomy.campaign.journal import Journal
 from cosmic.autonomy.campaign.motion_log import MotionLog
 from cosmic.autonomy.campaign.records import CalibrationNote, FibreRecord
@@ -18,6 +19,14 @@ from cosmic.autonomy.procedures.times import OperationTimes
 from cosmic.autonomy.procedures.tree import OPERATION, NodeEvent, NodeState
 
 _POINTS: Final = 5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InWork:
+    """A fibre whose treatment has begun and has not been kept yet, with its number."""
+
+    fibre: FibreInHand
+    number: int
 
 
 class Keeper:
@@ -44,18 +53,23 @@ class Keeper:
         self._motion = MotionLog(work.mico, work.daqco, work.settings.push.channel, work.clock)
         self._before_s = store.reader.elapsed_s()
         self._began_s = work.clock.now_s()
-        self._events: list[NodeEvent] = []
-        self._begun: FibreInHand | None = None
-        self._number: int | None = None
+        self._events: dict[str, list[NodeEvent]] = {}
+        self._begun: dict[str, FibreInHand] = {}
+        self._in_work: tuple[InWork, ...] = ()
 
     def progress(self) -> CampaignProgress:
         """Return how the campaign stands; any thread."""
         elapsed_s = self._before_s + self._work.clock.now_s() - self._began_s
         return progress(self.fibres, elapsed_s)
 
+    @property
+    def in_work(self) -> tuple[FibreInHand, ...]:
+        """Fibres whose treatment has begun and has not been kept yet; any thread."""
+        return tuple(each.fibre for each in self._in_work)
+
     def begin_run(self) -> None:
         """Forget the events of the fibre before."""
-        self._events = []
+        self._events = {}
 
     def note(self, event: NodeEvent) -> None:
         """Take what happened to a part of the procedure; in the run's thread.
@@ -65,41 +79,49 @@ class Keeper:
         CampaignError
             It cannot be written: then nothing more may be done.
         """
-        self._events.append(event)
+        self._events.setdefault(event.role, []).append(event)
         self.times.note(event)
-        self._begin_fibre()
+        self._begin_fibres()
         if event.kind == OPERATION and event.state is NodeState.RUNNING:
+            self._journal.fibre = self._number_of(event.role)
             self._journal.note(event.name, "begins", attempt=event.attempt)
 
-    def _begin_fibre(self) -> None:
-        fibre = self._work.fibre
-        if fibre is None or fibre is self._begun:
-            return
-        self._begun = fibre
-        self._motion.begin()
-        candidate = fibre.reach.candidate
-        self._number = self.store.begin_fibre(
-            pose_of(candidate), time_s=fibre.found_s, length_um=candidate.length_um
-        )
-        self._journal.fibre = self._number
+    def _number_of(self, role: str) -> int | None:
+        return next((each.number for each in self._in_work if each.fibre.hand == role), None)
+
+    def _begin_fibres(self) -> None:
+        for hand in self._work.hands:
+            fibre = hand.fibre
+            if fibre is None or fibre is self._begun.get(fibre.hand):
+                continue
+            self._begun[fibre.hand] = fibre
+            self._motion.begin(min([fibre.found_s, *(each.found_s for each in self.in_work)]))
+            candidate = fibre.reach.candidate
+            number = self.store.begin_fibre(
+                pose_of(candidate), time_s=fibre.found_s, length_um=candidate.length_um
+            )
+            self._in_work = (*self._in_work, InWork(fibre, number))
 
     def keep(self, fibre: FibreInHand | None, interrupted: str = "") -> None:
         """Write the record of a fibre; without effect for one that was not begun, or is kept."""
-        if fibre is None or self._number is None:
+        found = next((each for each in self._in_work if each.fibre is fibre), None)
+        if found is None or fibre is None:
             return
         self.store.finish_fibre(
             record_of(
                 fibre,
-                self._number,
+                found.number,
                 ended_s=self._work.clock.now_s(),
                 measures=self._measures,
                 pictures=self._pictures,
-                events=self._events,
-                series=self._motion.series(),
+                events=self._events.get(fibre.hand, ()),
+                series=self._motion.series(fibre.found_s, felt_s=felt_s(fibre)),
                 interrupted=interrupted,
             )
         )
-        self._number = self._journal.fibre = None
+        self._in_work = tuple(each for each in self._in_work if each is not found)
+        self._journal.fibre = None
+        self._events.pop(fibre.hand, None)
         fibre.pictures.clear()
         self.fibres = self.store.reader.fibres()
 
@@ -115,8 +137,14 @@ class Keeper:
         began = self.store.reader.info().started
         self.store.keep_calibrations(
             [
-                CalibrationNote(name, each.residual, each.unit, f"{began} + {each.time_s:.0f} s")
-                for name, each in self._work.calibration.made.items()
+                CalibrationNote(
+                    f"{name}, {hand.gripper.shown}" if self._work.beside_another else name,
+                    each.residual,
+                    each.unit,
+                    f"{began} + {each.time_s:.0f} s",
+                )
+                for hand in self._work.hands
+                for name, each in hand.calibration.made.items()
             ]
         )
         self.store.end(reason, time_s=self._work.clock.now_s())

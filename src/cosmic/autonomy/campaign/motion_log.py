@@ -1,5 +1,7 @@
 """Positions and force while a fibre is treated, for its record and for the replay."""
 
+import math
+from bisect import bisect_left
 from collections.abc import Callable
 from threading import Lock
 from typing import Final
@@ -20,7 +22,7 @@ LEAST_CHANGE: Final = 0.05
 
 
 class MotionLog:
-    """Keeps what axes and force did since `begin`; any thread.
+    """Keeps what axes and force did since the time given to `begin`; any thread.
 
     Positions are gate coordinates, in um or degrees, at the times they were read; the force is the
     mean of each chunk.
@@ -43,16 +45,28 @@ class MotionLog:
         for each in forget:
             each()
 
-    def begin(self) -> None:
-        """Forget what was, but for where the axes stand."""
-        now_s = self._clock.now_s()
+    def begin(self, since_s: float) -> None:
+        """Forget what was before a time, but for where the axes stood then."""
         with self._lock:
-            self._kept = {name: [(now_s, value)] for name, value in self._last.items()}
+            axes = {name: [(since_s, value)] for name, value in self._last.items()}
+            kept = {name: _since(values, since_s) for name, values in self._kept.items()}
+            self._kept = axes | kept
 
-    def series(self) -> tuple[Series, ...]:
-        """Return what was kept since `begin`."""
+    def series(
+        self, since_s: float = -math.inf, *, felt_s: tuple[float, float] | None = None
+    ) -> tuple[Series, ...]:
+        """Return what was kept since a time.
+
+        Parameters
+        ----------
+        felt_s : (float, float), optional
+            From when until when the force is wanted.
+        """
+        low_s, high_s = felt_s or (-math.inf, math.inf)
         with self._lock:
-            kept = {name: list(values) for name, values in self._kept.items()}
+            kept = {name: _since(values, since_s) for name, values in self._kept.items()}
+        force = kept.pop(self._channel, [])
+        kept[self._channel] = [each for each in force if low_s <= each[0] <= high_s]
         return tuple(
             Series(
                 name,
@@ -61,6 +75,7 @@ class MotionLog:
                 np.array([value for _, value in values]),
             )
             for name, values in kept.items()
+            if values
         )
 
     def _take(self, state: PositionerState) -> None:
@@ -81,3 +96,11 @@ class MotionLog:
             values = self._kept.setdefault(name, [])
             if len(values) < MOST:
                 values.append((time_s, value))
+
+
+def _since(values: list[tuple[float, float]], since_s: float) -> list[tuple[float, float]]:
+    """Return the values from a time on, the one that held at that time first."""
+    first = bisect_left(values, since_s, key=lambda each: each[0])
+    if first == 0:
+        return list(values)
+    return [(since_s, values[first - 1][1]), *values[first:]]
