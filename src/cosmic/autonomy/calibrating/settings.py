@@ -104,7 +104,7 @@ class CalibrationSettings(StrictModel):
     touch_behind_um: float = Field(300.0, gt=50.0)
     touch_below_um: float = 60.0
     touch_closing_um: float = Field(100.0, ge=0.0)
-    touch_stand_off_um: float = Field(10.0, gt=0.0, le=100.0)
+    touch_stand_off_um: float = Field(20.0, gt=0.0, le=100.0)
     touch_step_v: float = Field(15.0, ge=15.0, le=40.0)
     touch_step_um: float = Field(0.15, gt=0.0, le=1.0)
     touch_un: float = Field(2.0, gt=0.0)

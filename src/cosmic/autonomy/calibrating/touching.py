@@ -71,6 +71,11 @@ class TouchJaw(Calibrated):
             yield self._to(work, near + side * FAR_UM)
             base = yield from _mean_un(work, 0.1)
             yield self._to(work, near)
+            if abs((yield from _mean_un(work, 0.02)) - base) > settings.touch_un:
+                raise CalibrationRefused(
+                    "something is felt before the jaw, as the picture shows it, is near; look "
+                    "whether a tip is bent, and calibrate the picture anew"
+                )
             found = []
             for _ in range(settings.touches):
                 at = yield from self._feel(work, side, base)
@@ -93,7 +98,7 @@ class TouchJaw(Calibrated):
         settings, axis = work.settings.calibration, work.mico[work.probe.y_axis]
         _, begun = work.tip_now(work.probe)
         before = begun
-        while abs(before - begun) < 2.0 * settings.touch_stand_off_um + settings.touch_off_um:
+        while abs(before - begun) < settings.touch_stand_off_um + 2.0 * settings.touch_off_um:
             yield PatientMove(
                 lambda: axis.steps(
                     -round(side), amplitude_v=settings.touch_step_v, frequency_hz=100, wait=False
