@@ -3,8 +3,8 @@
 `cosmic campaign` runs as a process on the twin, and is killed: at any moment, while the file of a
 fibre is written, in the midst of a commit, and while the report is made. Then it is started again
 in the same folder, until nothing is left on the plate; then the next campaign begins. The plate
-stays as it is from one start to the next (benchmarks/kept_plate.py), and each second time the
-power was off as well, so that the controllers know no position.
+stays as it is from one start to the next (benchmarks/kept_plate.py), and each fourth time the
+power was off as well, so that the controllers know no position; these starts are not timed.
 
 After each kill the folder is read: every fibre that was finished must be there once, unchanged,
 with its curves. What was truly measured, and how often, tells the twin's own truth.
@@ -75,7 +75,7 @@ class Tally:
     doubled: int = 0
     unreadable: int = 0
     untold: int = 0
-    cut_short: int = 0
+    spoilt: int = 0
     orphans: int = 0
     trusted: int = 0
     contacts: int = 0
@@ -98,13 +98,14 @@ class Victim:
         self._before: dict[int, str] = {}
         self._measured: dict[int, int] = {}
         self._life = self._runs = self._seen = 0
+        self._cold = False
         self.over = False
 
     def live(self, kind: str, chance: random.Random) -> bool:
         """Start the program and kill it; returns False when it ended by itself first."""
         self._life += 1
         self._tally.lives += 1
-        cold = self._life % 2 == 0 and self._cut_off()
+        self._cold = cold = self._life % 4 == 0 and self._cut_off()
         config = self._plate.write(self._home / "config", cold=cold)
         truth = self._home / f"truth-{self._life}.jsonl"
         command = [sys.executable, "-m", "cosmic", "campaign", str(self._recipe)]
@@ -129,6 +130,9 @@ class Victim:
             reason = _end(self._out)
             self.over = reason.startswith(DONE) or self._life >= MOST_LIVES
             self._tally.ended[reason] += 1
+            if self.over:
+                query = "SELECT count(*) FROM fibre WHERE outcome = 'interrupted'"
+                self._tally.spoilt += _rows(self._out, query)[0][0]
         return killed
 
     def _strike(
@@ -210,6 +214,8 @@ class Victim:
         after_s = new[1][2] if len(new) > 1 else math.inf
         believed = new[0][3] != INITIALISE or after_s - new[0][2] < SHORTEST_S
         self._tally.trusted += believed and runs[-2][2] is None
+        if self._cold:
+            return
         self._tally.moving_s.append(new[0][2] - begin_s)
         working = next((each[2] for each in new if each[1] is not None), None)
         if working is not None:
@@ -335,6 +341,7 @@ def figures(tally: Tally) -> list[Figure]:
         *(Figure(NAME, f"kills: {kind}", n, "kills") for kind, n in sorted(tally.kills.items())),
         Figure(NAME, "starts of the program", tally.lives, "starts"),
         Figure(NAME, "finished fibres", tally.finished, "fibres"),
+        Figure(NAME, "fibres cut off, of campaigns that ended", tally.spoilt, "fibres"),
         Figure(NAME, "records lost", tally.lost + tally.untold, "fibres", none),
         Figure(NAME, "records changed afterwards", tally.changed, "fibres", none),
         Figure(NAME, "fibres measured twice", tally.doubled, "fibres", none),
