@@ -102,7 +102,8 @@ class Bench(FibreWork):
         dark = np.zeros_like(image)
         dark[rows[0] : rows[1], :60] = 1.0
         deep = 1.0 if self.lens.zoomed >= 5.0 else 0.3
-        blurred = cv2.GaussianBlur(dark, (0, 0), 0.6 + 0.03 * deep * abs(off_um))
+        sigma_px = float(np.hypot(1.5, 0.03 * deep * off_um))
+        blurred = cv2.GaussianBlur(dark, (0, 0), sigma_px)
         return image * (1.0 - 0.7 * blurred)
 
 
