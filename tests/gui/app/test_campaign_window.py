@@ -1,0 +1,108 @@
+"""A window that is closed while a campaign runs in it: a safe end, and the record stays."""
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from cosmic.app.campaign_dock import CAMPAIGN
+from cosmic.app.campaign_panel import CampaignPanel
+from cosmic.app.operator_window import OperatorWindow
+from cosmic.app.platform import Platform, build_platform
+from cosmic.autonomy.campaign.campaign import Campaign
+from cosmic.autonomy.campaign.records import Outcome
+from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.daqco.gui.main_widget import make_daqco_gui
+from cosmic.mico.gui.mico_widget import make_mico_gui
+from cosmic.vico.gui.vico_gui import make_vico_gui
+from gui.app.windows import Make, mico
+from system.campaign_bench import Strike
+
+RECIPE = """
+procedure = "transport"
+[sample]
+name = "three-dry"
+[stop]
+count = 3
+"""
+
+
+def whole_platform() -> Platform:
+    return build_platform(
+        None,
+        applications=("mico", "daqco", "vico"),
+        rate=10.0,
+        sample="three-dry",
+        mico_gui=make_mico_gui,
+        daqco_gui=make_daqco_gui,
+        vico_gui=make_vico_gui,
+    )
+
+
+def panel_of(window: OperatorWindow, qtbot: QtBot) -> CampaignPanel:
+    window.raise_panel(CAMPAIGN)
+    qtbot.waitUntil(lambda: window.findChild(CampaignPanel) is not None)
+    panel = window.findChild(CampaignPanel)
+    assert panel is not None
+    return panel
+
+
+def begun(window: OperatorWindow, qtbot: QtBot, home: Path) -> Campaign:
+    """Begin a campaign as the operator does."""
+    names = ("left.x", "probe.y", "table.rotation")
+    cards = mico(window).cards
+    qtbot.waitUntil(
+        lambda: all(cards[each].axis.details.position is not None for each in names),
+        timeout=30_000,
+    )
+    recipe = home / "recipe.toml"
+    recipe.write_text(RECIPE, encoding="utf-8")
+    panel = panel_of(window, qtbot)
+    panel.use_recipe(str(recipe))
+    panel.folder.setText(str(home / "out"))
+    qtbot.mouseClick(panel.procedure.start, Qt.MouseButton.LeftButton)
+    assert panel.campaign is not None, panel.procedure.reason.text()
+    return panel.campaign
+
+
+def close_and_check(window: OperatorWindow, campaign: Campaign, home: Path) -> list[Outcome]:
+    """Close the window in the middle of its campaign; returns what its fibres came to."""
+    assert not campaign.over, campaign.end_reason
+    window.close()
+    assert campaign.over
+    assert campaign.end_reason == "the window was closed"
+    assert campaign.run is not None
+    assert campaign.run.not_safe == ""
+    reader = CampaignReader(home / "out")
+    assert reader.ended()[1] == "the window was closed"
+    with CampaignStore.open(home / "out"):
+        pass  # nobody holds the folder any more
+    return [each.outcome for each in reader.fibres()]
+
+
+def test_closing_the_window_ends_its_campaign_safely(
+    make: Make, qtbot: QtBot, tmp_path: Path
+) -> None:
+    window = make(whole_platform())
+    campaign = begun(window, qtbot, tmp_path)
+    cards = mico(window).cards.values()
+
+    def moves() -> bool:
+        return any(each.axis.details.in_motion for each in cards) or campaign.over
+
+    qtbot.waitUntil(moves, timeout=30_000)
+    assert close_and_check(window, campaign, tmp_path) == []
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_closing_the_window_keeps_the_record_of_the_fibre_in_the_jaws(
+    make: Make, qtbot: QtBot, tmp_path: Path
+) -> None:
+    window = make(whole_platform())
+    campaign = begun(window, qtbot, tmp_path)
+    carried = Strike(campaign, "carry to the probe", lambda: None)
+    qtbot.waitUntil(lambda: carried.struck.is_set() or campaign.over, timeout=500_000)
+    assert close_and_check(window, campaign, tmp_path) == [Outcome.INTERRUPTED]
