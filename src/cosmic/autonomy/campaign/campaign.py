@@ -191,6 +191,7 @@ class Campaign(CampaignSteering):
 
     def _carry_out(self) -> None:
         failed = False
+        leading = self.work.clock.worker(leads=True)  # between two runs as well
         try:
             self._end_reason = self._treat_all()
         except CosmicError as exc:
@@ -200,6 +201,7 @@ class Campaign(CampaignSteering):
             failed, self._end_reason = True, f"a mistake in the program: {exc}"
         finally:
             self._leave(failed=failed)
+            leading.close()
 
     def _leave(self, *, failed: bool) -> None:
         self.work.close()
@@ -289,7 +291,8 @@ class Campaign(CampaignSteering):
         """Keep the fibres that were done with and are not kept yet."""
         while self._kept < len(self.work.finished):
             fibre = self.work.finished[self._kept]
-            self._insist(partial(self._keeper.keep, fibre))
+            with self.work.clock.at_work():
+                self._insist(partial(self._keeper.keep, fibre))
             self._kept += 1
             self._stuck = 0
             self._tell()
