@@ -9,7 +9,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cosmic.app.rig import Rig, connect
+    from cosmic.app.connect import connect
+    from cosmic.app.rig import Rig
     from cosmic.daqco.api.recording import Recording, open_recording
     from cosmic.frame.errors import (
         CollisionError,
@@ -40,7 +41,8 @@ __version__ = "0.1.0"
 logging.getLogger(__name__).addHandler(logging.NullHandler())
 
 _HOMES = {
-    "cosmic.app.rig": ("Rig", "connect"),
+    "cosmic.app.connect": ("connect",),
+    "cosmic.app.rig": ("Rig",),
     "cosmic.daqco.api.recording": ("Recording", "open_recording"),
     "cosmic.frame.errors": (
         "CollisionError",

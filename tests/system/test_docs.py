@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 import cosmic
-from cosmic.app import rig as rig_module
+from cosmic.app import connect as connect_module
 from system.docs_blocks import PAGES, ROOT, blocks, is_in, relative_links
 
 FASTEST = 20.0
@@ -32,7 +32,7 @@ def test_the_python_of_a_page_runs_from_top_to_bottom(
     page: Path, qapp: QApplication, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """A page marked `<!-- with rig -->` speaks of the console, where `rig` is there already."""
-    real = rig_module.connect
+    real = connect_module.connect
     opened: list[cosmic.Rig] = []
 
     @functools.wraps(real)
@@ -40,7 +40,7 @@ def test_the_python_of_a_page_runs_from_top_to_bottom(
         opened.append(real(*args, **{"rate": FASTEST, **kwargs}))
         return opened[-1]
 
-    monkeypatch.setattr(rig_module, "connect", fast)
+    monkeypatch.setattr(connect_module, "connect", fast)
     monkeypatch.chdir(tmp_path)
     text = page.read_text(encoding="utf-8")
     namespace: dict[str, Any] = {"__name__": "page"}

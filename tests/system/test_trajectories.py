@@ -11,8 +11,9 @@ import pytest
 from PySide6.QtCore import Qt
 from typing_extensions import override
 
+from cosmic.app.connect import connect
 from cosmic.app.platform import build_platform
-from cosmic.app.rig import Rig, connect
+from cosmic.app.rig import Rig
 from cosmic.frame.clock import WALL
 from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.errors import (

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Final, TextIO
 
 from cosmic.app.campaign_output import gui_application, write_output
-from cosmic.app.rig import connect
+from cosmic.app.connect import connect
 from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.opening import read_recipe
 from cosmic.autonomy.campaign.recipe import Recipe

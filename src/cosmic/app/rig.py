@@ -1,8 +1,7 @@
-"""The scripted API: ``cosmic.connect()`` and the `Rig` it returns."""
+"""`Rig`: the whole platform, as scripts and the console see it."""
 
 import atexit
-import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -12,23 +11,22 @@ from weakref import WeakSet
 from typing_extensions import override
 
 from cosmic.app.faults import SimulationFaults
-from cosmic.app.platform import Platform, Uses, build_platform
-from cosmic.app.platform_file import KNOWN_APPLICATIONS, check_applications
+from cosmic.app.platform import Platform
 from cosmic.app.remote_station import RemoteStation, StationControl
-from cosmic.app.serve_options import StationAddress
 from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun
 from cosmic.daqco.api.daqco import Daqco
-from cosmic.frame.errors import NotAvailable, NotConnectedError
+from cosmic.frame.errors import NotAvailable
 from cosmic.mico.api.mico import Mico
 from cosmic.vico.api.vico import Vico
 
 if TYPE_CHECKING:
+    from cosmic.autonomy.calibrating.book import Book
     from cosmic.autonomy.campaign.campaign import Campaign
     from cosmic.autonomy.campaign.recipe import Recipe
-
-logger = logging.getLogger(__name__)
+    from cosmic.autonomy.handling.settings import HandlingSettings
+    from cosmic.autonomy.handling.work import FibreWork
 
 W = TypeVar("W")
 
@@ -122,6 +120,48 @@ class Rig:
         campaign = campaign_on(self, self._platform, recipe, folder)
         self._runs.add(campaign)
         return campaign
+
+    @property
+    def calibrations(self) -> "Book":
+        """All calibrations that were made, with residual, age, and whether they may be used.
+
+        Raises
+        ------
+        NotAvailable
+            Cameras and axes do not run in this program.
+        """
+        from cosmic.app.calibrating import book_of
+
+        return book_of(self)
+
+    def calibrate(
+        self,
+        settings: "HandlingSettings | None" = None,
+        *,
+        anew: Sequence[str] = (),
+        zooms: bool = False,
+    ) -> "ProcedureRun[FibreWork]":
+        """Return a run that calibrates what is not fresh; begin it by `run_here` or `start`.
+
+        Parameters
+        ----------
+        settings : HandlingSettings or None
+            Which gripper and probe, where, and how good is good enough.
+        anew : sequence of str
+            Names of calibrations that are measured though they are fresh.
+        zooms : bool
+            The map at every step of the lens as well.
+
+        Raises
+        ------
+        NotAvailable
+            An application is not hosted here.
+        ConfigError
+            The platform has not what `settings` names, or there is no such calibration.
+        """
+        from cosmic.app.calibrating import calibration_on
+
+        return calibration_on(self, settings, anew, zooms=zooms)
 
     def procedure(self, procedure: Procedure[W], work: W) -> ProcedureRun[W]:
         """Return a run of `procedure` that is ready to begin, in the platform's time.
@@ -251,79 +291,3 @@ class Rig:
         trace: TracebackType | None,
     ) -> None:
         self.close()
-
-
-def connect(
-    config: str | Path | None = None,
-    applications: Sequence[str] = KNOWN_APPLICATIONS,
-    rate: float = 1.0,
-    stations: Mapping[str, str] | None = None,
-    *,
-    cold: bool = False,
-    seed: int = 0,
-    sample: str | None = None,
-    truth: str | Path | None = None,
-    certificates: str | Path | None = None,
-) -> Rig:
-    """Start the platform in this process and return it; no window and no event loop needed.
-
-    Parameters
-    ----------
-    config : path or None
-        A platform.toml or its folder; None is the simulated platform that ships with CoSMic.
-    applications : sequence of str
-        Which of "mico", "daqco", "vico" to host, as far as the platform file names them.
-    rate : float
-        How many times faster than the wall the simulated platform runs at most.
-    stations : mapping of str to str
-        Other stations by name, with where they listen, such as
-        ``{"fibervision": "tcp/127.0.0.1:7448"}``. What they host is used there and not hosted here.
-    cold : bool
-        Start the simulated platform at power-up, with no position known.
-    seed : int
-        Of everything random in the simulated platform.
-    certificates : path or None
-        Folder with which to prove who this is, for stations at ``tls/``; None: the one that the
-        platform file names.
-    sample : str or None
-        What lies on the simulated plate, as twin.toml names it, such as "forty-dry"; None: the
-        fibres that twin.toml lists.
-    truth : path or None
-        A new file for what truly happens on the simulated platform, for whoever scores a run; see
-        `cosmic.twin.truth.read_truth`.
-
-    Raises
-    ------
-    ConfigError
-        The configuration is wrong; a line for every mistake with file, key and reason.
-    NotConnectedError
-        The vendor library is not there, or no device answers.
-    StationAway
-        A station does not answer.
-    NotAvailable
-        What stations need is not installed.
-    """
-    if isinstance(applications, str):
-        applications = (applications,)
-    check_applications(applications, "applications")
-    uses = Uses(
-        tuple(StationAddress(*each) for each in (stations or {}).items()),
-        certificates=None if certificates is None else Path(certificates),
-    )
-    platform = build_platform(
-        config,
-        applications=tuple(applications),
-        rate=rate,
-        cold=cold,
-        seed=seed,
-        sample=sample,
-        truth=truth,
-        uses=uses,
-    )
-    rig = Rig(platform)
-    atexit.register(rig.close)
-    platform.initialize()
-    if platform.failure:
-        rig.close()
-        raise NotConnectedError(platform.failure)
-    return rig
