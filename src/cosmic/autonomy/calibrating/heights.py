@@ -24,7 +24,7 @@ from cosmic.vico.core.calibration_fit import CalibrationRefused
 from cosmic.vico.core.tool_settings import ToolSettings
 
 HEIGHTS = "heights over the plate"
-LOW_PART = 0.55
+LOW_PART = 0.45
 """Of the height at which fibres are held: where the tip is looked at a second time."""
 FIELD_POWER = 1.5
 """The depth of field grows with the magnification to the minus this."""
@@ -111,13 +111,15 @@ class HeightByFocus(Calibrated):
                 f"the focus goes {counts_um:.2f} counts for each um of the tip, not about "
                 f"{usual:.2f}: something else was in focus"
             )
-        ups = {
-            work.gripper.name: over_um(low, plate[0], counts_um, settings.lying_um) - low.stage_um,
-            work.probe.name: over_um(probe, plate[0], counts_um, settings.lying_um)
-            + work.probe.width_um / 2.0
-            - probe.stage_um,
-        }
-        std_um = math.hypot(plate[1], low.std_counts, 0.5 * high.std_counts) / counts_um
+        over = over_um(low, plate[0], counts_um, settings.lying_um)
+        up = over - low.stage_um
+        # The probe is as high as the tip at its highest: against that, and less against the plate.
+        beside = high.stage_um + up + (probe.counts - high.counts) / counts_um
+        probe_up = beside + work.probe.width_um / 2.0 - probe.stage_um
+        ups = {work.gripper.name: up, work.probe.name: probe_up}
+        far = over / (high.stage_um - low.stage_um)
+        stds = plate[1], (1.0 + far) * low.std_counts, far * high.std_counts
+        std_um = math.hypot(*stds) / counts_um
         work.calibration.up_um |= ups
         values = {
             "up_um": ups[work.gripper.name],
