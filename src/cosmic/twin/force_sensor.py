@@ -34,6 +34,8 @@ class ForceSensor:
     ----------
     saturated : bool
         The output stands at the end of the range, whatever it feels.
+    dead : bool
+        It stands at its zero, and has no noise.
     running_un_s : float
         By how much the zero runs away.
 
@@ -62,6 +64,7 @@ class ForceSensor:
             mounting.standard_normal()
         )
         self.saturated = False
+        self.dead = False
         self.running_un_s = 0.0
         self._lock = Lock()
         self._time_s = -math.inf
@@ -93,6 +96,8 @@ class ForceSensor:
         half_v = self.settings.gain_v_un * self.settings.range_un
         if self.saturated:
             return np.full_like(times_s, self.settings.zero_v + half_v)
+        if self.dead:
+            return np.full_like(times_s, self.true_zero_v)
         out = self.true_zero_v + self.true_gain_v_un * felt
         return np.clip(out, self.settings.zero_v - half_v, self.settings.zero_v + half_v)
 

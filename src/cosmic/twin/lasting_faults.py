@@ -84,6 +84,8 @@ class LastingFaults:
                 raise ValueError(f"{fault.name}: there is no sensor {name!r}; known: {known}")
             if fault.name == "sensor_saturated":
                 sensors[name].saturated = begins
+            elif fault.name == "sensor_dead":
+                sensors[name].dead = begins
             else:
                 rate = DRIFT_UN_S if fault.amount is None else fault.amount
                 sensors[name].running_un_s = rate if begins else 0.0

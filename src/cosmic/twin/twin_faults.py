@@ -28,6 +28,7 @@ LASTING_NAMES: Final = (
     "steps_lost",
     "sensor_drift",
     "sensor_saturated",
+    "sensor_dead",
 )
 """They hold until they are cleared."""
 
@@ -70,6 +71,7 @@ class TwinFaults:
       step.
     - `sensor_drift`: the zero of a force sensor wanders by `amount` (5) uN each second.
     - `sensor_saturated`: a force sensor stands at the end of its range.
+    - `sensor_dead`: it stands at its zero, whatever is felt, and without noise.
 
     Attributes
     ----------

@@ -118,3 +118,9 @@ def test_a_sensor_that_nothing_touches_reads_noise_and_drift() -> None:
     volts = spare.volts(times(1.0))
     assert volts.std() == pytest.approx(0.004, rel=0.15)
     assert volts.mean() == pytest.approx(2.5, abs=0.02)
+
+
+def test_a_dead_sensor_stands_at_its_zero_without_noise() -> None:
+    dead = sensor(lambda t: np.full_like(t, 42.0))
+    dead.dead = True
+    assert set(dead.volts(times(0.01))) == {dead.true_zero_v}

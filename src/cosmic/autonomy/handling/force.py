@@ -36,6 +36,11 @@ class ForceMean:
     time_s: float
     samples: int
 
+    @property
+    def spread_un(self) -> float:
+        """Standard deviation of one reading."""
+        return self.std_un * math.sqrt(self.samples)
+
 
 class ForceWatch:
     """Keeps the last samples of a force channel; any thread.

@@ -34,7 +34,7 @@ class SeeForce(FibreOperation):
 
 
 def ready_force(work: FibreWork) -> Steps:
-    """Have samples come, and wait until they are near zero; no limit is armed before.
+    """Have samples come, and wait until they are near zero and alive; no limit is armed before.
 
     Acquisition that has ended is begun again. From a sensor that stands far from zero the probe is
     taken away: what was overloaded comes back, and what pressed on it is gone.
@@ -58,13 +58,19 @@ def ready_force(work: FibreWork) -> Steps:
             trouble = str(exc)
             continue
         assert isinstance(mean, ForceMean)
-        if abs(mean.mean_un) <= highest_un:
+        if not abs(mean.mean_un) <= highest_un:
+            trouble = (
+                f"the force sensor reads {mean.mean_un:.0f} uN with nothing at the probe, and at "
+                f"most {highest_un:.0f} uN is allowed"
+            )
+            yield from retract_probe(work)
+        elif not mean.spread_un >= push.quiet_un:
+            trouble = (
+                f"the force sensor reads {mean.mean_un:.1f} uN without any noise, as one does that "
+                "is dead or cut off"
+            )
+        else:
             return
-        trouble = (
-            f"the force sensor reads {mean.mean_un:.0f} uN with nothing at the probe, and at most "
-            f"{highest_un:.0f} uN is allowed"
-        )
-        yield from retract_probe(work)
     raise OperationFailed(
         NO_FORCE,
         f"{trouble}; look at the sensor, its cable and the acquisition, and begin again",

@@ -134,6 +134,9 @@ class PushSettings(StrictModel):
         No step is made that may lead beyond this force.
     stop_un : float
         Force limit of the acquisition that stops everything; 0: none is armed.
+    quiet_un : float
+        Readings that spread less than this come from a sensor that is dead: a living one has
+        noise. 0: not looked at.
     settle_s, average_s : float
         Rest after a step, and the time over which the force is averaged.
     search_average_s : float
@@ -160,6 +163,7 @@ class PushSettings(StrictModel):
     contact_un: float = Field(0.6, gt=0.0)
     limit_un: float = Field(110.0, gt=0.0)
     stop_un: float = Field(140.0, ge=0.0)
+    quiet_un: float = Field(0.03, ge=0.0)
     settle_s: float = Field(0.02, ge=0.0)
     average_s: float = Field(0.04, gt=0.0)
     search_average_s: float = Field(0.02, gt=0.0)

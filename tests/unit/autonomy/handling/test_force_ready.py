@@ -32,7 +32,7 @@ class Daqco:
 class Work:
     """As much of the work as looking at the force needs; what is felt comes from a list."""
 
-    def __init__(self, *felt: float | Exception) -> None:
+    def __init__(self, *felt: float | ForceMean | Exception) -> None:
         self.settings = HandlingSettings()
         self.calibration = Calibration()
         self.daqco = Daqco()
@@ -47,6 +47,8 @@ class Work:
             found = self.felt.pop(0) if len(self.felt) > 1 else self.felt[0]
             if isinstance(found, Exception):
                 raise found
+            if isinstance(found, ForceMean):
+                return found
             return ForceMean(found, 0.1, 0.0, 20)
 
         return mean
@@ -102,6 +104,13 @@ def test_one_that_stays_there_is_told_with_what_to_look_at(reading_un: float):
         carry_out(work)
     assert work.waited_s == pytest.approx((LOOKS - 1) * APART_S)
     assert work.failures[-1][1].cause == "force sensor"
+
+
+def test_one_that_has_no_noise_is_told_to_be_dead():
+    work = Work(ForceMean(0.3, 0.002, 0.0, 20))
+    with pytest.raises(OperationFailed, match=r"reads 0\.3 uN without any noise.*cable"):
+        carry_out(work)
+    assert work.waited_s == pytest.approx((LOOKS - 1) * APART_S)
 
 
 def test_acquisition_that_has_ended_is_begun_again():
