@@ -123,7 +123,7 @@ def follow(work: FibreWork, gripper: TipSeen, probe: TipSeen) -> None:
     off = probe.off_um[0] - gripper.off_um[0], probe.off_um[1] - gripper.off_um[1]
     before = known.seen_off_um
     moved = off[0] - before[0], off[1] - before[1]
-    if not max(math.hypot(*gripper.off_um), math.hypot(*moved)) <= settings.drift_far_um:
+    if not all(math.hypot(*each) <= settings.drift_far_um for each in (gripper.off_um, moved)):
         distrust(work)
         return
     limit_um = max(settings.drift_um, TIMES_STD * gripper.std_um)

@@ -1,0 +1,103 @@
+"""What moved is followed; noise is not, and what moved far is measured anew."""
+
+from typing import Any
+
+import pytest
+
+from cosmic.autonomy.calibrating.book import Entry
+from cosmic.autonomy.calibrating.drift import DRIFT, CheckDrift, TipSeen, follow
+from cosmic.autonomy.calibrations import Calibrations
+from cosmic.autonomy.handling.in_hand import Calibration, Measured
+from cosmic.autonomy.handling.plate import PlateFrame
+from cosmic.autonomy.handling.prepare import HELD, PLATE, PROBE
+from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.places import PlatformPlaces
+from cosmic.frame.clock import ManualClock
+from unit.autonomy.test_calibrations import plane
+
+PIXEL = (900.0, 500.0)
+
+
+class Work:
+    """As much of the work as following a drift needs."""
+
+    def __init__(self) -> None:
+        self.settings = HandlingSettings()
+        self.clock = ManualClock()
+        self.calibration = Calibration(frame=PlateFrame((10.0, -5.0)))
+        self.calibration.probe_off_um = self.calibration.seen_off_um = 1.0, 2.0
+        self.gripper: Any = type("Tool", (), {"name": "left"})
+        self.finished: list[object] = []
+        self.vision = self
+        self.first_camera = "top"
+        self.places = PlatformPlaces.__new__(PlatformPlaces)
+        self.places.calibrations = Calibrations(["top"], ["left"], None)
+        self.places.calibrations.add_plane("top", "left", plane(0.0, 12.0))
+        book = self.calibration.book
+        for name in (PLATE, HELD, PROBE):
+            values = {"off_x_um": 1.0, "off_y_um": 2.0} if name == PROBE else {}
+            book.put(Entry(name, "left", values, 0.1, "px", 0.5, book.now(), 0.0, book.session))
+            self.calibration.made[name] = Measured(0.0, 0.1, "px")
+
+    def place_um(self) -> list[float]:
+        plane = self.places.calibrations.get("top", "left").planes[0]
+        return [float(each) for each in plane.fit.map.to_um(PIXEL)]
+
+
+def followed(work: Any, gripper: tuple[float, float], probe: tuple[float, float]) -> Any:
+    follow(work, TipSeen(gripper, 0.2), TipSeen(probe, 0.2))
+    return work
+
+
+def test_maps_and_rotation_centre_follow_a_gripper_that_moved() -> None:
+    work = Work()
+    x, y = work.place_um()
+    followed(work, (3.0, -1.0), (4.0, 1.0))
+    assert work.place_um() == pytest.approx([x - 3.0, y + 1.0])
+    assert work.calibration.frame.centre_um == (7.0, -4.0)
+    assert work.calibration.probe_off_um == (1.0, 2.0), "both went along"
+
+
+def test_the_probe_is_followed_from_where_a_touch_has_it() -> None:
+    work = Work()
+    work.calibration.probe_off_um = 1.0, 4.5
+    followed(work, (0.0, 0.0), (1.0, 4.0))
+    assert work.calibration.probe_off_um == pytest.approx((1.0, 6.5))
+    assert work.calibration.seen_off_um == (1.0, 4.0)
+    entry = work.calibration.book.get(PROBE, "left")
+    assert entry is not None
+    assert entry.values["off_y_um"] == pytest.approx(6.5)
+
+
+def test_what_may_be_noise_is_left_alone() -> None:
+    work = Work()
+    before = work.place_um()
+    followed(work, (0.5, 0.6), (1.7, 2.9))
+    assert work.place_um() == before
+    assert work.calibration.probe_off_um == (1.0, 2.0)
+    entry = work.calibration.book.get(DRIFT, "left")
+    assert entry is not None
+    assert entry.values["followed_from_um"] == 1.0
+    unsure = Work()
+    follow(unsure, TipSeen((2.0, 0.0), 0.9), TipSeen((3.0, 2.0), 0.9))  # type: ignore[arg-type]
+    assert unsure.place_um() == before, "at that zoom 1 um cannot be told"
+
+
+@pytest.mark.parametrize("probe", [(50.0, 0.0), (float("nan"), 0.0)])
+def test_what_moved_far_or_nowhere_is_measured_anew(probe: tuple[float, float]) -> None:
+    work = followed(Work(), (0.0, 0.0), probe)
+    assert work.calibration.made == {}
+    assert work.calibration.book.get(PLATE, "left") is None
+
+
+def test_it_is_looked_at_only_after_so_many_fibres() -> None:
+    work: Any = Work()
+    looked = []
+    for _ in range(11):
+        work.finished.append(object())
+        work.go = work.go_up = None
+        try:
+            list(CheckDrift().run(work))
+        except (AttributeError, TypeError):
+            looked.append(len(work.finished))
+    assert looked == [work.settings.calibration.drift_fibres]
