@@ -52,6 +52,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             )
         if not config.getoption("--hardware"):
             item.add_marker(skip)
+    if hasattr(config, "workerinput"):
+        # Side by side: a file of few and long tests that is begun last holds up the end.
+        items.sort(key=lambda item: "system" not in item.path.parts)
 
 
 @pytest.hookimpl(wrapper=True)
