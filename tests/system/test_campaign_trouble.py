@@ -282,6 +282,23 @@ def test_a_stop_ends_a_campaign_that_pauses(
     bench.rig.reset_stop()
 
 
+def test_a_stop_that_is_reset_at_once_ends_a_campaign_that_only_looks(make: Make) -> None:
+    bench = make()
+    campaign = bench.campaign(procedure="transport")
+
+    def stop_and_reset() -> None:
+        bench.rig.stop("a hand on the button")
+        bench.rig.reset_stop()
+
+    strike = Strike(campaign, "find it again", stop_and_reset)
+    campaign.run_here()
+    assert strike.struck.is_set()
+    assert "it was stopped" in campaign.end_reason
+    bench.check_stands()
+    assert [each.outcome for each in bench.fibres] == [Outcome.INTERRUPTED]
+    assert bench.truth.of("grasped") == ()
+
+
 # ---------------------------------------------------------------------- instruments that fail
 
 
@@ -294,6 +311,7 @@ def test_a_stop_ends_a_campaign_that_pauses(
         ("camera unplugged", {}, "carry to the probe", "microscope"),
         ("board unplugged", {}, "push the spans", "force"),
         ("sensor_saturated", {}, "carry to the probe", "force"),
+        ("sensor_dead", {}, "push the spans", "dead"),
     ],
 )
 def test_what_fails_in_mid_lift_leads_to_a_safe_end_that_names_it(
@@ -315,7 +333,12 @@ def test_what_fails_in_mid_lift_leads_to_a_safe_end_that_names_it(
 
 @pytest.mark.parametrize(
     ("fault", "told"),
-    [("board unplugged", "force"), ("sensor_saturated", "force"), ("camera unplugged", "camera")],
+    [
+        ("board unplugged", "force"),
+        ("sensor_saturated", "force"),
+        ("sensor_dead", "dead"),
+        ("camera unplugged", "camera"),
+    ],
 )
 def test_an_instrument_that_is_dead_from_the_start_is_found_before_a_fibre_is_touched(
     make: Make, fault: str, told: str

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import cosmic
 from cosmic.app.platform import Platform
+from cosmic.app.stop_watch import stopped_since
 from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.opening import Host, open_campaign, read_recipe
 from cosmic.autonomy.campaign.recipe import Recipe
@@ -24,7 +25,7 @@ def campaign_on(
     host = Host(
         rig=rig,
         policy=platform.policy,
-        stopped=lambda: rig.stopped,
+        stopped=stopped_since(platform),
         hardware=TWIN if rig.simulated else platform.file.platform.name,
         rate=platform.clock.rate,
         seed=read.file.twin.seed,
