@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from cosmic.autonomy.calibrating.book import Book
+from cosmic.autonomy.calibrating.book import CalibrationBook
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.places import PlatformPlaces
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cosmic.app.rig import Rig
 
 
-def book_of(rig: "Rig") -> Book:
+def book_of(rig: "Rig") -> CalibrationBook:
     """Return the book of calibrations; see `Rig.calibrations`."""
     application = rig.vico.application
     places = application.places if isinstance(application, VicoApplication) else None

@@ -13,6 +13,7 @@ from typing_extensions import override
 from cosmic.app.faults import SimulationFaults
 from cosmic.app.platform import Platform
 from cosmic.app.remote_station import RemoteStation, StationControl
+from cosmic.app.stop_watch import stopped_since
 from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun
@@ -22,7 +23,7 @@ from cosmic.mico.api.mico import Mico
 from cosmic.vico.api.vico import Vico
 
 if TYPE_CHECKING:
-    from cosmic.autonomy.calibrating.book import Book
+    from cosmic.autonomy.calibrating.book import CalibrationBook
     from cosmic.autonomy.campaign.campaign import Campaign
     from cosmic.autonomy.campaign.recipe import Recipe
     from cosmic.autonomy.handling.settings import HandlingSettings
@@ -122,7 +123,7 @@ class Rig:
         return campaign
 
     @property
-    def calibrations(self) -> "Book":
+    def calibrations(self) -> "CalibrationBook":
         """All calibrations that were made, with residual, age, and whether they may be used.
 
         Raises
@@ -180,7 +181,7 @@ class Rig:
             work,
             self._platform.clock,
             self._platform.policy,
-            stopped=lambda: self.stopped,
+            stopped=stopped_since(self._platform),
         )
         self._runs.add(cast("ProcedureRun[object]", run))
         return run

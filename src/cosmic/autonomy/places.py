@@ -7,7 +7,7 @@ from typing import Final
 
 from typing_extensions import override
 
-from cosmic.autonomy.calibrating.book import Book
+from cosmic.autonomy.calibrating.book import CalibrationBook
 from cosmic.autonomy.calibrations import Calibrations
 from cosmic.autonomy.rotation_procedure import RotationProcedure
 from cosmic.autonomy.stage_procedure import StageProcedure
@@ -44,7 +44,7 @@ class PlatformPlaces(Places):
     ----------
     calibrations : Calibrations
         Maps from platform to picture, and the rotation centre.
-    book : Book
+    book : CalibrationBook
         All that procedures measure, those maps among it.
 
     Raises
@@ -67,7 +67,7 @@ class PlatformPlaces(Places):
         if mistakes := tool_mistakes(vico.settings.tool, axes):
             raise ConfigError("\n".join(mistakes))
         self.calibrations = Calibrations(vico.units, self._tools, folder)
-        self.book = Book(folder, clock=vico.clock, version=version)
+        self.book = CalibrationBook(folder, clock=vico.clock, version=version)
 
     # Pixels to places
 

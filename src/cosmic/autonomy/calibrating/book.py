@@ -21,7 +21,7 @@ LONGEST_S: Final = 7200.0
 """Age at which a calibration is stale where nobody says another."""
 
 
-class Standing(StrEnum):
+class CalibrationStanding(StrEnum):
     """Whether a calibration may be used."""
 
     FRESH = "fresh"
@@ -31,7 +31,7 @@ class Standing(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class CalibrationEntry:
     """One calibration.
 
     Attributes
@@ -87,7 +87,7 @@ class Entry:
 
 
 @dataclass(slots=True)
-class Book:
+class CalibrationBook:
     """All calibrations, the newest of each name and tool; any thread.
 
     Parameters
@@ -116,39 +116,39 @@ class Book:
     clock: Clock | None = None
     now: Callable[[], datetime] = lambda: datetime.now(UTC)
     session: str = field(default_factory=lambda: uuid4().hex[:12])
-    _known: dict[tuple[str, str], Entry] = field(default_factory=dict)
+    _known: dict[tuple[str, str], CalibrationEntry] = field(default_factory=dict)
     _lock: Lock = field(default_factory=Lock)
     _listeners: tuple[Callable[[], object], ...] = ()
 
     def __post_init__(self) -> None:
         if self.folder is not None and (self.folder / FILE).exists():
             for each in read_book(self.folder / FILE):
-                entry = Entry(**each)
+                entry = CalibrationEntry(**each)
                 self._known[entry.key] = entry
 
     @property
-    def entries(self) -> tuple[Entry, ...]:
+    def entries(self) -> tuple[CalibrationEntry, ...]:
         """All of them, by name and tool."""
         with self._lock:
             return tuple(self._known[key] for key in sorted(self._known))
 
-    def get(self, name: str, tool: str) -> Entry | None:
+    def get(self, name: str, tool: str) -> CalibrationEntry | None:
         """Return the one in force; None where there is none, or the last was refused."""
         with self._lock:
             found = self._known.get((name, tool))
         return None if found is None or found.problem else found
 
-    def put(self, entry: Entry) -> None:
+    def put(self, entry: CalibrationEntry) -> None:
         """Put one in force, and keep it; raises `ConfigError` where it cannot be written."""
         with self._lock:
             self._known[entry.key] = replace(entry, session=self.session, version=self.version)
         self._write()
 
-    def refuse(self, entry: Entry, problem: str) -> None:
+    def refuse(self, entry: CalibrationEntry, problem: str) -> None:
         """Note that one was refused; what was in force before is none any more."""
         self.put(replace(entry, problem=problem))
 
-    def confirm(self, entry: Entry, now_s: float) -> Entry:
+    def confirm(self, entry: CalibrationEntry, now_s: float) -> CalibrationEntry:
         """Note that one was looked at and holds, and return it as it stands now."""
         made_s = now_s - self.age_s(entry)
         checked = replace(entry, checked=self.now(), session=self.session, made_s=made_s)
@@ -161,19 +161,25 @@ class Book:
             self._known.pop((name, tool), None)
         self._write()
 
-    def age_s(self, entry: Entry) -> float:
+    def age_s(self, entry: CalibrationEntry) -> float:
         """Return how long ago one was made: on the platform's clock, or by date if before it."""
         if self.clock is not None and entry.session == self.session:
             return max(0.0, self.clock.now_s() - entry.made_s)
         return max(0.0, (self.now() - entry.made).total_seconds())
 
-    def standing(self, entry: Entry, longest_s: float = LONGEST_S) -> Standing:
+    def standing(
+        self, entry: CalibrationEntry, longest_s: float = LONGEST_S
+    ) -> CalibrationStanding:
         """Return whether it may be used."""
         if entry.problem or not entry.residual <= entry.largest:
-            return Standing.POOR
+            return CalibrationStanding.POOR
         if not self.age_s(entry) <= longest_s:
-            return Standing.STALE
-        return Standing.FRESH if entry.session == self.session else Standing.UNCHECKED
+            return CalibrationStanding.STALE
+        return (
+            CalibrationStanding.FRESH
+            if entry.session == self.session
+            else CalibrationStanding.UNCHECKED
+        )
 
     def on_change(self, listener: Callable[[], object]) -> Callable[[], None]:
         """Call `listener()`, in any thread, after each change; returns what ends it."""
@@ -186,7 +192,7 @@ class Book:
 
     def _write(self) -> None:
         if self.folder is not None:
-            fields = Entry.__slots__
+            fields = CalibrationEntry.__slots__
             rows = [{name: getattr(each, name) for name in fields} for each in self.entries]
             write_book(self.folder / FILE, rows)
             logger.info("%s written", self.folder / FILE)

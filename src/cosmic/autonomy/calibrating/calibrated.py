@@ -4,7 +4,7 @@ from collections.abc import Generator, Mapping
 
 from typing_extensions import override
 
-from cosmic.autonomy.calibrating.book import Entry, Standing
+from cosmic.autonomy.calibrating.book import CalibrationEntry, CalibrationStanding
 from cosmic.autonomy.handling.in_hand import Measured
 from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.work import FibreWork
@@ -52,14 +52,14 @@ class Calibrated(FibreOperation):
         if entry is None or entry.made_with != self.made_with(work):
             return False
         standing = book.standing(entry, longest_s)
-        if standing is Standing.UNCHECKED:
+        if standing is CalibrationStanding.UNCHECKED:
             try:
                 if not (yield from self.check(work, entry)):
                     return False
             except (NotAvailable, CalibrationRefused):
                 return False
             entry = book.confirm(entry, work.clock.now_s())
-        elif standing is not Standing.FRESH:
+        elif standing is not CalibrationStanding.FRESH:
             return False
         self.restore(work, entry)
         self._note(work, entry)
@@ -71,12 +71,12 @@ class Calibrated(FibreOperation):
         """Measure it, and keep it by `kept`."""
         raise NotImplementedError
 
-    def check(self, work: FibreWork, entry: Entry) -> Holds:  # noqa: ARG002 - for subclasses
+    def check(self, work: FibreWork, entry: CalibrationEntry) -> Holds:  # noqa: ARG002 - for subclasses
         """Look whether one of an earlier start still holds; without a way to tell it does not."""
         return False
         yield  # what makes it a generator
 
-    def restore(self, work: FibreWork, entry: Entry) -> None:
+    def restore(self, work: FibreWork, entry: CalibrationEntry) -> None:
         """Put what stands in the book in force."""
 
     def tool(self, work: FibreWork) -> str:
@@ -121,9 +121,9 @@ class Calibrated(FibreOperation):
         largest: float,
         values: Mapping[str, float],
         how: str,
-    ) -> Entry:
+    ) -> CalibrationEntry:
         book = work.calibration.book
-        return Entry(
+        return CalibrationEntry(
             self.key,
             self.tool(work),
             values,
@@ -138,7 +138,7 @@ class Calibrated(FibreOperation):
             how=how,
         )
 
-    def _note(self, work: FibreWork, entry: Entry) -> None:
+    def _note(self, work: FibreWork, entry: CalibrationEntry) -> None:
         age_s = work.calibration.book.age_s(entry)
         work.calibration.made[self.key] = Measured(
             work.clock.now_s() - age_s, entry.residual, entry.unit

@@ -7,7 +7,7 @@ from typing import Final
 
 from typing_extensions import override
 
-from cosmic.autonomy.calibrating.book import Entry
+from cosmic.autonomy.calibrating.book import CalibrationEntry
 from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.plate import PlateFrame
 from cosmic.autonomy.handling.prepare import (
@@ -36,7 +36,7 @@ Off = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class TipSeen:
+class TipOff:
     """How far a tip is seen from where its stages and the map say.
 
     Attributes
@@ -49,7 +49,7 @@ class TipSeen:
     std_um: float
 
 
-def tip_off(work: FibreWork, picture: Picture, tool: ToolSettings) -> TipSeen:
+def tip_off(work: FibreWork, picture: Picture, tool: ToolSettings) -> TipOff:
     """Return how far a tip is from where it should be seen; raises `NotAvailable`."""
     found = see_tip(work, picture, tool)
     if isinstance(found, NotSeen):
@@ -61,7 +61,7 @@ def tip_off(work: FibreWork, picture: Picture, tool: ToolSettings) -> TipSeen:
     seen_px = found.hold_px if isinstance(found, GripperTips) else found.tip_px
     x, y = mapped.to_um(seen_px).tolist()
     std_um = math.hypot(found.std_px * mapped.scale_um_px, float(mapped.std_um(seen_px)))
-    return TipSeen((x - believed[0], y - believed[1]), std_um)
+    return TipOff((x - believed[0], y - believed[1]), std_um)
 
 
 def shift_maps(work: FibreWork, off_um: Off) -> None:
@@ -103,7 +103,7 @@ class CheckDrift(FibreOperation):
         yield SAFE_POINT
 
 
-def look_at_both(work: FibreWork) -> Generator[Wish, object, tuple[TipSeen, TipSeen]]:
+def look_at_both(work: FibreWork) -> Generator[Wish, object, tuple[TipOff, TipOff]]:
     """Hold both tips where fibres are pushed, and look at them; raises `NotAvailable`."""
     try:
         yield from zoom_to(work, work.settings.calibration.compare_zoom)
@@ -117,7 +117,7 @@ def look_at_both(work: FibreWork) -> Generator[Wish, object, tuple[TipSeen, TipS
     return tip_off(work, picture, work.gripper), tip_off(work, picture, work.probe)
 
 
-def follow(work: FibreWork, gripper: TipSeen, probe: TipSeen) -> None:
+def follow(work: FibreWork, gripper: TipOff, probe: TipOff) -> None:
     """Put right what has moved, and note it."""
     known, settings = work.calibration, work.settings.calibration
     off = probe.off_um[0] - gripper.off_um[0], probe.off_um[1] - gripper.off_um[1]
@@ -144,7 +144,7 @@ def distrust(work: FibreWork) -> None:
         work.calibration.book.forget(key, work.gripper.name)
 
 
-def _note(work: FibreWork, gripper: TipSeen, moved: Off, limit_um: float) -> None:
+def _note(work: FibreWork, gripper: TipOff, moved: Off, limit_um: float) -> None:
     book, now_s = work.calibration.book, work.clock.now_s()
     for key in (PLATE, HELD, PROBE):
         entry = book.get(key, work.gripper.name)
@@ -155,7 +155,7 @@ def _note(work: FibreWork, gripper: TipSeen, moved: Off, limit_um: float) -> Non
                 values["seen_x_um"], values["seen_y_um"] = work.calibration.seen_off_um
             book.confirm(replace(entry, values=values), now_s)
     book.put(
-        Entry(
+        CalibrationEntry(
             DRIFT,
             work.gripper.name,
             {

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from typing_extensions import override
 
-from cosmic.autonomy.calibrating.book import Entry
+from cosmic.autonomy.calibrating.book import CalibrationEntry
 from cosmic.autonomy.calibrating.calibrated import Calibrated, Holds
 from cosmic.autonomy.calibrating.focusing import (
     Found,
@@ -133,7 +133,7 @@ class HeightByFocus(Calibrated):
         self.kept(work, std_um, "um", settings.height_um, values=values, how=how)
 
     @override
-    def restore(self, work: FibreWork, entry: Entry) -> None:
+    def restore(self, work: FibreWork, entry: CalibrationEntry) -> None:
         work.calibration.up_um |= {
             work.gripper.name: entry.values["up_um"],
             work.probe.name: entry.values["probe_up_um"],
@@ -145,7 +145,7 @@ class HeightByFocus(Calibrated):
         return f"{super().made_with(work)}, {work.probe.name} at {tip}"
 
     @override
-    def check(self, work: FibreWork, entry: Entry) -> Holds:
+    def check(self, work: FibreWork, entry: CalibrationEntry) -> Holds:
         """Focus on the plate and on the tip once, and see that they are as far apart as before."""
         zoom, begun = entry.values["zoom"], focus_now(work)
         try:

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from typing_extensions import override
 
-from cosmic.autonomy.calibrating.book import Entry
+from cosmic.autonomy.calibrating.book import CalibrationEntry
 from cosmic.autonomy.calibrating.calibrated import Calibrated
 from cosmic.autonomy.handling.force import ForceMean
 from cosmic.autonomy.handling.jaws import move_jaws
@@ -137,7 +137,7 @@ class TouchJaw(Calibrated):
         self.kept(work, float(std_um), "um", settings.touch_std_um, values=values, how=how)
 
     @override
-    def restore(self, work: FibreWork, entry: Entry) -> None:
+    def restore(self, work: FibreWork, entry: CalibrationEntry) -> None:
         off_x, _ = work.calibration.probe_off_um
         work.calibration.probe_off_um = off_x, entry.values["off_y_um"]
 

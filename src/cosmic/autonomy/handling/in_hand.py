@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.span import Span
-from cosmic.autonomy.calibrating.book import Book
+from cosmic.autonomy.calibrating.book import CalibrationBook
 from cosmic.autonomy.handling.plate import PlateFrame, Reach
 from cosmic.autonomy.handling.sight import SeenFibre
 from cosmic.autonomy.procedures.operation import OperationFailed
@@ -45,7 +45,7 @@ class Calibration:
         The probe has gone to a jaw, and not come back yet.
     up_um : dict of str to float
         How much higher above the plate the tip of each tool is than its stages say.
-    book : Book
+    book : CalibrationBook
         Where it is kept beyond this work.
     """
 
@@ -56,7 +56,7 @@ class Calibration:
     drift_looked_at: int = 0
     touching: bool = False
     up_um: dict[str, float] = field(default_factory=dict)
-    book: Book = field(default_factory=Book)
+    book: CalibrationBook = field(default_factory=CalibrationBook)
 
     def fresh(self, name: str, now_s: float, age_s: float) -> bool:
         """Return whether a calibration is there and not too old."""

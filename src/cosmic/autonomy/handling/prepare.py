@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from typing_extensions import override
 
-from cosmic.autonomy.calibrating.book import Entry
+from cosmic.autonomy.calibrating.book import CalibrationEntry
 from cosmic.autonomy.calibrating.calibrated import Calibrated
 from cosmic.autonomy.handling.jaws import in_step, zero_jaws
 from cosmic.autonomy.handling.operation import FibreOperation
@@ -189,7 +189,7 @@ class ComparePlaces(Calibrated):
         self.kept(work, residual, "px", settings.residual_px, values=values, how="one picture")
 
     @override
-    def restore(self, work: FibreWork, entry: Entry) -> None:
+    def restore(self, work: FibreWork, entry: CalibrationEntry) -> None:
         known, values = work.calibration, entry.values
         known.probe_off_um = values["off_x_um"], values["off_y_um"]
         known.seen_off_um = values["seen_x_um"], values["seen_y_um"]

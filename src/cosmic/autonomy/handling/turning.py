@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from typing_extensions import override
 
-from cosmic.autonomy.calibrating.book import Entry
+from cosmic.autonomy.calibrating.book import CalibrationEntry
 from cosmic.autonomy.calibrating.calibrated import Calibrated
 from cosmic.autonomy.handling.plate import Candidate, PlateFrame
 from cosmic.autonomy.handling.prepare import TABLE, clear_picture
@@ -62,7 +62,7 @@ class FindRotationCentre(Calibrated):
         raise NotAvailable(why)
 
     @override
-    def restore(self, work: FibreWork, entry: Entry) -> None:
+    def restore(self, work: FibreWork, entry: CalibrationEntry) -> None:
         centre_um = entry.values["centre_x_um"], entry.values["centre_y_um"]
         _put_in_force(work, PlateFrame(centre_um))
 

@@ -5,15 +5,20 @@ from pathlib import Path
 
 import pytest
 
-from cosmic.autonomy.calibrating.book import FILE, Book, Entry, Standing
+from cosmic.autonomy.calibrating.book import (
+    FILE,
+    CalibrationBook,
+    CalibrationEntry,
+    CalibrationStanding,
+)
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import ConfigError
 
 NOON = datetime(2026, 11, 21, 12, 0, tzinfo=UTC)
 
 
-def entry(book: Book, name: str = "height", residual: float = 2.0) -> Entry:
-    return Entry(
+def entry(book: CalibrationBook, name: str = "height", residual: float = 2.0) -> CalibrationEntry:
+    return CalibrationEntry(
         name, "left", {"up_um": 38.5}, residual, "um", 12.0, book.now(), 10.0, book.session
     )
 
@@ -24,51 +29,53 @@ def clock() -> ManualClock:
 
 
 @pytest.fixture
-def book(tmp_path: Path, clock: ManualClock) -> Book:
-    return Book(tmp_path / "kept", "1.2", clock, lambda: NOON)
+def book(tmp_path: Path, clock: ManualClock) -> CalibrationBook:
+    return CalibrationBook(tmp_path / "kept", "1.2", clock, lambda: NOON)
 
 
 def test_what_was_put_is_in_force_and_fresh_until_it_is_too_old(
-    book: Book, clock: ManualClock
+    book: CalibrationBook, clock: ManualClock
 ) -> None:
     book.put(entry(book))
     found = book.get("height", "left")
     assert found is not None
     assert (found.values, found.version) == ({"up_um": 38.5}, "1.2")
-    assert book.standing(found, 600.0) is Standing.FRESH
+    assert book.standing(found, 600.0) is CalibrationStanding.FRESH
     clock.advance(500.0)
     assert book.age_s(found) == pytest.approx(490.0)
     clock.advance(200.0)
-    assert book.standing(found, 600.0) is Standing.STALE
+    assert book.standing(found, 600.0) is CalibrationStanding.STALE
 
 
 def test_after_a_restart_it_is_there_but_is_to_be_looked_at_first(
-    book: Book, tmp_path: Path
+    book: CalibrationBook, tmp_path: Path
 ) -> None:
     book.put(entry(book))
-    later = Book(tmp_path / "kept", "1.3", ManualClock(), lambda: NOON + timedelta(minutes=5))
+    later = CalibrationBook(
+        tmp_path / "kept", "1.3", ManualClock(), lambda: NOON + timedelta(minutes=5)
+    )
     found = later.get("height", "left")
     assert found is not None
     assert found.version == "1.2"
     assert later.age_s(found) == 300.0
-    assert later.standing(found) is Standing.UNCHECKED
-    assert later.standing(found, 200.0) is Standing.STALE
+    assert later.standing(found) is CalibrationStanding.UNCHECKED
+    assert later.standing(found, 200.0) is CalibrationStanding.STALE
     holds = later.confirm(found, now_s=20.0)
-    assert later.standing(holds) is Standing.FRESH
+    assert later.standing(holds) is CalibrationStanding.FRESH
     assert holds.checked == NOON + timedelta(minutes=5)
     assert later.age_s(holds) == pytest.approx(280.0), "it was made when it was made"
 
 
-def test_a_poor_one_is_listed_with_its_reason_and_never_in_force(book: Book) -> None:
+def test_a_poor_one_is_listed_with_its_reason_and_never_in_force(book: CalibrationBook) -> None:
     book.put(entry(book))
     book.refuse(entry(book, residual=30.0), "residual 30 um, at most 12 is allowed")
     assert book.get("height", "left") is None
     (listed,) = book.entries
-    assert book.standing(listed) is Standing.POOR
+    assert book.standing(listed) is CalibrationStanding.POOR
     assert "30 um" in listed.problem
 
 
-def test_one_is_forgotten_and_listeners_are_told(book: Book) -> None:
+def test_one_is_forgotten_and_listeners_are_told(book: CalibrationBook) -> None:
     told: list[int] = []
     forget = book.on_change(lambda: told.append(len(book.entries)))
     book.put(entry(book))
@@ -78,22 +85,22 @@ def test_one_is_forgotten_and_listeners_are_told(book: Book) -> None:
     assert told == [1, 0]
 
 
-def test_any_text_comes_back_as_it_was(book: Book, tmp_path: Path) -> None:
+def test_any_text_comes_back_as_it_was(book: CalibrationBook, tmp_path: Path) -> None:
     text = 'a "quoted" \\ name\twith µ, \x7f and\nlines'
     book.refuse(entry(book), text)
-    (again,) = Book(tmp_path / "kept").entries
+    (again,) = CalibrationBook(tmp_path / "kept").entries
     assert again.problem == text
 
 
-def test_a_broken_file_is_refused_with_its_key(book: Book, tmp_path: Path) -> None:
+def test_a_broken_file_is_refused_with_its_key(book: CalibrationBook, tmp_path: Path) -> None:
     book.put(entry(book))
     path = tmp_path / "kept" / FILE
     path.write_text(path.read_text().replace("residual = 2.0", 'residual = "good"'))
     with pytest.raises(ConfigError, match=r"calibrations\.toml: entry\[0\]\.residual"):
-        Book(tmp_path / "kept")
+        CalibrationBook(tmp_path / "kept")
 
 
 def test_without_a_folder_nothing_is_written(clock: ManualClock) -> None:
-    book = Book(clock=clock)
+    book = CalibrationBook(clock=clock)
     book.put(entry(book))
     assert len(book.entries) == 1

@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from cosmic.autonomy.calibrating.book import Entry
-from cosmic.autonomy.calibrating.drift import DRIFT, CheckDrift, TipSeen, follow
+from cosmic.autonomy.calibrating.book import CalibrationEntry
+from cosmic.autonomy.calibrating.drift import DRIFT, CheckDrift, TipOff, follow
 from cosmic.autonomy.calibrations import Calibrations
 from cosmic.autonomy.handling.in_hand import Calibration, Measured
 from cosmic.autonomy.handling.plate import PlateFrame
@@ -36,7 +36,11 @@ class Work:
         book = self.calibration.book
         for name in (PLATE, HELD, PROBE):
             values = {"off_x_um": 1.0, "off_y_um": 2.0} if name == PROBE else {}
-            book.put(Entry(name, "left", values, 0.1, "px", 0.5, book.now(), 0.0, book.session))
+            book.put(
+                CalibrationEntry(
+                    name, "left", values, 0.1, "px", 0.5, book.now(), 0.0, book.session
+                )
+            )
             self.calibration.made[name] = Measured(0.0, 0.1, "px")
 
     def place_um(self) -> list[float]:
@@ -45,7 +49,7 @@ class Work:
 
 
 def followed(work: Any, gripper: tuple[float, float], probe: tuple[float, float]) -> Any:
-    follow(work, TipSeen(gripper, 0.2), TipSeen(probe, 0.2))
+    follow(work, TipOff(gripper, 0.2), TipOff(probe, 0.2))
     return work
 
 
@@ -79,7 +83,7 @@ def test_what_may_be_noise_is_left_alone() -> None:
     assert entry is not None
     assert entry.values["followed_from_um"] == 1.0
     unsure = Work()
-    follow(unsure, TipSeen((2.0, 0.0), 0.9), TipSeen((3.0, 2.0), 0.9))  # type: ignore[arg-type]
+    follow(unsure, TipOff((2.0, 0.0), 0.9), TipOff((3.0, 2.0), 0.9))  # type: ignore[arg-type]
     assert unsure.place_um() == before, "at that zoom 1 um cannot be told"
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typing_extensions import override
 
-from cosmic.autonomy.calibrating.book import Book, Standing
+from cosmic.autonomy.calibrating.book import CalibrationBook, CalibrationStanding
 from cosmic.autonomy.calibrating.calibrated import POOR
 from cosmic.autonomy.calibrating.heights import HEIGHTS, HeightByFocus
 from cosmic.autonomy.handling.settings import HandlingSettings
@@ -145,7 +145,7 @@ def test_on_a_bare_plate_no_height_is_found_and_none_is_put_in_force() -> None:
     assert e.value.cause == POOR
     assert bench.calibration.up_um == {}
     (entry,) = bench.calibration.book.entries
-    assert bench.calibration.book.standing(entry) is Standing.POOR
+    assert bench.calibration.book.standing(entry) is CalibrationStanding.POOR
 
 
 def test_one_of_an_earlier_start_is_looked_at_and_taken_where_it_holds() -> None:
@@ -161,9 +161,9 @@ def test_one_of_an_earlier_start_is_looked_at_and_taken_where_it_holds() -> None
     assert moved.up_um(GRIPPER) == pytest.approx(70.0, abs=5.0), "measured anew"
 
 
-def later(book: Book) -> Book:
+def later(book: CalibrationBook) -> CalibrationBook:
     """Return the same book after a restart."""
-    again = Book()
+    again = CalibrationBook()
     for entry in book.entries:
         again._known[entry.key] = entry
     return again
