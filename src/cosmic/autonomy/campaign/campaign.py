@@ -2,19 +2,16 @@
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from typing import Final
 
 from cosmic.autonomy.campaign.keeper import Keeper, skip_known
+from cosmic.autonomy.campaign.keeping import CampaignKeeping
 from cosmic.autonomy.campaign.recipe import Recipe
-from cosmic.autonomy.campaign.records import FibreRecord
 from cosmic.autonomy.campaign.resume import ResumePlan
-from cosmic.autonomy.campaign.statistics import CampaignProgress
-from cosmic.autonomy.campaign.steering import OVER, CampaignPhase, CampaignSteering
+from cosmic.autonomy.campaign.steering import OVER, CampaignPhase
 from cosmic.autonomy.campaign.stop_rule import StopRule
 from cosmic.autonomy.campaign.store import CampaignStore
-from cosmic.autonomy.campaign.store_files import NotWrittenError
 from cosmic.autonomy.handling.survey import NONE_LEFT
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.failures import STOPPED, ProcedureAborted
@@ -22,7 +19,6 @@ from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun
 from cosmic.autonomy.procedures.run_thread import RunThread
-from cosmic.autonomy.procedures.times import OperationTimes
 from cosmic.autonomy.procedures.tree import OPERATION, NodeEvent, NodeState
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
@@ -49,7 +45,7 @@ class Doing:
     measures: bool = True
 
 
-class Campaign(CampaignSteering):
+class Campaign(CampaignKeeping):
     """Runs a procedure again and again on one platform, and keeps what comes of it; any thread.
 
     Parameters
@@ -81,23 +77,15 @@ class Campaign(CampaignSteering):
         stopped: Callable[[], str | None],
         known: ResumePlan | None = None,
     ) -> None:
-        super().__init__()
-        self.work = work
+        keeper = Keeper(work, store, measures=doing.measures, pictures=recipe.file.output.pictures)
+        super().__init__(work, keeper, StopRule(recipe.file.stop))
         self.recipe = recipe
         self.store = store
         self._doing = doing
         self._policy = policy
         self._stopped = stopped
         self._known = known
-        self._rule = StopRule(recipe.file.stop)
-        self._keeper = Keeper(
-            work, store, measures=doing.measures, pictures=recipe.file.output.pictures
-        )
         self._broken: CosmicError | None = None
-        self._unwritten = False
-        self._kept = 0
-        self._stuck = 0
-        work.bench.enough = self._enough
         self._end_reason = ""
         self._thread: RunThread | None = None
 
@@ -112,21 +100,6 @@ class Campaign(CampaignSteering):
     def end_reason(self) -> str:
         """Why it ended; empty before."""
         return self._end_reason
-
-    @property
-    def fibres(self) -> tuple[FibreRecord, ...]:
-        """All fibres so far without curves and pictures, those of earlier runs included."""
-        return self._keeper.fibres
-
-    @property
-    def times(self) -> OperationTimes:
-        """How long operations took, and what they failed with."""
-        return self._keeper.times
-
-    @property
-    def progress(self) -> CampaignProgress:
-        """How it stands."""
-        return self._keeper.progress()
 
     @property
     def left_s(self) -> float:
@@ -274,36 +247,6 @@ class Campaign(CampaignSteering):
             return f"{self._stuck} fibres in a row could not be put away, the last: {failure}"
         return ""
 
-    def _keep_held(self, hand: FibreWork, failure: OperationFailed) -> None:
-        """Keep a fibre that could not be put away."""
-        fibre, hand.fibre = hand.fibre, None
-        if fibre is not None:
-            fibre.failure = fibre.failure or failure
-            self._insist(lambda: self._keeper.keep(fibre))
-
-    def _keep_cut_off(self, reason: str) -> None:
-        """Keep the fibres of a run that was cut off: one that was done with by then is no less."""
-        self._keep_finished()
-        for fibre in self._keeper.in_work:
-            self._insist(partial(self._keeper.keep, fibre, interrupted=reason))
-
-    def _keep_finished(self) -> None:
-        """Keep the fibres that were done with and are not kept yet."""
-        while self._kept < len(self.work.finished):
-            fibre = self.work.finished[self._kept]
-            with self.work.clock.at_work():
-                self._insist(partial(self._keeper.keep, fibre))
-            self._kept += 1
-            self._stuck = 0
-            self._tell()
-        self._unwritten = False
-
-    def _enough(self) -> bool:
-        """Tell whether no further fibre is to be begun, if those in work become good ones."""
-        now, more = self.progress, len(self._keeper.in_work)
-        then = replace(now, done=now.done + more, good=now.good + more)
-        return self._unwritten or self._abort is not None or bool(self._rule.reason(then))
-
     # What happens meanwhile
 
     def _on_event(self, event: NodeEvent) -> None:
@@ -317,16 +260,3 @@ class Campaign(CampaignSteering):
             self._broken = exc
             if self._run is not None:
                 self._run.abort(str(exc))
-
-    def _keep_meanwhile(self) -> None:
-        """Keep what one hand is done with, while the other goes on."""
-        while self._kept < len(self.work.finished):
-            try:
-                self._keeper.keep(self.work.finished[self._kept])
-            except NotWrittenError as exc:
-                # Once both hands are done with theirs, it is tried again.
-                logger.error("%s; no further fibre is begun", exc)
-                self._unwritten = True
-                return
-            self._kept += 1
-            self._tell()

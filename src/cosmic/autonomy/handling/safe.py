@@ -10,7 +10,8 @@ def make_safe(work: FibreWork) -> Steps:
     work.surveyed, work.zoomed = False, None
     for hand in work.hands:
         hand.ready = False
-    yield from retract_probe(work)
+    touching = [hand for hand in work.hands if hand.calibration.touching]
+    yield from retract_probe((touching or [work])[0])
     with work.mico.collision.contact("grasp"):
         for hand in work.hands:
             yield hand.go_up(max(hand.settings.places.travel_um, hand.height_now()))
