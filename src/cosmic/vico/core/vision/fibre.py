@@ -24,7 +24,7 @@ class Fibre:
     projected_length_px : float
         The largest distance between two of its points.
     width_px : float
-        The mean of its width, between the places of half its contrast.
+        The mean of its width, of a blurred hollow bar that was fitted to its cross section.
     area_px2 : float
         Length times width; where it crosses itself both layers count.
     ends_px : ndarray, shape (2, 2), float64
