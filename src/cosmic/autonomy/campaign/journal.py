@@ -1,9 +1,13 @@
 """The journal: what is about to be done is written down before it is done."""
 
 from collections.abc import Callable
+from typing import Final
 
 from cosmic.autonomy.campaign.records import Value
 from cosmic.autonomy.campaign.store import CampaignStore
+
+FELL: Final = "fell"
+"""Phase of a line about a measured fibre that lies on the plate again, nobody knows where."""
 
 
 class Journal:

@@ -7,13 +7,14 @@ from typing import Final
 import numpy as np
 
 from cosmic.autonomy.campaign.fibre_notes import felt_s, pose_of, record_of
-from cosmic.autonomy.campaign.journal import Journal
+from cosmic.autonomy.campaign.journal import FELL, Journal
 from cosmic.autonomy.campaign.motion_log import MotionLog
 from cosmic.autonomy.campaign.records import CalibrationNote, FibreRecord
-from cosmic.autonomy.campaign.resume import Known, ResumePlan
+from cosmic.autonomy.campaign.resume import Fallen, Known, ResumePlan
 from cosmic.autonomy.campaign.statistics import CampaignProgress, progress
 from cosmic.autonomy.campaign.store import CampaignStore
-from cosmic.autonomy.handling.plate import Candidate
+from cosmic.autonomy.handling.plate import Candidate, Reach
+from cosmic.autonomy.handling.put_away import ToBin
 from cosmic.autonomy.handling.work import FibreInHand, FibreWork
 from cosmic.autonomy.procedures.times import OperationTimes
 from cosmic.autonomy.procedures.tree import OPERATION, NodeEvent, NodeState
@@ -107,6 +108,15 @@ class Keeper:
         found = next((each for each in self._in_work if each.fibre is fibre), None)
         if found is None or fibre is None:
             return
+        if any(each is fibre for each in self._work.spilled):
+            self._journal.fibre = found.number
+            self._journal.note(
+                ToBin.name,
+                FELL,
+                length_um=fibre.length_um,
+                width_um=fibre.width_um,
+                curl=fibre.curl,
+            )
         self.store.finish_fibre(
             record_of(
                 fibre,
@@ -157,6 +167,13 @@ def skip_known(work: FibreWork, plan: ResumePlan) -> None:
     """
     work.distrusted = plan.cut_off
     work.given_up += [_as_candidate(each) for each in plan.known]
+    work.spilled += [_as_spilled(each) for each in plan.fallen]
+
+
+def _as_spilled(fallen: Fallen) -> FibreInHand:
+    line = np.array([[0.0, 0.0], [fallen.length_um, 0.0]])
+    candidate = Candidate(line, fallen.length_um, fallen.width_um, fallen.curl, 0.0)
+    return FibreInHand(fallen.number, Reach(candidate, 0.0, line, (0.0, 0.0)))
 
 
 def _as_candidate(known: Known) -> Candidate:

@@ -4,10 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from cosmic.autonomy.campaign.journal import FELL
 from cosmic.autonomy.campaign.records import FINISHED, FibreRecord, JournalEntry, Outcome, Pose
 from cosmic.autonomy.campaign.store import CampaignStore
 
 JOURNAL_LINES: Final = 20
+LOOKS: Final = ("length_um", "width_um", "curl")
 SAME_PLACE_UM: Final = 150.0
 SAME_LENGTH_PART: Final = 0.05
 SAME_ANGLE_DEG: Final = 15.0
@@ -22,6 +24,16 @@ class Known:
     number: int
     pose: Pose
     length_um: float
+
+
+@dataclass(frozen=True, slots=True)
+class Fallen:
+    """A fibre that was measured and fell where nobody saw it: known by what it looks like only."""
+
+    number: int
+    length_um: float
+    width_um: float
+    curl: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +53,8 @@ class ResumePlan:
         Fibres to be skipped where they are found again.
     last : tuple of JournalEntry
         What was about to be done, oldest first.
+    fallen : tuple of Fallen
+        Finished fibres that lie on the plate again; one like each of them is skipped.
     cut_off : bool
         The run before ended without a word, as when the program is killed.
     """
@@ -49,6 +63,7 @@ class ResumePlan:
     interrupted: tuple[int, ...]
     known: tuple[Known, ...]
     last: tuple[JournalEntry, ...]
+    fallen: tuple[Fallen, ...] = ()
     cut_off: bool = False
 
     def is_done(self, pose: Pose, length_um: float) -> bool:
@@ -71,7 +86,18 @@ def resume(store: CampaignStore) -> ResumePlan:
         interrupted=tuple(interrupted),
         known=_known(fibres),
         last=store.reader.journal(JOURNAL_LINES),
+        fallen=_fallen(fibres, store.reader.phase(FELL)),
         cut_off=store.reader.cut_off(),
+    )
+
+
+def _fallen(fibres: Sequence[FibreRecord], lines: Sequence[JournalEntry]) -> tuple[Fallen, ...]:
+    """Return the finished ones: what was written before a record that never was counts nothing."""
+    finished = {each.number for each in fibres if each.outcome in FINISHED}
+    return tuple(
+        Fallen(each.fibre, **{name: float(str(each.payload[name])) for name in LOOKS})
+        for each in lines
+        if each.fibre is not None and each.fibre in finished
     )
 
 

@@ -165,17 +165,12 @@ class CampaignReader:
         rows = self._rows(
             "SELECT * FROM journal ORDER BY number DESC LIMIT ?", -1 if last is None else last
         )
-        return tuple(
-            JournalEntry(
-                number=int(number(row["number"])),
-                fibre=None if row["fibre"] is None else int(row["fibre"]),
-                time_s=number(row["time_s"]),
-                operation=str(row["operation"]),
-                phase=str(row["phase"]),
-                payload=json.loads(str(row["payload_json"])),
-            )
-            for row in reversed(rows)
-        )
+        return tuple(_entry(row) for row in reversed(rows))
+
+    def phase(self, phase: str) -> tuple[JournalEntry, ...]:
+        """Return the lines of the journal of one phase, oldest first."""
+        rows = self._rows("SELECT * FROM journal WHERE phase = ? ORDER BY number", phase)
+        return tuple(_entry(row) for row in rows)
 
     # ------------------------------------------------------------------ inside
 
@@ -203,6 +198,17 @@ class CampaignReader:
         for row in self._rows(query):
             found.setdefault(row["fibre"], []).append(row)
         return found
+
+
+def _entry(row: Row) -> JournalEntry:
+    return JournalEntry(
+        number=int(number(row["number"])),
+        fibre=None if row["fibre"] is None else int(row["fibre"]),
+        time_s=number(row["time_s"]),
+        operation=str(row["operation"]),
+        phase=str(row["phase"]),
+        payload=json.loads(str(row["payload_json"])),
+    )
 
 
 def _address(file: Path) -> str:

@@ -3,12 +3,19 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 
+from cosmic.autonomy.campaign.journal import FELL
+from cosmic.autonomy.campaign.keeper import skip_known
 from cosmic.autonomy.campaign.records import Outcome, Pose
-from cosmic.autonomy.campaign.resume import resume
+from cosmic.autonomy.campaign.resume import Fallen, resume
 from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.handling.plate import Candidate
+from cosmic.autonomy.handling.survey import MEASURED, leave_spilled
 from unit.autonomy.campaign.sample_records import INFO, failed, good
 
 LEFT_THERE = Pose(1000.0, -500.0, 20.0)
@@ -84,3 +91,45 @@ def test_another_fibre_at_the_place_of_an_interrupted_one_is_not_taken_for_it(
     assert plan.is_done(LEFT_THERE, 1510.0)
     assert not plan.is_done(LEFT_THERE, 2500.0)
     assert [each.length_um for each in plan.known] == [1500.0, 1500.0]
+
+
+LOOKS = {"length_um": 1510.0, "width_um": 31.0, "curl": 0.012}
+
+
+def test_a_measured_fibre_that_fell_is_known_by_its_looks(store: CampaignStore) -> None:
+    number = store.begin_fibre(LEFT_THERE, time_s=0.0)
+    store.note("carry to the bin", FELL, LOOKS, time_s=9.0, fibre=number)
+    store.finish_fibre(good(number))
+    assert resume(store).fallen == (Fallen(number, 1510.0, 31.0, 0.012),)
+
+
+def test_one_that_fell_before_its_record_was_written_may_be_measured_again(
+    store: CampaignStore,
+) -> None:
+    number = store.begin_fibre(LEFT_THERE, time_s=0.0)
+    store.note("carry to the bin", FELL, LOOKS, time_s=9.0, fibre=number)
+    assert resume(store).fallen == ()
+
+
+def test_a_run_that_ended_without_a_word_is_told_from_one_that_said_why(tmp_path: Path) -> None:
+    with CampaignStore.create(tmp_path, INFO) as begun:
+        assert not resume(begun).cut_off, "it is the first"
+    with CampaignStore.open(tmp_path) as after_kill:
+        assert resume(after_kill).cut_off
+        after_kill.end("1 fibres done", time_s=3.0)
+    with CampaignStore.open(tmp_path) as after_end:
+        assert not resume(after_end).cut_off
+
+
+def test_what_looks_like_one_that_fell_is_not_taken_after_the_restart(
+    store: CampaignStore,
+) -> None:
+    number = store.begin_fibre(LEFT_THERE, time_s=0.0)
+    store.note("carry to the bin", FELL, LOOKS, time_s=9.0, fibre=number)
+    store.finish_fibre(good(number))
+    work: Any = SimpleNamespace(distrusted=False, given_up=[], spilled=[])
+    skip_known(work, resume(store))
+    line = np.array([[0.0, 0.0], [1511.0, 0.0]])
+    alike, other = (Candidate(line, length, 31.2, 0.013, 60.0) for length in (1511.0, 1200.0))
+    left = leave_spilled([other, alike], work.spilled)
+    assert [each.problem for each in left] == ["", MEASURED]
