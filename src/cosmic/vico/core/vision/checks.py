@@ -102,6 +102,23 @@ def dirty_end(course: Course) -> bool:
     return False
 
 
+def uneven_ends(course: Course) -> float:
+    """Return by how many pixels more of a fibre is missing at one end than at the other.
+
+    A speck of dirt that lengthens it is seldom as dark as the fibre.
+    """
+    count = max(6, int(2.5 * course.width / STEP_PX))
+    if len(course.contrast) < 4 * count:
+        return 0.0
+    missing = []
+    for values in (course.contrast, course.contrast[::-1]):
+        usual = float(np.median(values[count : 2 * count]))
+        missing.append(
+            STEP_PX * float(np.maximum(1.0 - values[:count] / max(usual, 1e-6), 0).sum())
+        )
+    return abs(missing[0] - missing[1])
+
+
 def width_spread(course: Course) -> float:
     """Return the robust relative spread of a fibre's width."""
     widths = course.widths[np.isfinite(course.widths)]

@@ -180,7 +180,8 @@ def length_deviation(course: Course, length: float) -> float:
     """Return the standard deviation of the length."""
     ends = sum(end.std_px**2 for end in course.ends)
     hidden = float((~course.good).sum()) * 2.0
-    return float(np.sqrt(ends + (2e-4 * length) ** 2 + (0.004 * hidden) ** 2))
+    dirt = 2.0 * max(0.0, checks.uneven_ends(course) - 1.0)
+    return float(np.sqrt(ends + (2e-4 * length) ** 2 + (0.004 * hidden) ** 2 + dirt**2))
 
 
 def width_deviation(course: Course, section: Section) -> float:
