@@ -11,6 +11,11 @@ from cosmic.app.remote_station import StationControl
 from cosmic.autonomy.bending.plan import PlannedSpan
 from cosmic.autonomy.bending.result import BendingError, BendingResult, Quality, SpanFit
 from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.calibrating.book import (
+    CalibrationBook,
+    CalibrationEntry,
+    CalibrationStanding,
+)
 from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.records import CampaignError, FibreRecord, Outcome, Shape
 from cosmic.autonomy.campaign.statistics import CampaignProgress, MeanEi
@@ -171,6 +176,8 @@ CLASSES: Final[dict[str, type]] = {
     "CampaignReader": CampaignReader,
     "FibreRecord": FibreRecord,
     "Shape": Shape,
+    "CalibrationBook": CalibrationBook,
+    "CalibrationEntry": CalibrationEntry,
 }
 ENUMS: Final[dict[str, type[Enum]]] = {
     "Reason": cosmic.Reason,
@@ -191,6 +198,7 @@ ENUMS: Final[dict[str, type[Enum]]] = {
     "NodeState": NodeState,
     "Quality": Quality,
     "Outcome": Outcome,
+    "CalibrationStanding": CalibrationStanding,
 }
 # Exceptions that a script may want to name and that `cosmic` does not export.
 FURTHER_EXCEPTIONS: Final = (

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from cosmic.app.cli_calibrate import add_calibrate_command
 from cosmic.app.cli_campaign import add_campaign_command
 from cosmic.app.cli_stations import (
     add_station_commands,
@@ -49,8 +50,8 @@ def _carry_out(chosen: argparse.Namespace, parser: argparse.ArgumentParser) -> i
         return _export(chosen)
     if chosen.command == "certificates":
         return make_certificates(chosen)
-    if chosen.command == "campaign":
-        return _campaign(chosen)
+    if chosen.command in _BY_THEMSELVES:
+        return _BY_THEMSELVES[chosen.command](chosen)
     if chosen.rate is None:
         chosen.rate = 1.0
     if chosen.command == "serve":
@@ -116,6 +117,16 @@ def _campaign(chosen: argparse.Namespace) -> int:
     from cosmic.app.campaign_command import run_campaign
 
     return run_campaign(chosen)
+
+
+def _calibrate(chosen: argparse.Namespace) -> int:
+    from cosmic.app.calibrate_command import run_calibrate
+
+    return run_calibrate(chosen)
+
+
+_BY_THEMSELVES: Final = {"campaign": _campaign, "calibrate": _calibrate}
+"""Commands that carry something out on a platform of their own."""
 
 
 def _init(folder: Path) -> int:
@@ -226,6 +237,7 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--overwrite", action="store_true", help="replace a file that exists")
     add_station_commands(commands, platform)
     add_campaign_command(commands, platform)
+    add_calibrate_command(commands, platform)
     return parser
 
 

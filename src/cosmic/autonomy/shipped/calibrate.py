@@ -60,7 +60,7 @@ def build_calibrate(
         InitialiseAgain(),
         ClearUp(),
         MakeReady(),
-        HeightByFocus(),
+        Fallback("heights", HeightByFocus(), HeightsAsFiled()),
         *(_tried(settings, each) for each in everything),
         Survey(),
         FindRotationCentre(),

@@ -1,0 +1,48 @@
+"""``cosmic calibrate``: calibrates the platform without a window, and says what is in force."""
+
+import argparse
+import sys
+from typing import Final
+
+from cosmic.app.connect import connect
+from cosmic.autonomy.calibrating.book import CalibrationBook, CalibrationEntry, CalibrationStanding
+from cosmic.autonomy.procedures.tree import OPERATION, NodeEvent, NodeState
+from cosmic.frame.errors import CosmicError
+
+_ENDS: Final = {NodeState.DONE, NodeState.FAILED}
+
+
+def run_calibrate(chosen: argparse.Namespace) -> int:
+    """Calibrate, and return the exit code.
+
+    Raises
+    ------
+    CosmicError
+        The configuration is wrong, or there is no such calibration; nothing has moved.
+    """
+    rate = 1.0 if chosen.rate is None else chosen.rate
+    with connect(
+        chosen.config, rate=rate, cold=chosen.cold, sample=chosen.sample, truth=chosen.truth
+    ) as rig:
+        run = rig.calibrate(anew=chosen.anew, zooms=chosen.zooms)
+        run.subscribe(_tell)
+        try:
+            run.run_here()
+        except CosmicError as exc:
+            sys.stderr.write(f"{exc}\n")
+        for each in rig.calibrations.entries:
+            sys.stdout.write(f"{line_of(rig.calibrations, each)}\n")
+        book = rig.calibrations
+        poor = any(book.standing(each) is CalibrationStanding.POOR for each in book.entries)
+        return 1 if poor or run.failure is not None else 0
+
+
+def line_of(book: CalibrationBook, entry: CalibrationEntry) -> str:
+    """Return a calibration in one line."""
+    quality = entry.problem or f"{entry.residual:.2g} {entry.unit}, at most {entry.largest:g}"
+    return f"{entry.name} ({entry.tool}): {book.standing(entry)}, {quality}"
+
+
+def _tell(event: NodeEvent) -> None:
+    if event.kind == OPERATION and event.state in _ENDS:
+        sys.stderr.write(f"{event.name}: {event.state}\n")
