@@ -158,7 +158,7 @@ def _asynchronous(session: Session, base: str, operation: Operation) -> Body:
             device.advance(now_s)
             values, status = _run(operation, channel, now_s, args)
             if status >= _FIRST_HARDWARE_ERROR:
-                channel.reports.error(status, now_s)
+                channel.post_error(status, now_s)
             elif operation.packet:
                 data = operation.data(args, values)
                 device.post((operation.packet, channel_index, *data), now_s)
