@@ -98,7 +98,7 @@ def remote_mico(
             application.shut_down()
 
 
-def wait_for(condition: Callable[[], object], timeout_s: float = 5.0) -> None:
+def wait_for(condition: Callable[[], object], timeout_s: float = 20.0) -> None:
     until_s = WALL.now_s() + timeout_s
     while not condition():
         assert WALL.now_s() < until_s, "it did not happen"

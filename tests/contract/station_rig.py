@@ -146,7 +146,7 @@ def free_port() -> int:
         return port
 
 
-def wait_until(condition: Callable[[], Any], timeout_s: float = 5.0) -> bool:
+def wait_until(condition: Callable[[], Any], timeout_s: float = 20.0) -> bool:
     """Look every 5 ms until `condition` holds; False when it did not in time."""
     until_s = WALL.now_s() + timeout_s
     while not condition():

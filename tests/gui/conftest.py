@@ -1,11 +1,13 @@
 """Windows over the shipped platform, without the time that its gate's process takes to start."""
 
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Callable, Iterator, Mapping, Set
 from functools import cache
 from pathlib import Path
 from threading import Lock
 
 import pytest
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
 from cosmic.app import platform_file
@@ -15,6 +17,23 @@ from cosmic.mico.core.collision.collision_manager import Answering
 from cosmic.mico.core.collision.free_way import free_way
 from cosmic.mico.core.collision.model import BodyPair, SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
+
+PATIENCE_MS = 20_000
+
+
+class PatientBot(QtBot):
+    """Waits for a condition as long as a computer may need that does much else."""
+
+    @override
+    def waitUntil(self, callback: Callable[[], bool | None], *, timeout: int = PATIENCE_MS) -> None:
+        super().waitUntil(callback, timeout=timeout)
+
+
+@pytest.fixture
+def qtbot(qapp: QApplication, request: pytest.FixtureRequest) -> QtBot:
+    """Return the robot of pytest-qt, with more patience."""
+    return PatientBot(request)
+
 
 _load_scene = cache(scene_loader.load_scene)
 _sweep_of = cache(Sweep)

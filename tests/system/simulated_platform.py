@@ -36,7 +36,7 @@ def platform(
         application.shut_down()
 
 
-def wait_until(condition: Any, timeout_s: float = 5.0) -> None:
+def wait_until(condition: Any, timeout_s: float = 20.0) -> None:
     end = WALL.now_s() + timeout_s
     while not condition():
         assert WALL.now_s() < end, "it did not happen"

@@ -26,7 +26,6 @@ def with_python(page: Path) -> bool:
     return any(block.language == "python" for block in blocks(page))
 
 
-@pytest.mark.timeout(30)
 @pytest.mark.parametrize("page", list(filter(with_python, PAGES)), ids=ids)
 def test_the_python_of_a_page_runs_from_top_to_bottom(
     page: Path, qapp: QApplication, monkeypatch: pytest.MonkeyPatch, tmp_path: Path

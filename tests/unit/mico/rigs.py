@@ -63,7 +63,7 @@ def mico(
         application.shut_down()
 
 
-def wait_until(condition: Callable[[], bool], timeout_s: float = 3.0) -> None:
+def wait_until(condition: Callable[[], bool], timeout_s: float = 20.0) -> None:
     end = WALL.now_s() + timeout_s
     while not condition():
         assert WALL.now_s() < end, "it did not happen"
