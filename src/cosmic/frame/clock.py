@@ -7,7 +7,7 @@ faster than the wall. Dead-man, lease, stale-data and thread limits use `WALL`.
 import threading
 import time
 from abc import abstractmethod
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import contextmanager
 from typing import Final, Protocol
 
@@ -98,29 +98,31 @@ class RatedClock(Clock):
 
     @override
     def wait(self, condition: threading.Condition, until_s: float) -> None:
-        with self._waiting(until_s) as look_s:
-            wait_s = look_s()
-            if wait_s > 0.0:
-                condition.wait(min(wait_s, threading.TIMEOUT_MAX))
+        pace = self._pace
+        if pace is None:
+            left_s = (until_s - self.now_s()) / self._rate
+            if left_s > 0.0:
+                condition.wait(min(left_s, threading.TIMEOUT_MAX))
+            return
+        token = object()
+        left_s = pace.begin_wait(token, condition, until_s)
+        if left_s > 0.0:
+            try:
+                condition.wait(min(left_s, threading.TIMEOUT_MAX))
+            finally:
+                pace.end_wait(token)
 
     @override
     def sleep(self, duration_s: float) -> None:
-        with self._waiting(self.now_s() + duration_s) as look_s:
-            while (wait_s := look_s()) > 0.0:
-                time.sleep(min(wait_s, threading.TIMEOUT_MAX))
-
-    @contextmanager
-    def _waiting(self, until_s: float) -> Generator[Callable[[], float]]:
-        """Yield what tells for how long to wait at least, in wall time."""
-        pace = self._pace
-        if pace is None:
-            yield lambda: (until_s - self.now_s()) / self._rate
+        if self._pace is None:
+            if duration_s > 0.0:
+                time.sleep(duration_s / self._rate)
             return
-        token = object()
-        try:
-            yield lambda: pace.begin_wait(token, until_s)
-        finally:
-            pace.end_wait(token)
+        until_s = self.now_s() + duration_s
+        condition = threading.Condition()
+        with condition:
+            while self.now_s() < until_s:
+                self.wait(condition, until_s)
 
     @override
     def worker(self, *, leads: bool = False) -> Worker:

@@ -9,14 +9,15 @@ waits for it, and as the wall does while somebody is at work.
 import math
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 from typing_extensions import override
 
-LOOK_S: Final = 0.005
-"""How often somebody who waits looks again where the pace may change meanwhile, wall time."""
-WINDOW_S: Final = 0.05
-"""Over how long the pace that was reached is counted, wall time."""
+LOOK_S: Final = 0.02
+"""How often somebody looks again who waits while others work, and may miss their end; wall time."""
+LATE_S: Final = 0.0005
+"""How much too late somebody may wake who is not woken for it, wall time."""
 
 
 class Worker:
@@ -33,6 +34,15 @@ class Worker:
     def close(self) -> None:
         """Say that there will be no more of it."""
         return
+
+
+@dataclass(frozen=True, slots=True)
+class _Wait:
+    """Somebody waits on `condition` until `due_s`, and looks again at `look_wall_s`."""
+
+    condition: threading.Condition
+    due_s: float
+    look_wall_s: float
 
 
 class Pace:
@@ -58,16 +68,14 @@ class Pace:
         self._now_s = 0.0
         self._leading = 0
         self._busy = 0
-        self._due_s: dict[object, float] = {}
-        self._reached = rate
-        self._window = (self._wall_s, 0.0)
+        self._waits: dict[object, _Wait] = {}
 
     def now_s(self) -> float:
         """Return the time."""
         with self._lock:
             return self._settle()
 
-    def begin_wait(self, token: object, until_s: float) -> float:
+    def begin_wait(self, token: object, condition: threading.Condition, until_s: float) -> float:
         """Note that somebody waits for `until_s`; return how long to wait, in wall time.
 
         Who waits too long keeps the time from hurrying on, no more; who wakes too early, waits on.
@@ -76,24 +84,35 @@ class Pace:
             left_s = until_s - self._settle()
             if left_s <= 0.0:
                 return 0.0
-            self._due_s[token] = until_s
             wait_s = left_s / self._rate
-            if self._leading and (self._busy or min(self._due_s.values()) < until_s):
-                wait_s = max(wait_s, min(left_s / self._reached, LOOK_S))
+            if self._leading and self._busy:
+                wait_s = max(wait_s, min(left_s, LOOK_S))
+            self._waits[token] = _Wait(condition, until_s, self._wall_s + wait_s)
             return wait_s
 
     def end_wait(self, token: object) -> None:
         """Note that it goes on."""
         with self._lock:
             self._settle()
-            self._due_s.pop(token, None)
+            self._waits.pop(token, None)
 
     def change(self, *, busy: int = 0, leading: int = 0) -> None:
-        """Count workers in and out."""
+        """Count workers in and out, and wake who would wait too long from now on."""
         with self._lock:
-            self._settle()
+            now_s = self._settle()
             self._busy += busy
             self._leading += leading
+            waits = () if self._busy else tuple(self._waits.values())
+            late = [each for each in waits if self._late(each, now_s)]
+        for wait in late:
+            # The caller may hold any lock, so it waits for none: who is missed here looks again.
+            if wait.condition.acquire(blocking=False):
+                wait.condition.notify_all()
+                wait.condition.release()
+
+    def _late(self, wait: _Wait, now_s: float) -> bool:
+        due_wall_s = self._wall_s + (wait.due_s - now_s) / self._rate
+        return wait.look_wall_s > due_wall_s + LATE_S
 
     def _settle(self) -> float:
         """Bring the time up to the wall, with what was in force since the last time; locked."""
@@ -101,13 +120,10 @@ class Pace:
         passed_s, self._wall_s = wall_s - self._wall_s, wall_s
         fast_s = passed_s
         if self._leading:
-            ahead_s = min(self._due_s.values(), default=math.inf) - self._now_s
+            due_s = min((each.due_s for each in self._waits.values()), default=math.inf)
+            ahead_s = due_s - self._now_s
             fast_s = 0.0 if self._busy else min(passed_s, max(0.0, ahead_s / self._rate))
         self._now_s += fast_s * self._rate + (passed_s - fast_s)
-        began_s, then_s = self._window
-        if wall_s - began_s >= WINDOW_S:
-            self._reached = max(1.0, (self._now_s - then_s) / (wall_s - began_s))
-            self._window = (wall_s, self._now_s)
         return self._now_s
 
 

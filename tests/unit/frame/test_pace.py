@@ -2,8 +2,10 @@
 
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock, ManualClock, RatedClock
 from cosmic.frame.inbox import Inbox
@@ -38,7 +40,7 @@ def bench() -> Bench:
 
 def test_without_a_procedure_time_runs_at_its_rate_whoever_works(bench: Bench) -> None:
     bench.worker().busy()
-    bench.pace.begin_wait("somebody", 1.0)
+    bench.pace.begin_wait("somebody", threading.Condition(), 1.0)
     assert bench.passes(2.0) == pytest.approx(40.0)
 
 
@@ -69,17 +71,40 @@ def test_all_who_work_are_waited_for_while_a_procedure_is_under_way(bench: Bench
 
 def test_whoever_wakes_late_is_waited_for(bench: Bench) -> None:
     bench.worker(leads=True)
-    assert bench.pace.begin_wait("a", 10.0) == pytest.approx(0.5)
-    bench.pace.begin_wait("b", 30.0)
+    condition = threading.Condition()
+    assert bench.pace.begin_wait("a", condition, 10.0) == pytest.approx(0.5)
+    bench.pace.begin_wait("b", condition, 30.0)
     assert bench.passes(1.5) == pytest.approx(10.0 + 1.0)  # due after 0.5 s of the wall
     bench.pace.end_wait("a")
     assert bench.passes(0.5) == pytest.approx(10.0)
 
 
 def test_a_wait_for_what_has_passed_is_none(bench: Bench) -> None:
-    assert bench.pace.begin_wait("a", 0.0) == 0.0
+    assert bench.pace.begin_wait("a", threading.Condition(), 0.0) == 0.0
     bench.worker(leads=True)
     assert bench.passes(1.0) == pytest.approx(RATE)
+
+
+def test_who_waits_while_others_work_is_woken_at_their_end(bench: Bench) -> None:
+    bench.worker(leads=True)
+    working, woken = bench.worker(), list[str]()
+
+    class Told(threading.Condition):
+        @override
+        def notify_all(self) -> None:
+            woken.append("told")
+            super().notify_all()
+
+    condition = Told()
+    working.busy()
+    assert bench.pace.begin_wait("a", condition, 0.015) == pytest.approx(0.015)
+    with condition:
+        working.idle()  # it holds the lock itself, as many do
+    assert woken == ["told"]
+    working.busy()
+    with ThreadPoolExecutor(1) as pool, condition:
+        pool.submit(working.idle).result(5.0)  # and never waits for one
+    assert woken == ["told"]
 
 
 @pytest.fixture
