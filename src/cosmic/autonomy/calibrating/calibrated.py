@@ -14,7 +14,8 @@ from cosmic.vico.core.calibration_fit import CalibrationRefused
 
 POOR = "calibration poor"
 
-Holds = Generator[Wish, object, bool]
+Holds = Generator[Wish, object, CalibrationEntry | None]
+"""Of a check: the entry that holds, with what may be put right; or None."""
 
 
 class Calibrated(FibreOperation):
@@ -45,7 +46,7 @@ class Calibrated(FibreOperation):
             raise OperationFailed(POOR, f"{self.key}: {exc}") from exc
         yield SAFE_POINT
 
-    def _found(self, work: FibreWork) -> Holds:
+    def _found(self, work: FibreWork) -> Generator[Wish, object, bool]:
         """Take one from the book, where there is one that may be used, or that is seen to hold."""
         book, longest_s = work.calibration.book, work.settings.calibration.age_s
         entry = book.get(self.key, self.tool(work))
@@ -54,11 +55,12 @@ class Calibrated(FibreOperation):
         standing = book.standing(entry, longest_s)
         if standing is CalibrationStanding.UNCHECKED:
             try:
-                if not (yield from self.check(work, entry)):
-                    return False
+                holds = yield from self.check(work, entry)
             except (NotAvailable, CalibrationRefused):
                 return False
-            entry = book.confirm(entry, work.clock.now_s())
+            if holds is None:
+                return False
+            entry = book.confirm(holds, work.clock.now_s())
         elif standing is not CalibrationStanding.FRESH:
             return False
         self.restore(work, entry)
@@ -73,7 +75,7 @@ class Calibrated(FibreOperation):
 
     def check(self, work: FibreWork, entry: CalibrationEntry) -> Holds:  # noqa: ARG002 - for subclasses
         """Look whether one of an earlier start still holds; without a way to tell it does not."""
-        return False
+        return None
         yield  # what makes it a generator
 
     def restore(self, work: FibreWork, entry: CalibrationEntry) -> None:

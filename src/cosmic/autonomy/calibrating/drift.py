@@ -2,80 +2,20 @@
 
 import math
 from collections.abc import Generator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 from typing_extensions import override
 
 from cosmic.autonomy.calibrating.book import CalibrationEntry
 from cosmic.autonomy.handling.operation import FibreOperation
-from cosmic.autonomy.handling.plate import PlateFrame
-from cosmic.autonomy.handling.prepare import (
-    HELD,
-    PLATE,
-    PROBE,
-    beside_jaws,
-    retract_probe,
-    see_tip,
-    zoom_to,
-)
+from cosmic.autonomy.handling.prepare import HELD, PLATE, PROBE, see_both, zoom_to
+from cosmic.autonomy.handling.tips import TIMES_STD, Off, TipOff, shift_maps
 from cosmic.autonomy.handling.work import FibreWork
-from cosmic.autonomy.places import PlatformPlaces
 from cosmic.autonomy.procedures.operation import SAFE_POINT, Steps, Wish
-from cosmic.autonomy.tools import tip_um
 from cosmic.frame.errors import NotAvailable
-from cosmic.vico.core.picture import Picture
-from cosmic.vico.core.tool_settings import ToolSettings
-from cosmic.vico.core.vision.tool_types import GripperTips, NotSeen
 
 DRIFT: Final = "drift of the tips"
-TIMES_STD: Final = 3.0
-"""What is less than so many standard deviations is noise."""
-
-Off = tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class TipOff:
-    """How far a tip is seen from where its stages and the map say.
-
-    Attributes
-    ----------
-    std_um : float
-        Of a coordinate: of the tip on the picture and of the map there.
-    """
-
-    off_um: Off
-    std_um: float
-
-
-def tip_off(work: FibreWork, picture: Picture, tool: ToolSettings) -> TipOff:
-    """Return how far a tip is from where it should be seen; raises `NotAvailable`."""
-    found = see_tip(work, picture, tool)
-    if isinstance(found, NotSeen):
-        raise NotAvailable(f"{tool.shown} was not seen: {found.reason}")
-    believed = tip_um(tool, picture.circumstances.positions)
-    if believed is None:
-        raise NotAvailable(f"{tool.name}: where it stands is not known")
-    mapped = work.mapped(picture, believed[2])
-    seen_px = found.hold_px if isinstance(found, GripperTips) else found.tip_px
-    x, y = mapped.to_um(seen_px).tolist()
-    std_um = math.hypot(found.std_px * mapped.scale_um_px, float(mapped.std_um(seen_px)))
-    return TipOff((x - believed[0], y - believed[1]), std_um)
-
-
-def shift_maps(work: FibreWork, off_um: Off) -> None:
-    """Have the maps made by the gripper follow its tip, which is now off by so much.
-
-    What lies on the plate keeps its place there: the rotation centre goes along.
-    """
-    places = work.vision.places
-    if not isinstance(places, PlatformPlaces):
-        raise NotAvailable("micromanipulation is not hosted here: there are no maps")
-    camera = work.settings.camera or work.vision.first_camera
-    places.calibrations.shift(camera, work.gripper.name, (-off_um[0], -off_um[1]))
-    x, y = work.calibration.frame.centre_um
-    work.calibration.frame = PlateFrame((x - off_um[0], y - off_um[1]))
 
 
 class CheckDrift(FibreOperation):
@@ -107,14 +47,11 @@ def look_at_both(work: FibreWork) -> Generator[Wish, object, tuple[TipOff, TipOf
     """Hold both tips where fibres are pushed, and look at them; raises `NotAvailable`."""
     try:
         yield from zoom_to(work, work.settings.calibration.compare_zoom)
-        yield from beside_jaws(work)
-        picture = yield work.picture()
-        assert isinstance(picture, Picture)
-        yield from retract_probe(work)
+        seen = yield from see_both(work)
     finally:
         work.zoomed = None
     yield from zoom_to(work, work.settings.zoom)
-    return tip_off(work, picture, work.gripper), tip_off(work, picture, work.probe)
+    return seen
 
 
 def follow(work: FibreWork, gripper: TipOff, probe: TipOff) -> None:

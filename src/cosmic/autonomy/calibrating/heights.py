@@ -161,7 +161,7 @@ class HeightByFocus(Calibrated):
         settings = work.settings.calibration
         over = over_um(tip, plate[0], entry.values["counts_um"], settings.lying_um)
         off = over - tip.stage_um - entry.values["up_um"]
-        return bool(abs(off) <= settings.height_um)
+        return entry if abs(off) <= settings.height_um else None
 
 
 def over_um(tip: Seen, plate_counts: float, counts_um: float, lying_um: float) -> float:

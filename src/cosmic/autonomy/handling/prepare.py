@@ -1,27 +1,22 @@
 """Operations before the first fibre: out of the way, and calibrated as far as is not fresh."""
 
+import math
 from collections.abc import Generator
 from dataclasses import replace
 
 from typing_extensions import override
 
 from cosmic.autonomy.calibrating.book import CalibrationEntry
-from cosmic.autonomy.calibrating.calibrated import Calibrated
+from cosmic.autonomy.calibrating.calibrated import Calibrated, Holds
 from cosmic.autonomy.handling.jaws import in_step, zero_jaws
 from cosmic.autonomy.handling.operation import FibreOperation
-from cosmic.autonomy.handling.sight import map_at
+from cosmic.autonomy.handling.tips import TIMES_STD, TipOff, shift_maps, tip_off
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Wish
-from cosmic.autonomy.tools import expected, tip_um
-from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.mico.core.positioner import Confidence
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.tool_settings import ToolSettings
-from cosmic.vico.core.vision.algorithms import grey
-from cosmic.vico.core.vision.tips import find_gripper, find_probe
-from cosmic.vico.core.vision.tool_types import GripperTips, NotSeen, ToolEnd
 
-REACH_PX = 40.0
 OTHER_UP_UM = 5000.0
 OTHER_BACK_UM = 4000.0
 TURN_ON_DEG = 41.0
@@ -112,6 +107,11 @@ class CalibratePlate(Calibrated):
         residual = yield from calibrate_at(work, place.place_x_um, place.place_y_um, place.place_um)
         self.kept(work, residual, "px", place.residual_px)
 
+    @override
+    def check(self, work: FibreWork, entry: CalibrationEntry) -> Holds:
+        place = work.settings.calibration
+        return entry if (yield from still_at(work, place.place_um, follow=True)) else None
+
 
 class CalibrateHeld(Calibrated):
     """The same at the height of the probe."""
@@ -127,6 +127,37 @@ class CalibrateHeld(Calibrated):
         )
         self.kept(work, residual, "px", place.residual_px)
 
+    @override
+    def check(self, work: FibreWork, entry: CalibrationEntry) -> Holds:
+        return entry if (yield from still_at(work, work.hold_tip_um, follow=False)) else None
+
+
+def still_at(work: FibreWork, z_um: float, *, follow: bool) -> Generator[Wish, object, bool]:
+    """Look whether the tip is where the map has it; one that is near is followed, if wanted."""
+    settings = work.settings.calibration
+    yield from to_place(work, settings.place_x_um, settings.place_y_um)
+    with work.mico.collision.contact("grasp"):
+        yield work.go_up(z_um)
+        picture = yield work.picture()
+        assert isinstance(picture, Picture)
+        yield work.go_up(max(work.settings.places.travel_um, z_um))
+    seen = tip_off(work, picture, work.gripper)
+    far = math.hypot(*seen.off_um)
+    if far <= max(settings.drift_um, TIMES_STD * seen.std_um):
+        return True
+    if not (follow and far <= settings.drift_far_um):
+        return False
+    shift_maps(work, seen.off_um)
+    return True
+
+
+def to_place(work: FibreWork, x_um: float, y_um: float) -> Steps:
+    """Take the gripper over a place, its jaws as far open as is counted."""
+    yield work.go_up(max(work.settings.places.travel_um, work.height_now()))
+    yield work.go(work.at(work.gripper, x_um * work.jaws.forward, y_um))
+    if not in_step(work):
+        yield from zero_jaws(work)
+
 
 def calibrate_at(
     work: FibreWork, x_um: float, y_um: float, z_um: float
@@ -136,10 +167,7 @@ def calibrate_at(
     Returns the residual, px.
     """
     tool, travel = work.gripper, work.settings.places.travel_um
-    yield work.go_up(max(travel, work.height_now()))
-    yield work.go(work.at(tool, x_um * work.jaws.forward, y_um))
-    if not in_step(work):
-        yield from zero_jaws(work)
+    yield from to_place(work, x_um, y_um)
     begun = work.vico.calibrated
     with work.mico.collision.contact("grasp"):
         yield work.go_up(z_um)
@@ -179,20 +207,45 @@ class ComparePlaces(Calibrated):
     def _compare(self, work: FibreWork) -> Steps:
         hold_y, settings = work.settings.places.hold_y_um, work.settings.calibration
         residual = yield from calibrate_at(work, settings.compare_x_um, hold_y, work.hold_tip_um)
-        yield from beside_jaws(work)
-        picture = yield work.picture()
-        assert isinstance(picture, Picture)
-        x, y = work.calibration.probe_off_um = probe_off_um(work, picture)
-        work.calibration.seen_off_um = x, y
-        yield from retract_probe(work)
-        values = {"off_x_um": x, "off_y_um": y, "seen_x_um": x, "seen_y_um": y}
-        self.kept(work, residual, "px", settings.residual_px, values=values, how="one picture")
+        gripper, probe = yield from see_both(work)
+        off = probe.off_um[0] - gripper.off_um[0], probe.off_um[1] - gripper.off_um[1]
+        work.calibration.probe_off_um = work.calibration.seen_off_um = off
+        self.kept(work, residual, "px", settings.residual_px, values=_both(off), how="one picture")
+
+    @override
+    def check(self, work: FibreWork, entry: CalibrationEntry) -> Holds:
+        """See both tips anew by the map that there is, where that still holds."""
+        settings = work.settings.calibration
+        yield from zoom_to(work, settings.compare_zoom)
+        try:
+            gripper, probe = yield from see_both(work)
+        finally:
+            work.zoomed = None
+        yield from zoom_to(work, work.settings.zoom)
+        if math.hypot(*gripper.off_um) > max(settings.drift_um, TIMES_STD * gripper.std_um):
+            return None
+        off = probe.off_um[0] - gripper.off_um[0], probe.off_um[1] - gripper.off_um[1]
+        return replace(entry, values=_both(off))
 
     @override
     def restore(self, work: FibreWork, entry: CalibrationEntry) -> None:
         known, values = work.calibration, entry.values
         known.probe_off_um = values["off_x_um"], values["off_y_um"]
         known.seen_off_um = values["seen_x_um"], values["seen_y_um"]
+
+
+def _both(off_um: tuple[float, float]) -> dict[str, float]:
+    x, y = off_um
+    return {"off_x_um": x, "off_y_um": y, "seen_x_um": x, "seen_y_um": y}
+
+
+def see_both(work: FibreWork) -> Generator[Wish, object, tuple[TipOff, TipOff]]:
+    """Return where gripper and probe are seen on one picture; raises `NotAvailable`."""
+    yield from beside_jaws(work)
+    picture = yield work.picture()
+    assert isinstance(picture, Picture)
+    yield from retract_probe(work)
+    return tip_off(work, picture, work.gripper), tip_off(work, picture, work.probe)
 
 
 def beside_jaws(work: FibreWork) -> Steps:
@@ -231,41 +284,3 @@ def zoom_to(work: FibreWork, zoom: float) -> Steps:
         return
     yield lens.zoom_to(zoom)
     work.zoomed = zoom
-
-
-def probe_off_um(work: FibreWork, picture: Picture) -> tuple[float, float]:
-    """Return how far the probe's tip is from where its stages say, by a picture of both."""
-    off = []
-    for tool in (work.probe, work.gripper):
-        found = see_tip(work, picture, tool)
-        if isinstance(found, NotSeen):
-            raise NotAvailable(f"{tool.shown} was not seen: {found.reason}")
-        believed = tip_um(tool, picture.circumstances.positions)
-        if believed is None:
-            raise NotAvailable(f"{tool.name}: where it stands is not known")
-        seen_px = found.hold_px if isinstance(found, GripperTips) else found.tip_px
-        seen = work.mapped(picture, work.hold_tip_um).to_um(seen_px)
-        off.append((float(seen[0]) - believed[0], float(seen[1]) - believed[1]))
-    (px, py), (gx, gy) = off
-    return px - gx, py - gy
-
-
-def see_tip(
-    work: FibreWork, picture: Picture, tool: ToolSettings
-) -> GripperTips | ToolEnd | NotSeen:
-    """Look for a tool's tip where its stages say it is, with the jaws as far open as counted."""
-    positions = picture.circumstances.positions
-    tip = tip_um(tool, positions)
-    if tip is None:
-        return NotSeen("where it stands is not known")
-    try:
-        mapped = map_at(work.vision.places, picture, tip[2])
-    except CosmicError as exc:
-        return NotSeen(str(exc))
-    wanted = expected(tool, mapped, tip[:2], positions, REACH_PX)
-    if wanted is None:
-        return NotSeen("it is too small on the picture; zoom in")
-    if not tool.gap_axis:
-        return find_probe(grey(picture.data), wanted)
-    gap_px = (work.gap_um or 0.0) / mapped.scale_um_px
-    return find_gripper(grey(picture.data), replace(wanted, gap_px=gap_px))

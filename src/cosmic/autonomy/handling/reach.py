@@ -9,8 +9,8 @@ from cosmic.autonomy.handling.in_hand import FibreInHand
 from cosmic.autonomy.handling.jaws import move_jaws
 from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.plate import along, ways
-from cosmic.autonomy.handling.prepare import see_tip
 from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen, trace_along
+from cosmic.autonomy.handling.tips import see_tip
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.vico.core.picture import Picture

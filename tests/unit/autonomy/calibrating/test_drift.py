@@ -5,12 +5,13 @@ from typing import Any
 import pytest
 
 from cosmic.autonomy.calibrating.book import CalibrationEntry
-from cosmic.autonomy.calibrating.drift import DRIFT, CheckDrift, TipOff, follow
+from cosmic.autonomy.calibrating.drift import DRIFT, CheckDrift, follow
 from cosmic.autonomy.calibrations import Calibrations
 from cosmic.autonomy.handling.in_hand import Calibration, Measured
 from cosmic.autonomy.handling.plate import PlateFrame
 from cosmic.autonomy.handling.prepare import HELD, PLATE, PROBE
 from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.handling.tips import TipOff
 from cosmic.autonomy.places import PlatformPlaces
 from cosmic.frame.clock import ManualClock
 from unit.autonomy.test_calibrations import plane

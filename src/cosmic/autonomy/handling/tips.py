@@ -1,0 +1,86 @@
+"""Where the tips of tools are seen, and how far that is from where they should be."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+from cosmic.autonomy.handling.plate import PlateFrame
+from cosmic.autonomy.handling.sight import map_at
+from cosmic.autonomy.handling.work import FibreWork
+from cosmic.autonomy.places import REACH_PX, PlatformPlaces
+from cosmic.autonomy.tools import expected, tip_um
+from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.tool_settings import ToolSettings
+from cosmic.vico.core.vision.algorithms import grey
+from cosmic.vico.core.vision.tips import find_gripper, find_probe
+from cosmic.vico.core.vision.tool_types import GripperTips, NotSeen, ToolEnd
+
+TIMES_STD: Final = 3.0
+"""What is less than so many standard deviations is noise."""
+
+Off = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class TipOff:
+    """How far a tip is seen from where its stages and the map say.
+
+    Attributes
+    ----------
+    std_um : float
+        Of a coordinate: of the tip on the picture and of the map there.
+    """
+
+    off_um: Off
+    std_um: float
+
+
+def tip_off(work: FibreWork, picture: Picture, tool: ToolSettings) -> TipOff:
+    """Return how far a tip is from where it should be seen; raises `NotAvailable`."""
+    found = see_tip(work, picture, tool)
+    if isinstance(found, NotSeen):
+        raise NotAvailable(f"{tool.shown} was not seen: {found.reason}")
+    believed = tip_um(tool, picture.circumstances.positions)
+    if believed is None:
+        raise NotAvailable(f"{tool.name}: where it stands is not known")
+    mapped = work.mapped(picture, believed[2])
+    seen_px = found.hold_px if isinstance(found, GripperTips) else found.tip_px
+    x, y = mapped.to_um(seen_px).tolist()
+    std_um = math.hypot(found.std_px * mapped.scale_um_px, float(mapped.std_um(seen_px)))
+    return TipOff((x - believed[0], y - believed[1]), std_um)
+
+
+def shift_maps(work: FibreWork, off_um: Off) -> None:
+    """Have the maps made by the gripper follow its tip, which is now off by so much.
+
+    What lies on the plate keeps its place there: the rotation centre goes along.
+    """
+    places = work.vision.places
+    if not isinstance(places, PlatformPlaces):
+        raise NotAvailable("micromanipulation is not hosted here: there are no maps")
+    camera = work.settings.camera or work.vision.first_camera
+    places.calibrations.shift(camera, work.gripper.name, (-off_um[0], -off_um[1]))
+    x, y = work.calibration.frame.centre_um
+    work.calibration.frame = PlateFrame((x - off_um[0], y - off_um[1]))
+
+
+def see_tip(
+    work: FibreWork, picture: Picture, tool: ToolSettings
+) -> GripperTips | ToolEnd | NotSeen:
+    """Look for a tool's tip where its stages say it is, with the jaws as far open as counted."""
+    positions = picture.circumstances.positions
+    tip = tip_um(tool, positions)
+    if tip is None:
+        return NotSeen("where it stands is not known")
+    try:
+        mapped = map_at(work.vision.places, picture, tip[2])
+    except CosmicError as exc:
+        return NotSeen(str(exc))
+    wanted = expected(tool, mapped, tip[:2], positions, REACH_PX)
+    if wanted is None:
+        return NotSeen("it is too small on the picture; zoom in")
+    if not tool.gap_axis:
+        return find_probe(grey(picture.data), wanted)
+    gap_px = (work.gap_um or 0.0) / mapped.scale_um_px
+    return find_gripper(grey(picture.data), replace(wanted, gap_px=gap_px))
