@@ -4,7 +4,7 @@ import cosmic
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.mico.core.device_commander import CommanderType, DeviceCommander
-from cosmic.mico.core.device_manager import Mode
+from cosmic.mico.core.mode import Mode
 from cosmic.mico.core.positioner import Status
 from cosmic.mico.hw.interface import PositionerKind
 from unit.mico.rigs import listen, mico, wait_until

@@ -18,7 +18,8 @@ from cosmic.mico.api.ways import Way, way_from_plan
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT, CollisionChecker
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.collision_manager import CollisionManager
-from cosmic.mico.core.device_manager import DeviceManager, Mode
+from cosmic.mico.core.device_manager import DeviceManager
+from cosmic.mico.core.mode import Mode
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 from cosmic.mico.core.undo import UndoHistory

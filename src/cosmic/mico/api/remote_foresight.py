@@ -22,7 +22,6 @@ def foreseen(
     motions: Mapping[str, Motion], manager: "RemoteManager", *, consent: bool
 ) -> MoveVerdict:
     """Judge `motions` by all but collisions and the lease, with what the station told last."""
-    defaults, watch = manager.settings.defaults, manager.settings.watch
     picture = Picture(
         stop_reason=manager.latch.state.reason,
         token=_HERE,
@@ -30,10 +29,7 @@ def foreseen(
         held={},
         targets={},
         now_wall_s=WALL.now_s(),
-        rules=Limits(
-            largest_step={"um": defaults.largest_step_um, "deg": defaults.largest_step_deg},
-            stale_s=watch.stale_s,
-        ),
+        rules=Limits.of(manager.settings),
     )
     requests = [Request(name, motion, _HERE, consent) for name, motion in motions.items()]
     verdict = judge(requests, picture, NoCollisionModel(), advice=False).verdict

@@ -131,7 +131,6 @@ class TrajectorySite:
     ) -> Rehearsal:
         """Run a trajectory through the pure gate; one at a time, in the calling thread."""
         states = self.states()
-        defaults = self.manager.settings.defaults
         with self._rehearsing:
             checker, search = self._pure_gate(bound)
             stage = Stage(
@@ -140,13 +139,7 @@ class TrajectorySite:
                 frequencies_hz={name: float(self.frequency_hz(name)) for name in states},
                 step_um={name: self.step_um(name) for name in states},
                 checker=checker,
-                rules=Limits(
-                    largest_step={
-                        "um": defaults.largest_step_um,
-                        "deg": defaults.largest_step_deg,
-                    },
-                    stale_s=self.manager.settings.watch.stale_s,
-                ),
+                rules=Limits.of(self.manager.settings),
                 clearance=search,
                 speed=speed,
                 timed=timed,

@@ -2,13 +2,13 @@
 
 import logging
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from threading import Lock
 
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.listeners import tell
-from cosmic.mico.core.link_settings import mistake
+from cosmic.mico.core.link_settings import LinkSettings, mistake
 from cosmic.mico.core.orders import Motion, MoveBy, MoveTo
 
 logger = logging.getLogger(__name__)
@@ -33,14 +33,21 @@ class LinkTable:
     """The links in force; any thread.
 
     Links that have an axis in common make a chain, all of which moves together.
+
+    Parameters
+    ----------
+    links : iterable of LinkSettings
+        Those that are there from the start.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, links: Iterable[LinkSettings] = ()) -> None:
         self._lock = Lock()
         self._links: tuple[Link, ...] = ()
         self._factors: Mapping[str, Mapping[str, float]] = {}
         self._went_to: dict[str, float] = {}
         self._listeners: tuple[Callable[[], None], ...] = ()
+        for link in links:
+            self.add(link.first, link.second, link.ratio)
 
     @property
     def links(self) -> tuple[Link, ...]:

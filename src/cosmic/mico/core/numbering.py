@@ -9,7 +9,19 @@ from cosmic.mico.hw.interface import Controller, DeviceIdentity
 logger = logging.getLogger(__name__)
 
 
-def serials_to_open(controller: Controller, wanted: Sequence[int]) -> tuple[int, ...]:
+def open_devices(controller: Controller, wanted: Sequence[int]) -> dict[int, int]:
+    """Open the devices with the serial numbers `wanted`, or all where none are.
+
+    Returns
+    -------
+    dict of int
+        The library's index of each device by its number in the configuration.
+    """
+    identities = controller.open(_serials_to_open(controller, wanted))
+    return _library_indices(controller, wanted, identities)
+
+
+def _serials_to_open(controller: Controller, wanted: Sequence[int]) -> tuple[int, ...]:
     """Return those of the configured serial numbers that are connected; none wanted opens all.
 
     Raises
@@ -29,7 +41,7 @@ def serials_to_open(controller: Controller, wanted: Sequence[int]) -> tuple[int,
     return present
 
 
-def library_indices(
+def _library_indices(
     controller: Controller, wanted: Sequence[int], identities: Sequence[DeviceIdentity]
 ) -> dict[int, int]:
     """Return the library's index of each device by its number in the configuration.

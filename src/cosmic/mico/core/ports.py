@@ -186,7 +186,24 @@ class ManagerPort(Protocol):
         match_arrival: bool = False,
         follows: Mapping[str, Movement] | None = None,
     ) -> dict[str, Order]:
-        """Decide `motions` together and start them back to back, or none; see `DeviceManager`."""
+        """Decide `motions` together and start them back to back, or none of them.
+
+        Parameters
+        ----------
+        linked : bool
+            Axes linked to those named move with them; False moves those named only.
+        match_arrival : bool
+            Slow the axes down to the one that takes longest, so that all arrive together.
+        follows : mapping of Movement
+            By axis, what must be the newest movement there; otherwise this one is void.
+
+        Raises
+        ------
+        MoveRefused
+            The gate refused; nothing moved.
+        UnknownAxisError
+            One axis does not exist; nothing moved.
+        """
 
     @abstractmethod
     def stop(self, reason: str = "stop") -> None:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Self
 
 from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
@@ -22,6 +22,7 @@ from cosmic.mico.core.orders import (
     ToEndStop,
 )
 from cosmic.mico.core.positioner import Confidence, PositionerState, class_for
+from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Direction, PositionerKind, ReferenceKind
 
 ROUNDING: Final = 1e-6
@@ -43,6 +44,15 @@ class Limits:
 
     largest_step: dict[str, float]
     stale_s: float
+
+    @classmethod
+    def of(cls, settings: MicoSettings) -> Self:
+        """Return those of a platform file."""
+        defaults = settings.defaults
+        return cls(
+            largest_step={"um": defaults.largest_step_um, "deg": defaults.largest_step_deg},
+            stale_s=settings.watch.stale_s,
+        )
 
 
 def check_axis(

@@ -194,6 +194,12 @@ class MicoSettings(StrictModel):
             raise ValueError("; ".join(wrong))
         return self
 
+    @property
+    def start_regions(self) -> dict[str, tuple[float, float]]:
+        """Where each axis may stand at power-up; those that may stand anywhere are left out."""
+        regions = {each.name: each.start_region for each in self.positioner}
+        return {name: region for name, region in regions.items() if region is not None}
+
     def _keys(self) -> list[str]:
         keys = [key for each in self.positioner for key in (each.forward_key, each.backward_key)]
         return [key.upper() for key in keys if key]

@@ -1,8 +1,14 @@
 """Several axes ordered at once: links, speeds that match, and one start for all."""
 
+import logging
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
+from cosmic.frame.errors import refusal
+from cosmic.frame.verdict import MoveVerdict
+from cosmic.mico.core.device_table import DeviceTable
+from cosmic.mico.core.gate import Gate, Request
+from cosmic.mico.core.group_start import GroupStart, GroupStarted
+from cosmic.mico.core.lease import Lease
 from cosmic.mico.core.links import LinkTable
 from cosmic.mico.core.matching import Leg, matched_frequencies
 from cosmic.mico.core.movement import Movement
@@ -10,27 +16,135 @@ from cosmic.mico.core.orders import Grant, Motion, Order
 from cosmic.mico.core.positioner import PositionerState, class_for
 from cosmic.mico.core.settings import MotionDefaults
 
-if TYPE_CHECKING:
-    from cosmic.mico.core.device_manager import DeviceManager
+logger = logging.getLogger(__name__)
 
 
-def with_linked(
-    motions: Mapping[str, Motion], links: LinkTable, manager: "DeviceManager"
-) -> dict[str, Motion]:
-    """Return `motions` with those of the axes linked to them."""
-    if not links.links:
-        return dict(motions)
-    going = manager.gate.targets()
-    stand = {
-        name: going.get(name, state.position)
-        for name, state in manager.states().items()
-        if state.position is not None
-    }
-    known = {name: where for name, where in stand.items() if where is not None}
-    return links.expanded(motions, known, manager.settings.watch.tolerance_um)
+class GroupOrders:
+    """Has movements of several axes decided together and started back to back; any thread.
+
+    Parameters
+    ----------
+    check_ready : callable
+        Raises `MoveRefused` while axes cannot be moved.
+    on_refused, on_started : callable
+        Told that the gate refused a group, and that one was started, by whoever found out.
+    """
+
+    def __init__(
+        self,
+        table: DeviceTable,
+        *,
+        gate: Gate,
+        links: LinkTable,
+        lease: Lease,
+        check_ready: Callable[[], None],
+        on_refused: Callable[[MoveVerdict], None],
+        on_started: Callable[[GroupStarted], None],
+    ) -> None:
+        self._table = table
+        self._gate = gate
+        self._links = links
+        self._lease = lease
+        self._check_ready = check_ready
+        self._on_refused = on_refused
+        self._on_started = on_started
+
+    def check(self, motions: Mapping[str, Motion], *, consent: bool) -> MoveVerdict:
+        """Return what the gate says to `motions`, and those linked to them, as they are now."""
+        self._check_names(motions)
+        return self._gate.check(self._requests(self._with_linked(motions), consent=consent))
+
+    def order(
+        self,
+        motions: Mapping[str, Motion],
+        *,
+        source: str,
+        consent: bool,
+        linked: bool,
+        match_arrival: bool,
+        follows: Mapping[str, Movement],
+    ) -> dict[str, Order]:
+        """Start `motions` together, or none of them; see `ManagerPort.order_together`."""
+        self._check_names(motions)
+        if linked:
+            named = len(motions)
+            motions = self._with_linked(motions)
+            match_arrival = match_arrival or len(motions) > named
+        requests = self._requests(motions, consent=consent, alone=not linked)
+        self._check_ready()
+        grants = self._granted(requests, source)
+        speeds = self._matched_speeds(grants) if match_arrival else {}
+        start = GroupStart(len(motions), self._on_started) if len(motions) > 1 else None
+        token, guard = self._lease.local_token, self._lease.guard()
+        orders = {
+            name: Order(
+                self._table.address(name).channel,
+                motion,
+                token,
+                source,
+                consent,
+                grant=grants[name],
+                follows=follows.get(name),
+                start=start,
+                frequency_hz=speeds.get(name),
+                guard=guard,
+            )
+            for name, motion in motions.items()
+        }
+        self._submit(orders)
+        return orders
+
+    def _check_names(self, motions: Mapping[str, Motion]) -> None:
+        """Raise `UnknownAxisError` where one of the axes does not exist."""
+        for name in motions:
+            self._table.address(name)
+
+    def _with_linked(self, motions: Mapping[str, Motion]) -> dict[str, Motion]:
+        """Return `motions` with those of the axes linked to them."""
+        if not self._links.links:
+            return dict(motions)
+        going = self._gate.targets()
+        stand = {
+            name: going.get(name, state.position)
+            for name, state in self._table.states().items()
+            if state.position is not None
+        }
+        known = {name: where for name, where in stand.items() if where is not None}
+        return self._links.expanded(motions, known, self._table.settings.watch.tolerance_um)
+
+    def _requests(
+        self, motions: Mapping[str, Motion], *, consent: bool, alone: bool = False
+    ) -> list[Request]:
+        token, guard = self._lease.local_token, self._lease.guard()
+        return [
+            Request(name, motion, token, consent, alone=alone, guard=guard)
+            for name, motion in motions.items()
+        ]
+
+    def _granted(self, requests: list[Request], source: str) -> dict[str, Grant]:
+        verdict, grants = self._gate.decide(requests)
+        if not verdict.allowed:
+            logger.warning("refused (%s): %s", source, verdict)
+            self._on_refused(verdict)
+            raise refusal(verdict)
+        self._links.sent(
+            {name: each.target for name, each in grants.items() if each.target is not None}
+        )
+        return grants
+
+    def _matched_speeds(self, grants: Mapping[str, Grant]) -> dict[str, int]:
+        table = self._table
+        return _frequencies(
+            grants, table.states(), table.settings.defaults, table.usual_frequency_hz
+        )
+
+    def _submit(self, orders: Mapping[str, Order]) -> None:
+        _give_up_together(orders)
+        for name, order in orders.items():
+            self._table.device(name).submit(order)
 
 
-def frequencies(
+def _frequencies(
     grants: Mapping[str, Grant],
     states: Mapping[str, PositionerState],
     defaults: MotionDefaults,
@@ -53,7 +167,7 @@ def frequencies(
     return matched_frequencies(legs)
 
 
-def give_up_together(orders: Mapping[str, Order]) -> None:
+def _give_up_together(orders: Mapping[str, Order]) -> None:
     """Have the failure of one of `orders` before the common start withdraw the others."""
 
     def on_end(ended: Movement) -> None:
