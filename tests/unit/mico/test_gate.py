@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from cosmic.frame.verdict import ALLOWED, Reason, refuse
 from cosmic.mico.core.collision.answer import AxisSpan
 from cosmic.mico.core.collision.checker import NoCollisionModel
-from cosmic.mico.core.gate import Gate, Picture, Request, judge
+from cosmic.mico.core.gate import Gate
+from cosmic.mico.core.judgement import Picture, Request, judge
 from cosmic.mico.core.lease import Lease
 from cosmic.mico.core.orders import Calibrate, Interval, MoveBy, MoveTo, Reference, Step
 from cosmic.mico.core.positioner import Confidence, PositionerState

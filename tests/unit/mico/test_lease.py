@@ -9,7 +9,8 @@ from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.station import Station
 from cosmic.frame.verdict import Reason
 from cosmic.mico.core.collision.checker import NoCollisionModel
-from cosmic.mico.core.gate import Gate, Request
+from cosmic.mico.core.gate import Gate
+from cosmic.mico.core.judgement import Request
 from cosmic.mico.core.lease import Guard, Lease
 from cosmic.mico.core.orders import MoveTo
 from cosmic.mico.core.positioner import Confidence, PositionerState

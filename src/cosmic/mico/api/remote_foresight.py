@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 from cosmic.frame.clock import WALL
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.core.collision.checker import NoCollisionModel
-from cosmic.mico.core.gate import Picture, Request, judge
+from cosmic.mico.core.judgement import Picture, Request, judge
 from cosmic.mico.core.orders import Motion
 from cosmic.mico.core.rules import Limits
 

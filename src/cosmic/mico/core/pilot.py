@@ -11,8 +11,8 @@ from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.departure import ChannelDeparture
 from cosmic.mico.core.flight import Flight
 from cosmic.mico.core.follower import ChannelFollower
-from cosmic.mico.core.gate import Request
 from cosmic.mico.core.jog import SLOWER, JogRun
+from cosmic.mico.core.judgement import Request
 from cosmic.mico.core.lease import Guard
 from cosmic.mico.core.messages import Departed, MovementBegun
 from cosmic.mico.core.orders import (

@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 from cosmic.frame.errors import refusal
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.core.device_table import DeviceTable
-from cosmic.mico.core.gate import Gate, Request
+from cosmic.mico.core.gate import Gate
 from cosmic.mico.core.group_start import GroupStart, GroupStarted
+from cosmic.mico.core.judgement import Request
 from cosmic.mico.core.lease import Lease
 from cosmic.mico.core.links import LinkTable
 from cosmic.mico.core.matching import Leg, matched_frequencies

@@ -7,7 +7,7 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.errors import MoveCancelled
 from cosmic.frame.verdict import ALLOWED, MoveVerdict
 from cosmic.mico.core.collision.checker import CollisionChecker
-from cosmic.mico.core.gate import Picture, Request, judge
+from cosmic.mico.core.judgement import Picture, Request, judge
 from cosmic.mico.core.orders import Motion, MoveBy, MoveTo, Step
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.core.rules import Limits
