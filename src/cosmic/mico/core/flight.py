@@ -1,12 +1,10 @@
-"""One order on its way through a channel, and the bookkeeping of what was asked about it."""
+"""One order on its way through a channel, and what the pilots of a device share."""
 
 import math
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
 
-from cosmic.frame.clock import WALL, Clock
+from cosmic.frame.clock import Clock
 from cosmic.frame.errors import CosmicError, DeviceError
 from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import MoveVerdict
@@ -14,14 +12,10 @@ from cosmic.mico.core.data_container import DeviceDataContainer
 from cosmic.mico.core.gate import Gate
 from cosmic.mico.core.jog import JogRun
 from cosmic.mico.core.messages import Departed, MovementBegun
-from cosmic.mico.core.orders import Grant, Jog, Order, Step
+from cosmic.mico.core.orders import Grant, Jog, Order, Reference, Step
 from cosmic.mico.core.positioner import PositionerState
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Controller
-
-MOST_OPEN: Final = 8
-GIVEN_UP_S: Final = 2.0
-"""Wall time after which an answer is taken for lost."""
 
 
 @dataclass(slots=True)
@@ -67,6 +61,16 @@ class Flight:
     def has_own_speed(self) -> bool:
         """True when the channel has another closed-loop speed than the usual one meanwhile."""
         return isinstance(self.order.motion, Jog) or self.order.frequency_hz is not None
+
+    @property
+    def found_reference(self) -> bool:
+        """True of a reference run without error: the word of libraries that have none."""
+        return self.error is None and isinstance(self.order.motion, Reference)
+
+    @property
+    def asks_reference(self) -> bool:
+        """True while it stands and the controller was asked whether the reference was found."""
+        return self.known_pending and self.rests_seen > 0
 
     @property
     def withdrawn(self) -> bool:
@@ -115,41 +119,6 @@ class PilotContext:
     on_begun: Callable[[MovementBegun], None] = _nobody
     on_departed: Callable[[Departed], None] = _nobody
     poll_s: float = 0.05
-
-
-class Questions:
-    """Order numbers that were current when each open question was asked.
-
-    An answer says what was true when it was given: one asked for before a movement started says
-    nothing about it. Each channel answers in order, so the oldest number belongs to the next
-    answer. Lost answers make later ones look older than they are, which is safe, and are forgotten
-    when nothing has come for long.
-    """
-
-    def __init__(self) -> None:
-        self._open: deque[tuple[int, float]] = deque()
-
-    def may_ask(self) -> bool:
-        """Return False while enough questions wait for their answers."""
-        if len(self._open) < MOST_OPEN:
-            return True
-        if WALL.now_s() - self._open[0][1] < GIVEN_UP_S:
-            return False
-        self._open.clear()
-        return True
-
-    def asked(self, number: int) -> None:
-        """Note a question."""
-        self._open.append((number, WALL.now_s()))
-
-    def withdrawn(self) -> None:
-        """Forget the newest question, which could not be asked."""
-        if self._open:
-            self._open.pop()
-
-    def answered(self) -> int:
-        """Return the number under which the oldest open question was asked, 0 without one."""
-        return self._open.popleft()[0] if self._open else 0
 
 
 def missed_target(

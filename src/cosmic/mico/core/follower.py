@@ -1,25 +1,15 @@
 """`ChannelFollower`: what becomes of an order after it was sent; device thread only."""
 
 import logging
-from collections.abc import Callable
 
-from cosmic.frame.errors import (
-    CosmicError,
-    DeviceError,
-    DeviceFault,
-    DeviceTimeout,
-    MoveCancelled,
-)
-from cosmic.mico.core.flight import (
-    Flight,
-    PilotContext,
-    Questions,
-    counted_position,
-    missed_target,
-)
+from cosmic.frame.errors import CosmicError, DeviceError, DeviceFault, DeviceTimeout, MoveCancelled
+from cosmic.mico.core.channel_speed import ChannelSpeed
+from cosmic.mico.core.enquiry import Enquiry
+from cosmic.mico.core.flight import Flight, PilotContext, counted_position, missed_target
 from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import Grant, Jog, Reference
+from cosmic.mico.core.orders import Grant, Jog
 from cosmic.mico.core.positioner import Confidence, PositionerBase
+from cosmic.mico.core.quietly import quietly
 from cosmic.mico.hw.interface import (
     Activity,
     ActivityRead,
@@ -40,13 +30,12 @@ class ChannelFollower:
         self._positioner = positioner
         self._context = context
         self._address = positioner.state.address
-        self._activity = Questions()
-        self._position = Questions()
+        self._enquiry = Enquiry(positioner, context)
+        self.speed = ChannelSpeed(positioner, context)
         self.flight: Flight | None = None
         self.next_poll_s = 0.0
         self.newest: Movement | None = None
         self.settled = False
-        self._frequency_hz = context.settings.defaults.closed_loop_frequency_hz
 
     @property
     def name(self) -> str:
@@ -60,17 +49,9 @@ class ChannelFollower:
             not self._positioner.has_sensor or self._positioner.state.position is not None
         )
 
-    # Speed
-
     def set_frequency(self, frequency_hz: int) -> None:
         """Limit the closed-loop speed from now on."""
-        self._frequency_hz = frequency_hz
-        self._positioner.frequency_hz = frequency_hz
-        self._limit_speed(frequency_hz)
-
-    def _limit_speed(self, frequency_hz: int) -> None:
-        if self._positioner.has_sensor:
-            self._context.controller.set_closed_loop_frequency(self._address, frequency_hz)
+        self.speed.set_usual(frequency_hz)
 
     # Stopping
 
@@ -82,7 +63,7 @@ class ChannelFollower:
             self.flight.error = self.flight.error or error
             self.flight.jog = None
             self.flight.awaiting = False
-        self._quietly(lambda: self._context.controller.stop(self._address))
+        self._stop()
         if self.flight is not None:
             self.flight.progress_s = self._context.clock.now_s()
             self.ask_activity()
@@ -97,6 +78,9 @@ class ChannelFollower:
             flight.order.movement.fail(error)
             self._context.on_failed(self.name, error)
 
+    def _stop(self) -> None:
+        quietly(self.name, lambda: self._context.controller.stop(self._address))
+
     def _end_jog(self, error: CosmicError | None) -> None:
         flight = self.flight
         if flight is None:
@@ -105,29 +89,29 @@ class ChannelFollower:
         flight.error = flight.error or error
         if error is not None:
             logger.warning("%s: jogging ended: %s", self.name, error)
-        self._quietly(lambda: self._context.controller.stop(self._address))
+        self._stop()
         self.ask_activity()
 
     # Following
 
     def poll(self) -> None:
         """Ask what is due, and notice a movement that makes no progress."""
-        now_s = self._context.clock.now_s()
-        flight = self.flight
-        if now_s < self.next_poll_s:
+        flight, clock = self.flight, self._context.clock
+        wall_s = clock.wall_s()
+        if wall_s < self.next_poll_s:
             return
         watch = self._context.settings.watch
         period_s = watch.idle_poll_s if flight is None else self._context.poll_s
-        self.next_poll_s = now_s + period_s * (self._context.clock.rate or 1.0)
+        self.next_poll_s = wall_s + period_s
         self.ask_position()
         self.ask_activity()
         if flight is not None:
-            self._watch(flight, now_s)
+            self._watch(flight, clock.now_s())
 
     def _watch(self, flight: Flight, now_s: float) -> None:
         """See that a movement makes progress, and that one to be stopped does stop."""
         if flight.error is not None and not flight.at_rest:
-            self._quietly(lambda: self._context.controller.stop(self._address))
+            self._stop()
         late = now_s - flight.progress_s
         if late <= flight.patience_s(self._context.settings, self._context.clock.rate):
             return
@@ -148,47 +132,18 @@ class ChannelFollower:
         flight.order.movement.fail(error)
         self._context.on_failed(self.name, error)
 
-    @property
-    def _number(self) -> int:
-        """Under which number to ask: 0 while no order is under way, or it was not sent yet."""
-        flight = self.flight
-        return 0 if flight is None or flight.awaiting else flight.order.number
-
     def ask_activity(self) -> None:
         """Ask what the channel is doing."""
-        if not self._activity.may_ask():
-            return
-        self._activity.asked(self._number)
-        if not self._quietly(lambda: self._context.controller.ask_activity(self._address)):
-            self._activity.withdrawn()
+        self._enquiry.ask_activity(self.flight)
 
     def ask_position(self) -> None:
         """Ask for the position, where there is a sensor."""
-        if not self._positioner.has_sensor or not self._position.may_ask():
-            return
-        number = self._number
-        final = self.flight is not None and self.flight.rests_seen > 0
-        self._position.asked(-number if final else number)
-        unit = self._positioner.state.unit
-        if not self._quietly(lambda: self._context.controller.ask_position(self._address, unit)):
-            self._position.withdrawn()
+        self._enquiry.ask_position(self.flight)
 
     def ask_position_known(self) -> None:
         """Ask whether the position is referenced; old libraries cannot say."""
-        try:
-            self._context.controller.ask_position_known(self._address)
-        except DeviceError as exc:
-            if exc.fault is not DeviceFault.UNSUPPORTED:
-                raise
-            self._on_known(PositionKnownRead(self._address, known=self._found(self.flight)))
-
-    def ask_safe_direction(self) -> None:
-        """Ask which way a search for the reference goes; where unknown, it may go both."""
-        try:
-            self._context.controller.ask_safe_direction(self._address)
-        except DeviceError as exc:
-            if exc.fault is not DeviceFault.UNSUPPORTED:
-                raise
+        if not self._enquiry.ask_position_known():
+            self._on_known(PositionKnownRead(self._address, known=self._found_reference))
 
     def take(self, event: Event) -> None:
         """Follow one event of this channel."""
@@ -206,7 +161,7 @@ class ChannelFollower:
                 self._on_failed(event.error)
 
     def _on_activity(self, event: ActivityRead) -> None:
-        number = self._activity.answered()
+        number = self._enquiry.activity_answered()
         flight = self.flight
         if not self.settled:
             self._settle(event.activity)
@@ -236,7 +191,7 @@ class ChannelFollower:
         self.ask_position()
 
     def _on_position(self) -> None:
-        number = self._position.answered()
+        number = self._enquiry.position_answered()
         flight = self.flight
         if flight is None:
             return
@@ -248,7 +203,7 @@ class ChannelFollower:
         known = Confidence.KNOWN if event.known else Confidence.UNKNOWN
         self._context.container.update(self._address.channel, confidence=known)
         flight = self.flight
-        if flight is not None and flight.known_pending and flight.rests_seen > 0:
+        if flight is not None and flight.asks_reference:
             flight.known_pending = False
             if not event.known and flight.error is None:
                 text = f"{self.name}: it stopped without having found its reference"
@@ -258,9 +213,10 @@ class ChannelFollower:
     def _on_failed(self, error: DeviceError) -> None:
         flight = self.flight
         if error.fault in (DeviceFault.NO_SENSOR, DeviceFault.WRONG_KIND):
-            self._position.answered()  # that is what the question got for an answer
-        if error.fault is DeviceFault.UNSUPPORTED and self._only_asked(flight):
-            self._on_known(PositionKnownRead(self._address, known=self._found(flight)))
+            self._enquiry.position_answered()  # that is what the question got for an answer
+        only_asked = flight is None or flight.asks_reference
+        if error.fault is DeviceFault.UNSUPPORTED and only_asked:
+            self._on_known(PositionKnownRead(self._address, known=self._found_reference))
         elif flight is None:
             self._note(error)
         elif flight.at_rest and not flight.told:
@@ -269,17 +225,9 @@ class ChannelFollower:
         elif flight.error is None:
             self._blame(error)
 
-    @staticmethod
-    def _only_asked(flight: Flight | None) -> bool:
-        """Return True where a command not supported can only be a question of ours."""
-        return flight is None or (flight.known_pending and flight.rests_seen > 0)
-
-    @staticmethod
-    def _found(flight: Flight | None) -> bool:
-        """Return True after a reference run without error: the word of libraries that have none."""
-        if flight is None or flight.error is not None:
-            return False
-        return isinstance(flight.order.motion, Reference)
+    @property
+    def _found_reference(self) -> bool:
+        return self.flight is not None and self.flight.found_reference
 
     def _blame(self, error: DeviceError) -> None:
         """Remember why the movement fails, and leave nothing moving unwatched."""
@@ -326,7 +274,7 @@ class ChannelFollower:
         if flight is None:
             return
         if flight.has_own_speed:
-            self._quietly(lambda: self._limit_speed(self._frequency_hz))
+            self.speed.restore()
         in_motion = not flight.at_rest
         state = self._context.container.update(self._address.channel, in_motion=in_motion)
         position = state.position if state else None
@@ -344,14 +292,3 @@ class ChannelFollower:
 
     def _announce(self) -> None:
         self._context.on_state(self._address.channel)
-
-    def _quietly(self, call: Callable[[], None]) -> bool:
-        """Make a call and say whether it was taken; a device out of reach is another's matter."""
-        try:
-            call()
-        except DeviceError as exc:
-            if exc.fault in (DeviceFault.COMMUNICATION, DeviceFault.TIMEOUT):
-                raise
-            logger.warning("%s: %s", self.name, exc)
-            return False
-        return True

@@ -8,6 +8,7 @@ from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.mico.core.flight import PilotContext
 from cosmic.mico.core.pilot import ChannelPilot
 from cosmic.mico.hw.interface import (
+    Channel,
     Event,
     PositionerKind,
     ReferenceKind,
@@ -79,13 +80,21 @@ class Introduction:
         self.pilots[channel] = pilot
         if positioner.state.kind is not PositionerKind.OPEN_LOOP:
             usual_hz = self._context.settings.defaults.closed_loop_frequency_hz
-            pilot.set_frequency(positioner.frequency_hz or usual_hz)
+            pilot.speed.set_usual(positioner.frequency_hz or usual_hz)
             pilot.ask_position_known()
             found = positioner.state.positioner
             if found is not None and found.reference is ReferenceKind.END_STOP:
-                pilot.ask_safe_direction()
+                self._ask_safe_direction(positioner.state.address)
         pilot.ask_activity()
         pilot.ask_position()
+
+    def _ask_safe_direction(self, address: Channel) -> None:
+        """Ask which way a search for the reference goes; where unknown, it may go both."""
+        try:
+            self._context.controller.ask_safe_direction(address)
+        except DeviceError as exc:
+            if exc.fault is not DeviceFault.UNSUPPORTED:
+                raise
 
     def look(self) -> None:
         """See whether it is over."""

@@ -2,7 +2,6 @@
 
 import logging
 import math
-from typing import Final
 
 from typing_extensions import override
 
@@ -16,7 +15,6 @@ from cosmic.mico.core.judgement import Request
 from cosmic.mico.core.lease import Guard
 from cosmic.mico.core.messages import Departed, MovementBegun
 from cosmic.mico.core.orders import (
-    FREQUENCY_HZ,
     Grant,
     Jog,
     Motion,
@@ -26,13 +24,11 @@ from cosmic.mico.core.orders import (
     Reference,
     Steer,
 )
+from cosmic.mico.core.quietly import quietly
 from cosmic.mico.core.rules import malformed
 from cosmic.mico.core.steer import SteerRun
 
 logger = logging.getLogger(__name__)
-
-GLIDE: Final = 1.5
-"""How much faster than the jog an axis may go, to make up for its slow last micrometres."""
 
 
 class ChannelPilot(ChannelFollower):
@@ -81,9 +77,9 @@ class ChannelPilot(ChannelFollower):
         """Give the channel the speed of `order`, or its usual one back."""
         own_hz = order.frequency_hz
         if own_hz is not None:
-            self._quietly(lambda: self._limit_speed(own_hz))
+            self.speed.limit(own_hz)
         elif replaced is not None and replaced.has_own_speed:
-            self._quietly(lambda: self._limit_speed(self._frequency_hz))
+            self.speed.restore()
 
     def _await_start(self, order: Order, replaced: Flight | None) -> None:
         """Get everything ready, and leave the call itself to the one that starts the group."""
@@ -152,7 +148,7 @@ class ChannelPilot(ChannelFollower):
         replaced, self.flight = self.flight, flight
         if replaced is not None:
             replaced.replaced = True
-        self.next_poll_s = now_s + self._context.poll_s * (self._context.clock.rate or 1.0)
+        self.next_poll_s = self._context.clock.wall_s() + self._context.poll_s
         return replaced
 
     def _tell_begun(self, order: Order, replaced: Flight | None) -> None:
@@ -197,24 +193,6 @@ class ChannelPilot(ChannelFollower):
 
     # Jogging
 
-    def _nominal_step(self) -> float:
-        defaults = self._context.settings.defaults
-        rotary = self._positioner.state.unit == "deg"
-        return defaults.nominal_step_deg if rotary else defaults.nominal_step_um
-
-    def _top_speed(self) -> float:
-        """Return what the axis can do at its frequency limit; without a sensor, in Hz."""
-        if not self._positioner.has_sensor:
-            return float(FREQUENCY_HZ[1])
-        return self._frequency_hz * self._nominal_step()
-
-    def _limit_jog_speed(self, jog: JogRun) -> None:
-        """Have the axis glide from packet to packet, not leap and wait."""
-        step = self._nominal_step()
-        glide = jog.glide(step) if isinstance(jog, SteerRun) else GLIDE
-        wanted_hz = math.ceil(glide * jog.speed / step)
-        self._limit_speed(max(FREQUENCY_HZ[0], min(wanted_hz, self._frequency_hz)))
-
     def renew(self, order_number: int) -> None:
         """Keep a jog alive; any thread."""
         flight = self.flight
@@ -229,7 +207,7 @@ class ChannelPilot(ChannelFollower):
         return isinstance(flight.jog, SteerRun) and flight.jog.steer(velocity)
 
     def _jog_run(self, motion: Jog) -> JogRun:
-        settings, top_speed = self._context.settings, self._top_speed()
+        settings, top_speed = self._context.settings, self.speed.top_speed
         if isinstance(motion, Steer):
             return SteerRun(motion, settings, top_speed, self._context.clock.rate or 1.0)
         return JogRun(motion, settings, top_speed)
@@ -249,7 +227,7 @@ class ChannelPilot(ChannelFollower):
         if grant is not None:
             replaced = self._begin(order, grant, jog=jog)
             try:
-                self._limit_jog_speed(jog)
+                self.speed.limit_jog(jog)
                 self._send(packet, grant)
             finally:
                 self._tell_begun(order, replaced)
@@ -283,7 +261,7 @@ class ChannelPilot(ChannelFollower):
             return
         jog.follow_hand()
         if jog.must_look() and jog.slow_down(self._free_share(flight.order, jog)):
-            self._quietly(lambda: self._limit_jog_speed(jog))
+            quietly(self.name, lambda: self.speed.limit_jog(jog))
         packet = jog.packet(self._positioner.state, now_s)
         if packet is None:
             self._end_jog(jog.lost)
