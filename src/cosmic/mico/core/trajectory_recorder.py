@@ -18,7 +18,7 @@ from cosmic.mico.core.messages import MovementBegun, MovementEnded
 from cosmic.mico.core.ports import DevicePort, ManagerPort
 from cosmic.mico.core.positioner import class_for
 from cosmic.mico.core.trajectory.model import Place, Statement, Trajectory
-from cosmic.mico.core.trajectory.parser import END_OF_RECORDING
+from cosmic.mico.core.trajectory.reader import END_OF_RECORDING
 from cosmic.mico.core.trajectory.segments import SegmentBuilder
 from cosmic.mico.core.trajectory.words import number
 from cosmic.mico.core.trajectory.writer import head_lines, statement_lines

@@ -12,7 +12,7 @@ from cosmic.mico.core.trajectory.model import (
     Trajectory,
     Wait,
 )
-from cosmic.mico.core.trajectory.parser import END_OF_RECORDING
+from cosmic.mico.core.trajectory.reader import END_OF_RECORDING
 from cosmic.mico.core.trajectory.words import number
 
 
