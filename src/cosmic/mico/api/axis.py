@@ -1,30 +1,26 @@
 """One axis of the scripted API: ``rig.mico["left.x"]``."""
 
-from collections.abc import Callable
 from typing import Literal, overload
 
-from PySide6.QtCore import QObject, Qt
 from typing_extensions import override
 
 from cosmic.frame.errors import NotAvailable, refusal
-from cosmic.frame.listeners import tell
-from cosmic.frame.units import AxisUnit
 from cosmic.frame.verdict import Reason, refuse
-from cosmic.mico.api.axis_shape import AxisMovable, AxisShape
+from cosmic.mico.api.axis_facts import AxisFacts
+from cosmic.mico.api.axis_shape import AxisMovable
 from cosmic.mico.api.entry import Number, as_number, as_whole
 from cosmic.mico.api.group import waited_for
 from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.linked import linked_movement
-from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.device_commander import DeviceCommander
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.orders import FREQUENCY_HZ, Motion, MoveBy, MoveTo
 from cosmic.mico.core.ports import ManagerPort
-from cosmic.mico.core.positioner import Confidence, PositionerState, Status, class_for
-from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
+from cosmic.mico.core.positioner import Confidence, class_for
+from cosmic.mico.hw.interface import Direction
 
 
-class Axis(AxisShape):
+class Axis(AxisFacts):
     """One positioner, as scripts and widgets command it; any thread.
 
     Positions are in `unit` from the user's zero (see `set_zero`). A number may be given as text
@@ -47,120 +43,6 @@ class Axis(AxisShape):
         shown = state.shown_position
         where = "position unknown" if shown is None else f"{shown:.4g} {self.unit}"
         return f"<Axis {self._name}: {where}, {state.status}, position {state.confidence}>"
-
-    # What it is
-
-    @property
-    def details(self) -> PositionerState:
-        """Everything known of it, frozen; positions in gate coordinates."""
-        return self._manager.state(self._name)
-
-    @property
-    def kind(self) -> PositionerKind:
-        """linear, rotary or open-loop."""
-        return self.details.kind
-
-    @property
-    def unit(self) -> AxisUnit:
-        """Unit of its positions: "um" or "deg"."""
-        return self.details.unit
-
-    @property
-    def state(self) -> Status:
-        """OK, BUSY, ERROR, or UNKNOWN when its device does not answer."""
-        return self.details.status
-
-    @property
-    def activity(self) -> Activity:
-        """What the controller says it is doing."""
-        return self.details.activity
-
-    @property
-    def error(self) -> str:
-        """What is wrong with it; empty when nothing is."""
-        return self.details.error
-
-    @property
-    def confidence(self) -> Confidence:
-        """How well its position is known: known, estimated (counted steps) or unknown."""
-        return self.details.confidence
-
-    @property
-    def limits(self) -> tuple[float, float] | None:
-        """Soft limits (low, high) in `unit` from the user's zero; None without a sensor."""
-        return self.details.shown_limits
-
-    @property
-    def collision_detection(self) -> bool:
-        """Whether its movements are checked for collisions; set it to take the axis out (CL.13).
-
-        Raises
-        ------
-        NotAvailable
-            It is set, and there is no collision model.
-        """
-        model = self._manager.exemptions
-        return model is not None and self._name not in model.taken_out
-
-    @collision_detection.setter
-    def collision_detection(self, on: bool) -> None:
-        model = self._manager.exemptions
-        if model is None:
-            raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the platform file")
-        change = model.take_in if on else model.take_out
-        change(self._name, source=self.commander.source)
-
-    @property
-    def linked_to(self) -> dict[str, float]:
-        """How far each axis linked to it goes when it goes 1; empty where it is linked to none."""
-        return dict(self._manager.links.companions(self._name))
-
-    @property
-    def position_um(self) -> float | None:
-        """Position in um; counted from steps without a sensor; None before the first reading.
-
-        Raises
-        ------
-        NotAvailable
-            The axis is rotary: use `angle_deg`.
-        """
-        return self._position("um", "angle_deg")
-
-    @property
-    def angle_deg(self) -> float | None:
-        """Angle in degrees; None before the first reading.
-
-        Raises
-        ------
-        NotAvailable
-            The axis is not rotary: use `position_um`.
-        """
-        return self._position("deg", "position_um")
-
-    def _position(self, unit: AxisUnit, other: str) -> float | None:
-        state = self.details
-        if state.unit != unit:
-            raise NotAvailable(f"{self._name} is a {state.kind} axis: use {other}")
-        return state.shown_position
-
-    def subscribe(self, callback: Callable[[PositionerState], None]) -> Callable[[], None]:
-        """Call `callback(state)` after each change; returns the function that ends it.
-
-        It is called in the device's thread and must return at once; a position in motion is read
-        about 20 times a second.
-        """
-
-        def on_state(state: PositionerState) -> None:
-            if state.name == self._name:
-                tell([callback], state)
-
-        direct = Qt.ConnectionType.DirectConnection
-        connection = self.commander.state_changed.connect(on_state, direct)
-
-        def unsubscribe() -> None:
-            QObject.disconnect(connection)
-
-        return unsubscribe
 
     @property
     def movable(self) -> AxisMovable:
@@ -392,8 +274,7 @@ class Axis(AxisShape):
         self._set_zero(0.0)
 
     def _set_zero(self, zero: float) -> None:
-        device = self._manager.device(self._name)
-        device.set_zero(self._channel, zero)
+        self._manager.device(self._name).set_zero(self._channel, zero)
 
     def set_closed_loop_frequency(self, frequency_hz: Number) -> None:
         """Limit the speed of movements to a position, 1 to 18500 Hz.
