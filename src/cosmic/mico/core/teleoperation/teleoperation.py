@@ -1,8 +1,8 @@
 """`Teleoperation`: one input device steers positioners by one profile (M9, thesis MiCo4)."""
 
 import logging
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from threading import RLock
 
@@ -13,6 +13,7 @@ from cosmic.mico.core.device_commander import DeviceCommander
 from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.positioner import class_for
 from cosmic.mico.core.stop_latch import StopState
+from cosmic.mico.core.teleoperation.coupling import ForceCoupling
 from cosmic.mico.core.teleoperation.driver import AxisDriver
 from cosmic.mico.core.teleoperation.input_thread import InputThread, Steering
 from cosmic.mico.core.teleoperation.mapping import Converter, ProfileMapping
@@ -29,26 +30,6 @@ from cosmic.mico.hw.input_sources import InputSources
 logger = logging.getLogger(__name__)
 
 SOURCE = "teleoperation"
-
-
-@dataclass(frozen=True)
-class ForceCoupling:
-    """What another subsystem has to say about steering; any thread.
-
-    Attributes
-    ----------
-    make_converter : callable
-        Puts something between the inputs and the movements.
-    begin, end : callable
-        Called when teleoperation begins and ends.
-    slowed : callable
-        Part of the speed that the force leaves now.
-    """
-
-    make_converter: Callable[[ProfileMapping], Converter]
-    begin: Callable[[], None]
-    end: Callable[[], None]
-    slowed: Callable[[], float]
 
 
 class Teleoperation:
