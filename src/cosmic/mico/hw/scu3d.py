@@ -8,7 +8,7 @@ from typing import Final
 
 from typing_extensions import override
 
-from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
+from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.hw import scu3d_convert as convert
 from cosmic.mico.hw import scu3d_ctypes as sa
@@ -20,7 +20,7 @@ from cosmic.mico.hw.interface import (
     Direction,
     Event,
 )
-from cosmic.mico.hw.scu3d_errors import place, status_error
+from cosmic.mico.hw.scu3d_errors import nothing_found, place, require_serials, status_error
 from cosmic.mico.hw.scu3d_events import event_from_packet
 
 logger = logging.getLogger(__name__)
@@ -108,8 +108,8 @@ class Scu3dController(Controller):
             try:
                 devices = self._identify()
                 if not devices:
-                    raise _nothing_found("SA_GetNumberOfDevices()")
-                _require(serials, [device.serial for device in devices])
+                    raise nothing_found("SA_GetNumberOfDevices()")
+                require_serials(serials, [device.serial for device in devices])
             except DeviceError:
                 self._release()
                 raise
@@ -262,8 +262,8 @@ class Scu3dController(Controller):
         wanted = [convert.index(serial, "serial number") for serial in serials]
         found = self.find_devices()
         if not found:
-            raise _nothing_found("SA_GetAvailableDevices()")
-        _require(wanted, found)
+            raise nothing_found("SA_GetAvailableDevices()")
+        require_serials(wanted, found)
         self._call("SA_ClearInitDevicesList")
         for serial in wanted:
             self._call("SA_AddDeviceToInitDevicesList", serial)
@@ -284,19 +284,3 @@ class Scu3dController(Controller):
             logger.debug("SA_ReleaseDevices() answered 0")
         else:
             logger.warning("%s", status_error(status, "SA_ReleaseDevices()"))
-
-
-def _nothing_found(call: str) -> DeviceError:
-    # An empty list and the status for it are the same to the operator.
-    return status_error(sa.SA_NO_DEVICES_FOUND_ERROR, call)
-
-
-def _require(wanted: Sequence[int], found: Sequence[int]) -> None:
-    missing = [serial for serial in wanted if serial not in found]
-    if missing:
-        raise NotConnectedError(
-            f"{place(None)}: no device with serial number {', '.join(map(str, missing))}; "
-            f"connected: {', '.join(map(str, found)) or 'none'}",
-            fault=DeviceFault.COMMUNICATION,
-            code=sa.SA_DEVICE_NOT_FOUND_ERROR,
-        )

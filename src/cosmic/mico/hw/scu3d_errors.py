@@ -1,9 +1,11 @@
 """SCU3DControl's status codes as CoSMic exceptions."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 from cosmic.frame.errors import DeviceError, DeviceFault, DeviceTimeout, NotConnectedError
+from cosmic.mico.hw.scu3d_ctypes import SA_DEVICE_NOT_FOUND_ERROR, SA_NO_DEVICES_FOUND_ERROR
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,3 +151,21 @@ def refused(text: str, *, device: int | None = None, channel: int | None = None)
     return DeviceError(
         f"{where}: {text}", fault=DeviceFault.PARAMETER, device=device, channel=channel
     )
+
+
+def nothing_found(call: str) -> DeviceError:
+    """Return the exception for a call that finds no device at all."""
+    # An empty list and the status for it are the same to the operator.
+    return status_error(SA_NO_DEVICES_FOUND_ERROR, call)
+
+
+def require_serials(wanted: Sequence[int], found: Sequence[int]) -> None:
+    """Raise `NotConnectedError` where one of the serial numbers `wanted` was not found."""
+    missing = [serial for serial in wanted if serial not in found]
+    if missing:
+        raise NotConnectedError(
+            f"{place(None)}: no device with serial number {', '.join(map(str, missing))}; "
+            f"connected: {', '.join(map(str, found)) or 'none'}",
+            fault=DeviceFault.COMMUNICATION,
+            code=SA_DEVICE_NOT_FOUND_ERROR,
+        )
