@@ -16,16 +16,16 @@ from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, ui_font
 from cosmic.frame.task import Task
 from cosmic.mico.api.mico import Mico
-from cosmic.mico.api.trajectory_places import AwayFromStartError
 from cosmic.mico.api.trajectory_player import TrajectoryPlayer
-from cosmic.mico.api.trajectory_recording import TrajectoryRecording
-from cosmic.mico.api.trajectory_state import PlayProgress, PlayState, StartMode
+from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
 from cosmic.mico.core.trajectory.model import SUFFIX, Problem, Trajectory, TrajectoryError
-from cosmic.mico.core.trajectory.parser import LARGEST_BYTES
 from cosmic.mico.core.trajectory.rehearsal import Rehearsal
 from cosmic.mico.gui.poses_box import PosesBox
 from cosmic.mico.gui.trajectory_bars import RecordBar, RunBar, StartQuestion
 from cosmic.mico.gui.trajectory_lines import TrajectoryLines
+from cosmic.mico.gui.trajectory_play import PlayControl
+from cosmic.mico.gui.trajectory_record import RecordControl
+from cosmic.mico.gui.trajectory_texts import lines_of, rehearsal_text
 
 logger = logging.getLogger(__name__)
 
@@ -46,8 +46,6 @@ class _Relay(QObject):
     loaded = Signal(object, object)
     rehearsed = Signal(object)
     failed = Signal(str)
-    progressed = Signal(object, object)
-    recorded = Signal()
 
 
 class TrajectoryPanel(QWidget):
@@ -70,11 +68,9 @@ class TrajectoryPanel(QWidget):
         self._mico = mico
         self._application = mico.application
         self._api = mico.trajectories
-        self._trajectory: Trajectory | None = None
-        self._player: TrajectoryPlayer | None = None
-        self._recording: TrajectoryRecording | None = None
-        self._asked: Callable[[StartMode], None] | None = None
         self._make_widgets()
+        self._recorder = RecordControl(mico.trajectories, self.record_bar, self)
+        self._play = PlayControl(mico, self.run_bar, self.question, self)
         self._arrange()
         self._connect()
         self._show_player()
@@ -122,30 +118,24 @@ class TrajectoryPanel(QWidget):
         self._relay.loaded.connect(self._on_loaded)
         self._relay.rehearsed.connect(self._on_rehearsed)
         self._relay.failed.connect(self._on_failed)
-        self._relay.progressed.connect(self._on_progressed)
-        self._relay.recorded.connect(self._on_recorded)
+        self._recorder.recorded.connect(self.open)
         self.open_button.clicked.connect(self._on_open)
         self.mirror_button.clicked.connect(self.mirror)
         self.rehearse_button.clicked.connect(self.rehearse)
         self.record_bar.record_requested.connect(self._on_record)
-        self.record_bar.stop_requested.connect(self.stop_recording)
-        self.run_bar.run_requested.connect(self.run)
-        self.run_bar.step_requested.connect(self.step)
-        self.run_bar.pause_requested.connect(self._on_pause)
-        self.run_bar.cancel_requested.connect(self._on_cancel)
-        self.run_bar.speed_changed.connect(self._on_speed)
-        self.question.chosen.connect(self._on_start_chosen)
+        self._play.progressed.connect(self._on_progressed)
+        self._play.refused.connect(self._on_failed)
         self.poses_box.poses_changed.connect(self._on_poses_changed)
 
     @property
     def trajectory(self) -> Trajectory | None:
         """The trajectory shown, if it can be run."""
-        return self._trajectory
+        return self._play.trajectory
 
     @property
     def player(self) -> TrajectoryPlayer | None:
         """Its player; None before it was run."""
-        return self._player
+        return self._play.player
 
     # Opening
 
@@ -180,7 +170,7 @@ class TrajectoryPanel(QWidget):
             self._show_trajectory(found)
             return
         self.title.set_text(path.name)
-        self.lines.lines.set_lines(_text_of(path))
+        self.lines.lines.set_lines(lines_of(path))
         if isinstance(found, TrajectoryError):
             self.lines.lines.set_problems(found.problems)
             self.lines.look_at(found.problems[0].line)
@@ -192,7 +182,7 @@ class TrajectoryPanel(QWidget):
         self._show_player()
 
     def _show_trajectory(self, trajectory: Trajectory) -> None:
-        self._trajectory = trajectory
+        self._play.take(trajectory)
         self.title.set_text(trajectory.name)
         self.lines.lines.set_lines(trajectory.lines)
         count = len(trajectory.lines)
@@ -201,18 +191,15 @@ class TrajectoryPanel(QWidget):
 
     def _forget(self) -> None:
         """Let go of the trajectory shown; one that is paused is given up."""
-        if self._player is not None and not self._player.done:
-            self._player.cancel()
-        self._trajectory = self._player = None
-        self.question.hide()
+        self._play.forget()
         self.preview_changed.emit(None)
 
     def mirror(self) -> None:
         """Show the trajectory for the opposite assembly."""
-        if self._trajectory is None:
+        if self.trajectory is None:
             return
         try:
-            found = self._api.mirror(self._trajectory)
+            found = self._api.mirror(self.trajectory)
         except CosmicError as exc:
             self._say(str(exc), State.REFUSED)
             return
@@ -229,42 +216,13 @@ class TrajectoryPanel(QWidget):
 
     def record(self, path: Path) -> None:
         """Begin to record as the bar says; the dialogue has asked about a file that is there."""
-        bar = self.record_bar
-        try:
-            self._recording = self._api.record(
-                path,
-                title=path.stem,
-                timed=bar.timed.isChecked(),
-                relative_to=bar.relative_to,
-                sources=bar.sources,
-                overwrite=True,
-            )
-        except CosmicError as exc:
-            bar.show_recording(str(exc), recording=False)
-            return
-        self._recording.subscribe(self._relay.recorded.emit)
-        self._on_recorded()
-
-    def stop_recording(self) -> None:
-        """End the recording and show it."""
-        recording, self._recording = self._recording, None
-        if recording is None:
-            return
-        recording.stop()
-        self.record_bar.show_recording(_recorded(recording), recording=False)
-        if recording.error is None:
-            self.open(recording.path)
-
-    def _on_recorded(self) -> None:
-        if self._recording is not None:
-            error = self._recording.error
-            self.record_bar.show_recording(_recorded(self._recording), recording=error is None)
+        self._recorder.record(path)
 
     # Rehearsing
 
     def rehearse(self) -> None:
         """Run it through the gate in the application's thread, without moving anything."""
-        trajectory, speed = self._trajectory, self.run_bar.speed.value()
+        trajectory, speed = self.trajectory, self.run_bar.speed.value()
         if trajectory is None:
             return
 
@@ -301,73 +259,14 @@ class TrajectoryPanel(QWidget):
 
     # Running
 
-    def run(self) -> None:
-        """Run it, or go on where it was paused or has failed."""
-        self._start(lambda player, start: player.resume(start))
-
-    def step(self) -> None:
-        """Make one line."""
-        self._start(lambda player, start: player.step(start))
-
-    def _start(self, begin: Callable[[TrajectoryPlayer, StartMode], None]) -> None:
-        player = self._usable_player()
-        if player is None:
-            return
-        player.loops = self.run_bar.wanted_loops
-        player.speed = self.run_bar.speed.value()
-        self._asked = lambda start: begin(player, start)
-        self._try_start("refuse")
-
-    def _try_start(self, start: StartMode) -> None:
-        if self._asked is None:
-            return
-        self.question.hide()
-        try:
-            self._asked(start)
-        except AwayFromStartError as exc:
-            self.question.ask(str(exc), has_model=self._application.collision is not None)
-        except CosmicError as exc:
-            self._say(str(exc), State.REFUSED)
-
-    def _on_start_chosen(self, mode: str) -> None:
-        self._try_start("way" if mode == "way" else "straight")
-
-    def _usable_player(self) -> TrajectoryPlayer | None:
-        """Return a player that can go on, or a new one."""
-        done = (PlayState.ENDED, PlayState.CANCELLED)
-        if self._player is not None and self._player.state not in done:
-            return self._player
-        if self._trajectory is None:
-            return None
-        try:
-            player = self._player = self._api.prepare(self._trajectory)
-        except CosmicError as exc:
-            self._say(str(exc), State.REFUSED)
-            return None
-        player.subscribe(lambda progress: self._relay.progressed.emit(player, progress))
-        return player
-
-    def _on_pause(self) -> None:
-        if self._player is not None:
-            self._player.pause()
-
-    def _on_cancel(self) -> None:
-        if self._player is not None:
-            self._player.cancel()
-
-    def _on_speed(self, factor: float) -> None:
-        if self._player is not None:
-            self._player.speed = factor
-
-    def _on_progressed(self, player: TrajectoryPlayer, progress: PlayProgress) -> None:
-        if player is not self._player:
-            return
+    def _on_progressed(self, progress: PlayProgress) -> None:
         self.run_bar.show_state(progress, ready=True)
         self.lines.show_line(0 if progress.state is PlayState.ENDED else progress.line)
         if progress.error:
             self.lines.lines.set_problems([Problem(progress.line, progress.error)])
         words = progress.error or progress.text
-        if progress.state is PlayState.ENDED and player.rehearsal is not None:
+        player = self.player
+        if progress.state is PlayState.ENDED and player and player.rehearsal is not None:
             words = f"done. {rehearsal_text(player.rehearsal)}"
         self._say(words, _STATES[progress.state])
         self._enable(running=progress.state is PlayState.RUNNING)
@@ -378,12 +277,12 @@ class TrajectoryPanel(QWidget):
         self.record_bar.set_poses(self._mico.poses.names)
 
     def _show_player(self) -> None:
-        progress = self._player.progress if self._player is not None else None
-        self.run_bar.show_state(progress, ready=self._trajectory is not None)
+        progress = self.player.progress if self.player is not None else None
+        self.run_bar.show_state(progress, ready=self.trajectory is not None)
         self._enable(running=False)
 
     def _enable(self, *, running: bool) -> None:
-        there = self._trajectory is not None
+        there = self.trajectory is not None
         self.open_button.setEnabled(not running)
         self.mirror_button.setEnabled(there and not running)
         self.rehearse_button.setEnabled(there and not running)
@@ -391,35 +290,6 @@ class TrajectoryPanel(QWidget):
     def _say(self, text: str, state: State) -> None:
         self.report.setText(text)
         self.badge.set_state(state)
-
-
-def rehearsal_text(found: Rehearsal) -> str:
-    """Return what a rehearsal found, for the operator."""
-    parts = [f"{found.lines} lines in about {found.duration_s:.1f} s"]
-    if found.clearance_um is not None:
-        where = f"line {found.clearance_line}" if found.clearance_line else "the start"
-        bodies = " and ".join(found.clearance_bodies)
-        parts.append(f"smallest clearance {found.clearance_um:.0f} µm at {where} ({bodies})")
-    ends = [f"{axis} {value:.1f}" for axis, value in found.end.items()]
-    if ends:
-        parts.append(f"ends at {', '.join(ends)}")
-    return "; ".join(parts)
-
-
-def _recorded(recording: TrajectoryRecording) -> str:
-    if recording.error is not None:
-        return str(recording.error)
-    return f"{recording.path.name}: {recording.lines} lines"
-
-
-def _text_of(path: Path) -> list[str]:
-    """Return what can be shown of a file that is no trajectory."""
-    try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST_BYTES)
-    except OSError:
-        return []
-    return data.decode("utf-8", errors="replace").splitlines()
 
 
 def make_trajectory_panel(mico: Mico) -> TrajectoryPanel:
