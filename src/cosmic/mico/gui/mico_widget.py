@@ -2,8 +2,8 @@
 
 import logging
 
-from PySide6.QtCore import QCoreApplication, Signal
-from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.errors import CosmicError, NotAvailable
@@ -13,6 +13,7 @@ from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.group_start import GroupStarted
 from cosmic.mico.core.settings import GroupSettings, MicoSettings, PositionerSettings
+from cosmic.mico.gui.arrangement import arranged_groups
 from cosmic.mico.gui.axis_commands import ConsentRequest
 from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI
 from cosmic.mico.gui.collision_status import CollisionStatus
@@ -25,6 +26,7 @@ from cosmic.mico.gui.key_names import key_text
 from cosmic.mico.gui.linking import join_links, show_links
 from cosmic.mico.gui.mico_header import MicoHeader
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
+from cosmic.mico.gui.qt_application import qt_application
 from cosmic.mico.gui.registry import gui_class
 from cosmic.mico.gui.state_feed import StateFeed
 from cosmic.mico.gui.undo_gui import UNDO_KEY, UndoGui
@@ -74,7 +76,7 @@ class MicoWidget(QWidget):
         self._undoing = UndoGui(mico, self)
         self._columns = GroupColumns()
         self._feed = StateFeed(mico, self)
-        self._keys = JogKeys(_application(), self._header.speed, self)
+        self._keys = JogKeys(qt_application(), self._header.speed, self)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -185,24 +187,10 @@ class MicoWidget(QWidget):
         if self._dialog is not None:
             self._dialog.close()  # its question is about a card that goes
         self._cards = {}
-        groups = [self._make_group(each) for each in self._arrangement()]
+        groups = [self._make_group(each) for each in arranged_groups(self._manager)]
         self._columns.set_groups(groups)
         self._keys.set_keys(self._jog_keys())
         self._on_collision_changed()
-
-    def _arrangement(self) -> list[GroupSettings]:
-        """Return the groups of the configuration, and one a device for what they leave out."""
-        groups = list(self._settings.group)
-        named = {name for group in groups for name in group.positioners}
-        rest: dict[int, list[str]] = {}
-        for name in self._mico.names:
-            if name not in named:
-                rest.setdefault(self._manager.address(name).device, []).append(name)
-        groups += [
-            GroupSettings(title=f"Device {index}", positioners=tuple(names))
-            for index, names in sorted(rest.items())
-        ]
-        return groups
 
     def _make_group(self, arranged: GroupSettings) -> DeviceGUI:
         group = DeviceGUI(arranged.title)
@@ -303,10 +291,3 @@ def make_mico_gui(application: CosmicApplicationBase) -> MicoWidget:
     if not isinstance(application, MicoApplicationBase):
         raise TypeError(f"{application!r} is no MicoApplication")
     return MicoWidget(Mico(application, "window"))
-
-
-def _application() -> QApplication:
-    app = QCoreApplication.instance()
-    if not isinstance(app, QApplication):
-        raise TypeError("widgets need a QApplication")
-    return app
