@@ -3,14 +3,11 @@
 from collections.abc import Callable
 from typing import Final
 
-from PySide6.QtCore import QCoreApplication, QSignalBlocker, Qt, QTimer, Signal
+from PySide6.QtCore import QSignalBlocker, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import (
-    QApplication,
     QComboBox,
     QHBoxLayout,
-    QLabel,
-    QLineEdit,
     QVBoxLayout,
     QWidget,
 )
@@ -23,9 +20,11 @@ from cosmic.frame.overrides import override
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.teleoperation.settings import TeleoperationProfileSettings
 from cosmic.mico.core.teleoperation.state import TeleoperationPhase, TeleoperationState
+from cosmic.mico.gui.fine_row import FineRow
 from cosmic.mico.gui.input_bars import ForceBar, InputBars
 from cosmic.mico.gui.mapping_table import MappingTable
 from cosmic.mico.gui.phase_sign import PhaseSign
+from cosmic.mico.gui.qt_application import qt_application
 from cosmic.mico.gui.steering_keys import SteeringKeys
 from cosmic.mico.hw.input_device import InputKind
 
@@ -56,7 +55,7 @@ class TeleoperationPanel(QWidget):
         super().__init__(parent)
         self.setObjectName("TeleoperationPanel")
         self._teleoperation = mico.teleoperation
-        self._app = _application()
+        self._app = qt_application()
         settings = mico.application.manager.settings
         self.devices = named(QComboBox(), "teleoperationDevice")
         self.profiles = named(QComboBox(), "teleoperationProfile")
@@ -70,9 +69,8 @@ class TeleoperationPanel(QWidget):
         self.bars = InputBars()
         self.force = ForceBar()
         self.table = MappingTable({each.name: each.kind for each in settings.positioner})
-        self.fine_share = named(QLineEdit(), "fineShare")
-        self.fine_button = named(QLineEdit(), "fineButton")
-        self.pace = QLabel("coarse")
+        self.fine = FineRow()
+        self.fine_share = self.fine.share
         self.message = ElidedLabel()
         self.keys = SteeringKeys(self._app, self._teleoperation.sources.keys.keyboard, self)
         self._words = ""
@@ -102,35 +100,21 @@ class TeleoperationPanel(QWidget):
         told.setSpacing(STEP_PX)
         told.addWidget(self.sign, 3)
         told.addWidget(self.force, 2)
+        pace = QHBoxLayout()
+        pace.setSpacing(STEP_PX // 2)
+        pace.addWidget(self.fine)
+        pace.addWidget(self.rates, 1)
+        pace.addWidget(self.as_configured)
         column = QVBoxLayout(self)
         column.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
         column.setSpacing(STEP_PX)
         column.addLayout(choice)
         column.addLayout(told)
-        column.addLayout(self._fine_row())
+        column.addLayout(pace)
         column.addWidget(self.message)
         column.addWidget(self.bars)
         column.addWidget(self.table, 1)
         self.message.hide()
-
-    def _fine_row(self) -> QHBoxLayout:
-        tips = (
-            (self.fine_share, "fine share", "Part of the speed that fine leaves, 0 to 1"),
-            (self.fine_button, "fine button", "Button that changes between fine and coarse"),
-        )
-        for edit, name, tip in tips:
-            edit.setAccessibleName(name)
-            edit.setToolTip(tip)
-        self.fine_share.setFixedWidth(7 * STEP_PX)
-        self.fine_button.setFixedWidth(17 * STEP_PX)
-        self.pace.setFixedWidth(self.pace.fontMetrics().horizontalAdvance("coarse") + STEP_PX)
-        row = QHBoxLayout()
-        row.setSpacing(STEP_PX // 2)
-        for widget in (self.pace, QLabel("fine:"), self.fine_share, QLabel("by"), self.fine_button):
-            row.addWidget(widget)
-        row.addWidget(self.rates, 1)
-        row.addWidget(self.as_configured)
-        return row
 
     def _connect(self) -> None:
         self.start.clicked.connect(self._on_start)
@@ -138,8 +122,7 @@ class TeleoperationPanel(QWidget):
         self.profiles.currentIndexChanged.connect(self._on_profile_chosen)
         self.table.changed.connect(self._on_table_changed)
         self.table.refused.connect(self._say)
-        self.fine_share.editingFinished.connect(self._on_fine_edited)
-        self.fine_button.editingFinished.connect(self._on_fine_edited)
+        self.fine.edited.connect(self._on_fine_edited)
         self._app.applicationStateChanged.connect(self._on_attention)
         self._refresh_timer = QTimer(self, interval=REFRESH_MS)
         self._refresh_timer.timeout.connect(self.refresh)
@@ -181,8 +164,7 @@ class TeleoperationPanel(QWidget):
         profile = self._profile()
         self.table.show_profile(profile)
         if profile is not None:
-            self.fine_share.setText(f"{profile.fine_share:g}")
-            self.fine_button.setText(profile.fine_button)
+            self.fine.show_profile(profile)
         self._allow()
 
     def _allow(self) -> None:
@@ -231,7 +213,7 @@ class TeleoperationPanel(QWidget):
         self.sign.show_phase(state.phase, state.words)
         self.bars.show_inputs(state.inputs)
         self.force.show_force(state.force, state.slowed)
-        self.pace.setText("fine" if state.fine else "coarse")
+        self.fine.show_pace(fine=state.fine)
         self.table.show_state(state)
         running = self._running(state)
         rates = f"read {state.poll_hz:.0f} Hz, sent {state.command_hz:.0f} Hz"
@@ -249,15 +231,11 @@ class TeleoperationPanel(QWidget):
     def _on_table_changed(self, row: int, key: str, value: object) -> None:
         self._edit(lambda name: self._teleoperation.edit_axis(name, row, **{key: value}))
 
-    def _on_fine_edited(self) -> None:
-        profile = self._profile()
-        if profile is None:
-            return
-        share, button = self.fine_share.text().strip(), self.fine_button.text().strip()
-        if (share, button) != (f"{profile.fine_share:g}", profile.fine_button):
+    def _on_fine_edited(self, share: object, button: str) -> None:
+        if self._profile() is not None:
             self._edit(
                 lambda name: self._teleoperation.edit_profile(
-                    name, fine_share=_number(share), fine_button=button
+                    name, fine_share=share, fine_button=button
                 )
             )
 
@@ -295,20 +273,6 @@ class TeleoperationPanel(QWidget):
         self.keys.unplug()
 
 
-def _number(text: str) -> float | str:
-    try:
-        return float(text)
-    except ValueError:
-        return text
-
-
 def make_teleoperation_panel(mico: Mico) -> TeleoperationPanel:
     """Return the panel that steers by an input device."""
     return TeleoperationPanel(mico)
-
-
-def _application() -> QApplication:
-    app = QCoreApplication.instance()
-    if not isinstance(app, QApplication):
-        raise TypeError("widgets need a QApplication")
-    return app
