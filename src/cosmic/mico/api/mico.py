@@ -1,38 +1,32 @@
 """The MiCo part of the scripted API: ``rig.mico``."""
 
-from collections.abc import Callable, Iterator, Mapping
-from threading import Lock
+from collections.abc import Callable, Mapping
 from typing import Literal, overload
 
-from PySide6.QtCore import Qt
 from typing_extensions import override
 
-from cosmic.frame.errors import MoveRefused, NotAvailable
+from cosmic.frame.errors import NotAvailable
 from cosmic.frame.task import Progress, Task
 from cosmic.frame.threads import forbid_waiting_here
-from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.application_base import WAY_BUDGET_S, MicoApplicationBase
-from cosmic.mico.api.axis import Axis
-from cosmic.mico.api.axis_group import AxisGroup
+from cosmic.mico.api.axes_together import AxesTogether
 from cosmic.mico.api.collision import Collision
-from cosmic.mico.api.entry import Number, as_number
+from cosmic.mico.api.entry import Number
 from cosmic.mico.api.group import GroupMovement, waited_for
 from cosmic.mico.api.initialisation import Confirm
 from cosmic.mico.api.links import check_linkable
 from cosmic.mico.api.poses import Poses
+from cosmic.mico.api.task_wait import wait_or_cancel
 from cosmic.mico.api.trajectories import Trajectories
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
-from cosmic.mico.core.device_commander import DeviceCommander
 from cosmic.mico.core.links import Link
-from cosmic.mico.core.orders import Motion, MoveBy, MoveTo
-from cosmic.mico.core.ports import DevicePort
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 from cosmic.mico.core.undo import UndoEntry
 
 
-class Mico:
+class Mico(AxesTogether):
     """The axes of the platform, by name; any thread.
 
     Parameters
@@ -44,72 +38,17 @@ class Mico:
     """
 
     def __init__(self, application: MicoApplicationBase, source: str = "script") -> None:
+        super().__init__(application.manager, source)
         self._application = application
-        self._manager = application.manager
-        self._source = source
-        self._commanders: dict[int, DeviceCommander] = {}
-        self._axes: dict[str, Axis] = {}
-        self._joined: dict[int, DevicePort] = {}
-        self._joining = Lock()
-        self._connect()
-        # Direct, because a script has no event loop that a queued call could arrive in.
-        application.manager.changed.connect(self._connect, Qt.ConnectionType.DirectConnection)
-
-    def _connect(self) -> None:
-        """Join the commanders to the devices there are now."""
-        token = self._manager.lease.local_token
-        with self._joining:
-            for index, device in self._manager.devices.items():
-                commander = self._commanders.get(index)
-                if commander is None:
-                    commander = self._commanders[index] = DeviceCommander(token, self._source)
-                if self._joined.get(index) is not device:
-                    self._joined[index] = device
-                    self._manager.connect_device_commander(index, commander)
 
     @property
     def application(self) -> MicoApplicationBase:
         """The application behind it."""
         return self._application
 
-    @property
-    def simulated(self) -> bool:
-        """True when no hardware moves."""
-        return self._manager.controller.simulated
-
-    @property
-    def names(self) -> list[str]:
-        """Names of all axes, in the order of the configuration."""
-        return self._manager.names()
-
-    @property
-    def missing(self) -> tuple[str, ...]:
-        """What was configured and is not there, a line each."""
-        return self._manager.missing
-
-    def __getitem__(self, name: str) -> Axis:
-        """Return an axis; raises `UnknownAxisError`, a `CosmicError` and `KeyError`."""
-        address = self._manager.address(name)
-        axis = self._axes.get(name)
-        if axis is None:
-            if address.device not in self._commanders:
-                self._connect()  # it was told of just now, and `changed` is on its way
-            axis = Axis(name, self._manager, self._commanders[address.device])
-            self._axes[name] = axis
-        return axis
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.names
-
     @override
     def __repr__(self) -> str:
         return f"<Mico: {', '.join(self.names)}>"
-
-    def __iter__(self) -> Iterator[Axis]:
-        return (self[name] for name in self.names)
-
-    def __len__(self) -> int:
-        return len(self.names)
 
     def initialise(
         self,
@@ -156,136 +95,8 @@ class Mico:
         if progress is not None:
             task.subscribe(progress)
         if wait:
-            try:
-                task.wait()
-            except KeyboardInterrupt:
-                task.cancel()
-                raise
+            wait_or_cancel(task)
         return task
-
-    @overload
-    def move(
-        self,
-        targets: Mapping[str, Number],
-        *,
-        wait: Literal[True] = True,
-        consent: bool = False,
-        match_arrival: bool = False,
-    ) -> dict[str, float | None]: ...
-
-    @overload
-    def move(
-        self,
-        targets: Mapping[str, Number],
-        *,
-        wait: Literal[False],
-        consent: bool = False,
-        match_arrival: bool = False,
-    ) -> GroupMovement: ...
-
-    def move(
-        self,
-        targets: Mapping[str, Number],
-        *,
-        wait: bool = True,
-        consent: bool = False,
-        match_arrival: bool = False,
-    ) -> dict[str, float | None] | GroupMovement:
-        """Move several axes to positions together; returns the positions reached.
-
-        They are decided together and started back to back; each goes at its own speed, so the
-        path is not a straight line. The failure of one stops the others. Axes that are linked to
-        them, and not named, move with them.
-
-        Parameters
-        ----------
-        targets : mapping
-            Positions by axis name, in the unit of each axis, from the user's zero.
-        wait : bool
-            False returns the `GroupMovement` at once.
-        match_arrival : bool
-            Slow the axes down to the one that takes longest, so that all arrive together; their
-            own speeds come back afterwards.
-
-        Raises
-        ------
-        MoveRefused
-            The gate refused; nothing moved.
-        UnknownAxisError
-            One axis does not exist; nothing moved.
-        DeviceError, MoveCancelled
-            One of them failed or was stopped.
-        """
-        motions = self._targets(targets)
-        return self._together(motions, wait=wait, consent=consent, match_arrival=match_arrival)
-
-    @overload
-    def move_by(
-        self,
-        distances: Mapping[str, Number],
-        *,
-        wait: Literal[True] = True,
-        consent: bool = False,
-        match_arrival: bool = False,
-    ) -> dict[str, float | None]: ...
-
-    @overload
-    def move_by(
-        self,
-        distances: Mapping[str, Number],
-        *,
-        wait: Literal[False],
-        consent: bool = False,
-        match_arrival: bool = False,
-    ) -> GroupMovement: ...
-
-    def move_by(
-        self,
-        distances: Mapping[str, Number],
-        *,
-        wait: bool = True,
-        consent: bool = False,
-        match_arrival: bool = False,
-    ) -> dict[str, float | None] | GroupMovement:
-        """Move several axes by distances together; otherwise as `move`."""
-        motions: dict[str, Motion] = {}
-        for name, value in distances.items():
-            unit = self[name].unit
-            motions[name] = MoveBy(as_number(value, unit, name), unit)
-        return self._together(motions, wait=wait, consent=consent, match_arrival=match_arrival)
-
-    def _targets(self, targets: Mapping[str, Number]) -> dict[str, Motion]:
-        motions: dict[str, Motion] = {}
-        for name, value in targets.items():
-            motions[name] = MoveTo(self._in_gate(name, value), self[name].unit)
-        return motions
-
-    def _together(
-        self, motions: Mapping[str, Motion], *, wait: bool, consent: bool, match_arrival: bool
-    ) -> dict[str, float | None] | GroupMovement:
-        orders = self._manager.order_together(
-            motions, source=self._source, consent=consent, match_arrival=match_arrival
-        )
-        group = GroupMovement.of(orders)
-        return waited_for(group) if wait else group
-
-    def group(self, *names: str, name: str = "") -> AxisGroup:
-        """Return axes that a bluesky plan moves as one; raises `UnknownAxisError`."""
-        axes = {each: self[each].movable for each in names}
-        return AxisGroup(axes, lambda to: self.move(to, wait=False), self.check, name)
-
-    def check(self, targets: Mapping[str, Number]) -> MoveVerdict:
-        """Return the gate's answer to absolute targets together, without moving.
-
-        Raises
-        ------
-        UnknownAxisError
-            One axis does not exist.
-        """
-        try:
-            return self._manager.check(self._targets(targets))
-        except MoveRefused as exc:
-            return exc.verdict
 
     # Ways round (ECM)
 
@@ -333,10 +144,6 @@ class Mico:
     ) -> Task:
         """Find a way to absolute targets and go it; raises as `find_way` and `follow`."""
         return self.follow(self.find_way(targets, budget_s=budget_s), wait=wait)
-
-    def _in_gate(self, name: str, value: Number) -> float:
-        axis = self[name]
-        return as_number(value, axis.unit, name) + axis.details.zero
 
     # Teleoperation
 

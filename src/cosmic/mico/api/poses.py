@@ -3,9 +3,10 @@
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from cosmic.frame.errors import MoveCancelled, NotAvailable, UnknownAxisError
+from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable, UnknownAxisError
 from cosmic.frame.task import Task
 from cosmic.mico.api.group import move_together
+from cosmic.mico.api.task_wait import wait_or_cancel
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.core.orders import Motion, MoveTo
 from cosmic.mico.core.poses import Pose
@@ -114,16 +115,10 @@ class Poses:
             f"Going to {name}", lambda task: self._go(pose, task, way=way)
         )
         if wait:
-            try:
-                task.wait()
-            except KeyboardInterrupt:
-                task.cancel()
-                raise
+            wait_or_cancel(task)
         return task
 
     def _go(self, pose: Pose, task: Task, *, way: bool) -> None:
-        from cosmic.frame.errors import CosmicError
-
         manager = self._site.manager
         try:
             parts = [pose.positions]
