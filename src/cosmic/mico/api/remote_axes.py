@@ -1,7 +1,7 @@
 """The axes of a station, as they were told of last."""
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from threading import RLock
 from typing import Final
@@ -9,12 +9,7 @@ from typing import Final
 from PySide6.QtCore import QObject, Signal
 
 from cosmic.frame.clock import WALL, Clock, RatedClock
-from cosmic.frame.errors import (
-    NotAvailable,
-    ProtocolError,
-    UnknownAxisError,
-)
-from cosmic.frame.network.travelling_errors import from_plain
+from cosmic.frame.errors import NotAvailable, ProtocolError, UnknownAxisError
 from cosmic.mico.api.remote_device import RemoteDevice
 from cosmic.mico.api.remote_line import CommandLine
 from cosmic.mico.api.remote_mirrors import (
@@ -40,7 +35,6 @@ from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.device_commander import CommanderType, DeviceCommander, join
 from cosmic.mico.core.group_start import GroupStarted
 from cosmic.mico.core.lease import Lease
-from cosmic.mico.core.messages import MovementBegun, MovementEnded, PositionChanged
 from cosmic.mico.core.orders import Order
 from cosmic.mico.core.positioner import Confidence, PositionerState
 from cosmic.mico.core.settings import MicoSettings, PositionerSettings
@@ -70,11 +64,9 @@ class RemoteAxes(QObject):
         super().__init__()
         self._line = line
         self._lock = RLock()
-        self._facts: MicoFacts | None = None
         self._status: MicoStatus | None = None
         self._states: dict[str, StampedState] = {}
         self._telling = RLock()
-        self._shown: dict[str, PositionerState] = {}
         self._devices: dict[int, RemoteDevice] = {}
         self._away = NOT_YET
         self._others: dict[str, PositionerSettings] = {}
@@ -181,7 +173,6 @@ class RemoteAxes(QObject):
         except ValueError as exc:
             raise ProtocolError(f"the station's settings are not understood: {exc}") from exc
         with self._lock:
-            self._facts = facts
             self.settings = settings
             self._others = {each.name: each for each in (*settings.positioner, *others)}
             self.clock = RatedClock(facts.rate)
@@ -220,23 +211,12 @@ class RemoteAxes(QObject):
                 self.heed(event)
             case MicoStatus():
                 self._take_status(event)
+            case Refused(together=True):
+                self.group_refused.emit(event.verdict)
             case Refused():
-                self._on_refused(event)
-            case Begun():
-                begun = MovementBegun(
-                    event.name,
-                    event.motion,
-                    event.from_position,
-                    event.target,
-                    event.unit,
-                    event.time_s,
-                    event.source,
-                )
-                self._tell_device(event.name, lambda device: device.movement_begun.emit(begun))
-            case Ended():
-                error = None if event.error is None else from_plain(event.error)
-                ended = MovementEnded(event.name, event.position, error)
-                self._tell_device(event.name, lambda device: device.movement_ended.emit(ended))
+                self._tell_device(event.verdict.axis, event)
+            case Begun() | Ended():
+                self._tell_device(event.name, event)
             case StartedTogether():
                 self.group_started.emit(GroupStarted(event.names, event.skew_ms))
             case None:
@@ -270,18 +250,11 @@ class RemoteAxes(QObject):
     def _tell(self, name: str) -> None:
         """Emit the newest state of an axis; one at a time, so that the newest comes last."""
         with self._telling:
-            known, before = self._states.get(name), self._shown.get(name)
+            known = self._states.get(name)
             if known is None:
                 return
-            state = known.state
-            if before is not None and _alike(before, state):
-                return
-            self._shown[name] = state
-            device = self._device(state.address.device)
-            device.state_changed.emit(state)
-            moved = before is None or before.position != state.position
-            if moved and state.position is not None:
-                device.position_changed.emit(PositionChanged(name, state.position, state.unit))
+            device = self._device(known.state.address.device)
+            device.news.tell(known.state)
 
     def _device(self, index: int) -> RemoteDevice:
         device = self._devices.get(index)
@@ -310,32 +283,16 @@ class RemoteAxes(QObject):
         self.poses.show(status.poses)
         self.undo.show(status.undo)
         self.collision.show(status.taken_out, status.contacts)
-        if before is None or _shape(before) != _shape(status):
+        if before is None or before.outline != status.outline:
             self.changed.emit()
 
-    def _on_refused(self, refused: Refused) -> None:
-        if refused.together:
-            self.group_refused.emit(refused.verdict)
-        elif refused.verdict.axis:
-            verdict = refused.verdict
-            name = refused.verdict.axis
-            self._tell_device(name, lambda device: device.movement_refused.emit(verdict))
-
-    def _tell_device(self, name: str, how: Callable[[RemoteDevice], None]) -> None:
+    def _tell_device(self, name: str, event: Begun | Ended | Refused) -> None:
         known = self._states.get(name)
         if known is not None:
-            how(self._device(known.state.address.device))
-
-
-def _alike(one: PositionerState, other: PositionerState) -> bool:
-    return replace(one, read_wall_s=other.read_wall_s) == other
+            self._device(known.state.address.device).tell(event)
 
 
 def _lost(state: PositionerState, why: str) -> PositionerState:
     sensed = state.kind is not PositionerKind.OPEN_LOOP
     confidence = Confidence.UNKNOWN if sensed else state.confidence
     return replace(state, present=False, in_motion=False, error=why, confidence=confidence)
-
-
-def _shape(status: MicoStatus) -> tuple[object, ...]:
-    return status.ready, status.failure, status.names, status.missing

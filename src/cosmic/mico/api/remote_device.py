@@ -10,10 +10,12 @@ from cosmic.frame.errors import CosmicError, MoveCancelled, MoveRefused, Protoco
 from cosmic.frame.network.ongoing import Ongoing
 from cosmic.frame.network.travelling_errors import from_plain
 from cosmic.mico.api.remote_line import CommandLine, when_over
-from cosmic.mico.api.station_words import Outcomes
+from cosmic.mico.api.station_words import Begun, Ended, Outcomes, Refused
+from cosmic.mico.core.messages import MovementEnded
 from cosmic.mico.core.orders import Jog, Order
 from cosmic.mico.core.positioner import PositionerBase, PositionerState, class_for
 from cosmic.mico.core.settings import PositionerSettings
+from cosmic.mico.core.state_news import StateNews
 
 logger = logging.getLogger(__name__)
 
@@ -69,6 +71,18 @@ class RemoteDevice(QObject):
         self._newest: dict[int, int] = {}
         self._void: dict[int, int] = {}
         self.slots = CommanderSlots(self)
+        self.news = StateNews(self.state_changed.emit, self.position_changed.emit)
+
+    def tell(self, event: Begun | Ended | Refused) -> None:
+        """Emit what the station says of a movement."""
+        match event:
+            case Begun():
+                self.movement_begun.emit(event.heard())
+            case Ended():
+                error = None if event.error is None else from_plain(event.error)
+                self.movement_ended.emit(MovementEnded(event.name, event.position, error))
+            case Refused():
+                self.movement_refused.emit(event.verdict)
 
     def submit(self, order: Order) -> None:
         """Send `order`; how it goes is told by its movement and by signals."""

@@ -20,6 +20,7 @@ from cosmic.mico.core.collision.model import (
     WatchedPair,
 )
 from cosmic.mico.core.links import Link
+from cosmic.mico.core.messages import MovementBegun
 from cosmic.mico.core.orders import (
     Calibrate,
     Jog,
@@ -132,6 +133,11 @@ class MicoStatus:
     undo: tuple[UndoEntry, ...]
     poses: tuple[Pose, ...]
 
+    @property
+    def outline(self) -> tuple[object, ...]:
+        """What of it is told by `changed`."""
+        return self.ready, self.failure, self.names, self.missing
+
 
 @transferable
 @dataclass(frozen=True, slots=True)
@@ -163,6 +169,18 @@ class Begun:
     unit: AxisUnit
     time_s: float
     source: str
+
+    def heard(self) -> MovementBegun:
+        """Return it as this process knows it."""
+        return MovementBegun(
+            name=self.name,
+            motion=self.motion,
+            from_position=self.from_position,
+            target=self.target,
+            unit=self.unit,
+            time_s=self.time_s,
+            source=self.source,
+        )
 
 
 @transferable
