@@ -98,8 +98,8 @@ def slender(course: Course, least: float) -> bool:
     """Return whether what was measured is long and narrow."""
     length = float(arc_lengths(course.line)[-1])
     typical = float(np.median(course.contrast[course.good])) if course.good.any() else 0.0
-    beside = checks.edging(course, typical) < 0.5
-    return beside and typical > 0 and length >= max(least, SLENDER * course.width)
+    long = length >= max(least, SLENDER * course.width)
+    return long and typical > 0 and checks.edging(course, typical) < 0.5
 
 
 def neighbours(scene: Scene, kept: list[Strand], index: int) -> Neighbours:
@@ -129,8 +129,8 @@ def section_of(scene: Scene, course: Course) -> Section:
     found = fit_section(gathered(scene, course.line, good, course.ground, reach), course.width)
     if found is not None:
         return found
-    blur = max(course.blur_px, APERTURE_PX)
-    return Section(course.width, 0.2 * course.width + 0.2, float(np.log(blur)), 0.5, 0.0)
+    blur_ln = float(np.log(max(course.blur_px, APERTURE_PX)))
+    return Section(course.width, 0.2 * course.width + 0.2, blur_ln, 0.5, 0.0)
 
 
 def fibre(scene: Scene, course: Course, section: Section, doubts: list[str]) -> Fibre:
