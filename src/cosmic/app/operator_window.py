@@ -7,6 +7,7 @@ from PySide6.QtCore import QSettings, Qt
 from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
 import cosmic
+from cosmic.app.calibration_panel import CalibrationPanel, add_calibrations
 from cosmic.app.campaign_dock import CAMPAIGN, CampaignDock, can_run
 from cosmic.app.collision_bar import CollisionBar
 from cosmic.app.control_mode import ACM, ECM, SCM, ControlMode, blocked_modes
@@ -92,11 +93,13 @@ class OperatorWindow(CosmicServerGui):
                 self, self._mico_gui, self._scene, self._rig.control, beside=SCENE
             )
         self._campaign: CampaignDock | None = None
+        self._calibrations: CalibrationPanel | None = None
         if self._scene is not None and can_run(platform):
             self._campaign = CampaignDock(
                 self, self._rig, self._scene, platform.policy, beside=MICO
             )
             self._campaign.replayed.connect(self._raise_scene)
+            self._calibrations = add_calibrations(self, self._rig, beside=MICO)
             self.dock(MICO).raise_()
         if pictures:
             self.dock(pictures).raise_()
@@ -298,6 +301,8 @@ class OperatorWindow(CosmicServerGui):
             self._mico_gui.release_keys()
         if self._campaign is not None:
             self._campaign.shut_down()
+        if self._calibrations is not None:
+            self._calibrations.shut_down()
         if self._procedures is not None:
             self._procedures.shut_down()
         self._rig.close()

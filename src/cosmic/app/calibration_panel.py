@@ -1,0 +1,183 @@
+"""The panel "Calibrations": all there are, how good and how old, and how to renew them."""
+
+from collections.abc import Callable, Sequence
+from typing import Final, Protocol
+
+from PySide6.QtCore import QSize, Qt, QTimer
+from PySide6.QtGui import QHideEvent, QIcon, QShowEvent
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QHBoxLayout,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from cosmic.app.procedure_tree import ProcedureTreePanel
+from cosmic.app.procedure_tree_port import ProcedurePort
+from cosmic.app.procedure_tree_sign import SIGN_PX, state_pixmap
+from cosmic.app.rig import Rig
+from cosmic.autonomy.calibrating.book import CalibrationBook, CalibrationEntry, CalibrationStanding
+from cosmic.frame.gui.amounts import duration_text
+from cosmic.frame.gui.build import named, push_button, tipped
+from cosmic.frame.gui.server_gui import CosmicServerGui
+from cosmic.frame.gui.theme import STEP_PX, State
+from cosmic.frame.overrides import override
+
+CALIBRATIONS: Final = "Calibrations"
+HEADERS: Final = ("Calibration", "Tool", "Standing", "Residual", "At most", "Age", "How")
+NAME, TOOL, STANDING, RESIDUAL, LARGEST, AGE, HOW = range(len(HEADERS))
+PERIOD_MS: Final = 1000
+SIGNS: Final = {
+    CalibrationStanding.FRESH: State.OK,
+    CalibrationStanding.STALE: State.REFUSED,
+    CalibrationStanding.UNCHECKED: State.REFUSED,
+    CalibrationStanding.POOR: State.ERROR,
+}
+_KEY: Final = Qt.ItemDataRole.UserRole
+
+
+class Calibrating(Protocol):
+    """Begins a run that calibrates what is due; `zooms` adds every step of the lens."""
+
+    def __call__(self, *, zooms: bool) -> ProcedurePort:
+        """Return the run, ready to begin."""
+        ...
+
+
+class CalibrationPanel(QWidget):
+    """Lists the book, and carries out the procedure that calibrates; GUI thread.
+
+    Parameters
+    ----------
+    book : callable
+        Returns the book.
+    calibrate : callable
+        Returns a run that is ready to begin.
+    """
+
+    def __init__(
+        self,
+        book: Callable[[], CalibrationBook],
+        calibrate: Calibrating,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("CalibrationPanel")
+        self._book = book
+        self.list = named(QTreeWidget(), "calibrationList")
+        self.list.setHeaderLabels(list(HEADERS))
+        self.list.setRootIsDecorated(False)
+        self.list.setSelectionMode(QTreeWidget.SelectionMode.ExtendedSelection)
+        self.list.setIconSize(QSize(SIGN_PX, SIGN_PX))
+        self.list.itemSelectionChanged.connect(self._on_selection)
+        self.anew = named(
+            push_button("Measure anew", "What is selected is measured by the next run in any case"),
+            "calibrationAnew",
+        )
+        self.anew.clicked.connect(self._on_anew)
+        self.zooms = named(QCheckBox("every zoom"), "calibrationZooms")
+        tipped(self.zooms, "The map at every step of the lens as well; it takes a minute")
+        self.run = ProcedureTreePanel(lambda: calibrate(zooms=self.zooms.isChecked()))
+        row = QHBoxLayout()
+        row.addWidget(self.anew)
+        row.addWidget(self.zooms)
+        row.addStretch(1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
+        column.addWidget(self.list, 1)
+        column.addLayout(row)
+        column.addWidget(self.run, 1)
+        self._timer = QTimer(self)
+        self._timer.setInterval(PERIOD_MS)
+        self._timer.timeout.connect(self.refresh)
+        self._icons: dict[CalibrationStanding, QIcon] = {}
+        self._shown: tuple[tuple[str, str], ...] = ()
+        self._on_selection()
+
+    def refresh(self) -> None:
+        """Show the book as it is now."""
+        book = self._book()
+        entries = book.entries
+        keys = tuple(each.key for each in entries)
+        if keys != self._shown:
+            self.list.clear()
+            self.list.addTopLevelItems([QTreeWidgetItem() for _ in keys])
+            self._shown = keys
+        for row, entry in enumerate(entries):
+            self._fill(self.list.topLevelItem(row), book, entry)
+        for column in range(HOW):
+            self.list.resizeColumnToContents(column)
+
+    def _fill(
+        self, item: QTreeWidgetItem | None, book: CalibrationBook, entry: CalibrationEntry
+    ) -> None:
+        if item is None:
+            return
+        standing = book.standing(entry)
+        for column, text in enumerate(texts(book, entry)):
+            if item.text(column) != text:
+                item.setText(column, text)
+        if standing not in self._icons:
+            self._icons[standing] = QIcon(state_pixmap(SIGNS[standing]))
+        item.setIcon(STANDING, self._icons[standing])
+        item.setData(NAME, _KEY, entry.key)
+        tip = "\n".join(
+            [*(f"{key}: {each:.4g}" for key, each in entry.values.items()), _told(entry)]
+        )
+        for column in range(len(HEADERS)):
+            item.setToolTip(column, entry.problem or tip)
+
+    def _on_selection(self) -> None:
+        self.anew.setEnabled(bool(self.list.selectedItems()))
+
+    def _on_anew(self) -> None:
+        book = self._book()
+        for item in self.list.selectedItems():
+            name, tool = item.data(NAME, _KEY)
+            book.forget(name, tool)
+        self.refresh()
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        self.refresh()
+        self._timer.start()
+        super().showEvent(event)
+
+    @override
+    def hideEvent(self, event: QHideEvent) -> None:
+        self._timer.stop()
+        super().hideEvent(event)
+
+    def shut_down(self) -> None:
+        """End the run that was begun here."""
+        self._timer.stop()
+        self.run.shut_down()
+
+
+def texts(book: CalibrationBook, entry: CalibrationEntry) -> Sequence[str]:
+    """Return what stands in the columns of the list."""
+    refused = bool(entry.problem)
+    return (
+        entry.name,
+        entry.tool,
+        str(book.standing(entry)),
+        "" if refused else f"{entry.residual:.2g} {entry.unit.replace('um', 'µm')}",
+        "" if refused else f"{entry.largest:g}",
+        duration_text(book.age_s(entry)),
+        entry.problem or entry.how,
+    )
+
+
+def _told(entry: CalibrationEntry) -> str:
+    made = entry.made.astimezone().strftime("%Y-%m-%d %H:%M")
+    seen = entry.checked.astimezone().strftime("; seen to hold %H:%M") if entry.checked else ""
+    return f"made {made}{seen}; with {entry.made_with}; CoSMic {entry.version}"
+
+
+def add_calibrations(window: CosmicServerGui, rig: Rig, beside: str) -> CalibrationPanel:
+    """Put the panel in a window, in a tab with another one."""
+    panel = CalibrationPanel(lambda: rig.calibrations, lambda *, zooms: rig.calibrate(zooms=zooms))
+    window.add_panel(CALIBRATIONS, panel, beside=beside, tabbed=True)
+    return panel
