@@ -145,7 +145,9 @@ def still_at(work: FibreWork, z_um: float, *, follow: bool) -> Generator[Wish, o
     far = math.hypot(*seen.off_um)
     if far <= max(settings.drift_um, TIMES_STD * seen.std_um):
         return True
-    if not (follow and far <= settings.drift_far_um):
+    if not follow:
+        return far <= settings.residual_px * seen.scale_um_px
+    if not far <= settings.drift_far_um:
         return False
     shift_maps(work, seen.off_um)
     return True
@@ -222,7 +224,7 @@ class ComparePlaces(Calibrated):
         finally:
             work.zoomed = None
         yield from zoom_to(work, work.settings.zoom)
-        if math.hypot(*gripper.off_um) > max(settings.drift_um, TIMES_STD * gripper.std_um):
+        if not math.hypot(*gripper.off_um) <= settings.residual_px * gripper.scale_um_px:
             return None
         off = probe.off_um[0] - gripper.off_um[0], probe.off_um[1] - gripper.off_um[1]
         return replace(entry, values=_both(off))
