@@ -35,6 +35,8 @@ T = TypeVar("T")
 FIRST_DATA_S: Final = 1.0
 MORE_CHUNKS: Final = 5.0
 """How many times more chunks a simulation at a rate makes, on the wall; then they grow."""
+LONGEST_CHUNK_S: Final = 0.25
+"""They must come, at the pace of the wall too, before they are missed."""
 
 
 class SilenceWatch(WorkerThread):
@@ -215,7 +217,8 @@ class DaqcoApplication(TaskApplication):
             settings = self._settings
             # Many more of them on the wall than were asked for would be too many, however fast a
             # simulation runs; but who waits for samples waits for their chunk.
-            chunk_s = settings.chunk_s * max(1.0, self.clock.rate / MORE_CHUNKS)
+            longer_s = min(settings.chunk_s * self.clock.rate / MORE_CHUNKS, LONGEST_CHUNK_S)
+            chunk_s = max(settings.chunk_s, longer_s)
             plan = make_plan(settings.channel, settings.rate_hz, chunk_s, self._infos)
             for name in plan.boards:
                 if name not in self._boards:
