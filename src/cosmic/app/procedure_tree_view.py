@@ -42,6 +42,8 @@ _KINDS: Final = {
     "guard": "Goes on only while a condition holds",
     "parallel": "Side by side",
     "repeat": "Again and again",
+    "holding": "Needs something that one part uses at a time",
+    "role": "By one of several that do the same",
 }
 
 
@@ -132,7 +134,7 @@ class ProcedureTree(QTreeWidget):
         item.setText(TRY, _count(view))
         item.setText(TIME, time)
         item.setText(CAUSE, event.cause or event.text)
-        item.setToolTip(CAUSE, f"{event.cause}: {event.text}" if event.cause else "")
+        item.setToolTip(CAUSE, f"{event.cause}: {event.text}" if event.cause else event.text)
         running = view.state in UNDER_WAY
         quiet = view.state is NodeState.WAITING
         colour = QBrush(QColor(palette.dim if quiet else palette.text))
