@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cosmic.app.campaign_output import gui_application, write_output
+from cosmic.app.campaign_output import write_output
 from cosmic.app.rig import Rig
 from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.recipe import OutputSettings
@@ -87,15 +87,14 @@ def test_every_operation_is_in_the_journal_before_it_is_done(done: Campaign) -> 
     assert journal[-1].fibre == 1
 
 
+@pytest.mark.usefixtures("qapp")  # one for all tests of a process: the report would make its own
 def test_report_and_table_are_written_without_a_window(done: Campaign) -> None:
-    application = gui_application()
     written = write_output(done.store.folder, OutputSettings())
     assert [each.name for each in written] == ["report.html", "report.pdf", "fibres.csv"]
     assert all(each.stat().st_size > 100 for each in written)
     with written[2].open(encoding="utf-8", newline="") as file:
         (row,) = csv.DictReader(file)
     assert row["outcome"] == "good"
-    assert application is not None
 
 
 def test_a_campaign_that_is_done_is_not_done_again(done: Campaign, rig: Rig, home: Path) -> None:
