@@ -8,6 +8,7 @@ from pydantic import BaseModel
 
 from cosmic.autonomy.bending.plan import SpanLimits
 from cosmic.autonomy.bending.settings import FitSettings
+from cosmic.autonomy.calibrating.settings import CalibrationSettings
 from cosmic.autonomy.campaign.opening import read_recipe
 from cosmic.autonomy.campaign.recipe import (
     OutputSettings,
@@ -31,6 +32,7 @@ TABLES: Final[dict[str, type[BaseModel]]] = {
     "[twin]": TwinChoice,
     "[parameters.push.spans]": SpanLimits,
     "[parameters.push.fit]": FitSettings,
+    "[parameters.calibration]": CalibrationSettings,
 }
 
 
