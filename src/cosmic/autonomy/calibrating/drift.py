@@ -8,6 +8,7 @@ from typing import Final
 from typing_extensions import override
 
 from cosmic.autonomy.calibrating.book import CalibrationEntry
+from cosmic.autonomy.handling.in_hand import Measured
 from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.prepare import HELD, PLATE, PROBE, see_both, zoom_to
 from cosmic.autonomy.handling.tips import TIMES_STD, Off, TipOff, shift_maps
@@ -91,6 +92,7 @@ def _note(work: FibreWork, gripper: TipOff, moved: Off, limit_um: float) -> None
                 values["off_x_um"], values["off_y_um"] = work.calibration.probe_off_um
                 values["seen_x_um"], values["seen_y_um"] = work.calibration.seen_off_um
             book.confirm(replace(entry, values=values), now_s)
+    work.calibration.made[DRIFT] = Measured(now_s, gripper.std_um, "um")
     book.put(
         CalibrationEntry(
             DRIFT,

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Final
 
 import numpy as np
@@ -151,13 +152,26 @@ class Keeper:
                     f"{name}, {hand.gripper.shown}" if self._work.beside_another else name,
                     each.residual,
                     each.unit,
-                    f"{began} + {each.time_s:.0f} s",
+                    _made(hand, name) or f"{began} + {each.time_s:.0f} s",
                 )
                 for hand in self._work.hands
                 for name, each in hand.calibration.made.items()
             ]
         )
         self.store.end(reason, time_s=self._work.clock.now_s())
+
+
+def _made(work: FibreWork, name: str) -> str:
+    """Return when and how a calibration was made, as the book has it; empty: it has it not."""
+    entry = work.calibration.book.get(name, work.gripper.name)
+    if entry is None:
+        return ""
+    held = f", seen to hold {_date(entry.checked)}" if entry.checked is not None else ""
+    return f"{_date(entry.made)}{held}{f', {entry.how}' if entry.how else ''}"
+
+
+def _date(when: datetime) -> str:
+    return when.astimezone().isoformat(sep=" ", timespec="minutes")
 
 
 def skip_known(work: FibreWork, plan: ResumePlan) -> None:
