@@ -19,7 +19,7 @@ MARGIN_UM = 5.0
 
 @pytest.fixture
 def rig() -> Iterator[cosmic.Rig]:
-    with cosmic.connect(rate=20.0) as rig:
+    with cosmic.connect(rate=20.0, applications=("mico",)) as rig:
         yield rig
 
 
@@ -61,7 +61,8 @@ def test_the_way_that_is_told_to_be_free_is_free(rig: cosmic.Rig) -> None:
 
 
 def test_a_cold_platform_initialises_without_a_refusal(caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level(logging.WARNING), cosmic.connect(rate=20.0, cold=True) as rig:
+    connected = cosmic.connect(rate=20.0, cold=True, applications=("mico",))
+    with caplog.at_level(logging.WARNING), connected as rig:
         assert not rig.mico.check({"left.x": 10.0}).allowed
         with pytest.raises(cosmic.NotAvailable):
             rig.mico.clearance()
@@ -71,7 +72,7 @@ def test_a_cold_platform_initialises_without_a_refusal(caplog: pytest.LogCapture
 
 
 def test_an_initialisation_that_was_stopped_half_way_can_be_begun_again() -> None:
-    with cosmic.connect(rate=5.0, cold=True) as rig:
+    with cosmic.connect(rate=5.0, cold=True, applications=("mico",)) as rig:
         task = rig.mico.initialise(wait=False)
         wait_until(lambda: task.progress.fraction > 0.15, 20.0)
         rig.stop("the test wants it")

@@ -16,7 +16,7 @@ from unit.mico.rigs import wait_until
 
 @pytest.fixture(scope="module")
 def rig() -> Iterator[cosmic.Rig]:
-    with cosmic.connect(rate=4.0) as rig:
+    with cosmic.connect(rate=4.0, applications=("mico", "daqco")) as rig:
         rig.mico.move({"left.z": -800.0, "left.x": 3600.0})
         rig.mico["probe.y"].move_to(-4900.0)
         yield rig
