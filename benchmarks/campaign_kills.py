@@ -9,7 +9,7 @@ power was off as well, so that the controllers know no position; these starts ar
 After each kill the folder is read: every fibre that was finished must be there once, unchanged,
 with its curves. What was truly measured, and how often, tells the twin's own truth.
 
-    python -m benchmarks.campaign_kills           # 50 kills, an hour on two quiet cores
+    python -m benchmarks.campaign_kills           # 50 kills, half an hour on two quiet cores
     python -m benchmarks.campaign_kills --quick   # two kills
 """
 

@@ -21,8 +21,8 @@ from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.frame.errors import CosmicError
 from cosmic.twin.truth import read_truth
 
-RATE: Final = 4.0
-LONGEST_S: Final = 60.0
+RATE: Final = 20.0
+LONGEST_S: Final = 25.0
 EARLY_S: Final = 15.0
 EARLY: Final = 0.15
 """The part of the kills at any moment that come while the program starts."""
