@@ -1,5 +1,6 @@
 """What the book of calibrations keeps, and whether it lets one be used."""
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -90,6 +91,13 @@ def test_any_text_comes_back_as_it_was(book: CalibrationBook, tmp_path: Path) ->
     book.refuse(entry(book), text)
     (again,) = CalibrationBook(tmp_path / "kept").entries
     assert again.problem == text
+
+
+def test_values_of_any_name_come_back(book: CalibrationBook, tmp_path: Path) -> None:
+    values = {"residual_0.58x_px": 0.1, "x": -1e-9, 'a "name"': 3.0}
+    book.put(replace(entry(book), values=values))
+    (again,) = CalibrationBook(tmp_path / "kept").entries
+    assert again.values == values
 
 
 def test_a_broken_file_is_refused_with_its_key(book: CalibrationBook, tmp_path: Path) -> None:
