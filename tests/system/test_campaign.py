@@ -25,6 +25,8 @@ procedure = "{procedure}"
 name = "easy"
 [stop]
 count = {count}
+[parameters.calibration]
+heights = false
 """
 
 
