@@ -40,7 +40,8 @@ class CheckDrift(FibreOperation):
         except NotAvailable:
             distrust(work)
             return
-        follow(work, gripper, probe)
+        if gripper.certain:
+            follow(work, gripper, probe)
         yield SAFE_POINT
 
 

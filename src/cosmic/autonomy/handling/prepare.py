@@ -142,6 +142,8 @@ def still_at(work: FibreWork, z_um: float, *, follow: bool) -> Generator[Wish, o
         assert isinstance(picture, Picture)
         yield work.go_up(max(work.settings.places.travel_um, z_um))
     seen = tip_off(work, picture, work.gripper)
+    if not seen.certain:
+        return False
     far = math.hypot(*seen.off_um)
     if far <= max(settings.drift_um, TIMES_STD * seen.std_um):
         return True

@@ -32,11 +32,14 @@ class TipOff:
         Of a coordinate: of the tip on the picture and of the map there.
     scale_um_px : float
         Of the picture.
+    certain : bool
+        Nothing on the picture makes one doubt it, such as a fibre at an edge.
     """
 
     off_um: Off
     std_um: float
     scale_um_px: float = 0.0
+    certain: bool = True
 
 
 def tip_off(work: FibreWork, picture: Picture, tool: ToolSettings) -> TipOff:
@@ -51,7 +54,7 @@ def tip_off(work: FibreWork, picture: Picture, tool: ToolSettings) -> TipOff:
     seen_px = found.hold_px if isinstance(found, GripperTips) else found.tip_px
     x, y = mapped.to_um(seen_px).tolist()
     std_um = math.hypot(found.std_px * mapped.scale_um_px, float(mapped.std_um(seen_px)))
-    return TipOff((x - believed[0], y - believed[1]), std_um, mapped.scale_um_px)
+    return TipOff((x - believed[0], y - believed[1]), std_um, mapped.scale_um_px, found.certain)
 
 
 def shift_maps(work: FibreWork, off_um: Off) -> None:
