@@ -60,6 +60,7 @@ class Seen:
         angle = math.radians(angle_deg)
         self.line_um = np.column_stack([x_um + way * math.cos(angle), y_um + way * math.sin(angle)])
         self.length_um, self.width_um = length_um, 30.0
+        self.length_std_um, self.width_std_um, self.curl_std = 2.0, 1.5, 0.001
         self.fibre: Any = self
         self.curl, self.doubts, self.certain, self.contrast = curl, doubts, not doubts, 60.0
 
