@@ -16,9 +16,9 @@ from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.frame.clock import WALL
 from cosmic.mico.api.application_base import MicoApplicationBase
+from cosmic.mico.core.teleoperation.coupling import ForceCoupling
 from cosmic.mico.core.teleoperation.mapping import Converter
 from cosmic.mico.core.teleoperation.settings import TeleoperationSettings
-from cosmic.mico.core.teleoperation.coupling import ForceCoupling
 from cosmic.mico.hw.input_device import InputState
 
 STALE_S: Final = 0.1
