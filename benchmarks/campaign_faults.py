@@ -24,7 +24,7 @@ from cosmic.frame.clock import WALL
 from cosmic.twin.truth import read_truth
 
 NAME = "campaign_faults"
-RATE = 4.0
+RATE = 20.0
 LIMIT_S = 120.0
 PEAK_UN = 0.8 * 180.0
 RECIPE = """

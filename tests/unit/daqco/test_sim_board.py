@@ -234,6 +234,27 @@ def test_a_fast_clock_brings_the_samples_as_much_faster() -> None:
 # --- trouble ----------------------------------------------------------------------------------
 
 
+def test_a_hurried_clock_is_not_held_up_by_boards_that_begin_one_after_the_other() -> None:
+    clock = RatedClock(20.0)
+    library = SimulatedLibrary(clock)
+    boards = [library.open(name) for name in ("Dev1", "Dev2")]
+    procedure = clock.worker(leads=True)
+    try:
+        for board in boards:
+            board.configure(inputs(1), 1000.0, 200)
+            board.start()
+            clock.sleep(0.1)  # half a chunk
+        began_s = clock.wall_s()
+        for _ in range(10):
+            for board in boards:
+                assert board.receive(5.0) is not None
+        assert clock.wall_s() - began_s < 1.0  # 2 s of the platform
+    finally:
+        procedure.close()
+        for board in boards:
+            board.close()
+
+
 def test_a_receiver_that_is_too_late_is_told_how_much_was_lost() -> None:
     clock = ManualClock()
     board = SimulatedLibrary(clock).open("Dev1")

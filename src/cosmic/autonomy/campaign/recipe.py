@@ -46,7 +46,7 @@ class TwinChoice(StrictModel):
     """
 
     seed: int = Field(0, ge=0)
-    rate: float = Field(4.0, gt=0.0, le=1000.0)
+    rate: float = Field(20.0, gt=0.0, le=1000.0)
 
 
 class RecipeFile(StrictModel):

@@ -15,6 +15,7 @@ from cosmic.daqco.hw.sim_faults import BoardFaults
 from cosmic.daqco.hw.sim_signal import Signal
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
+from cosmic.frame.pace import Worker
 
 logger = logging.getLogger(__name__)
 
@@ -58,6 +59,9 @@ class SimulatedBoard(Board):
         False: chunks are due at once, however many are asked for.
     owners : dict of str to SimulatedBoard
         Of the library: who has configured each board; nobody else can until it is closed.
+    receiver : Worker
+        Of the library: the thread that receives, one for all boards. While it waits for a chunk of
+        one board it is not at work on the chunk of another.
     """
 
     def __init__(
@@ -68,6 +72,7 @@ class SimulatedBoard(Board):
         make_signal: MakeSignal,
         *,
         owners: dict[str, "SimulatedBoard"],
+        receiver: Worker,
         timebase_hz: float = TIMEBASE_HZ,
         paced: bool = True,
     ) -> None:
@@ -81,7 +86,7 @@ class SimulatedBoard(Board):
         self._setup: _Setup | None = None
         self._run: _Run | None = None
         self._closed = False
-        self._receiver = clock.worker()
+        self._receiver = receiver
 
     @property
     @override

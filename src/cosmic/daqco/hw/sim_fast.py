@@ -90,6 +90,7 @@ class FastLibrary(BoardLibrary):
             self.faults,
             make_signal,
             owners=self._owners,
+            receiver=self._clock.worker(),
             timebase_hz=0.0,
             paced=self._paced,
         )

@@ -73,6 +73,7 @@ class SimulatedLibrary(BoardLibrary):
         }
         self.faults = BoardFaults()
         self._owners: dict[str, SimulatedBoard] = {}
+        self._receiver = clock.worker()
         for board, name in self._sources:
             if board not in self._infos or name not in self._infos[board].inputs:
                 raise ConfigError(
@@ -116,4 +117,11 @@ class SimulatedLibrary(BoardLibrary):
                 seed=self._seed,
             )
 
-        return SimulatedBoard(info, self._clock, self.faults, make_signal, owners=self._owners)
+        return SimulatedBoard(
+            info,
+            self._clock,
+            self.faults,
+            make_signal,
+            owners=self._owners,
+            receiver=self._receiver,
+        )
