@@ -50,6 +50,7 @@ def rig() -> Iterator[Rig]:
         yield rig
 
 
+@pytest.mark.slow
 def test_after_an_end_without_warning_no_position_is_believed(rig: Rig, tmp_path: Path) -> None:
     path, folder = recipe(tmp_path), tmp_path / "out"
     cut_off(folder, path.read_text(encoding="utf-8"))
