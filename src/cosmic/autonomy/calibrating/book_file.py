@@ -1,9 +1,6 @@
 """The book of calibrations as a file that a person can read."""
 
-import json
-import os
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -11,6 +8,7 @@ from pydantic import AwareDatetime, Field
 
 from cosmic.frame.config import StrictModel, load_model
 from cosmic.frame.errors import ConfigError
+from cosmic.frame.kept_file import toml_lines, write_whole
 
 HEAD: Final = """\
 # Calibrations of the platform, written by the program when it measures.
@@ -56,31 +54,9 @@ def write_book(path: Path, entries: Sequence[Mapping[str, object]]) -> None:
     ConfigError
         It cannot be written there.
     """
-    text = HEAD + "".join(f"\n[[entry]]\n{_lines(each)}" for each in entries)
-    fresh = path.with_name(path.name + ".new")
+    text = HEAD + "".join(f"\n[[entry]]\n{toml_lines(each)}" for each in entries)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with fresh.open("w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        fresh.replace(path)
+        write_whole(path, text)
     except OSError as exc:
         raise ConfigError(f"{path}: cannot be written: {exc.strerror or exc}") from exc
-
-
-def _lines(entry: Mapping[str, object]) -> str:
-    return "".join(f"{key} = {_toml(each)}\n" for key, each in entry.items() if each is not None)
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, Mapping):
-        # Quoted, for a name may hold a point.
-        pairs = (f"{_toml(str(key))} = {_toml(each)}" for key, each in value.items())
-        return "{ " + ", ".join(pairs) + " }"
-    if isinstance(value, datetime):
-        return value.astimezone(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
-    if isinstance(value, str):
-        # JSON and TOML write text alike, but for what JSON leaves as it is.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(float(value)) if isinstance(value, int | float) else str(value)

@@ -12,6 +12,7 @@ from typing import Final
 
 from cosmic.frame.config import read_toml
 from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.frame.kept_file import write_whole
 
 logger = logging.getLogger(__name__)
 
@@ -105,11 +106,9 @@ class PoseBook:
         path = self._path
         if path is None:
             return
-        part = path.with_name(f"{path.name}.part")
         try:
             text = path.read_text(encoding="utf-8") if path.exists() else HEAD
-            part.write_text(_replaced(text, name, self._poses.get(name)), encoding="utf-8")
-            part.replace(path)
+            write_whole(path, _replaced(text, name, self._poses.get(name)))
         except (OSError, UnicodeDecodeError) as exc:
             self._path = None
             logger.warning("%s cannot be written (%s): poses are kept in memory only", path, exc)

@@ -1,8 +1,5 @@
 """A camera's calibration as a file that a person can read."""
 
-import math
-import os
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Final, Literal, Self
 
@@ -11,6 +8,7 @@ from pydantic import AwareDatetime, Field, model_validator
 
 from cosmic.frame.config import StrictModel, load_model
 from cosmic.frame.errors import ConfigError
+from cosmic.frame.kept_file import toml_lines, write_whole
 from cosmic.vico.core.calibration import Calibration, Plane, RotationCentre
 from cosmic.vico.core.calibration_fit import (
     FEWEST_ANGLES,
@@ -140,25 +138,21 @@ def save_calibration(path: Path, calibration: Calibration) -> None:
     ConfigError
         It cannot be written there.
     """
-    text = calibration_text(calibration)
-    fresh = path.with_name(path.name + ".new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with fresh.open("w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        fresh.replace(path)
+        write_whole(path, calibration_text(calibration))
     except OSError as exc:
         raise ConfigError(f"{path}: cannot be written: {exc.strerror or exc}") from exc
+    except ValueError as exc:
+        raise ConfigError(f"{path}: a calibration holds what cannot be kept: {exc}") from exc
 
 
 def calibration_text(calibration: Calibration) -> str:
     """Return `calibration` as TOML."""
-    parts = [HEAD, _lines({"format": 1, "camera": calibration.camera})]
-    parts += ["\n[[planes]]\n" + _lines(_plane_values(each)) for each in calibration.planes]
+    parts = [HEAD, toml_lines({"format": 1, "camera": calibration.camera})]
+    parts += ["\n[[planes]]\n" + toml_lines(_plane_values(each)) for each in calibration.planes]
     if calibration.rotation is not None:
-        parts.append("\n[rotation]\n" + _lines(_rotation_values(calibration.rotation)))
+        parts.append("\n[rotation]\n" + toml_lines(_rotation_values(calibration.rotation)))
     return "".join(parts)
 
 
@@ -193,26 +187,3 @@ def _rotation_values(rotation: RotationCentre) -> dict[str, object]:
         "sense": fit.sense,
         "angles": fit.angles,
     }
-
-
-def _lines(values: dict[str, object]) -> str:
-    return "".join(f"{key} = {_toml(value)}\n" for key, value in values.items())
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, tuple):
-        return f"[{', '.join(_toml(each) for each in value)}]"
-    if isinstance(value, str):
-        return '"' + "".join(_character(each) for each in value) + '"'
-    if isinstance(value, datetime):
-        return value.astimezone(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ConfigError(f"a calibration holds {value}, which is not a number to be kept")
-    # repr keeps every digit, so that what is read is what was measured; numpy's own says its type.
-    return repr(float(value) if isinstance(value, float) else value)
-
-
-def _character(one: str) -> str:
-    if one in '"\\':
-        return "\\" + one
-    return one if one.isprintable() else f"\\U{ord(one):08X}"

@@ -1,6 +1,5 @@
 """Profiles of teleoperation: those of the platform file, and what the operator changed."""
 
-import json
 import logging
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,6 +10,7 @@ from pydantic import Field, ValidationError
 
 from cosmic.frame.config import StrictModel, load_model
 from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.frame.kept_file import toml_lines, write_whole
 from cosmic.mico.core.teleoperation.settings import (
     TeleoperationProfileSettings,
     TeleoperationSettings,
@@ -124,24 +124,17 @@ class ProfileBook:
         if path is None:
             return
         changed = [each for name, each in self._profiles.items() if each != self._given.get(name)]
-        part = path.with_name(f"{path.name}.part")
         try:
-            part.write_text(HEAD + "".join(map(_section, changed)), encoding="utf-8")
-            part.replace(path)
+            write_whole(path, HEAD + "".join(map(_section, changed)))
         except OSError as exc:
             self._path = None
             logger.warning("%s cannot be written (%s): profiles are kept in memory", path, exc)
 
 
 def _section(profile: TeleoperationProfileSettings) -> str:
-    """Return a profile as TOML; a string of JSON is one of TOML too."""
     whole = profile.model_dump(exclude_none=True)
     rows = whole.pop("axis")
-    lines = ["", "[[profile]]", *_lines(whole)]
+    parts = ["\n[[profile]]\n", toml_lines(whole)]
     for row in rows:
-        lines += ["", "[[profile.axis]]", *_lines(row)]
-    return "\n".join(lines) + "\n"
-
-
-def _lines(table: dict[str, object]) -> list[str]:
-    return [f"{key} = {json.dumps(value)}" for key, value in table.items()]
+        parts += ["\n[[profile.axis]]\n", toml_lines(row)]
+    return "".join(parts)
