@@ -21,6 +21,7 @@ from cosmic.app.rig import Rig
 from cosmic.autonomy.calibrating.book import CalibrationBook, CalibrationEntry, CalibrationStanding
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, push_button, tipped
+from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.frame.gui.theme import STEP_PX, State
 from cosmic.frame.overrides import override
@@ -83,6 +84,8 @@ class CalibrationPanel(QWidget):
         row = QHBoxLayout()
         row.addWidget(self.anew)
         row.addWidget(self.zooms)
+        self.none = named(ElidedLabel("Nothing yet: Start measures all"), "calibrationNone")
+        row.addWidget(self.none, 9)
         row.addStretch(1)
         column = QVBoxLayout(self)
         column.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
@@ -101,6 +104,7 @@ class CalibrationPanel(QWidget):
         book = self._book()
         entries = book.entries
         keys = tuple(each.key for each in entries)
+        self.none.setVisible(not keys)
         if keys != self._shown:
             self.list.clear()
             self.list.addTopLevelItems([QTreeWidgetItem() for _ in keys])
@@ -179,5 +183,5 @@ def _told(entry: CalibrationEntry) -> str:
 def add_calibrations(window: CosmicServerGui, rig: Rig, beside: str) -> CalibrationPanel:
     """Put the panel in a window, in a tab with another one."""
     panel = CalibrationPanel(lambda: rig.calibrations, lambda *, zooms: rig.calibrate(zooms=zooms))
-    window.add_panel(CALIBRATIONS, panel, beside=beside, tabbed=True)
+    window.add_panel(CALIBRATIONS, panel, scroll=False, beside=beside, tabbed=True)
     return panel

@@ -127,6 +127,23 @@ def test_the_layout_and_the_theme_are_back_at_the_next_start(
     assert second.dock("Log").isVisible()
 
 
+def test_a_layout_of_other_panels_is_not_used(qtbot: QtBot, settings: QSettings) -> None:
+    first = CosmicServerGui(settings)
+    qtbot.addWidget(first)
+    fill(first)
+    show(qtbot, first)
+    first.addDockWidget(AREA.RightDockWidgetArea, first.dock("MiCo"))
+    first.close()
+
+    second = CosmicServerGui(QSettings(settings.fileName(), QSettings.Format.IniFormat))
+    qtbot.addWidget(second)
+    fill(second)
+    second.add_panel("New", QLabel("of this version"), beside="MiCo", tabbed=True)
+    show(qtbot, second)
+    assert second.dockWidgetArea(second.dock("MiCo")) == AREA.LeftDockWidgetArea
+    assert second.tabifiedDockWidgets(second.dock("MiCo")) == [second.dock("New")]
+
+
 @pytest.mark.parametrize(
     "damaged", [QByteArray(b"garbage"), "text", 42, QByteArray(), ["a", "list"]], ids=repr
 )

@@ -1,10 +1,11 @@
 """Remembers where the panels of a main window were, and which theme it had."""
 
 import logging
+import zlib
 from typing import Final
 
 from PySide6.QtCore import QByteArray, QSettings
-from PySide6.QtWidgets import QMainWindow
+from PySide6.QtWidgets import QDockWidget, QMainWindow
 
 from cosmic.frame.gui.palette import ThemeName
 from cosmic.frame.gui.theme import is_theme
@@ -14,7 +15,6 @@ logger = logging.getLogger(__name__)
 _GEOMETRY: Final = "window/geometry"
 _DOCKS: Final = "window/docks"
 _THEME: Final = "window/theme"
-_VERSION: Final = 1
 
 
 class LayoutStore:
@@ -32,12 +32,12 @@ class LayoutStore:
 
     def remember_default(self, window: QMainWindow) -> None:
         """Take the docks as they are now for what `reset` goes back to."""
-        self._default = window.saveState(_VERSION)
+        self._default = window.saveState(_panels(window))
 
     def save(self, window: QMainWindow, theme: ThemeName) -> None:
         """Keep the layout of `window` for the next start."""
         self._settings.setValue(_GEOMETRY, window.saveGeometry())
-        self._settings.setValue(_DOCKS, window.saveState(_VERSION))
+        self._settings.setValue(_DOCKS, window.saveState(_panels(window)))
         self._settings.setValue(_THEME, theme)
         self._settings.sync()
 
@@ -48,14 +48,16 @@ class LayoutStore:
             logger.warning("the saved size of the window is damaged; the default is used")
         if docks is None:
             return False
-        if not window.restoreState(docks, _VERSION):
-            logger.warning("the saved layout of the panels is damaged; the default is used")
+        if not window.restoreState(docks, _panels(window)):
+            logger.warning(
+                "the saved layout of the panels is damaged, or of others; the default is used"
+            )
             return False
         return True
 
     def reset(self, window: QMainWindow) -> None:
         """Put the docks back to where they are at a first start."""
-        window.restoreState(self._default, _VERSION)
+        window.restoreState(self._default, _panels(window))
 
     def theme(self) -> ThemeName | None:
         """Return the theme saved, if there is one."""
@@ -73,3 +75,9 @@ class LayoutStore:
         if value is not None:
             logger.warning("the saved %s is damaged; the default is used", key)
         return None
+
+
+def _panels(window: QMainWindow) -> int:
+    """Return a number for the panels there are: where one is new, an old layout tears them apart."""
+    names = sorted(each.objectName() for each in window.findChildren(QDockWidget))
+    return zlib.crc32("\n".join(names).encode()) & 0x7FFFFFFF
