@@ -78,6 +78,6 @@ class LayoutStore:
 
 
 def _panels(window: QMainWindow) -> int:
-    """Return a number for the panels there are: where one is new, an old layout tears them apart."""
+    """Return a number for the panels there are: an old layout tears them apart from a new one."""
     names = sorted(each.objectName() for each in window.findChildren(QDockWidget))
     return zlib.crc32("\n".join(names).encode()) & 0x7FFFFFFF
