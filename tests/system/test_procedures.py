@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from typing_extensions import override
@@ -42,6 +43,19 @@ class Go(UnitOperation[cosmic.Rig]):
     @override
     def undo(self, work: cosmic.Rig) -> Steps:
         yield work.mico[self.axis].move_to(0.0, wait=False)
+
+
+class Again(UnitOperation[cosmic.Rig]):
+    """Does what was recorded."""
+
+    name = "as it was recorded"
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @override
+    def run(self, work: cosmic.Rig) -> Steps:
+        yield work.mico.trajectories.run(self.path, start="straight", wait=False)
 
 
 class Wait(UnitOperation[cosmic.Rig]):
@@ -154,3 +168,34 @@ def test_closing_the_platform_ends_what_runs() -> None:
         run = started(rig, Wait(), "wait")
     with pytest.raises(ProcedureAborted, match="the platform is closed"):
         run.wait(LIMIT_S)
+
+
+def recorded(rig: cosmic.Rig, path: Path) -> Path:
+    """Return a trajectory from 0 to 200 um, with the axis back at 0."""
+    with rig.mico.trajectories.record(path, timed=False):
+        rig.mico["left.x"].move_to(200.0)
+    rig.mico["left.x"].move_to(0.0)
+    return path
+
+
+def test_a_recorded_trajectory_is_a_step_like_any_other(rig: cosmic.Rig, tmp_path: Path) -> None:
+    for axis in AXES:
+        rig.mico[axis].set_closed_loop_frequency(18_500)
+    again = Again(recorded(rig, tmp_path / "there.trajectory"))
+    parts = Sequence("there and on", again, Go("left.x", 250.0))
+    rig.procedure(Procedure("repeated", parts), rig).run_here()
+    assert rig.mico["left.x"].position_um == pytest.approx(250.0, abs=1.0)
+
+
+def test_an_abort_ends_a_trajectory_on_its_way(rig: cosmic.Rig, tmp_path: Path) -> None:
+    axis = rig.mico["left.x"]
+    axis.set_closed_loop_frequency(18_500)
+    again = Again(recorded(rig, tmp_path / "there.trajectory"))
+    axis.set_closed_loop_frequency(20)
+    run = started(rig, again, again.name)
+    wait_for(axis, 5.0)
+    run.abort("not there")
+    with pytest.raises(ProcedureAborted, match="not there"):
+        run.wait(LIMIT_S)
+    assert standing(rig)
+    assert 5.0 < (axis.position_um or 0.0) < 200.0
