@@ -2,12 +2,14 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 
 from cosmic.mico.core.collision.scene_loader import find_scene_mistakes
+from cosmic.mico.core.collision.scene_meshes import box_mesh, mesh_faults, parse_mesh, volume_um3
 from unit.mico.scene_writer import (
     SLIDER_BOX,
     SLIDER_MESH,
@@ -170,3 +172,36 @@ def test_a_mesh_in_another_format_or_from_elsewhere_is_refused(tmp_path: Path, n
 def test_a_folder_instead_of_a_mesh_is_refused(tmp_path: Path) -> None:
     (tmp_path / "part.stl").mkdir()
     assert "is not a file" in mistakes(write_scene(tmp_path, urdf={SLIDER_BOX: SLIDER_MESH}))
+
+
+def volume_and_corners(vertices: Any, faces: Any) -> tuple[float, int, set[tuple[float, ...]]]:
+    whole = trimesh.Trimesh(vertices, faces, process=False)
+    return float(whole.volume), len(faces), {tuple(each) for each in np.round(vertices, 6)}
+
+
+def test_a_binary_stl_is_read_as_the_mesh_library_reads_it() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.7)
+    vertices, faces = parse_mesh(trimesh.exchange.stl.export_stl(ball), ".stl")
+    read, wanted = (
+        volume_and_corners(vertices, faces),
+        volume_and_corners(ball.vertices, ball.faces),
+    )
+    assert read[0] == pytest.approx(wanted[0], rel=1e-6)
+    assert read[1] == wanted[1]
+    assert len(vertices) == len(ball.vertices)
+    assert mesh_faults(1e3 * vertices, faces) == []
+
+
+def test_a_text_stl_gives_the_same_mesh_as_a_binary_one() -> None:
+    part = block()
+    binary = parse_mesh(trimesh.exchange.stl.export_stl(part), ".stl")
+    text = parse_mesh(trimesh.exchange.stl.export_stl_ascii(part).encode(), ".stl")
+    assert np.allclose(binary[0], text[0], atol=1e-6)
+    assert (binary[1] == text[1]).all()
+
+
+def test_a_box_is_a_closed_body_of_its_size() -> None:
+    vertices_um, faces = box_mesh((2.0, 4.0, 6.0))
+    assert mesh_faults(vertices_um, faces) == []
+    assert volume_um3(vertices_um, faces) == pytest.approx(48.0)
+    assert np.ptp(vertices_um, axis=0).tolist() == [2.0, 4.0, 6.0]

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
 from cosmic.autonomy.bending.result import Floats, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
@@ -109,6 +108,8 @@ def _ei(log_slope: float) -> float:
 
 
 def _best(line: _Line, start: float) -> float:
+    from scipy.optimize import minimize_scalar  # half a second, at the first fit
+
     found = minimize_scalar(
         lambda each: line.chi2(math.exp(each)),
         bounds=(start - WIDEST, start + WIDEST),
@@ -125,6 +126,7 @@ def _excess(chi2: float, freedom: int) -> float:
 
 def _ends(line: _Line, best: float, lowest: float, *, scale: float) -> tuple[float, float]:
     """Return where chi squared has grown by `INTERVAL` on both sides of the best slope."""
+    from scipy.optimize import brentq
 
     def above(log_slope: float) -> float:
         return line.chi2(math.exp(log_slope)) - lowest - INTERVAL * scale

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.stats import chi2 as chi2_distribution
+from scipy.special import chdtrc  # scipy.stats takes a second to load
 
 from cosmic.autonomy.bending.branch import (
     CLEAR_SIGMAS,
@@ -117,6 +116,8 @@ class _Model:
     def fit(self) -> _Found:
         points = self._points
         baseline = free_force_un(points)
+        from scipy.optimize import least_squares  # half a second, at the first fit
+
         start: list[float] = []
         for branch in self.branches:
             first = rough(points, branch, baseline)
@@ -251,7 +252,7 @@ def _flags(
     if fit.k_std_un_um > fit.k_un_um * settings.soft_percent / 100.0:
         flags.add(Quality.TOO_SOFT)
     away = span.force_un[points.kept] - fit.fitted_un[points.kept]
-    unlikely = chi2_distribution.sf(fit.chi2, max(fit.freedom, 1)) < POOR_PROBABILITY
+    unlikely = chdtrc(max(fit.freedom, 1), fit.chi2) < POOR_PROBABILITY
     if unlikely and float(np.sqrt(np.mean(away**2))) > POOR_PART * fit.peak_un:
         flags.add(Quality.POOR_FIT)
     return frozenset(flags)

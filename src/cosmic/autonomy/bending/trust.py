@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from scipy.stats import chi2 as chi2_distribution
+from scipy.special import chdtrc  # scipy.stats takes a second to load
 
 from cosmic.autonomy.bending.result import BendingResult, Quality, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
@@ -60,7 +60,7 @@ def judged(result: BendingResult, settings: FitSettings) -> BendingResult:
 
 
 def _unlikely(result: BendingResult) -> bool:
-    return float(chi2_distribution.sf(result.chi2, result.freedom)) < POOR_PROBABILITY
+    return float(chdtrc(result.freedom, result.chi2)) < POOR_PROBABILITY
 
 
 def half_width_percent(result: BendingResult) -> float:

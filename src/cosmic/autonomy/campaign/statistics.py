@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit  # scipy.stats takes a second to load
 
 from cosmic.autonomy.campaign.records import FINISHED, FibreRecord, Outcome
 
@@ -88,7 +88,7 @@ def mean_ei(values_n_m2: Iterable[float]) -> MeanEi:
     if count == 1:
         return MeanEi(1, math.exp(middle), 0.0, math.inf, math.nan)
     spread = float(np.std(logs, ddof=1))
-    half = float(student.ppf(CONFIDENCE, count - 1)) * spread / math.sqrt(count)
+    half = float(stdtrit(count - 1, CONFIDENCE)) * spread / math.sqrt(count)
     ends = math.exp(middle - half), math.exp(middle + half)
     return MeanEi(count, math.exp(middle), *ends, spread)
 

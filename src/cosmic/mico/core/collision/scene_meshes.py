@@ -1,14 +1,15 @@
 """Triangle meshes of a scene: read from files, made for primitives, and judged.
 
-trimesh is used here and in `scene_decompose`, nowhere else.
+trimesh is used here and in `scene_decompose`, nowhere else. It takes half a second to load, so
+what nearly every scene consists of, boxes and binary STL, does without.
 """
 
 import io
+import itertools
 import math
 from typing import Final
 
 import numpy as np
-import trimesh
 
 from cosmic.mico.core.collision.model import Floats, Indices
 
@@ -20,6 +21,17 @@ _VIEW_SIDES: Final = 48
 _ROUNDING: Final = 1e-6  # STL keeps 24 bits: about 1e-7 of the largest coordinate
 _TOLERANCE_UM: Final = 1e-3
 _LARGEST: Final = 1e9  # in the unit of the file; what is larger is rubbish
+_MERGED: Final = 1e-8  # in the unit of the file; vertices that differ by less are one
+_STL_HEADER: Final = 84
+_STL_FACET: Final = np.dtype(
+    [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")]
+)
+# Corners count as binary numbers: bit 2 is x, bit 1 is y, bit 0 is z.
+_BOX_FACES: Final = (
+    *((1, 3, 0), (0, 3, 2), (4, 6, 5), (5, 6, 7)),
+    *((4, 1, 0), (5, 1, 4), (2, 3, 7), (2, 7, 6)),
+    *((2, 4, 0), (6, 4, 2), (1, 7, 3), (5, 7, 1)),
+)
 
 
 def parse_mesh(content: bytes, suffix: str) -> Mesh:
@@ -30,30 +42,63 @@ def parse_mesh(content: bytes, suffix: str) -> Mesh:
     ValueError
         The content is no mesh of that format, or has no triangle.
     """
-    try:
-        with np.errstate(all="ignore"):
-            mesh = trimesh.load_mesh(io.BytesIO(content), file_type=suffix[1:], process=False)
-    except (ValueError, KeyError, IndexError, TypeError, AttributeError, EOFError) as exc:
-        raise ValueError(f"not a mesh: {exc}") from exc
-    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+    vertices, faces = (
+        _binary_stl(content) if _is_binary_stl(content, suffix) else _any_mesh(content, suffix)
+    )
+    if not len(faces):
         raise ValueError("no triangle in it")
-    vertices = np.asarray(mesh.vertices, dtype=np.float64)
-    faces = np.asarray(mesh.faces)
     if not np.isfinite(vertices).all():
         raise ValueError("a vertex is not finite")
     if not np.abs(vertices).max() <= _LARGEST:
         raise ValueError(f"a coordinate is above {_LARGEST:g}")
     if not (faces.min() >= 0 and faces.max() < len(vertices)):
         raise ValueError("a face names a vertex that is not there")
-    whole = trimesh.Trimesh(vertices, faces, process=False)
-    whole.merge_vertices(merge_tex=True, merge_norm=True)
-    return _plain(whole.vertices, whole.faces)
+    return _merged(vertices, faces)
+
+
+def _is_binary_stl(content: bytes, suffix: str) -> bool:
+    """Tell by the length: a text that begins like this one by chance has another."""
+    if suffix != ".stl" or len(content) < _STL_HEADER:
+        return False
+    count = int.from_bytes(content[_STL_HEADER - 4 : _STL_HEADER], "little")
+    return len(content) == _STL_HEADER + count * _STL_FACET.itemsize
+
+
+def _binary_stl(content: bytes) -> Mesh:
+    facets = np.frombuffer(content, _STL_FACET, offset=_STL_HEADER)
+    vertices = facets["corners"].reshape(-1, 3).astype(np.float64)
+    return vertices, np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
+
+
+def _any_mesh(content: bytes, suffix: str) -> Mesh:
+    import trimesh
+
+    try:
+        with np.errstate(all="ignore"):
+            mesh = trimesh.load_mesh(io.BytesIO(content), file_type=suffix[1:], process=False)
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, EOFError) as exc:
+        raise ValueError(f"not a mesh: {exc}") from exc
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise ValueError("no triangle in it")
+    return np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces)
+
+
+def _merged(vertices: Floats, faces: Indices) -> Mesh:
+    """Return the mesh with each vertex that a face names once; equal ones are one."""
+    used = np.unique(faces)
+    rows = np.round(vertices[used] / _MERGED) + 0.0  # no -0.0 beside 0.0
+    order = np.lexsort(rows.T)
+    new = np.ones(len(rows), dtype=bool)
+    new[1:] = (rows[order][1:] != rows[order][:-1]).any(axis=1)
+    place = np.empty(len(vertices), dtype=np.int32)
+    place[used[order]] = np.cumsum(new) - 1
+    return _plain(vertices[used[order[new]]], place[faces])
 
 
 def box_mesh(sides_um: tuple[float, float, float]) -> Mesh:
     """Return a box about the origin."""
-    box = trimesh.creation.box(extents=sides_um)
-    return _plain(box.vertices, box.faces)
+    corners = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
+    return _plain(corners * sides_um, _BOX_FACES)
 
 
 def cylinder_mesh(radius_um: float, length_um: float, *, around: bool) -> Mesh:
@@ -81,6 +126,8 @@ def cylinder_mesh(radius_um: float, length_um: float, *, around: bool) -> Mesh:
 
 def sphere_mesh(radius_um: float, *, around: bool) -> Mesh:
     """Return a polyhedron about the origin; `around` a sphere, never inside it, or in it."""
+    import trimesh
+
     ball = trimesh.creation.icosphere(subdivisions=2, radius=1.0)
     reach = np.einsum("ij,ij->i", ball.face_normals, ball.triangles_center).min() if around else 1.0
     return _plain(ball.vertices * (radius_um / float(reach)), ball.faces)

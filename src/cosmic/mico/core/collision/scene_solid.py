@@ -3,7 +3,6 @@
 from typing import Final
 
 import numpy as np
-from scipy.optimize import linprog
 
 from cosmic.mico.core.collision.kinematics import body_poses
 from cosmic.mico.core.collision.model import BodyPair, Floats, SceneModel
@@ -102,6 +101,9 @@ def _gap_of_boxes(one: Floats, other: Floats) -> float:
 
 def _normal(one: Floats, other: Floats) -> Floats | None:
     """Return the unit normal with the widest gap, measured by its largest component."""
+    # Half a second to load, and bodies that stand well apart never need it.
+    from scipy.optimize import linprog
+
     # Unknowns: normal (3), a level, the gap. Maximise the gap with
     # one @ normal <= level and other @ normal >= level + gap.
     above = np.hstack((one, np.full((len(one), 1), -1.0), np.zeros((len(one), 1))))
