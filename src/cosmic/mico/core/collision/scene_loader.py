@@ -101,7 +101,7 @@ class _Reading:
         check_urdf_text(file, self._findings)
         if len(self._findings.mistakes) > before:
             return file, None
-        return file, understand(file, self._findings)
+        return file, understand(file)
 
     def _shapes(
         self, settings: SceneSettings, files: SceneFiles, urdf: XmlFile, described: Description

@@ -1,22 +1,20 @@
-"""URDF as yourdfpy understands it, turned into plain data: the edge from metres to um.
+"""URDF turned into plain data: the edge from metres to um.
 
-yourdfpy is used here and nowhere else. It is given text that was checked before, and is not
-allowed to load meshes: by default it would merge all shapes of a link into one.
+It is read from elements that `check_urdf_text` has found right. Libraries that read URDF load a
+mesh library with it, which takes a second at every start; the tests compare with one.
 """
 
-import io
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from yourdfpy import URDF
 
 from cosmic.mico.core.collision.model import Floats, JointKind
-from cosmic.mico.core.collision.scene_findings import Findings
 from cosmic.mico.core.collision.scene_xml import XmlFile
 
 _UM_PER_M: Final = 1e6
 _GREY: Final = (0.7, 0.7, 0.7, 1.0)
+_SIZES: Final = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
 _KINDS: Final = {
     "fixed": JointKind.FIXED,
     "prismatic": JointKind.PRISMATIC,
@@ -79,35 +77,32 @@ class Description:
     joints: tuple[JointText, ...]
 
 
-def understand(file: XmlFile, findings: Findings) -> Description | None:
-    """Return what a URDF says whose text was checked; None where yourdfpy gives up."""
-    try:
-        robot = URDF.load(
-            io.BytesIO(file.content()),
-            build_scene_graph=False,
-            load_meshes=False,
-            force_collision_mesh=False,
-        ).robot
-    except (ValueError, TypeError, KeyError, AttributeError, IndexError) as exc:
-        findings.wrong(file.path, f"not understood: {exc}")
-        return None
-    colours = {each.name: _rgba(each.color) for each in robot.materials if each.color}
+def understand(file: XmlFile) -> Description:
+    """Return what a URDF says whose text was checked."""
+    colours = {
+        each.get("name"): _rgba(each.find("color"))
+        for each in file.root.findall("material")
+        if each.find("color") is not None
+    }
     return Description(
-        tuple(_link(each, colours) for each in robot.links),
-        tuple(_joint(each) for each in robot.joints),
+        tuple(_link(each, colours) for each in file.root.findall("link")),
+        tuple(_joint(each) for each in file.root.findall("joint")),
     )
 
 
 def _rgba(colour: Any) -> tuple[float, float, float, float]:
-    red, green, blue, opacity = (float(part) for part in colour.rgba)
+    red, green, blue, opacity = _numbers(colour, "rgba", "1 1 1 1")
     return red, green, blue, opacity
 
 
 def _link(link: Any, colours: dict[str, tuple[float, float, float, float]]) -> LinkText:
     return LinkText(
-        link.name,
-        tuple(_figure(each, _GREY) for each in link.collisions),
-        tuple(_figure(each, _colour(each.material, colours)) for each in link.visuals),
+        link.get("name"),
+        tuple(_figure(each, _GREY) for each in link.findall("collision")),
+        tuple(
+            _figure(each, _colour(each.find("material"), colours))
+            for each in link.findall("visual")
+        ),
     )
 
 
@@ -116,39 +111,48 @@ def _colour(
 ) -> tuple[float, float, float, float]:
     if material is None:
         return _GREY
-    return _rgba(material.color) if material.color else colours.get(material.name, _GREY)
+    own = material.find("color")
+    return colours.get(material.get("name"), _GREY) if own is None else _rgba(own)
 
 
 def _figure(element: Any, colour: tuple[float, float, float, float]) -> Figure:
-    geometry, place, name = element.geometry, _pose_um_from_m(element.origin), element.name or ""
-    if geometry.box is not None:
-        sides = tuple(_um_from_m(float(side)) for side in geometry.box.size)
-        return Figure("box", place, sides, colour=colour, name=name)
-    if geometry.cylinder is not None:
-        sizes = (float(geometry.cylinder.radius), float(geometry.cylinder.length))
-        sizes_um = tuple(map(_um_from_m, sizes))
-        return Figure("cylinder", place, sizes_um, colour=colour, name=name)
-    if geometry.sphere is not None:
-        radius_um = _um_from_m(float(geometry.sphere.radius))
-        return Figure("sphere", place, (radius_um,), colour=colour, name=name)
-    scale = np.broadcast_to(1.0 if geometry.mesh.scale is None else geometry.mesh.scale, 3)
-    x, y, z = (float(part) * _UM_PER_M for part in scale)
-    file = geometry.mesh.filename
-    return Figure("mesh", place, mesh=file, um_per_unit=(x, y, z), colour=colour, name=name)
+    place, name = _pose_um_from_m(element.find("origin")), element.get("name") or ""
+    shape = element.find("geometry")[0]
+    if shape.tag == "mesh":
+        scale = np.broadcast_to(_numbers(shape, "scale", "1"), 3)
+        x, y, z = (float(part) * _UM_PER_M for part in scale)
+        return Figure(
+            "mesh",
+            place,
+            mesh=shape.get("filename"),
+            um_per_unit=(x, y, z),
+            colour=colour,
+            name=name,
+        )
+    sizes_m = [part for key in _SIZES[shape.tag] for part in _numbers(shape, key)]
+    sizes_um = tuple(map(_um_from_m, sizes_m))
+    return Figure(shape.tag, place, sizes_um, colour=colour, name=name)
 
 
 def _joint(joint: Any) -> JointText:
-    kind = _KINDS[joint.type]
+    kind = _KINDS[joint.get("type")]
     low = high = 0.0
-    if joint.type == "continuous":
+    if joint.get("type") == "continuous":
         low, high = -np.inf, np.inf
     elif kind is not JointKind.FIXED:
-        low, high = float(joint.limit.lower), float(joint.limit.upper)
+        limit = joint.find("limit")
+        (low,), (high,) = _numbers(limit, "lower"), _numbers(limit, "upper")
     if kind is JointKind.PRISMATIC:
         low, high = _um_from_m(low), _um_from_m(high)
-    axis = np.array([1.0, 0.0, 0.0] if joint.axis is None else joint.axis, dtype=float)
-    place = _pose_um_from_m(joint.origin)
-    return JointText(joint.name, kind, joint.parent, joint.child, place, axis, low, high)
+    axis = np.array(_numbers(joint.find("axis"), "xyz", "1 0 0"))
+    place = _pose_um_from_m(joint.find("origin"))
+    parent, child = (joint.find(each).get("link") for each in ("parent", "child"))
+    return JointText(joint.get("name"), kind, parent, child, place, axis, low, high)
+
+
+def _numbers(element: Any, key: str, default: str = "") -> list[float]:
+    text = default if element is None else element.get(key, default)
+    return [float(word) for word in text.split()]
 
 
 def _um_from_m(length_m: float) -> float:
@@ -156,14 +160,26 @@ def _um_from_m(length_m: float) -> float:
     return round(length_m * _UM_PER_M, 6)
 
 
-def _pose_um_from_m(pose_m: Any) -> Floats:
-    if pose_m is None:
-        return np.eye(4)
-    pose = np.array(pose_m, dtype=float)
-    pose[:3, 3] = np.round(pose[:3, 3] * _UM_PER_M, 6)
+def _pose_um_from_m(origin: Any) -> Floats:
+    pose = np.eye(4)
+    place_m = np.array(_numbers(origin, "xyz", "0 0 0"))
+    pose[:3, 3] = np.round(place_m * _UM_PER_M, 6)
     turn = pose[:3, :3]
+    turn[:] = _turned(*_numbers(origin, "rpy", "0 0 0"))
     # A quarter turn leaves sines of 1e-16, which would tilt what is meant to be aligned.
     nearest = np.round(turn)
     close = np.abs(turn - nearest) < 1e-12
     turn[close] = nearest[close]
     return pose
+
+
+def _turned(roll: float, pitch: float, yaw: float) -> Floats:
+    """Return the rotation about the fixed axes x, y, z, one after the other."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )

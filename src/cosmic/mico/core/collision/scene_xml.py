@@ -85,10 +85,6 @@ class XmlFile:
                 return self.where(element)
         return f"{self.path}: joint {name!r}"
 
-    def content(self) -> bytes:
-        """Return the file again, without comments, entities or a document type."""
-        return bytes(etree.tostring(self.root))
-
 
 def read_xml(path: Path, files: SceneFiles, asked_by: str, findings: Findings) -> XmlFile | None:
     """Read an XML file whose root is `robot`; None where that failed."""
