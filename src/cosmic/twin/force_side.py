@@ -95,6 +95,18 @@ class ForceSide:
         """Return the whole truth now: force, what touches where, each fibre's state."""
         return self._timeline.moment(now_s)
 
+    @property
+    def unseen(self) -> int:
+        """How many movements of one stage nobody has looked at yet, at most."""
+        return self._timeline.unseen
+
+    def keep_up(self, now_s: float) -> None:
+        """Go some way towards now if nobody has looked for long, so that no backlog grows.
+
+        For who has time to spare and holds no lock that others wait for.
+        """
+        self._timeline.keep_up(now_s)
+
     def finish(self, now_s: float) -> None:
         """Tell the truth what lasts until the end, which is now."""
         self._timeline.finish(now_s)

@@ -234,6 +234,11 @@ class Scene:
         self._truth.tell(self.clock.now_s(), "end")
         self._truth.close()
 
+    def keep_up(self) -> None:
+        """Do some of the physics that nobody has asked for yet; see `ForceSide.keep_up`."""
+        if self.force_side is not None:
+            self.force_side.keep_up(self.clock.now_s())
+
     def truth(self) -> dict[str, float]:
         """Return where every stage truly is now, in its unit: for views and logs, not control."""
         now_s = self.clock.now_s()

@@ -92,9 +92,9 @@ class Stage:
 
     Attributes
     ----------
-    remember : callable or None
-        Called with the time when many movements were planned since `seen`, before the oldest is
-        forgotten.
+    planned : callable or None
+        Given every path when it is planned, with the lock of a controller held: it may take note,
+        and must not compute.
     step_share : float
         How much of each step it makes; less than 1 when something is worn.
 
@@ -112,14 +112,9 @@ class Stage:
         self._paths: tuple[Path, ...] = (Path((0.0,), (start,)),)
         self._wall: tuple[float, int] | None = None
         self.step_share = 1.0
-        self.remember: Callable[[float], None] | None = None
-        self._unseen = 0
+        self.planned: Callable[[Path], None] | None = None
         creep_per_min = self.random.uniform(kind.drift_per_min_low, kind.drift_per_min_high)
         self._creep_per_s = creep_per_min * self.random.choice((-1, 1)) / 60.0
-
-    def seen(self) -> None:
-        """Have somebody know of all movements so far."""
-        self._unseen = 0
 
     @property
     def unit(self) -> AxisUnit:
@@ -237,10 +232,9 @@ class Stage:
 
     def _plan(self, path: Path) -> None:
         path = replace(path, creep_per_s=self._creep_per_s)
-        self._unseen += 1
-        if self._unseen > PATHS_KEPT // 2 and self.remember is not None:
-            self.remember(path.times_s[0])
         self._paths = (*self._paths[1 - PATHS_KEPT :], path)
+        if self.planned is not None:
+            self.planned(path)
 
 
 class Route:

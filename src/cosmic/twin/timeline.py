@@ -30,17 +30,77 @@ SLACK_PART: Final = 0.25
 LONGEST_REST_S: Final = 0.5
 """Stages that stand creep by nanometres; they are looked at again after this time."""
 
+BEHIND: Final = 64
+"""So many movements of a stage may wait to be seen before somebody should keep up."""
+
+
+class Track:
+    """The movements of one stage from the last look on; its stage may add one at any time.
+
+    Whoever plans a movement only puts it down here; the rest is called with the timeline's lock
+    held.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        self._new: deque[Path] = deque()
+        self._paths: list[Path] = [stage.path]
+        self._current = 0
+        stage.planned = self._new.append
+
+    @property
+    def unseen(self) -> int:
+        """How many movements wait to be seen."""
+        return len(self._new) + len(self._paths) - self._current - 1
+
+    def take_note(self) -> None:
+        """Learn of the movements planned so far; what one of them replaced is forgotten."""
+        if not self._new:
+            return
+        paths = self._paths
+        del paths[: self._current]
+        self._current = 0
+        while self._new:
+            path = self._new.popleft()
+            while paths and paths[-1].times_s[0] >= path.times_s[0]:
+                paths.pop()
+            paths.append(path)
+
+    def path(self, time_s: float) -> Path:
+        """Return the movement in force at `time_s`, which never falls."""
+        paths = self._paths
+        after = self._current + 1
+        while after < len(paths) and paths[after].times_s[0] <= time_s:
+            after += 1
+        self._current = after - 1
+        return paths[self._current]
+
+    def position(self, time_s: float) -> float:
+        """Return where the stage is at `time_s`, which never falls."""
+        low, high = self.stage.bounds
+        return min(max(self.path(time_s).at(time_s), low), high)
+
+    def leg(self, time_s: float) -> tuple[float, float]:
+        """Return its speed at `time_s` without sign, and until when it stays so."""
+        speed, end_s = self.path(time_s).leg(time_s)
+        if self._current + 1 < len(self._paths):
+            end_s = min(end_s, self._paths[self._current + 1].times_s[0])
+        return speed, end_s
+
 
 class Timeline:
     """What the probe felt and feels; any thread.
 
     Looks lie on a grid of time, close where something moves fast, so that the answer hardly depends
     on who asked when. Between two looks the force goes straight.
+
+    Who moves a stage waits for nothing here: movements are put down, and looked at in the threads
+    that ask, or that keep up when nobody does.
     """
 
     def __init__(self, workplace: Workplace, stages: Mapping[str, Stage], step_s: float) -> None:
         self._workplace = workplace
-        self._stages = tuple(stages[name] for name in sorted(workplace.stages))
+        self._tracks = tuple(Track(stages[name]) for name in sorted(workplace.stages))
         self._step_s = step_s
         self._lock = Lock()
         self._felt = Felt()
@@ -50,13 +110,24 @@ class Timeline:
         self._at = -1
         self._times_s: deque[float] = deque(maxlen=KEPT)
         self._forces_un: deque[float] = deque(maxlen=KEPT)
-        for stage in self._stages:
-            stage.remember = self.catch_up
 
-    def catch_up(self, time_s: float) -> None:
-        """Go on to `time_s` though nobody asked: a stage is about to forget where it was."""
-        with self._lock:
-            self._advance(time_s)
+    @property
+    def unseen(self) -> int:
+        """How many movements of one stage wait to be looked at, at most."""
+        return max(track.unseen for track in self._tracks)
+
+    def keep_up(self, time_s: float) -> None:
+        """Go some way towards `time_s` if nobody has asked for long; hold no lock meanwhile.
+
+        The longer nobody asked the further it goes, so that what waits to be seen stays bounded.
+        """
+        unseen = self.unseen
+        if unseen < BEHIND or not self._lock.acquire(blocking=False):
+            return
+        try:
+            self._advance(time_s, most=unseen // 4)
+        finally:
+            self._lock.release()
 
     def force_un(self, times_s: Floats) -> Floats:
         """Return the force on the probe, uN, positive when it is pushed back.
@@ -96,12 +167,15 @@ class Timeline:
                 break
         return times[::-1], forces[::-1]
 
-    def _advance(self, time_s: float) -> None:
+    def _advance(self, time_s: float, most: float = math.inf) -> None:
+        """Look until `time_s`, or `most` times."""
+        for track in self._tracks:
+            track.take_note()
         if self._at < 0:
             self._look(0)
         last = math.ceil(time_s / self._step_s - 1e-9)
         looks, coarse = 0, 0
-        while self._at < last:
+        while self._at < last and looks < most:
             looks += 1
             if looks == MOST_LOOKS:
                 coarse = (last - self._at) // MOST_LOOKS
@@ -117,13 +191,12 @@ class Timeline:
         if time_s >= self._creep_from_s:
             self._resting.clear()
             self._creep_from_s = time_s + LONGEST_REST_S
-        for stage in self._stages:
-            path = stage.path
-            stage.seen()
-            if self._resting.get(stage.name) is not path:
-                self._values[stage.name] = stage.position_then(time_s)
+        for track in self._tracks:
+            path, name = track.path(time_s), track.stage.name
+            if self._resting.get(name) is not path:
+                self._values[name] = track.position(time_s)
                 if path.end_s <= time_s:
-                    self._resting[stage.name] = path
+                    self._resting[name] = path
         self._felt = self._workplace.look(self._values, time_s)
         self._times_s.append(time_s)
         self._forces_un.append(self._felt.total_un)
@@ -136,11 +209,11 @@ class Timeline:
         felt, grippers = self._felt, self._workplace.gripper_stages
         way = max(LONGEST_WAY, SLACK_PART * felt.slack_um)
         gap = max(LONGEST_WAY, SLACK_PART * min(felt.slack_um, felt.gap_um))
-        for stage in self._stages:
-            speed, end_s = stage.leg_then(now_s)
+        for track in self._tracks:
+            speed, end_s = track.leg(now_s)
             if speed > 0.0:
                 at_rest = False
-                longest = gap if stage.name in grippers else way
+                longest = gap if track.stage.name in grippers else way
                 end_s = min(end_s, now_s + longest / speed)
             until_s = min(until_s, end_s)
         return until_s, at_rest

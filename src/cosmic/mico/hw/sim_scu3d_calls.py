@@ -26,6 +26,7 @@ from cosmic.mico.hw.sim_scu3d_operations import OPERATIONS, Operation
 from cosmic.mico.hw.sim_scu3d_properties import SYSTEM_KEYS, system_property
 from cosmic.mico.hw.sim_scu3d_queue import Packet
 from cosmic.mico.hw.sim_scu3d_types import Refusal
+from cosmic.twin.scene import Scene
 
 logger = logging.getLogger(__name__)
 
@@ -40,6 +41,7 @@ class Session(Protocol):
     """What the functions of section II need of the library."""
 
     clock: Clock
+    scene: Scene
 
     def device(self, index: int, *, asynchronous: bool) -> Device:
         """Return the device at `index`; raises `Refusal` when that is not possible."""
@@ -122,6 +124,7 @@ def _synchronous(session: Session, base: str, operation: Operation) -> Body:
             device.advance(now_s)
             values, status = _run(operation, channel, now_s, args)
             status = device.told(status)
+        session.scene.keep_up()  # with no lock held
         if latency_s:
             session.clock.sleep(latency_s)
         for out, value in zip(outs, values, strict=False):
@@ -289,6 +292,7 @@ def _receive(
         if consume and head is not _NOTHING_CAME:
             device.queue.pop(now_s)
             device.changed.notify_all()
+    session.scene.keep_up()  # with no lock held
     out = packet[0]
     out.packetType, out.channelIndex, out.data1, out.data2, out.data3 = head
     return SA_OK
