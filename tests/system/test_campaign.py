@@ -131,4 +131,4 @@ def test_stop_ends_a_campaign_and_its_fibre_can_be_gone_on_with(
     again = plate.campaign(trial.recipe, trial.folder)
     assert again.phase is CampaignPhase.READY
     again.abort("not now")
-    assert (again.phase, again.end_reason) == (CampaignPhase.ENDED, "not now")
+    assert (again.phase, again.end_reason) == (CampaignPhase.STOPPED, "not now")

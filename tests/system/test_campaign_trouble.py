@@ -124,7 +124,7 @@ def test_where_nothing_can_be_taken_up_the_campaign_ends_and_says_why(
     bench = make(sample, config)
     campaign = bench.campaign(sample)
     campaign.run_here()
-    assert campaign.phase is CampaignPhase.ENDED
+    assert campaign.phase is CampaignPhase.STOPPED
     with pytest.raises(AssertionError, match=f"no fibre: {told}"):
         raise AssertionError(campaign.end_reason)
     assert bench.fibres == ()

@@ -24,6 +24,7 @@ _SIGNS: Final = {
     "paused": State.REFUSED,
     "ending": State.REFUSED,
     "ended": State.OK,
+    "stopped": State.REFUSED,
     "failed": State.ERROR,
 }
 

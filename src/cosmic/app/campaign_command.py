@@ -11,13 +11,15 @@ from typing import Final, TextIO
 from cosmic.app.campaign_output import gui_application, write_output
 from cosmic.app.connect import connect
 from cosmic.autonomy.campaign.campaign import Campaign
-from cosmic.autonomy.campaign.opening import read_recipe
+from cosmic.autonomy.campaign.opening import read_recipe, recorded_seed
 from cosmic.autonomy.campaign.recipe import Recipe
+from cosmic.autonomy.campaign.records import TWIN
 from cosmic.autonomy.campaign.steering import CampaignPhase
 from cosmic.frame.clock import WALL
 
 _EVERY_S: Final = 0.5
 _BAR: Final = 24
+_CODES: Final = {CampaignPhase.ENDED: 0, CampaignPhase.FAILED: 1, CampaignPhase.STOPPED: 3}
 
 
 def run_campaign(chosen: argparse.Namespace) -> int:
@@ -32,21 +34,27 @@ def run_campaign(chosen: argparse.Namespace) -> int:
     application = gui_application()  # noqa: F841 - Qt forgets one that nobody holds
     twin = recipe.file.twin
     rate = twin.rate if chosen.rate is None else chosen.rate
-    seed = twin.seed if chosen.seed is None else chosen.seed
+    seed = chosen.seed
+    if seed is None:  # a campaign that is gone on with has the fibres of its own seed
+        known = recorded_seed(chosen.out)
+        seed = twin.seed if known is None else known
     sample = chosen.sample or recipe.file.sample.name or None
     with connect(
         chosen.config, rate=rate, cold=chosen.cold, seed=seed, sample=sample, truth=chosen.truth
     ) as rig:
         campaign = rig.campaign(recipe, chosen.out)
+        if rig.simulated:
+            sys.stderr.write(f"{recipe.name}: {TWIN}, seed {seed}, {rate:g} times\n")
         with _ended_by_signals(campaign):
             campaign.start()
             Bar(campaign, recipe, sys.stderr).follow()
             campaign.join()
     for path in write_output(chosen.out, recipe.file.output):
         sys.stdout.write(f"{path}\n")
-    failed = campaign.phase is CampaignPhase.FAILED
-    (sys.stderr if failed else sys.stdout).write(f"{recipe.name}: {campaign.end_reason}\n")
-    return 1 if failed else 0
+    code = _CODES[campaign.phase]
+    text = f"{recipe.name}: {campaign.end_reason}\n"
+    (sys.stderr if code else sys.stdout).write(text)
+    return code
 
 
 class Bar:
@@ -58,6 +66,7 @@ class Bar:
         self._told = told
         self._length = 0
         self._done = -1
+        self._share = 0.0
 
     def follow(self) -> None:
         """Write until the campaign is over."""
@@ -82,8 +91,9 @@ class Bar:
     def _line(self) -> str:
         now, left_s = self._campaign.progress, self._campaign.left_s
         whole_s = now.elapsed_s + left_s
-        share = now.elapsed_s / whole_s if whole_s > 0.0 else 0.0
-        full = 0 if math.isnan(share) else round(_BAR * share)
+        if whole_s > 0.0:  # else it stays as it was: nothing can be told
+            self._share = now.elapsed_s / whole_s
+        full = round(_BAR * self._share)
         parts = [f"{self._name} [{'#' * full}{'.' * (_BAR - full)}]"]
         parts.append(f"{now.done} fibres, {now.good} good, {now.failed} failed")
         if now.done:

@@ -17,7 +17,7 @@ from cosmic.app.procedure_tree import ProcedureTreePanel
 from cosmic.app.procedure_tree_port import ProcedurePort
 from cosmic.autonomy.campaign.board import board_of, card_of
 from cosmic.autonomy.campaign.campaign import Campaign
-from cosmic.autonomy.campaign.recipe import shipped_recipes
+from cosmic.autonomy.campaign.recipe import Recipe, shipped_recipes
 from cosmic.autonomy.campaign.records import FibreRecord
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.frame.errors import CosmicError
@@ -34,7 +34,7 @@ OTHER: Final = "another file…"
 PERIOD_MS: Final = 500
 _FIRST: Final = "quick"
 
-Open = Callable[[Path, Path], Campaign]
+Open = Callable[[Recipe | Path, Path], Campaign]
 
 
 class _Relay(QObject):
@@ -98,7 +98,7 @@ class CampaignPanel(QWidget):
             push_button("Report", "Write report and table of what there is by now"), "report"
         )
         self.told = named(ElidedLabel(), "campaignTold")
-        self.procedure = ProcedureTreePanel(self._make_run)
+        self.procedure = ProcedureTreePanel(self._make_run, self._go_on)
         self.board = CampaignBoard()
         self.card = FibreCard()
         self.report.setEnabled(False)
@@ -165,12 +165,23 @@ class CampaignPanel(QWidget):
 
     def _make_run(self) -> ProcedurePort:
         """Return a campaign that is ready to begin; the tree shows why there is none."""
+        return self._opened(Path(self.recipe.currentText()), Path(self.folder.text()))
+
+    def _go_on(self) -> ProcedurePort:
+        """Return the campaign that ended early, ready to go on: its recipe, in its folder."""
+        before = self._campaign
+        if before is None:
+            raise CosmicError("there is no campaign to go on with; begin one")
+        return self._opened(before.recipe, before.store.folder)
+
+    def _opened(self, recipe: Recipe | Path, folder: Path) -> ProcedurePort:
         before = self._campaign
         if before is not None and not before.over:
             raise CosmicError("a campaign is under way; end it first")
-        campaign = self._open(Path(self.recipe.currentText()), Path(self.folder.text()))
+        campaign = self._open(recipe, folder)
         campaign.on_change(self._relay.changed.emit)
         self._campaign = campaign
+        self.folder.setText(str(folder))
         self._say("")
         self.refresh()
         return CampaignRun(campaign)

@@ -20,6 +20,7 @@ _STATES: Final = {
     CampaignPhase.PAUSED: RunState.PAUSED,
     CampaignPhase.ENDING: RunState.ABORTING,
     CampaignPhase.ENDED: RunState.DONE,
+    CampaignPhase.STOPPED: RunState.ABORTED,
     CampaignPhase.FAILED: RunState.FAILED,
 }
 
@@ -47,8 +48,7 @@ class CampaignRun(ProcedurePort):
     @override
     def failure(self) -> Exception | None:
         campaign = self.campaign
-        failed = campaign.phase is CampaignPhase.FAILED
-        return CosmicError(campaign.end_reason) if failed else None
+        return CosmicError(campaign.end_reason) if campaign.unfinished else None
 
     @property
     @override

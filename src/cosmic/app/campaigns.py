@@ -2,7 +2,7 @@
 
 import platform as computer
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import cosmic
 from cosmic.app.platform import Platform
@@ -10,11 +10,10 @@ from cosmic.app.stop_watch import stopped_since
 from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.opening import Host, open_campaign, read_recipe
 from cosmic.autonomy.campaign.recipe import Recipe
+from cosmic.autonomy.campaign.records import TWIN
 
 if TYPE_CHECKING:
     from cosmic.app.rig import Rig
-
-TWIN: Final = "digital twin"
 
 
 def campaign_on(
@@ -28,7 +27,7 @@ def campaign_on(
         stopped=stopped_since(platform),
         hardware=TWIN if rig.simulated else platform.file.platform.name,
         rate=platform.clock.rate,
-        seed=read.file.twin.seed,
+        seed=platform.seed if rig.simulated else 0,
         versions={"CoSMic": cosmic.__version__, "Python": computer.python_version()},
     )
     return open_campaign(read, Path(folder), host)

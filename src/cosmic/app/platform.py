@@ -34,6 +34,11 @@ class Platform:
     """What one process runs: the applications, their clock, and the policy for failures.
 
     An application that another station hosts stands in the place of one of its own.
+
+    Attributes
+    ----------
+    seed : int
+        Of everything random in the simulated platform.
     """
 
     file: PlatformFile
@@ -41,6 +46,7 @@ class Platform:
     clock: Clock
     policy: FailurePolicy
     mico: MicoApplicationBase | None
+    seed: int = 0
     faults: SimulationFaults | None = None
     daqco: DaqcoApplication | RemoteDaqcoApplication | None = None
     vico: VicoApplication | RemoteVicoApplication | None = None
@@ -195,6 +201,7 @@ def build_platform(
             clock=clock,
             policy=policy,
             mico=own.mico or used["mico"],
+            seed=seed,
             faults=own.faults,
             daqco=own.daqco or used["daqco"],
             vico=own.vico or used["vico"],

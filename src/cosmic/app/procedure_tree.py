@@ -45,16 +45,21 @@ class ProcedureTreePanel(QWidget):
     ----------
     make_run : callable or None
         Returns a run that is ready to begin; called when Start is pressed and none is at hand.
+    go_on : callable or None
+        Returns a run that goes on where the one that is shown ended early; called when Resume is
+        pressed then.
     """
 
     def __init__(
         self,
         make_run: Callable[[], ProcedurePort] | None = None,
+        go_on: Callable[[], ProcedurePort] | None = None,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self.setObjectName("ProcedureTreePanel")
         self._make_run = make_run
+        self._go_on = go_on
         self._run: ProcedurePort | None = None
         self._mine: ProcedurePort | None = None
         self._bridge = ChangeBridge(self)
@@ -71,7 +76,9 @@ class ProcedureTreePanel(QWidget):
         self.step = named(
             push_button("Step", "Carry out one operation, then rest"), "procedureStep"
         )
-        self.resume = named(push_button("Resume", "Go on"), "procedureResume")
+        self.resume = named(
+            push_button("Resume", "Go on after a pause, or after an early end"), "procedureResume"
+        )
         self.abort = named(
             push_button(
                 "Abort", "End it at once: what moves is cancelled, then the tools are made safe"
@@ -158,9 +165,17 @@ class ProcedureTreePanel(QWidget):
         self.refresh()
 
     def _on_resume(self) -> None:
-        if self._run is not None:
-            self._run.resume()
-        self.refresh()
+        def go_on() -> None:
+            if self._run is None:
+                return
+            if self._run.state not in OVER:
+                self._run.resume()
+            elif self._go_on is not None:
+                self._mine = self._go_on()
+                self.follow(self._mine)
+                self._mine.start()
+
+        self._attempt(go_on)
 
     def _on_abort(self) -> None:
         if self._run is not None:
@@ -211,7 +226,8 @@ class ProcedureTreePanel(QWidget):
         self.start.setEnabled(fresh)
         self.pause.setEnabled(state is RunState.RUNNING)
         self.step.setEnabled(fresh or state is RunState.PAUSED)
-        self.resume.setEnabled(state in (RunState.PAUSED, RunState.PAUSING))
+        early = self._go_on is not None and state in (RunState.ABORTED, RunState.FAILED)
+        self.resume.setEnabled(early or state in (RunState.PAUSED, RunState.PAUSING))
         self.abort.setEnabled(state in _BEGUN)
 
     @override

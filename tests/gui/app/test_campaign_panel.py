@@ -15,11 +15,13 @@ from cosmic.autonomy.campaign.records import CampaignInfo, FibreRecord, Series
 from cosmic.autonomy.campaign.statistics import progress
 from cosmic.autonomy.campaign.steering import CampaignPhase
 from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.campaign.store_files import DATABASE
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.shipped.bend_test import build_bend_test
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.gui.theme import State
 from unit.autonomy.campaign.sample_records import good
 
 INFO = CampaignInfo("quick", "bend test", "three", "", "2026-11-21T12:00:00+00:00")
@@ -33,8 +35,9 @@ class StoredCampaign:
     """A campaign that is over, with what it left."""
 
     def __init__(self, folder: Path) -> None:
-        self.store = CampaignStore.create(folder, INFO)
-        for number in (1, 2):
+        there = (folder / DATABASE).exists()
+        self.store = CampaignStore.open(folder) if there else CampaignStore.create(folder, INFO)
+        for number in () if there else (1, 2):
             self.store.begin_fibre(time_s=10.0 * number)
             self.store.finish_fibre(good(number))
         self.store.close()
@@ -47,7 +50,11 @@ class StoredCampaign:
 
     @property
     def over(self) -> bool:
-        return self.phase is CampaignPhase.ENDED
+        return self.phase in (CampaignPhase.ENDED, CampaignPhase.STOPPED)
+
+    @property
+    def unfinished(self) -> bool:
+        return self.phase is CampaignPhase.STOPPED
 
     @property
     def fibres(self) -> tuple[FibreRecord, ...]:
@@ -63,8 +70,11 @@ class StoredCampaign:
     def start(self) -> None:
         self.phase, self.end_reason = CampaignPhase.ENDED, "2 fibres done"
 
+    def pause(self) -> None:
+        self.phase, self.end_reason = CampaignPhase.PAUSED, ""
+
     def abort(self, reason: str) -> None:
-        self.phase, self.end_reason = CampaignPhase.ENDED, reason
+        self.phase, self.end_reason = CampaignPhase.STOPPED, reason
 
     def join(self) -> None:
         pass
@@ -110,6 +120,32 @@ def test_start_opens_the_chosen_recipe_in_the_folder_that_is_shown(
     panel.folder.setText(str(tmp_path / "here"))
     press(qtbot, panel.procedure.start)
     assert opened == [(Path("transport"), tmp_path / "here")]
+
+
+def test_one_that_was_stopped_is_shown_as_stopped_and_resume_goes_on_in_its_folder(
+    panel, qtbot, tmp_path, opened
+) -> None:
+    panel.recipe.setCurrentText("transport")
+    panel.folder.setText(str(tmp_path / "here"))
+    press(qtbot, panel.procedure.step)
+    first = panel.campaign
+    first.abort("a hand on the button")
+    panel.refresh()
+    panel.procedure.refresh()
+    for sign in (panel.board.sign, panel.procedure.sign):
+        assert sign.state is State.REFUSED
+    assert panel.board.state.text() == "stopped"
+    assert "a hand on the button" in panel.procedure.reason.text()
+    assert panel.procedure.resume.isEnabled()
+    panel.recipe.setCurrentText("quick")  # what is chosen meanwhile is for the next one
+    press(qtbot, panel.procedure.resume)
+    assert opened[-1] == (first.recipe, tmp_path / "here")
+    assert panel.campaign is not first
+    assert panel.campaign.phase is CampaignPhase.ENDED
+    panel.refresh()
+    panel.procedure.refresh()
+    assert panel.board.state.text() == "ended"
+    assert not panel.procedure.resume.isEnabled(), "it did what was asked"
 
 
 def test_a_finished_fibre_is_shown_and_can_be_replayed(panel, qtbot, tmp_path) -> None:

@@ -82,18 +82,30 @@ def close_and_check(window: OperatorWindow, campaign: Campaign, home: Path) -> l
     return [each.outcome for each in reader.fibres()]
 
 
-def test_closing_the_window_ends_its_campaign_safely(
+def test_a_campaign_is_stopped_gone_on_with_and_ended_safely_with_its_window(
     make: Make, qtbot: QtBot, tmp_path: Path
 ) -> None:
     window = make(whole_platform())
     campaign = begun(window, qtbot, tmp_path)
     cards = mico(window).cards.values()
 
-    def moves() -> bool:
+    def moves(campaign: Campaign) -> bool:
         return any(each.axis.details.in_motion for each in cards) or campaign.over
 
-    qtbot.waitUntil(moves, timeout=30_000)
-    assert close_and_check(window, campaign, tmp_path) == []
+    qtbot.waitUntil(lambda: moves(campaign), timeout=30_000)
+    window.stop("a hand on the button")
+    qtbot.waitUntil(lambda: campaign.over, timeout=30_000)
+    panel = panel_of(window, qtbot)
+    qtbot.waitUntil(lambda: panel.board.state.text() == "stopped", timeout=5_000)
+    qtbot.waitUntil(panel.procedure.resume.isEnabled, timeout=5_000)
+    window.top_bar.reset_requested.emit()
+    qtbot.mouseClick(panel.procedure.resume, Qt.MouseButton.LeftButton)
+    again = panel.campaign
+    assert again is not None
+    assert again is not campaign, panel.procedure.reason.text()
+    assert campaign.progress.elapsed_s <= again.progress.elapsed_s
+    qtbot.waitUntil(lambda: moves(again), timeout=30_000)
+    assert close_and_check(window, again, tmp_path) == []
 
 
 @pytest.mark.slow

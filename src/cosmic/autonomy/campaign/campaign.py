@@ -1,6 +1,7 @@
 """`Campaign`: fibre after fibre by one recipe, kept so that it can be gone on with."""
 
 import logging
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
@@ -87,6 +88,7 @@ class Campaign(CampaignKeeping):
         self._known = known
         self._broken: CosmicError | None = None
         self._end_reason = ""
+        self._reached = False
         self._thread: RunThread | None = None
 
     # What is known of it
@@ -102,8 +104,15 @@ class Campaign(CampaignKeeping):
         return self._end_reason
 
     @property
+    def unfinished(self) -> bool:
+        """True when it is over and could be gone on with: what the recipe asks for is not done."""
+        return self.over and self._phase is not CampaignPhase.ENDED
+
+    @property
     def left_s(self) -> float:
         """Time until it ends, on the platform's clock, as far as can be told; nan: it cannot."""
+        if self.over:
+            return 0.0 if self._phase is CampaignPhase.ENDED else math.nan
         return self._rule.left_s(self.progress)
 
     # What can be asked of it
@@ -184,10 +193,11 @@ class Campaign(CampaignKeeping):
             failed, self._end_reason = True, f"{self._end_reason}; {exc}"
         finally:
             self.store.close()
-        told = logger.error if failed else logger.info
+        end = CampaignPhase.ENDED if self._reached else CampaignPhase.STOPPED
+        told = logger.error if failed else logger.info if self._reached else logger.warning
         told("campaign %s: %s", self.recipe.name, self._end_reason)
         self._operation = ""
-        self._move_on(CampaignPhase.FAILED if failed else CampaignPhase.ENDED)
+        self._move_on(CampaignPhase.FAILED if failed else end)
         self._tell()
 
     def _treat_all(self) -> str:
@@ -197,8 +207,10 @@ class Campaign(CampaignKeeping):
             self._rest()
             if self._abort is not None:
                 return self._abort
-            reason = self._rule.reason(self.progress) or self._treat_one()
-            if reason:
+            if reason := self._rule.reason(self.progress):
+                self._reached = True
+                return reason
+            if reason := self._treat_one():
                 return reason
 
     def _treat_one(self) -> str:

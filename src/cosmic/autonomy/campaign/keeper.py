@@ -55,13 +55,15 @@ class Keeper:
         self._motion = MotionLog(work.mico, work.daqco, work.settings.push.channel, work.clock)
         self._before_s = store.reader.elapsed_s()
         self._began_s = work.clock.now_s()
+        self._ended_s: float | None = None
         self._events: dict[str, list[NodeEvent]] = {}
         self._begun: dict[str, FibreInHand] = {}
         self._in_work: tuple[InWork, ...] = ()
 
     def progress(self) -> CampaignProgress:
         """Return how the campaign stands; any thread."""
-        elapsed_s = self._before_s + self._work.clock.now_s() - self._began_s
+        now_s = self._work.clock.now_s() if self._ended_s is None else self._ended_s
+        elapsed_s = self._before_s + now_s - self._began_s
         return progress(self.fibres, elapsed_s)
 
     @property
@@ -144,6 +146,7 @@ class Keeper:
         CampaignError
             It cannot be written.
         """
+        self._ended_s = self._work.clock.now_s()
         self._motion.close()
         began = self.store.reader.info().started
         self.store.keep_calibrations(
@@ -158,7 +161,7 @@ class Keeper:
                 for name, each in hand.calibration.made.items()
             ]
         )
-        self.store.end(reason, time_s=self._work.clock.now_s())
+        self.store.end(reason, time_s=self._ended_s)
 
 
 def _made(work: FibreWork, name: str) -> str:

@@ -8,10 +8,11 @@ from pathlib import Path
 
 from cosmic.autonomy.campaign.campaign import Campaign, Doing
 from cosmic.autonomy.campaign.recipe import Recipe, load_recipe
-from cosmic.autonomy.campaign.records import CampaignError, CampaignInfo
+from cosmic.autonomy.campaign.records import TWIN, CampaignError, CampaignInfo
 from cosmic.autonomy.campaign.resume import ResumePlan, resume
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_files import DATABASE
+from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.work import FibreWork, Handles
 from cosmic.autonomy.shipped.registry import PARAMETERS, PROCEDURES
@@ -32,6 +33,8 @@ class Host:
         Returns why motion is stopped, or None.
     hardware : str
         "digital twin", or the platform's name.
+    seed : int
+        Of everything random in the twin that runs: what is recorded, whatever the recipe says.
     """
 
     rig: Handles
@@ -95,17 +98,39 @@ def _store(
 ) -> tuple[CampaignStore, ResumePlan | None]:
     if not (folder / DATABASE).exists():
         return CampaignStore.create(folder, _info(recipe, host), time_s=now_s), None
+    # Before it is opened for writing: a run that was refused would count as one cut off.
+    _check_same(CampaignReader(folder).info(), recipe, folder, host)
     store = CampaignStore.open(folder, time_s=now_s, versions=host.versions)
     try:
-        if store.reader.info().recipe_text != recipe.text:
-            raise CampaignError(
-                f"{folder} holds a campaign by another recipe than {recipe.path}: "
-                "go on with that one, or name another folder"
-            )
         return store, resume(store)
     except BaseException:
         store.close()
         raise
+
+
+def _check_same(info: CampaignInfo, recipe: Recipe, folder: Path, host: Host) -> None:
+    if info.recipe_text != recipe.text:
+        raise CampaignError(
+            f"{folder} holds a campaign by another recipe than {recipe.path}: "
+            "go on with that one, or name another folder"
+        )
+    if info.hardware == host.hardware == TWIN and info.seed != host.seed:
+        raise CampaignError(
+            f"{folder} holds a campaign on a twin with seed {info.seed}, and this one has seed "
+            f"{host.seed}: its fibres are others. Go on with seed {info.seed}, or name another "
+            "folder"
+        )
+
+
+def recorded_seed(folder: Path) -> int | None:
+    """Return the seed of the campaign that a folder holds; None: it holds none.
+
+    Raises
+    ------
+    CampaignError
+        The campaign cannot be read.
+    """
+    return CampaignReader(folder).info().seed if (folder / DATABASE).exists() else None
 
 
 def _info(recipe: Recipe, host: Host) -> CampaignInfo:

@@ -18,6 +18,8 @@ Image = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 Value = str | int | float | bool | None
 
 
+TWIN: Final = "digital twin"
+"""What a campaign without hardware was made on."""
 UNRESOLVED: Final = 0.12
 """A width that is known no better than to this part of it was not resolved."""
 
@@ -217,7 +219,7 @@ class CampaignInfo:
     started: str
     description: str = ""
     operator: str = ""
-    hardware: str = "digital twin"
+    hardware: str = TWIN
     seed: int = 0
     rate: float = 1.0
     versions: Mapping[str, str] = field(default_factory=dict)

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from cosmic.autonomy.campaign.records import FibreRecord, Outcome
+from cosmic.autonomy.campaign.records import TWIN, FibreRecord, Outcome
 from cosmic.autonomy.campaign.report_card import card
 from cosmic.autonomy.campaign.report_data import ReportData
 from cosmic.autonomy.campaign.report_figures import (
@@ -98,7 +98,7 @@ def _summary(data: ReportData) -> str:
         ("Spread between fibres", _spread(now.mean.spread_ln)),
         ("Mean length, width, curl", _shape(data.finished)),
     ]
-    if info.hardware == "digital twin":
+    if info.hardware == TWIN:
         rows.insert(3, ("Seed and rate of the twin", f"{info.seed}; {info.rate:g} times"))
     return _pairs(rows)
 

@@ -3,14 +3,13 @@
 import math
 from typing import Final
 
-from cosmic.autonomy.campaign.records import CampaignInfo, FibreRecord, Shape
+from cosmic.autonomy.campaign.records import TWIN, CampaignInfo, FibreRecord, Shape
 from cosmic.autonomy.campaign.report_figures import EI_UNIT
 from cosmic.autonomy.campaign.statistics import MeanEi
 
 NONE: Final = "–"
 TWO_SIDED: Final = 1.96
 """Standard deviations in half of a 95 % interval."""
-TWIN: Final = "digital twin"
 
 PROVES_ON_TWIN: Final = (
     "These fibres were simulated. The report shows that the procedures, the safety checks, the "

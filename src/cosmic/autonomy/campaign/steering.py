@@ -24,7 +24,11 @@ WAITING: Final = "waits for room on the disk"
 
 
 class CampaignPhase(StrEnum):
-    """What a campaign is at; the value is the word."""
+    """What a campaign is at; the value is the word.
+
+    `ENDED`: what the recipe asks for is done. `STOPPED`: it ended before that, in order: by
+    somebody's wish, by a stop, or because no fibre could be taken. `FAILED`: by a fault.
+    """
 
     READY = "ready"
     RUNNING = "running"
@@ -32,10 +36,11 @@ class CampaignPhase(StrEnum):
     PAUSED = "paused"
     ENDING = "ending"
     ENDED = "ended"
+    STOPPED = "stopped"
     FAILED = "failed"
 
 
-OVER: Final = frozenset({CampaignPhase.ENDED, CampaignPhase.FAILED})
+OVER: Final = frozenset({CampaignPhase.ENDED, CampaignPhase.STOPPED, CampaignPhase.FAILED})
 
 
 class CampaignSteering:

@@ -153,6 +153,14 @@ def test_both_that_were_in_work_when_the_program_was_killed_are_interrupted(desk
     assert [each.number for each in plan.known] == [1]
 
 
+def test_the_time_of_a_campaign_that_is_over_stands_still(desk: Desk) -> None:
+    desk.does("left", "close the gripper", seconds=90.0)
+    desk.keeper.close("enough")
+    desk.clock.advance(3600.0)
+    assert desk.keeper.progress().elapsed_s == 90.0
+    assert desk.store.reader.elapsed_s() == 90.0
+
+
 def test_a_fibre_is_kept_once(desk: Desk) -> None:
     fibre = desk.take("left", 1)
     desk.does("left", "release")
