@@ -11,6 +11,9 @@ from typing import Final
 
 from typing_extensions import override
 
+from cosmic.frame.clock import WALL, Clock
+from cosmic.frame.log_folding import FoldingHandler
+
 LINE_FORMAT: Final = "%(asctime)s.%(msecs)03d %(levelname)-7s %(name)s: %(message)s"
 TIME_FORMAT: Final = "%Y-%m-%d %H:%M:%S"
 
@@ -68,11 +71,16 @@ def _as_text(record: logging.LogRecord) -> logging.LogRecord:
 
 
 def set_up_logging(
-    ring: RingBufferHandler | None = None, *, file: Path | None = None, console: bool = False
+    ring: RingBufferHandler | None = None,
+    *,
+    file: Path | None = None,
+    console: bool = False,
+    clock: Clock = WALL,
 ) -> Callable[[], None]:
     """Send the records of ``cosmic`` to `ring`, a rotating file and the terminal.
 
-    Returns the function that undoes it.
+    Floods are folded on the way (`FoldingHandler`), by `clock`. The file and its three predecessors
+    hold 20 MB at most. Returns the function that undoes it.
     """
     root = logging.getLogger("cosmic")
     handlers: list[logging.Handler] = [] if ring is None else [ring]
@@ -88,14 +96,16 @@ def set_up_logging(
         handlers.append(logging.StreamHandler())
     for handler in handlers:
         handler.setFormatter(formatter)
-        root.addHandler(handler)
+    folding = FoldingHandler(handlers, clock)
+    root.addHandler(folding)
     before = root.level
     root.setLevel(logging.INFO)
 
     def undo() -> None:
         root.setLevel(before)
+        root.removeHandler(folding)
+        folding.close()
         for handler in handlers:
-            root.removeHandler(handler)
             if handler is not ring:
                 handler.close()
 

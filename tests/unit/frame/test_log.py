@@ -2,6 +2,7 @@
 
 import gc
 import logging
+import re
 import weakref
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -9,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from cosmic.frame.clock import ManualClock
 from cosmic.frame.log import RingBufferHandler, set_up_logging
+from cosmic.frame.log_folding import tell_folded
 
 logger = logging.getLogger("cosmic.test")
 
@@ -120,3 +123,95 @@ def test_undoing_the_set_up_leaves_logging_as_it_was() -> None:
     logger.warning("to nobody")
     assert (root.level, list(root.handlers)) == before
     assert not ring.records()
+
+
+# --- floods
+
+
+def _flood(path: Path, clock: ManualClock, seconds: int, per_second: int) -> int:
+    """Log refused greetings at that rate, and something else in the middle; return how many."""
+    for second in range(seconds):
+        for number in range(per_second):
+            logger.warning("%s refused %s: %s", "fibres", f"rude/{number}", "greet first")
+            if second == seconds // 2 and number == 17:
+                logger.warning("left.x does not answer")
+        clock.advance(1.0)
+    return seconds * per_second
+
+
+def test_a_flood_of_refused_greetings_is_told_in_few_lines_with_the_right_count(
+    tmp_path: Path,
+) -> None:
+    path, clock = tmp_path / "cosmic.log", ManualClock()
+    undo = set_up_logging(file=path, clock=clock)
+    sent = _flood(path, clock, seconds=20, per_second=500)
+    undo()
+    text = path.read_text(encoding="utf-8")
+    assert len(text) < 50_000
+    assert "left.x does not answer" in text, "another message passes"
+    counted = [int(each) for each in re.findall(r"repeated (\d+) times in", text)]
+    single = text.count("refused rude/") - len(counted)
+    assert single + sum(counted) == sent
+    assert single >= 50, "the first are kept as they are"
+
+
+def test_a_flood_that_has_ended_is_told_though_nothing_else_is_logged() -> None:
+    ring, clock = RingBufferHandler(), ManualClock()
+    undo = set_up_logging(ring, clock=clock)
+    for _ in range(862):
+        logger.warning("cable out")
+    tell_folded()
+    assert _texts(ring) == ["cable out"] * 50
+    clock.advance(10.0)
+    tell_folded()
+    assert _texts(ring)[50:] == ["cable out ... repeated 812 times in 10 s"]
+    clock.advance(10.0)
+    tell_folded()
+    logger.warning("cable out")
+    assert _texts(ring)[51:] == ["cable out"], "afterwards it is new again"
+    undo()
+
+
+def test_an_error_that_is_new_passes_in_any_flood_of_errors() -> None:
+    ring, clock = RingBufferHandler(), ManualClock()
+    undo = set_up_logging(ring, clock=clock)
+    for number in range(1000):
+        logger.error("%s", "device 1 hangs")
+        if number % 100 == 99:
+            logger.error("%s", f"device 2 hangs at {number}")
+    assert sum("device 2" in text for text in _texts(ring)) == 10
+    assert len(ring.records()) == 60
+    undo()
+    assert _texts(ring)[60:] == ["device 1 hangs ... repeated 950 times in 1 s"]
+
+
+def test_errors_whose_text_never_repeats_are_a_flood_too() -> None:
+    ring = RingBufferHandler()
+    undo = set_up_logging(ring, clock=ManualClock())
+    for number in range(3000):
+        logger.error("packet %d is broken", number)
+    assert len(ring.records()) == 200
+    undo()
+    assert "repeated 2800 times" in _texts(ring)[-1]
+
+
+def test_folding_keeps_no_object_alive_and_forgets_old_sources(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(logging.getLogger("cosmic"), "propagate", False)  # pytest keeps records
+    ring = RingBufferHandler(capacity=10_000)
+    undo = set_up_logging(ring, clock=ManualClock())
+
+    def flood() -> weakref.ref[_Window]:
+        window = _Window()
+        for _ in range(60):
+            logger.warning("closed %s", window)
+        return weakref.ref(window)
+
+    window = flood()
+    gc.collect()
+    assert window() is None
+    for number in range(2000):
+        logger.warning(f"source {number}")  # noqa: G004 - as many sources as can be
+    assert any("repeated 10 times" in text for text in _texts(ring)), "told when it is forgotten"
+    undo()

@@ -25,6 +25,7 @@ from cosmic.frame.gui.build import push_button, tipped
 from cosmic.frame.gui.log_model import LEVEL, MESSAGE, TIME, WHERE, LogEntry, LogFilter, LogModel
 from cosmic.frame.gui.theme import STEP_PX, code_font, number_font
 from cosmic.frame.log import RingBufferHandler
+from cosmic.frame.log_folding import tell_folded
 from cosmic.frame.overrides import override
 
 REFRESH_MS: Final = 100
@@ -150,6 +151,7 @@ class LogPanel(QWidget):
         return self._model.entry(source.row())
 
     def _on_timer(self) -> None:
+        tell_folded()
         waiting = [self._pending.popleft() for _ in range(len(self._pending))]
         known = {id(record) for record in self._shown_at_start}
         self._shown_at_start = []

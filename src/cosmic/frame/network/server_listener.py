@@ -9,6 +9,7 @@ from typing import Final
 from typing_extensions import override
 
 from cosmic.frame.errors import CosmicError, ProtocolError
+from cosmic.frame.log_folding import tell_folded
 from cosmic.frame.network.addresses import (
     asks,
     client_of,
@@ -199,6 +200,7 @@ class ServerListener(WorkerThread):
     # Housekeeping, in the listener's own thread
 
     def _look(self) -> None:
+        tell_folded()  # of a flood that has ended nobody else may tell for long
         self._station.lease.poll()
         while len(self._gone):
             self._end(self._gone.take(), "its sign of life is gone")
