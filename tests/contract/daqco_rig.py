@@ -24,6 +24,7 @@ from cosmic.frame.network.line_settings import Line
 from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Transport
 
+LONGEST_SILENCE_S = 1.0
 FORCE = ScaleSettings(name="Probe", unit="uN", coefficients=(0.0, 20.0))
 
 
@@ -71,7 +72,11 @@ def settings(folder: Path, channels: int = 2, rate_hz: float = 1000.0) -> DaqcoS
     )
     force = ChannelSettings(name="force", board="Dev1", input="ai0", scale="Probe")
     return DaqcoSettings(
-        rate_hz=rate_hz, directory=str(folder), scale=(FORCE,), channel=(force, *others)
+        rate_hz=rate_hz,
+        silence_s=LONGEST_SILENCE_S,  # a machine that is busy with other tests falls silent as well
+        directory=str(folder),
+        scale=(FORCE,),
+        channel=(force, *others),
     )
 
 

@@ -24,7 +24,6 @@ def rig(
     request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[DaqcoRig]:
     # A machine that is busy with other tests falls silent for a moment now and then.
-    monkeypatch.setattr("cosmic.daqco.core.limits.STALE_S", 5.0)
     monkeypatch.setattr("cosmic.daqco.api.remote_guard.SILENCE_LIMIT_S", 5.0)
     with daqco_rig(request.param, settings(tmp_path)) as made:
         yield made

@@ -39,12 +39,6 @@ def rig(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[DaqcoRig]:
         yield made
 
 
-@pytest.fixture(autouse=True)
-def _patient_board(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let a board on a machine that is busy with other tests fall silent for a moment."""
-    monkeypatch.setattr("cosmic.daqco.core.limits.STALE_S", 5.0)
-
-
 # --- samples ----------------------------------------------------------------------------------
 
 

@@ -62,7 +62,7 @@ def test_boards_there_stop_axes_here_and_their_silence_does_as_well() -> None:
         rig.daqco.remove_limit("force")
         rig.reset_stop()
 
-        rig.daqco.arm_limit("force", low=-500.0, high=500.0)
+        rig.daqco.arm_limit("force", low=-200.0, high=200.0)
         assert rig.stopped is None
         host.close()
         assert wait_until(lambda: rig.stopped), "nobody can say that the limit holds"

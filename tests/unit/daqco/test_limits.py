@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cosmic.daqco.core.chunk import DataChunk
-from cosmic.daqco.core.limits import STALE_S, Crossing, Limit, LimitGuard
+from cosmic.daqco.core.limits import SILENCE_S, Crossing, Limit, LimitGuard
 from cosmic.daqco.core.scale import VOLTS, Scale
 from cosmic.frame.clock import WALL, ManualClock, RatedClock
 from cosmic.frame.errors import ConfigError, NotAvailable
@@ -106,8 +106,7 @@ def test_silence_while_armed_counts_as_crossed() -> None:
     rig.guard.look(chunk([2.5]))
     rig.guard.look_for_silence()
     assert not rig.stops
-    until_s = WALL.now_s() + 1.5 * STALE_S
-    wait_until(lambda: WALL.now_s() > until_s)
+    rig.clock.advance(1.5 * SILENCE_S)
     rig.guard.look_for_silence()
     rig.guard.look_for_silence()
     assert len(rig.stops) == 1
@@ -181,7 +180,7 @@ def test_a_simulation_that_runs_faster_may_be_silent_longer():
     guard = LimitGuard(RatedClock(10.0), stops.append)
     guard.set_rate(1000.0)
     guard.set_limit(Limit("force", high=100.0, armed=True))
-    until_s = WALL.now_s() + 1.5 * STALE_S
+    until_s = WALL.now_s() + 1.5 * SILENCE_S
     wait_until(lambda: WALL.now_s() > until_s)
     guard.look_for_silence()
     assert not stops
@@ -201,3 +200,43 @@ def test_who_asks_after_a_stop_is_told_of_the_crossing_that_made_it() -> None:
     rig.guard.look(chunk([4.5]))
     reader.join(2.0)
     assert [len(each) for each in answers] == [1]
+
+
+def test_an_armed_channel_that_is_missing_in_the_data_counts_as_silent() -> None:
+    rig = Rig()
+    rig.arm()
+    other = DataChunk(0, 0.0, 1000.0, ("spare",), np.zeros((1, 3)), (FORCE,))
+    for _ in range(4):
+        rig.clock.advance(0.5 * SILENCE_S)
+        rig.guard.look(other)
+        rig.guard.look_for_silence()
+    assert len(rig.stops) == 1
+    assert rig.stops[0] == "no data from force for 0.1 s while the limit of force is armed"
+    with pytest.raises(NotAvailable, match="no data from force"):
+        rig.guard.acknowledge("force")
+
+
+def test_a_scale_that_changes_under_an_armed_limit_stops_whoever_changed_it() -> None:
+    rig = Rig()
+    rig.arm()
+    rig.guard.look(chunk([2.5]))
+    weak = DataChunk(1, 0.0, 1000.0, ("force",), np.full((1, 3), 2.5), (Scale("x", "uN", (0.0,)),))
+    rig.guard.look(weak)
+    assert len(rig.stops) == 1
+    assert "scale of force changed" in rig.stops[0]
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+def test_simulated_data_are_missed_by_the_platforms_clock_and_real_ones_by_the_wall(
+    simulated: bool,
+) -> None:
+    rig = Rig()
+    rig.guard.watch_silence(0.02, simulated=simulated)
+    rig.arm()
+    until_s = WALL.now_s() + 0.03
+    wait_until(lambda: WALL.now_s() > until_s)  # the platform's clock is held meanwhile
+    rig.guard.look_for_silence()
+    assert len(rig.stops) == (0 if simulated else 1)
+    rig.clock.advance(0.03)
+    rig.guard.look_for_silence()
+    assert len(rig.stops) == 1

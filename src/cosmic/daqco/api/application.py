@@ -1,7 +1,7 @@
 """DAQCo as a CoSMic application (thesis 5.5, 6.2)."""
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from threading import RLock
 from typing import Final, TypeVar
@@ -13,8 +13,9 @@ from cosmic.daqco.api.errands import Errands, Told, do_and_tell
 from cosmic.daqco.api.files import LocalFiles
 from cosmic.daqco.api.recorder import Recorder
 from cosmic.daqco.core.chunk import DataChunk
+from cosmic.daqco.core.guarded import check_arming, check_guarded, successor
 from cosmic.daqco.core.limits import Crossing, Limit, LimitGuard
-from cosmic.daqco.core.plan import make_plan, restarts
+from cosmic.daqco.core.plan import AcquisitionPlan, make_plan, restarts
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings, ScaleSettings
 from cosmic.daqco.core.udaq_buffer import UDaqBuffer
@@ -33,7 +34,7 @@ logger = logging.getLogger(__name__)
 T = TypeVar("T")
 
 FIRST_DATA_S: Final = 1.0
-MORE_CHUNKS: Final = 5.0
+MORE_CHUNKS: Final = 1.0
 """How many times more chunks a simulation at a rate makes, on the wall; then they grow."""
 LONGEST_CHUNK_S: Final = 0.25
 """They must come, at the pace of the wall too, before they are missed."""
@@ -80,6 +81,7 @@ class DaqcoApplication(TaskApplication):
         self.clock = clock
         self.buffer = UDaqBuffer()
         self.guard = LimitGuard(clock)
+        self.guard.check = self._check_arming
         self.files = LocalFiles(self)
         self._policy = policy
         self._settings = settings
@@ -164,24 +166,26 @@ class DaqcoApplication(TaskApplication):
 
     def _open(self) -> None:
         try:
+            self._set_configured_limits()
             self.look_for_boards()
             self.start_acquisition()
-            self._arm_configured()
         except CosmicError as exc:
             self._fail(str(exc))
         self.status_changed.emit()
 
-    def _arm_configured(self) -> None:
+    def _set_configured_limits(self) -> None:
+        """Set the limits of the file; those that are to be armed are, once samples come."""
         for each in self._settings.limit:
-            self.guard.set_limit(
-                Limit(
-                    each.channel,
-                    low=-float("inf") if each.low is None else each.low,
-                    high=float("inf") if each.high is None else each.high,
-                    hysteresis=each.hysteresis,
-                    armed=each.armed,
-                )
+            limit = Limit(
+                each.channel,
+                low=-float("inf") if each.low is None else each.low,
+                high=float("inf") if each.high is None else each.high,
+                hysteresis=each.hysteresis,
             )
+            if each.armed:
+                self.guard.set_suspended(limit)
+            else:
+                self.guard.set_limit(limit)
 
     def look_for_boards(self) -> None:
         """Look for boards and open those there are.
@@ -210,10 +214,8 @@ class DaqcoApplication(TaskApplication):
                 return
             if self.end_requested:
                 raise NotAvailable("DAQCo is closed")
-            if self._core is not None:
-                # One that failed may still be ending; forgotten while it runs, it ends the program.
-                self._core.request_end()
-                self._core.join()
+            # One that failed may still be ending; forgotten while it runs, it ends the program.
+            self._end_core()
             settings = self._settings
             # Many more of them on the wall than were asked for would be too many, however fast a
             # simulation runs; but who waits for samples waits for their chunk.
@@ -235,6 +237,7 @@ class DaqcoApplication(TaskApplication):
             self.buffer.clear()
             core.open()
             self._core, self._problem = core, ""
+            self.guard.watch_silence(settings.silence_s, simulated=self._simulated(plan))
             self.guard.set_rate(core.rate_hz)
         logger.info(
             "acquiring %d channels at %g Hz from %s",
@@ -244,17 +247,28 @@ class DaqcoApplication(TaskApplication):
         )
         self.status_changed.emit()
 
+    def _simulated(self, plan: AcquisitionPlan) -> bool:
+        return all(self._infos[name].simulated for name in plan.boards)
+
     def stop_acquisition(self) -> None:
-        """End acquiring; harmless when nothing runs. Limits that are armed are disarmed."""
+        """End acquiring; harmless when nothing runs.
+
+        Limits that are armed are not watched meanwhile, which is told, and are armed again when
+        acquisition starts.
+        """
         with self._lock:
-            core, self._core = self._core, None
-            if core is None:
+            if self._core is None:
                 return
             self.guard.set_rate(0.0)
-            core.request_end()
-            core.join()
+            self._end_core()
         logger.info("acquisition ended")
         self.status_changed.emit()
+
+    def _end_core(self) -> None:
+        core, self._core = self._core, None
+        if core is not None:
+            core.request_end()
+            core.join()
 
     def apply(self, settings: DaqcoSettings) -> None:
         """Put `settings` in force; acquisition goes on with them if it ran.
@@ -264,35 +278,54 @@ class DaqcoApplication(TaskApplication):
         LimitError, NotConnectedError, ConfigError
             They cannot be; what was in force stays.
         NotAvailable
-            Rate or channels would change while recording.
+            Rate or channels would change while recording, or something that an armed limit rests
+            on: disarm that first.
         """
         with self._lock:
             if self._infos:
                 make_plan(settings.channel, settings.rate_hz, settings.chunk_s, self._infos)
+            before = self._settings
+            limits = self.guard.limits.values()
             for check in self._before_change:
                 check(settings)
-            before, self._settings = self._settings, settings
+            for limit in limits:
+                if limit.armed or limit.suspended:
+                    check_guarded(limit, before, settings)
+            self._settings = settings
             core = self._core
             if core is not None and not restarts(before, settings):
                 core.set_scales(self.scales())
+                self.guard.watch_silence(settings.silence_s, simulated=self._simulated(core.plan))
             elif core is not None:
-                armed = [limit for limit in self.guard.limits.values() if limit.armed]
-                self.stop_acquisition()
-                try:
-                    self.start_acquisition()
-                except CosmicError:
-                    self._settings = before
-                    raise
-                self._arm_again(armed)
+                self._restart(before)
+            self._follow(limits, before)
         self.status_changed.emit()
 
-    def _arm_again(self, limits: Sequence[Limit]) -> None:
-        """Watch limits again that were armed before acquisition began anew."""
-        for limit in limits:
+    def _restart(self, before: DaqcoSettings) -> None:
+        """Acquire anew; limits stay armed, and silence of more than `silence_s` trips them."""
+        self._end_core()
+        try:
+            self.start_acquisition()
+        except CosmicError:
+            self._settings = before
             try:
-                self.guard.set_limit(limit)
-            except NotAvailable as exc:
-                logger.warning("%s; its limit is no longer armed", exc)
+                self.start_acquisition()
+            except CosmicError as exc:
+                self._fail(str(exc))
+                self.guard.trip_all(f"acquisition does not run ({exc})")
+            raise
+
+    def _follow(self, limits: Iterable[Limit], before: DaqcoSettings) -> None:
+        """Have limits that are not armed follow their channels, or say that they are gone."""
+        for limit in limits:
+            name, why = successor(limit.channel, before, self._settings)
+            if why:
+                self.guard.remove(limit.channel, why)
+            elif name != limit.channel:
+                self.guard.rename(limit.channel, name)
+
+    def _check_arming(self, limit: Limit) -> None:
+        check_arming(limit, self._settings)
 
     def before_change(self, check: Callable[[DaqcoSettings], None]) -> None:
         """Call `check(settings)` before they come into force; what it raises forbids them."""

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -303,7 +303,9 @@ class Daqco:
     def _shown(self, limit: Limit, crossing: Crossing | None) -> DaqLimit:
         known = crossing is not None and math.isfinite(crossing.value)
         reason = crossing.text if crossing is not None else ""
-        if not reason and self.rate_hz < LOWEST_RATE_HZ:
+        if not reason and limit.suspended:
+            reason = "not watched: nothing is acquired; armed again when acquisition starts"
+        elif not reason and self.rate_hz < LOWEST_RATE_HZ:
             reason = f"limits are watched from {LOWEST_RATE_HZ:g} Hz on"
         reaction_ms = None
         if crossing is not None and math.isfinite(crossing.reaction_s):
@@ -362,6 +364,20 @@ class Daqco:
         except ValueError as exc:
             raise ConfigError(f"limit of {channel}: {exc}") from None
         self.set_limit(limit)
+
+    def disarm_limit(self, channel: str) -> None:
+        """Watch a channel no longer; its limit stays, to be armed again by `set_limit`.
+
+        Raises
+        ------
+        ConfigError
+            The channel has no limit.
+        """
+        limit = self._application.guard.limits.get(channel)
+        if limit is None:
+            raise ConfigError(f"{channel!r} has no limit that could be disarmed")
+        self._application.guard.set_limit(replace(limit, armed=False, suspended=False))
+        self._tell()
 
     def remove_limit(self, channel: str) -> None:
         """Take away the limit of a channel."""

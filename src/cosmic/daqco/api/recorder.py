@@ -95,6 +95,7 @@ class Recorder:
         self._listeners: tuple[Callable[[], object], ...] = ()
         self.position_source: PositionSource | None = None
         application.guard.subscribe(self._on_crossing)
+        application.guard.on_note(self._on_limit_note)
         application.before_change(self._forbid)
 
     def on_change(self, listener: Callable[[], object]) -> None:
@@ -211,6 +212,10 @@ class Recorder:
             channel=crossing.channel,
             value=crossing.value,
         )
+
+    def _on_limit_note(self, channel: str, text: str) -> None:
+        now_s = self._application.clock.now_s()
+        self._add_event("note", f"{channel}: {text}", now_s, channel=channel)
 
     def _add_event(
         self,

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from cosmic.daqco.core.chunk import DataChunk, Values
+from cosmic.daqco.core.scale import Scale
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.listeners import tell
@@ -17,8 +18,8 @@ from cosmic.frame.listeners import tell
 logger = logging.getLogger(__name__)
 
 LOWEST_RATE_HZ: Final = 200.0
-STALE_S: Final = 0.1
-"""How long data may stay away while a limit is armed, wall time."""
+SILENCE_S: Final = 0.1
+"""How long data may stay away while a limit is armed, unless somebody says otherwise."""
 _TOLD_S: Final = 1.0
 LAXEST: Final = 10.0
 """A simulation that runs faster than the wall may be silent so much longer: nothing can break."""
@@ -40,6 +41,8 @@ class Limit:
         It was crossed, and nobody has acknowledged that yet.
     beyond : bool
         The channel has not come back inside since.
+    suspended : bool
+        It was armed when acquisition ended, and is armed again when acquisition starts.
     """
 
     channel: str
@@ -49,6 +52,14 @@ class Limit:
     armed: bool = False
     tripped: bool = False
     beyond: bool = False
+    suspended: bool = False
+
+    @property
+    def range_text(self) -> str:
+        """What it allows, in words."""
+        if math.isfinite(self.low) and math.isfinite(self.high):
+            return f"{self.low:g} to {self.high:g}"
+        return f"above {self.low:g}" if math.isfinite(self.low) else f"below {self.high:g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,19 +96,26 @@ class LimitGuard:
     trip : callable
         Called with the reason the moment a limit is crossed, in the acquisition thread, before
         anybody else hears of it. It must return at once.
+
+    Attributes
+    ----------
+    check : callable
+        Called with a limit before it is armed; what it raises forbids that.
     """
 
     def __init__(self, clock: Clock, trip: Callable[[str], None] | None = None) -> None:
         self._clock = clock
         self.trip = trip
-        self._stale_s = STALE_S * min(max(clock.rate, 1.0), LAXEST)
+        self.check: Callable[[Limit], None] = lambda _limit: None
         self._lock = Lock()
         self._telling = RLock()
         self._limits: dict[str, Limit] = {}
         self._listeners: tuple[Callable[[Crossing], None], ...] = ()
-        self._last_wall_s = -math.inf
+        self._note_listeners: tuple[Callable[[str, str], None], ...] = ()
         self._rate_hz = 0.0
         self._crossings: tuple[Crossing, ...] = ()
+        self._scales: dict[str, Scale] = {}
+        self.watch_silence(SILENCE_S, simulated=True)
 
     @property
     def limits(self) -> dict[str, Limit]:
@@ -125,19 +143,64 @@ class LimitGuard:
         """Call `listener(crossing)` after each trip, in the thread that saw it."""
         self._listeners = (*self._listeners, listener)
 
+    def on_note(self, listener: Callable[[str, str], None]) -> None:
+        """Call `listener(channel, text)` when a limit is armed, disarmed, suspended or removed."""
+        self._note_listeners = (*self._note_listeners, listener)
+
+    def watch_silence(self, silence_s: float, *, simulated: bool) -> None:
+        """Set for how long data may stay away while a limit is armed.
+
+        Parameters
+        ----------
+        simulated : bool
+            True: the platform's clock judges it, which waits when the computer is slow, and then
+            no data is due either. False: the wall's does, for real boards wait for nobody.
+        """
+        rate = max(self._clock.rate, 1.0) if simulated else 1.0
+        with self._lock:
+            self._watch: Clock = self._clock if simulated else WALL
+            self._silence_s = silence_s
+            self._most_s = silence_s * rate * min(rate, LAXEST)
+            self._seen_s = dict.fromkeys(self._limits, self._watch.now_s())
+
     def set_rate(self, rate_hz: float) -> None:
         """Say how often channels are sampled; 0 while they are not.
 
-        Limits that were armed are disarmed where that is too slow for them.
+        Limits that are armed are suspended where that is too slow for them, and armed again when
+        it is fast enough.
         """
         with self._lock:
             self._rate_hz = rate_hz
-            self._last_wall_s = WALL.now_s()
-            if rate_hz < LOWEST_RATE_HZ:
-                for name, limit in self._limits.items():
-                    if limit.armed:
-                        logger.warning("%s: its limit is disarmed at %g Hz", name, rate_hz)
-                        self._limits[name] = replace(limit, armed=False)
+            self._scales.clear()
+            now_s = self._watch.now_s()
+            self._seen_s = dict.fromkeys(self._limits, now_s)
+            slow = rate_hz < LOWEST_RATE_HZ
+            changed = [
+                limit
+                for limit in self._limits.values()
+                if (limit.armed if slow else limit.suspended)
+            ]
+            for limit in changed:
+                self._limits[limit.channel] = replace(limit, armed=not slow, suspended=slow)
+        for limit in changed:
+            if slow:
+                why = (
+                    "nothing is acquired" if rate_hz == 0.0 else f"it is sampled at {rate_hz:g} Hz"
+                )
+                self._tell_note(limit.channel, f"its limit is no longer watched: {why}")
+            else:
+                self._arm_again(limit)
+
+    def _arm_again(self, limit: Limit) -> None:
+        """Arm what was suspended, or say why that cannot be."""
+        try:
+            self.check(limit)
+        except (ConfigError, NotAvailable) as exc:
+            with self._lock:
+                self._limits[limit.channel] = replace(limit, armed=False, suspended=False)
+            self._tell_note(limit.channel, f"its limit is disarmed: {exc}")
+        else:
+            self._tell_note(limit.channel, f"its limit is armed: {limit.range_text}")
 
     def set_limit(self, limit: Limit) -> None:
         """Set the limit of a channel, armed or not.
@@ -149,20 +212,41 @@ class LimitGuard:
         NotAvailable
             It is to be armed, and channels are sampled at less than 200 Hz.
         """
-        if not limit.low < limit.high:
-            raise ConfigError(f"{limit.channel}: the low limit must lie below the high one")
-        if not 0.0 <= limit.hysteresis < (limit.high - limit.low) / 2.0:
-            raise ConfigError(
-                f"{limit.channel}: a hysteresis of {limit.hysteresis!r} leaves nothing between"
-            )
+        self._check_numbers(limit)
+        if limit.armed:
+            self.check(limit)
         with self._lock:
             if limit.armed and not self._rate_hz >= LOWEST_RATE_HZ:
                 raise NotAvailable(
                     f"{limit.channel}: limits are watched from {LOWEST_RATE_HZ:g} Hz on; it is "
                     f"sampled at {self._rate_hz:g} Hz"
                 )
-            self._last_wall_s = WALL.now_s()
-            self._limits[limit.channel] = replace(limit, tripped=False, beyond=False)
+            before = self._limits.get(limit.channel)
+            self._put(replace(limit, tripped=False, beyond=False))
+        if limit.armed:
+            self._tell_note(limit.channel, f"its limit is armed: {limit.range_text}")
+        elif before is not None and (before.armed or before.suspended):
+            self._tell_note(limit.channel, "its limit was disarmed")
+
+    def set_suspended(self, limit: Limit) -> None:
+        """Set a limit that is armed as soon as channels are sampled; raises as `set_limit`."""
+        self._check_numbers(limit)
+        with self._lock:
+            self._put(replace(limit, armed=False, suspended=True))
+
+    def _check_numbers(self, limit: Limit) -> None:
+        if not limit.low < limit.high:
+            raise ConfigError(f"{limit.channel}: the low limit must lie below the high one")
+        if not 0.0 <= limit.hysteresis < (limit.high - limit.low) / 2.0:
+            raise ConfigError(
+                f"{limit.channel}: a hysteresis of {limit.hysteresis!r} leaves nothing between"
+            )
+
+    def _put(self, limit: Limit) -> None:
+        """Put a limit in force; locked."""
+        self._seen_s[limit.channel] = self._watch.now_s()
+        self._scales.pop(limit.channel, None)
+        self._limits[limit.channel] = limit
 
     def acknowledge(self, channel: str) -> None:
         """Forget that the limit of a channel was crossed; it stays armed.
@@ -170,44 +254,82 @@ class LimitGuard:
         Raises
         ------
         NotAvailable
-            The channel has not come back inside.
+            The channel has not come back inside, or there is no data of it.
         """
         with self._lock:
             limit = self._limits.get(channel)
             if limit is None:
                 return
             if limit.armed and limit.beyond:
-                raise NotAvailable(
-                    f"{channel} is still beyond its limit; bring it back inside, or disarm it"
-                )
+                if self._watch.now_s() - self._seen_s[channel] > self._most_s:
+                    text = f"there is still no data from {channel}; start the acquisition"
+                else:
+                    text = f"{channel} is still beyond its limit; bring it back inside"
+                raise NotAvailable(f"{text}, or disarm its limit")
             self._limits[channel] = replace(limit, tripped=False)
 
-    def remove(self, channel: str) -> None:
+    def remove(self, channel: str, why: str = "") -> None:
         """Forget the limit of a channel."""
         with self._lock:
-            self._limits.pop(channel, None)
+            limit = self._limits.pop(channel, None)
+        if limit is not None:
+            self._tell_note(channel, f"its limit was removed{why and ': '}{why}")
+
+    def rename(self, channel: str, name: str) -> None:
+        """Have a limit follow its channel to another name."""
+        with self._lock:
+            limit = self._limits.pop(channel, None)
+            if limit is not None:
+                self._put(replace(limit, channel=name))
+
+    def _tell_note(self, channel: str, text: str) -> None:
+        logger.warning("%s: %s", channel, text)
+        tell(self._note_listeners, channel, text)
 
     # Watching
 
     def look(self, chunk: DataChunk) -> None:
         """Check a chunk; acquisition thread, before anybody else gets it."""
-        self._last_wall_s = WALL.now_s()
+        if not self.armed:
+            return
+        now_s = self._watch.now_s()
         for name, limit in list(self._limits.items()):
             if limit.armed and name in chunk.channels:
                 row = chunk.channels.index(name)
-                self._check(chunk, row, limit)
+                if self._is_same_quantity(name, chunk.scales[row]):
+                    self._seen_s[name] = now_s
+                    self._check(chunk, row, limit)
+                elif not limit.beyond:
+                    self._trip_blind(limit, f"the scale of {name} changed under its armed limit")
+
+    def _is_same_quantity(self, name: str, scale: Scale) -> bool:
+        """Return False when a channel is scaled otherwise than since its limit was armed."""
+        known = self._scales.setdefault(name, scale)
+        if known is scale:
+            return True
+        return (known.unit, known.coefficients) == (scale.unit, scale.coefficients)
 
     def look_for_silence(self) -> None:
         """Trip when data has stayed away for too long; called again and again by a watcher."""
-        if not self.armed or WALL.now_s() - self._last_wall_s <= self._stale_s:
+        if not self.armed:
             return
+        now_s = self._watch.now_s()
+        for name, limit in list(self._limits.items()):
+            if not limit.armed or limit.beyond:
+                continue
+            if now_s - self._seen_s.get(name, now_s) > self._most_s:
+                self._trip_blind(limit, f"no data from {name} for {self._silence_s:g} s")
+
+    def trip_all(self, why: str) -> None:
+        """Trip every armed limit: samples are missing, and nobody knows what they were."""
         for limit in list(self._limits.values()):
             if limit.armed and not limit.beyond:
-                text = (
-                    f"no data of {limit.channel} for {self._stale_s:g} s while its limit is armed"
-                )
-                now_s = self._clock.now_s()
-                self._trip(Crossing(limit.channel, -1, now_s, math.nan, math.nan, "", text), limit)
+                self._trip_blind(limit, why)
+
+    def _trip_blind(self, limit: Limit, why: str) -> None:
+        text = f"{why} while the limit of {limit.channel} is armed"
+        now_s = self._clock.now_s()
+        self._trip(Crossing(limit.channel, -1, now_s, math.nan, math.nan, "", text), limit)
 
     def _check(self, chunk: DataChunk, row: int, limit: Limit) -> None:
         scale = chunk.scales[row]

@@ -78,7 +78,8 @@ class DaqcoSettings(StrictModel):
     backend: Literal["simulated", "nidaqmx"] = "simulated"
     rate_hz: float = Field(default=1000.0, ge=LOWEST_RATE_HZ, le=HIGHEST_RATE_HZ)
     refresh_hz: float = Field(default=20.0, ge=1.0, le=300.0)
-    chunk_s: float = Field(default=0.01, ge=0.005, le=0.1)
+    chunk_s: float = Field(default=0.002, ge=0.001, le=0.1)
+    silence_s: float = Field(default=0.1, ge=0.02, le=1.0)
     directory: str = ""
     clock_sources: dict[str, str] = Field(default_factory=dict)
     scale: Annotated[tuple[ScaleSettings, ...], Field(strict=False)] = ()
