@@ -95,6 +95,12 @@ class CampaignDock(QObject):
             layout.addWidget(panel)
         return panel
 
+    @property
+    def running(self) -> bool:
+        """True while a campaign that was begun here is under way."""
+        campaign = self._panel.campaign if self._panel is not None else None
+        return campaign is not None and not campaign.over
+
     def shut_down(self) -> None:
         """End what runs; what it did is kept."""
         if self._panel is not None:

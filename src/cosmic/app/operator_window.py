@@ -85,7 +85,7 @@ class OperatorWindow(CosmicServerGui):
         self._guide: WayGuide | None = None
         self._bridge = WindowBridge()
         self._forget_policy = platform.policy.subscribe(self._bridge.tell_failure)
-        self._stop_filter = StopKeyFilter(_application(), stop_key, self)
+        self._stop_filter = StopKeyFilter(_application(), stop_key, self, moving=self._is_moving)
         self._add_mico(settings)
         pictures = self._add_instruments()
         if self._mico_gui is not None and self._scene is not None:
@@ -166,6 +166,8 @@ class OperatorWindow(CosmicServerGui):
     def _connect_all(self) -> None:
         self.stop_requested.connect(self._on_stop_button)
         self._stop_filter.stop_requested.connect(self._on_stop_key)
+        self._stop_filter.add_cancel(self._cancel_path)
+        self._stop_filter.add_cancel(self._cancel_tool)
         self.top_bar.reset_requested.connect(self._on_reset)
         self.top_bar.message_clicked.connect(self._on_message_read)
         self.rescan_requested.connect(self._on_rescan)
@@ -180,7 +182,7 @@ class OperatorWindow(CosmicServerGui):
         stop_key = platform.file.platform.stop_key
         keys = [
             (stop_key, "stop every movement and keep it stopped, from anywhere"),
-            ("Esc", "stop as well; in a field being edited: take the entry back"),
+            ("Esc", "cancel a menu, dialog, entry or tool; with none of them, stop what moves"),
         ]
         if self._mico_gui is not None:
             keys += self._mico_gui.keys()
@@ -240,6 +242,34 @@ class OperatorWindow(CosmicServerGui):
         for name, state in self._platform.mico.manager.states().items():
             if state.in_motion:
                 self._mico_gui.mico[name].halt()
+
+    def _is_moving(self) -> bool:
+        """Tell whether Escape has something to stop."""
+        campaign = self._campaign is not None and self._campaign.running
+        mico = self._platform.mico
+        if campaign or mico is None or not mico.manager.ready:
+            return campaign
+        task = mico.running_task
+        return (task is not None and not task.done) or any(
+            state.in_motion for state in mico.manager.states().values()
+        )
+
+    def _cancel_tool(self) -> bool:
+        """Put the tools on the pictures away, as Escape does first."""
+        pictures = self._instruments.pictures
+        views = list(pictures.cameras.values()) if pictures is not None else []
+        chosen = [each for each in views if each.isVisible() and each.view.tool is not None]
+        for each in chosen:
+            each.tools.put_away()
+        return bool(chosen)
+
+    def _cancel_path(self) -> bool:
+        """Leave a detour that is looked for or offered; one that is being driven is stopped."""
+        guide = self._guide
+        if guide is None or guide.stage not in (Stage.SEARCHING, Stage.FOUND):
+            return False
+        guide.cancel()
+        return True
 
     def _on_stop_button(self) -> None:
         self.stop("STOP button")

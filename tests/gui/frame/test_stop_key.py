@@ -3,7 +3,17 @@ from collections.abc import Iterator
 import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QKeyEvent, QKeySequence, QShortcut
-from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QMenu, QPushButton, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QComboBox,
+    QDialog,
+    QLineEdit,
+    QMenu,
+    QPushButton,
+    QTableWidget,
+    QTableWidgetItem,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from cosmic.frame.gui.quantity_field import QuantityField
@@ -13,14 +23,26 @@ F12, ESCAPE = Qt.Key.Key_F12, Qt.Key.Key_Escape
 
 
 @pytest.fixture
-def stops(qapp: QApplication) -> Iterator[list[str]]:
-    """What the stop key asked for, in order."""
-    told: list[str] = []
-    key = StopKeyFilter(qapp, "F12")
-    key.stop_requested.connect(told.append)
-    yield told
+def moves() -> list[bool]:
+    """Empty while nothing moves."""
+    return [True]
+
+
+@pytest.fixture
+def key(qapp: QApplication, moves: list[bool]) -> Iterator[StopKeyFilter]:
+    """The stop key of a platform that moves."""
+    key = StopKeyFilter(qapp, "F12", moving=lambda: bool(moves))
+    yield key
     qapp.removeEventFilter(key)
     key.deleteLater()
+
+
+@pytest.fixture
+def stops(key: StopKeyFilter) -> list[str]:
+    """What the stop key asked for, in order."""
+    told: list[str] = []
+    key.stop_requested.connect(told.append)
+    return told
 
 
 def show(qtbot: QtBot, window: QWidget) -> None:
@@ -93,16 +115,87 @@ def test_escape_stops_once_on_its_way_through_the_window(
     assert stops == ["Esc", "Esc"]
 
 
-def test_escape_closes_a_dialog_and_stops_too(
+def test_escape_closes_a_dialog_and_does_not_stop(
     qtbot: QtBot, form: QWidget, stops: list[str]
 ) -> None:
     dialog = QDialog(form)
     with qtbot.waitActive(dialog):
         dialog.show()
         dialog.activateWindow()
+    qtbot.waitUntil(lambda: QApplication.activeWindow() is dialog)
     qtbot.keyClick(dialog, ESCAPE)
     assert not dialog.isVisible()
+    assert stops == []
+
+
+def test_escape_closes_a_menu_and_the_list_of_a_combo_box_and_does_not_stop(
+    qtbot: QtBot, form: QWidget, stops: list[str]
+) -> None:
+    menu = QMenu(form)
+    menu.addAction("something")
+    menu.popup(form.pos())
+    qtbot.keyClick(menu, ESCAPE)
+    assert not menu.isVisible()
+    combo = QComboBox(form)
+    combo.addItems(["one", "two"])
+    combo.show()
+    combo.showPopup()
+    qtbot.keyClick(combo.view(), ESCAPE)
+    assert not combo.view().isVisible()
+    assert stops == []
+
+
+def test_escape_leaves_the_cell_that_is_open_and_stops_the_next_time(
+    qtbot: QtBot, stops: list[str]
+) -> None:
+    table = QTableWidget(1, 1)
+    table.setItem(0, 0, QTableWidgetItem("12"))
+    show(qtbot, table)
+    table.setFocus()
+    table.editItem(table.item(0, 0))
+    qtbot.waitUntil(lambda: isinstance(QApplication.focusWidget(), QLineEdit))
+    qtbot.keyClick(QApplication.focusWidget(), ESCAPE)
+    assert stops == []
+    qtbot.waitUntil(lambda: table.state() == QTableWidget.State.NoState)
+    qtbot.keyClick(table, ESCAPE)
     assert stops == ["Esc"]
+
+
+def test_escape_puts_a_tool_away_before_it_stops(
+    qtbot: QtBot, form: QWidget, key: StopKeyFilter, stops: list[str]
+) -> None:
+    tools = ["distance"]
+    key.add_cancel(lambda: bool(tools and tools.pop()))
+    qtbot.keyClick(form, ESCAPE)
+    assert (tools, stops) == ([], [])
+    qtbot.keyClick(form, ESCAPE)
+    assert stops == ["Esc"]
+
+
+def test_escape_that_is_held_cancels_one_thing_and_does_not_go_on_to_stop(
+    qtbot: QtBot, form: QWidget, stops: list[str]
+) -> None:
+    dialog = QDialog(form)
+    with qtbot.waitActive(dialog):
+        dialog.show()
+        dialog.activateWindow()
+    qtbot.waitUntil(lambda: QApplication.activeWindow() is dialog)
+    qtbot.keyPress(dialog, ESCAPE)
+    assert not dialog.isVisible()
+    for repeat in (True, True):
+        press = QKeyEvent(QEvent.Type.KeyPress, ESCAPE, Qt.KeyboardModifier.NoModifier, "", repeat)
+        QApplication.sendEvent(form, press)
+    assert stops == []
+
+
+def test_escape_does_not_stop_what_stands(
+    qtbot: QtBot, form: QWidget, moves: list[bool], stops: list[str]
+) -> None:
+    moves.clear()
+    qtbot.keyClick(form, ESCAPE)
+    assert stops == []
+    qtbot.keyClick(form, F12)
+    assert stops == ["F12"]
 
 
 def test_escape_reverts_an_edited_field_and_stops_the_next_time(

@@ -1,9 +1,13 @@
 """Who a key belongs to: the widget that text is typed into, or the program."""
 
 from PySide6.QtWidgets import (
+    QAbstractItemView,
     QAbstractSpinBox,
+    QApplication,
     QComboBox,
+    QDialog,
     QLineEdit,
+    QMenuBar,
     QPlainTextEdit,
     QTextEdit,
     QWidget,
@@ -15,6 +19,36 @@ def takes_text(widget: QWidget | None) -> bool:
     if isinstance(widget, QComboBox):
         return widget.isEditable()
     return isinstance(widget, (QLineEdit, QPlainTextEdit, QTextEdit, QAbstractSpinBox))
+
+
+def escape_is_for(widget: QWidget | None) -> bool:
+    """Tell whether Escape has something to cancel that `widget`, with the focus, belongs to.
+
+    A menu, the list of a combo box, a dialog, a panel that is being dragged, an entry in a
+    field or in a table, or what says so by a bool attribute `is_editing`.
+    """
+    if QApplication.activePopupWidget() is not None or QApplication.activeModalWidget() is not None:
+        return True
+    if isinstance(QApplication.activeWindow(), QDialog) or QWidget.mouseGrabber() is not None:
+        return True
+    if isinstance(widget, QMenuBar) or is_being_edited(widget) or _is_item_editor(widget):
+        return True
+    return any(getattr(each, "is_editing", False) is True for each in _ancestors(widget))
+
+
+def _ancestors(widget: QWidget | None) -> list[QWidget]:
+    found: list[QWidget] = []
+    at = widget.parentWidget() if widget is not None else None
+    while at is not None:
+        found.append(at)
+        at = at.parentWidget()
+    return found
+
+
+def _is_item_editor(widget: QWidget | None) -> bool:
+    """Tell whether a cell of a table or a list is open for editing there."""
+    views = [each for each in _ancestors(widget) if isinstance(each, QAbstractItemView)]
+    return any(view.state() == QAbstractItemView.State.EditingState for view in views)
 
 
 def is_being_edited(widget: QWidget | None) -> bool:

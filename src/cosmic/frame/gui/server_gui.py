@@ -15,6 +15,7 @@ from cosmic.frame.gui.palette import ThemeName
 from cosmic.frame.gui.tab_bars import hide_stale_tab_bars
 from cosmic.frame.gui.theme import STEP_PX, apply_theme, current_palette
 from cosmic.frame.gui.top_bar import TopBar
+from cosmic.frame.gui.wheel_guard import WheelGuard
 from cosmic.frame.overrides import override
 
 Area = Qt.DockWidgetArea
@@ -80,6 +81,9 @@ class CosmicServerGui(QMainWindow):
         self.setCorner(Qt.Corner.BottomLeftCorner, Area.BottomDockWidgetArea)
         self.setCorner(Qt.Corner.BottomRightCorner, Area.BottomDockWidgetArea)
         self._connect()
+        app = QApplication.instance()
+        if isinstance(app, QApplication):
+            self._wheel = WheelGuard(app, self)
         self.set_theme(self._store.theme() or theme)
         self.resize(170 * STEP_PX, 95 * STEP_PX)
 
@@ -179,6 +183,11 @@ class CosmicServerGui(QMainWindow):
         self._keys_dialog.show()
         self._keys_dialog.raise_()
         self._keys_dialog.activateWindow()
+
+    @property
+    def keys_dialog(self) -> KeysDialog | None:
+        """The list of keys, once it was shown."""
+        return self._keys_dialog
 
     def set_about(self, text: str) -> None:
         """Give the text that Help > About shows."""

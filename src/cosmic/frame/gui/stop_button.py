@@ -38,6 +38,6 @@ class StopButton(QPushButton):
         self.setText(f"STOP  {key_text}".rstrip())
         self.setToolTip(
             f"Stop every movement now and keep it stopped until Reset ({key_text}, from any "
-            "window; Esc too, unless a field is being edited)"
+            "window; Esc too, where it has nothing to cancel)"
         )
         self.setAccessibleName("Stop all movement")

@@ -27,6 +27,11 @@ class Overlay(QFrame):
         self.setAutoFillBackground(True)
         self.anchor = anchor
 
+    @property
+    def is_editing(self) -> bool:
+        """True while it is open: Escape closes it."""
+        return self.isVisible()
+
     def open_below(self, first: QWidget) -> None:
         """Show it below its button, with the focus on `first`."""
         self._place()
@@ -63,7 +68,7 @@ class Overlay(QFrame):
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
         super().keyPressEvent(event)
-        if event.key() == Qt.Key.Key_Escape:  # which stops everything, too
+        if event.key() == Qt.Key.Key_Escape:
             self.close()
 
     @override
