@@ -15,7 +15,7 @@ from nidaqmx.task.collections import AIChannelCollection
 from contract import fake_nidaqmx
 from contract.board_rig import NidaqmxRig, failure_of, one_input, received, some_inputs
 from cosmic.daqco.hw import nidaqmx_board
-from cosmic.daqco.hw.interface import BoardChunk, InputMode
+from cosmic.daqco.hw.interface import BoardChunk, InputMode, OverrunError
 from cosmic.daqco.hw.nidaqmx_errors import STATUS, board_error, status_error
 from cosmic.daqco.hw.nidaqmx_library import NidaqmxLibrary
 from cosmic.frame.clock import ManualClock
@@ -464,8 +464,8 @@ def test_a_living_board_without_samples_is_warned_of_but_goes_on(
 @pytest.mark.parametrize(
     ("code", "kind", "fault", "advice"),
     [
-        (-200279, DeviceError, DeviceFault.OVERRUN, "lower the rate"),
-        (-200361, DeviceError, DeviceFault.OVERRUN, "memory on the board"),
+        (-200279, OverrunError, DeviceFault.OVERRUN, "lower the rate"),
+        (-200361, OverrunError, DeviceFault.OVERRUN, "memory on the board"),
         (-200284, DeviceTimeout, DeviceFault.TIMEOUT, "clock"),
         (-50103, DeviceError, DeviceFault.STATE, "close it"),
         (-200220, NotConnectedError, DeviceFault.COMMUNICATION, "cable"),

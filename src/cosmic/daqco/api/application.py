@@ -1,6 +1,7 @@
 """DAQCo as a CoSMic application (thesis 5.5, 6.2)."""
 
 import logging
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from threading import RLock
@@ -20,9 +21,9 @@ from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings, ScaleSettings
 from cosmic.daqco.core.udaq_buffer import UDaqBuffer
 from cosmic.daqco.core.udaq_core import UDaqCore
-from cosmic.daqco.hw.interface import Board, BoardInfo, BoardLibrary
+from cosmic.daqco.hw.interface import Board, BoardInfo, BoardLibrary, OverrunError
 from cosmic.frame.application import GuiFactory
-from cosmic.frame.clock import Clock
+from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import ConfigError, CosmicError, DeviceError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.task import Task
@@ -38,6 +39,33 @@ MORE_CHUNKS: Final = 1.0
 """How many times more chunks a simulation at a rate makes, on the wall; then they grow."""
 LONGEST_CHUNK_S: Final = 0.25
 """They must come, at the pace of the wall too, before they are missed."""
+
+
+MOST_RESTARTS: Final = 3
+RESTARTS_S: Final = 60.0
+"""So often within this time acquisition begins again by itself after an overrun."""
+
+
+def lost_text(lost: int | None, rate_hz: float) -> str:
+    """Return how many samples were lost, in words and in time."""
+    if lost is None:
+        return "an unknown number of samples of each channel was lost"
+    return f"{lost} samples of each channel ({1000.0 * lost / rate_hz:.0f} ms) were lost"
+
+
+class RestartBudget:
+    """How often acquisition may begin again by itself; one thread."""
+
+    def __init__(self) -> None:
+        self._taken_s: deque[float] = deque(maxlen=MOST_RESTARTS)
+
+    def take(self, now_s: float) -> bool:
+        """Take one restart; False where there were too many of late."""
+        full = len(self._taken_s) == MOST_RESTARTS
+        if full and now_s - self._taken_s[0] < RESTARTS_S:
+            return False
+        self._taken_s.append(now_s)
+        return True
 
 
 class SilenceWatch(WorkerThread):
@@ -93,6 +121,7 @@ class DaqcoApplication(TaskApplication):
         self._silence = SilenceWatch(self.guard, policy)
         self._errands = Errands(policy)
         self._before_change: tuple[Callable[[DaqcoSettings], None], ...] = ()
+        self._restarts = RestartBudget()
         self.recorder = Recorder(self, policy, software=software, configuration=configuration)
 
     # What there is
@@ -339,9 +368,36 @@ class DaqcoApplication(TaskApplication):
         self.buffer.put(chunk)
 
     def _on_core_failed(self, error: DeviceError) -> None:
-        self.guard.look_for_silence()
-        self._fail(str(error))
+        """Stop what the limits guard, then tell; acquisition thread, which ends."""
+        if not isinstance(error, OverrunError):
+            self.guard.trip_all(f"acquisition ended ({error})")
+            self._fail(str(error))
+        else:
+            failed, amount = self._core, lost_text(error.lost, self.rate_hz)
+            self.guard.trip_all(f"computer overloaded, {amount}: nobody saw them")
+            self._fail(str(error))
+            self.recorder.note("overload", f"computer overloaded, {amount} ({error})")
+            if self._restarts.take(WALL.now_s()):
+                self._errands.do(lambda: self._start_again(failed, amount), self._on_started_again)
+            else:
+                self._fail(
+                    f"{error}. Acquisition was restarted {MOST_RESTARTS} times within "
+                    f"{RESTARTS_S:g} s and stays off now"
+                )
         self.status_changed.emit()
+
+    def _start_again(self, failed: UDaqCore | None, amount: str) -> None:
+        """Acquire again after an overrun, unless somebody did something else meanwhile."""
+        with self._lock:
+            if failed is None or self._core is not failed or self.end_requested:
+                return
+            self.start_acquisition()
+        logger.warning("acquisition goes on after an overrun: %s", amount)
+
+    def _on_started_again(self, _result: None, error: CosmicError | None) -> None:
+        if error is not None:
+            self._fail(str(error))
+            self.status_changed.emit()
 
     def _fail(self, text: str) -> None:
         self._problem = text

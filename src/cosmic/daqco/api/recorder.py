@@ -169,7 +169,11 @@ class Recorder:
 
     def mark(self, text: str) -> None:
         """Write a mark with the present time into the recording; nothing where none runs."""
-        self._add_event("mark", text, self._application.clock.now_s())
+        self.note("mark", text)
+
+    def note(self, kind: str, text: str, channel: str = "") -> None:
+        """Write an event of any kind with the present time; nothing where nothing is recorded."""
+        self._add_event(kind, text, self._application.clock.now_s(), channel=channel)
 
     def _header(self) -> RecordingHeader:
         application = self._application
@@ -214,8 +218,7 @@ class Recorder:
         )
 
     def _on_limit_note(self, channel: str, text: str) -> None:
-        now_s = self._application.clock.now_s()
-        self._add_event("note", f"{channel}: {text}", now_s, channel=channel)
+        self.note("note", f"{channel}: {text}", channel)
 
     def _add_event(
         self,

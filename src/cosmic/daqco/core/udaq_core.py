@@ -10,8 +10,8 @@ from typing_extensions import override
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.plan import AcquisitionPlan
 from cosmic.daqco.core.scale import Scale
-from cosmic.daqco.hw.interface import Board, BoardChunk
-from cosmic.frame.errors import DeviceError, DeviceFault
+from cosmic.daqco.hw.interface import Board, BoardChunk, OverrunError
+from cosmic.frame.errors import DeviceError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.threads import WorkerThread
 
@@ -120,10 +120,9 @@ class UDaqCore(WorkerThread):
         first = pieces[0]
         for piece in pieces[1:]:
             if piece.first_sample != first.first_sample:
-                raise DeviceError(
+                raise OverrunError(
                     f"the boards are not in step: sample {first.first_sample} and "
-                    f"{piece.first_sample} arrived together",
-                    fault=DeviceFault.OVERRUN,
+                    f"{piece.first_sample} arrived together"
                 )
         volts = first.volts
         if len(pieces) > 1:

@@ -21,13 +21,13 @@ def limit_text(limit: LimitState, unit: str) -> str:
         for side, value in (("low", limit.settings.low), ("high", limit.settings.high))
         if value is not None
     ]
-    text = f"{limit.settings.channel} crossed its limit ({', '.join(sides)})"
-    if limit.value is not None:
-        text += f": {limit.value:.4g} {shown}"
+    stopped = ""
     if limit.reaction_ms is not None:
-        text += f", stopped after {limit.reaction_ms:.1f} ms"
-    # The reason repeats the value where there is one; without, it is all that is known.
-    return f"{text}; {limit.reason}" if limit.reason and limit.value is None else text
+        stopped = f", stopped after {limit.reaction_ms:.1f} ms"
+    if limit.value is None and limit.reason:  # nobody knows whether it was crossed
+        return f"{limit.reason}{stopped}"
+    value = "" if limit.value is None else f": {limit.value:.4g} {shown}"
+    return f"{limit.settings.channel} crossed its limit ({', '.join(sides)}){value}{stopped}"
 
 
 class LimitBanner(QWidget):

@@ -9,7 +9,23 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.frame.errors import DeviceError, DeviceFault
+
 Volts = npt.NDArray[np.float64]
+
+
+class OverrunError(DeviceError):
+    """Samples were lost because they were not fetched in time; the board has stopped.
+
+    Attributes
+    ----------
+    lost : int or None
+        How many of each channel, where the driver knows.
+    """
+
+    def __init__(self, text: str, *, lost: int | None = None, code: int | None = None) -> None:
+        super().__init__(text, fault=DeviceFault.OVERRUN, code=code)
+        self.lost = lost
 
 
 class InputMode(StrEnum):
@@ -127,8 +143,8 @@ class Board(Protocol):
         Raises
         ------
         DeviceError
-            `DeviceFault.OVERRUN` when samples were lost, with how many in the text; the board is
-            gone, or failed. After it nothing more comes before the next `start`.
+            `OverrunError` when samples were lost, with how many in the text; the board is gone, or
+            failed. After it nothing more comes before the next `start`.
         """
 
     @abstractmethod

@@ -11,6 +11,7 @@ from nidaqmx.errors import (
     Error,
 )
 
+from cosmic.daqco.hw.interface import OverrunError
 from cosmic.frame.errors import (
     CosmicError,
     DeviceError,
@@ -185,6 +186,7 @@ def status_error(
     if known.fault is DeviceFault.OVERRUN:
         amount = "an unknown number of" if lost is None else lost
         text = f"{amount} samples of each channel were lost: {text}"
+        return OverrunError(f"{where}: {text}{driver}", lost=lost, code=code)
     return known.kind(f"{where}: {text}{driver}", fault=known.fault, code=code)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from nidaqmx.constants import AcquisitionType, TaskMode, TerminalConfiguration, VoltageUnits
 from nidaqmx.errors import DaqError, Error
 
-from cosmic.daqco.hw.interface import InputMode, InputSettings, Volts
+from cosmic.daqco.hw.interface import InputMode, InputSettings, OverrunError, Volts
 from cosmic.daqco.hw.nidaqmx_errors import board_error, status_error
 from cosmic.frame.errors import DeviceError, DeviceFault, DeviceTimeout
 
@@ -249,11 +249,12 @@ class InputTask:
             got = self._reader.read_many_sample(volts, missing, READ_TIMEOUT_S)
 
     def _too_slow(self, run: Run) -> DeviceError:
-        return DeviceError(
+        lost = self._behind(run)
+        return OverrunError(
             f"{self._settings.board}: CoSMic did not take its samples for {BUFFER_S:g} s; all "
-            f"after sample {run.next_sample} were lost ({self._behind(run)} of each channel so "
-            f"far); close what slows the computer, or lower the rate, and start again",
-            fault=DeviceFault.OVERRUN,
+            f"after sample {run.next_sample} were lost ({lost} of each channel so far); close what "
+            f"slows the computer, or lower the rate, and start again",
+            lost=lost,
         )
 
     def _behind(self, run: Run) -> int:

@@ -10,7 +10,13 @@ import numpy as np
 from typing_extensions import override
 
 from cosmic.daqco.hw.board_checks import check_chunk, check_inputs, check_rate
-from cosmic.daqco.hw.interface import Board, BoardChunk, BoardInfo, InputSettings
+from cosmic.daqco.hw.interface import (
+    Board,
+    BoardChunk,
+    BoardInfo,
+    InputSettings,
+    OverrunError,
+)
 from cosmic.daqco.hw.sim_faults import BoardFaults
 from cosmic.daqco.hw.sim_signal import Signal
 from cosmic.frame.clock import WALL, Clock
@@ -207,11 +213,11 @@ class SimulatedBoard(Board):
             raise self._overrun(run, lost)
 
     def _overrun(self, run: _Run, lost: int) -> DeviceError:
-        return self._error(
-            f"receive: {lost} samples of each channel were lost after sample {run.next_sample}: "
-            f"they were not fetched in time; close what slows the computer, or lower the rate, "
-            f"and start again",
-            DeviceFault.OVERRUN,
+        return OverrunError(
+            f"{self._info.name}: receive: {lost} samples of each channel were lost after sample "
+            f"{run.next_sample}: they were not fetched in time; close what slows the computer, or "
+            f"lower the rate, and start again",
+            lost=lost,
         )
 
     def _check_there(self, call: str) -> None:
