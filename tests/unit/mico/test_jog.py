@@ -106,3 +106,26 @@ def test_a_jog_limits_the_speed_while_it_lasts_and_gives_it_back():
             150,
             4000,
         ]
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_an_axis_left_outside_its_limits_jogs_back_to_the_inside_and_no_further_out(direction):
+    with mico(watch={"idle_poll_s": 0.1}) as (rig, controller):
+        axis = rig["d0.c0"]
+        controller.position[X] = -5972.0 * direction
+        wait_until(lambda: axis.position_um == -5972.0 * direction)
+        with axis.jog(direction, speed=4000.0) as jog:
+            keep_alive(jog, 0.5)
+        assert isinstance(jog.movement.exception(2), cosmic.MoveCancelled)
+        targets = [call[2] * direction for call in controller.of("move_to")]
+        assert len(targets) > 5
+        assert targets == sorted(targets)
+        assert targets[-1] > -5000.0
+        controller.position[X] = -5972.0 * direction
+        wait_until(lambda: axis.position_um == -5972.0 * direction)
+        with pytest.raises(cosmic.LimitError):
+            axis.jog(-direction, speed=4000.0).movement.wait(2)
+        axis.move_by(20.0 * direction)
+        assert axis.move_to(-5900.0 * direction) == -5900.0 * direction
+        with pytest.raises(cosmic.LimitError):
+            axis.move_to(-5901.0 * direction)

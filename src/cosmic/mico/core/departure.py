@@ -5,7 +5,7 @@ import math
 
 from typing_extensions import override
 
-from cosmic.frame.errors import DeviceError
+from cosmic.frame.errors import CosmicError, DeviceError, refusal
 from cosmic.mico.core.flight import Flight, PilotContext
 from cosmic.mico.core.group_start import Departure
 from cosmic.mico.core.messages import Departed
@@ -26,7 +26,7 @@ class ChannelDeparture(Departure):
         self._positioner = positioner
         self._context = context
         self._flight = flight
-        self._error: DeviceError | None = None
+        self._error: CosmicError | None = None
 
     @property
     @override
@@ -43,6 +43,11 @@ class ChannelDeparture(Departure):
         if self._void:
             return False
         motion, grant = self._flight.order.motion, self._flight.grant
+        refused = self._context.gate.claim(grant, self.name, motion)
+        if refused is not None:
+            logger.warning("refused: %s", refused)
+            self._error = refusal(refused)
+            return False
         if isinstance(motion, MoveBy):
             motion = MoveTo(math.nan if grant.target is None else grant.target, motion.unit)
         try:

@@ -196,8 +196,7 @@ class Device(WorkerThread):
         name = state.name if state else f"device {self.index} channel {order.channel}"
         text = f"{name}: motion is stopped ({reason}); reset the stop first"
         verdict = refuse(Reason.STOPPED, text, axis=name)
-        if order.grant is not None:
-            self._context.gate.release(order.grant)
+        self._context.gate.withdraw(order.grant)
         logger.warning("refused (%s): %s", order.source, verdict)
         order.movement.fail(refusal(verdict))
         self.movement_refused.emit(verdict)
@@ -313,8 +312,7 @@ class Device(WorkerThread):
             self._turn_away(order, None)
             return
         if order.number <= self._void.get(order.channel, 0):
-            if order.grant is not None:
-                self._context.gate.release(order.grant)
+            self._context.gate.withdraw(order.grant)
             order.movement.fail(MoveCancelled(f"{pilot.name}: halted before it started"))
             return
         try:
@@ -335,8 +333,7 @@ class Device(WorkerThread):
         name = state.name if state else f"device {self.index} channel {order.channel}"
         why = state.error if state and state.error else "it is not connected; check it, then rescan"
         verdict = refuse(Reason.DEVICE, f"{name}: {why}", axis=name)
-        if order.grant is not None:
-            self._context.gate.release(order.grant)
+        self._context.gate.withdraw(order.grant)
         order.movement.fail(refusal(verdict))
         self.movement_refused.emit(verdict)
 
@@ -393,8 +390,7 @@ class Device(WorkerThread):
         while not self._inbox.empty():
             message = self._inbox.get_nowait()
             if isinstance(message, Order):
-                if message.grant is not None:
-                    self._context.gate.release(message.grant)
+                self._context.gate.withdraw(message.grant)
                 message.movement.fail(error)
         self._inbox.close()
 

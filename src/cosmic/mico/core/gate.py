@@ -7,12 +7,12 @@ from itertools import count
 from threading import Lock
 
 from cosmic.frame.clock import WALL
-from cosmic.frame.verdict import MoveVerdict
+from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision.answer import AxisSpan
 from cosmic.mico.core.collision.checker import CollisionChecker
 from cosmic.mico.core.judgement import Picture, Request, judge, origin, span_of
 from cosmic.mico.core.lease import Lease, LeaseHolder
-from cosmic.mico.core.orders import Grant, Interval
+from cosmic.mico.core.orders import Grant, Interval, Motion
 from cosmic.mico.core.positioner import Confidence, PositionerState
 from cosmic.mico.core.rules import Limits
 from cosmic.mico.core.stop_latch import StopLatch, StopState
@@ -20,13 +20,25 @@ from cosmic.mico.core.stop_latch import StopLatch, StopState
 
 @dataclass(frozen=True, slots=True)
 class _Hold:
+    grant: Grant
     interval: Interval
     target: float | None
     begun_at: float | None
 
 
+@dataclass(frozen=True, slots=True)
+class _Unused:
+    """A reservation that was given and not used yet."""
+
+    grant: Grant
+    motion: Motion
+
+
 class Gate:
     """Keeps what is in flight and asks `judge`; any thread.
+
+    A reservation (`Grant`) covers one motion of one axis and is used once, with `claim`, at the
+    moment at which the motion is sent. Only the object that the gate gave counts, no copy of it.
 
     Parameters
     ----------
@@ -58,6 +70,10 @@ class Gate:
         self._links = links
         self._numbers = count(1)
         self._holds: dict[str, dict[int, _Hold]] = {}
+        self._given = 0
+        self._sent: dict[str, int] = {}
+        # By identity; each read and written in one step, for `claim` takes no lock.
+        self._unused: dict[int, _Unused] = {}
         self._power_up = dict(regions or {})
         self._regions = dict(self._power_up)
 
@@ -83,14 +99,17 @@ class Gate:
             picture = self._picture(holder)
             decision = judge(requests, picture, self._checker)
             grants: dict[str, Grant] = {}
+            asked = {request.axis: request.motion for request in requests}
             for axis, interval in decision.intervals.items():
                 target = decision.targets.get(axis)
                 grant = Grant(axis, next(self._numbers), epoch, target)
                 state = picture.states[axis]
                 if state.confidence is Confidence.UNKNOWN:
                     self._regions[axis] = interval  # wherever that ends, it is somewhere there
-                hold = _Hold(interval, target, origin(state, picture.begun_at))
+                hold = _Hold(grant, interval, target, origin(state, picture.begun_at))
                 self._holds.setdefault(axis, {})[grant.number] = hold
+                self._given = grant.number
+                self._unused[id(grant)] = _Unused(grant, asked[axis])
                 grants[axis] = grant
             return decision.verdict, grants
 
@@ -106,25 +125,74 @@ class Gate:
         state = self._latch.state
         return not state.latched and state.epoch == grant.epoch
 
+    # Reservations
+
+    def objection(self, grant: Grant, axis: str, motion: Motion) -> MoveVerdict | None:
+        """Return why `grant` does not cover sending `motion` to `axis` now; takes no lock."""
+        given = self._unused.get(id(grant))
+        if given is None:
+            known = type(grant) is Grant and grant.number in range(1, self._given + 1)
+            why = "was used or released before" if known else "was not given by the gate"
+        elif given.grant.axis != axis:
+            why = f"is for {given.grant.axis}"
+        elif given.motion is not motion:
+            why = "is for another motion"
+        elif not self.still_valid(grant):
+            text = f"{axis}: stopped before it was sent; give the order again after the reset"
+            return refuse(Reason.STOPPED, text, axis=axis)
+        else:
+            return None
+        text = f"{axis}: its reservation {why}; nothing was sent. Give the order anew"
+        return refuse(Reason.NO_LEASE, text, axis=axis)
+
+    def claim(self, grant: Grant, axis: str, motion: Motion) -> MoveVerdict | None:
+        """Use `grant` up at the moment at which `motion` is sent to `axis`; takes no lock.
+
+        Returns why it must not be sent, or None, which it does once for each reservation.
+        """
+        refused = self.objection(grant, axis, motion)
+        if refused is None and self._unused.pop(id(grant), None) is None:
+            refused = self.objection(grant, axis, motion)  # another thread came first
+        if refused is None:
+            self._sent[axis] = grant.number
+        return refused
+
+    def superseded(self, grant: Grant) -> bool:
+        """Return True when a movement decided later was sent to the axis; takes no lock."""
+        return self._sent.get(grant.axis, 0) > grant.number
+
+    def withdraw(self, grant: Grant | None) -> None:
+        """Release a reservation of an order that is not sent; harmless for any other.
+
+        One in use keeps its interval, for orders come from anybody.
+        """
+        if self._unused.pop(id(grant), None) is not None and grant is not None:
+            self.release(grant)
+
     def release(self, grant: Grant) -> None:
         """Give back the interval of a movement that has ended, its position read; or replaced.
 
         The interval of a movement that replaces another holds the other's as well.
         """
         with self._lock:
-            self._holds.get(grant.axis, {}).pop(grant.number, None)
+            self._unused.pop(id(grant), None)
+            holds = self._holds.get(grant.axis, {})
+            hold = holds.get(grant.number)
+            if hold is not None and hold.grant is grant:
+                del holds[grant.number]
 
     def abandon(self, grant: Grant) -> None:
         """Keep the interval, but no longer count on the target: the movement will not get there."""
         with self._lock:
             hold = self._holds.get(grant.axis, {}).get(grant.number)
-            if hold is not None:
+            if hold is not None and hold.grant is grant:
                 self._holds[grant.axis][grant.number] = replace(hold, target=None)
 
     def release_axis(self, axis: str) -> None:
         """Give back all of an axis that stands and whose position has just been read."""
         with self._lock:
-            self._holds.pop(axis, None)
+            for hold in self._holds.pop(axis, {}).values():
+                self._unused.pop(id(hold.grant), None)
 
     @property
     def stop_state(self) -> StopState:

@@ -114,4 +114,4 @@ class Departed:
     """An order that waited for others was sent with them, or could not be."""
 
     order: Order
-    error: DeviceError | None
+    error: CosmicError | None

@@ -106,9 +106,10 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """The gate's leave to make one movement, void after the next stop.
+    """A reservation: the gate's leave to make one movement once, void after the next stop.
 
     It holds the interval that the movement may sweep until it is given back (`Gate.release`).
+    Only the object that the gate gave is worth anything; it is used up with `Gate.claim`.
     """
 
     axis: str

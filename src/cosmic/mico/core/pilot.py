@@ -38,18 +38,15 @@ class ChannelPilot(ChannelFollower):
 
     def launch(self, order: Order) -> None:
         """Ask the gate, send `order` to the library, and begin to follow it."""
+        gate = self._context.gate
         if order.movement.cancelled or (order.follows and order.follows is not self.newest):
-            self._give_back(order.grant)
+            gate.withdraw(order.grant)
             why = "a newer command came first" if order.follows else "cancelled before it started"
             order.movement.fail(MoveCancelled(f"{self.name}: {why}"))
             return
-        if order.guard is not None and order.guard.expired:
-            self._give_back(order.grant)
-            self.turn_away(order, _unguarded(self.name, order.guard))
-            return
-        if order.epoch is not None and order.epoch != self._context.gate.stop_state.epoch:
-            self._give_back(order.grant)
-            self.turn_away(order, _stopped(self.name))
+        refused = self._void(order)
+        if refused is not None:
+            self.turn_away(order, refused)
             return
         self.newest = order.movement
         if isinstance(order.motion, Jog):
@@ -58,8 +55,8 @@ class ChannelPilot(ChannelFollower):
         grant = self._granted(order)
         if grant is None:
             return
-        if not self._context.gate.still_valid(grant):
-            self._give_back(grant)
+        if not gate.still_valid(grant):
+            gate.withdraw(grant)
             self.turn_away(order, _stopped(self.name))
             return
         replaced = self._begin(order, grant)
@@ -72,6 +69,21 @@ class ChannelPilot(ChannelFollower):
         finally:
             self._tell_begun(order, replaced)
         self.ask_activity()
+
+    def _void(self, order: Order) -> MoveVerdict | None:
+        """Return why `order` must not be sent any more, or never was to be; None if it may."""
+        gate, guard, over = self._context.gate, order.guard, None
+        if guard is not None and guard.expired:
+            over = _unguarded(self.name, guard)
+        elif order.epoch is not None and order.epoch != gate.stop_state.epoch:
+            over = _stopped(self.name)
+        elif order.grant is not None:
+            over = gate.objection(order.grant, self.name, order.motion)
+            if over is not None and over.reason is not Reason.STOPPED:
+                return over  # whoever it was given to may still use it
+        if over is not None:
+            gate.withdraw(order.grant)
+        return over
 
     def _set_speed_for(self, order: Order, replaced: Flight | None) -> None:
         """Give the channel the speed of `order`, or its usual one back."""
@@ -100,8 +112,10 @@ class ChannelPilot(ChannelFollower):
             return
         flight.awaiting = False
         flight.progress_s = self._context.clock.now_s()
-        if departed.error is not None:
+        if isinstance(departed.error, DeviceError):
             self._blame(departed.error)
+        elif departed.error is not None:
+            self.halt(departed.error)
         elif flight.error is None and not self._context.gate.still_valid(flight.grant):
             self.halt(refusal(_stopped(self.name)))
         self.ask_activity()
@@ -113,9 +127,9 @@ class ChannelPilot(ChannelFollower):
             text = f"{self.name}: it does not stand yet, so there is no place to go on from"
             self.turn_away(order, refuse(Reason.NO_ANSWER, text, axis=self.name))
             return None
-        if grant is not None and flight is not None and flight.grant.number > grant.number:
-            # Something was started since this was decided: the volume is another one now.
-            self._give_back(grant)
+        if grant is not None and self._context.gate.superseded(grant):
+            # The axis was sent elsewhere since this was decided: the volume is another one now.
+            self._context.gate.withdraw(grant)
             grant = None
         return grant or self._grant(order, order.motion)
 
@@ -182,6 +196,12 @@ class ChannelPilot(ChannelFollower):
         self._announce()
 
     def _send(self, motion: Motion, grant: Grant) -> None:
+        refused = self._context.gate.claim(grant, self.name, motion)
+        if refused is not None:
+            logger.warning("refused: %s", refused)
+            self.halt(refusal(refused))
+            self._context.on_refused(refused)
+            return
         if isinstance(motion, MoveBy):
             motion = MoveTo(math.nan if grant.target is None else grant.target, motion.unit)
         try:

@@ -161,9 +161,12 @@ def _finite(number: object) -> bool:
     return fine and math.isfinite(number)  # type: ignore[arg-type]
 
 
-def _returns(state: PositionerState, target: float, held: Interval | None) -> bool:
-    """Return True for a way from outside the limits towards the inside."""
-    if state.limits is None or state.position is None or held is not None:
+def _returns(state: PositionerState, target: float) -> bool:
+    """Return True for a way from outside the limits towards the inside.
+
+    It counts from where the axis stands now, whatever is under way: a jog is made of packets.
+    """
+    if state.limits is None or state.position is None:
         return False
     low, high = state.limits
     return state.position < target <= low or high <= target < state.position
@@ -278,7 +281,7 @@ def _limit(
             place = place.hull(held)
         swept = swept_interval(motion, state, None, place, rules)
         target = swept.high if motion.steps > 0 else swept.low
-    if low - ROUNDING <= target <= high + ROUNDING or _returns(state, target, held):
+    if low - ROUNDING <= target <= high + ROUNDING or _returns(state, target):
         return None
     value, limit = target - state.zero, (high if target > high else low) - state.zero
     what = "could reach" if isinstance(motion, Step) else "target"
