@@ -22,6 +22,7 @@ from cosmic.autonomy.calibrating.book import CalibrationBook, CalibrationEntry, 
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.late_panel import LatePanel, is_seen
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.frame.gui.theme import STEP_PX, State
 from cosmic.frame.overrides import override
@@ -94,7 +95,7 @@ class CalibrationPanel(QWidget):
         column.addWidget(self.run, 1)
         self._timer = QTimer(self)
         self._timer.setInterval(PERIOD_MS)
-        self._timer.timeout.connect(self.refresh)
+        self._timer.timeout.connect(self._on_timer)
         self._icons: dict[CalibrationStanding, QIcon] = {}
         self._shown: tuple[tuple[str, str], ...] = ()
         self._on_selection()
@@ -113,6 +114,10 @@ class CalibrationPanel(QWidget):
             self._fill(self.list.topLevelItem(row), book, entry)
         for column in range(HOW):
             self.list.resizeColumnToContents(column)
+
+    def _on_timer(self) -> None:
+        if is_seen(self):
+            self.refresh()
 
     def _fill(
         self, item: QTreeWidgetItem | None, book: CalibrationBook, entry: CalibrationEntry
@@ -180,8 +185,12 @@ def _told(entry: CalibrationEntry) -> str:
     return f"made {made}{seen}; with {entry.made_with}; CoSMic {entry.version}"
 
 
-def add_calibrations(window: CosmicServerGui, rig: Rig, beside: str) -> CalibrationPanel:
-    """Put the panel in a window, in a tab with another one."""
-    panel = CalibrationPanel(lambda: rig.calibrations, lambda *, zooms: rig.calibrate(zooms=zooms))
+def add_calibrations(window: CosmicServerGui, rig: Rig, beside: str) -> LatePanel[CalibrationPanel]:
+    """Put the panel in a window, in a tab with another one; it is made when it is first seen."""
+    panel = LatePanel(
+        lambda: CalibrationPanel(
+            lambda: rig.calibrations, lambda *, zooms: rig.calibrate(zooms=zooms)
+        )
+    )
     window.add_panel(CALIBRATIONS, panel, scroll=False, beside=beside, tabbed=True)
     return panel

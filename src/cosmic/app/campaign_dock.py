@@ -1,39 +1,22 @@
 """The panel of campaigns in the operator window, and what joins it to the scene."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from PySide6.QtCore import QObject, QStandardPaths, QTimer, Signal
-from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtCore import QObject, QStandardPaths, Signal
 
 from cosmic.app.platform import Platform
 from cosmic.app.rig import Rig
 from cosmic.app.scene_panel import ScenePanel
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.gui.late_panel import LatePanel
 from cosmic.frame.gui.server_gui import CosmicServerGui
-from cosmic.frame.overrides import override
 
 if TYPE_CHECKING:
     from cosmic.app.campaign_panel import CampaignPanel
     from cosmic.autonomy.campaign.records import FibreRecord
 
 CAMPAIGN: Final = "Campaign"
-
-
-class _Holder(QWidget):
-    """Has its content made when it is first seen."""
-
-    def __init__(self, fill: Callable[[], object]) -> None:
-        super().__init__()
-        self._fill = fill
-        QVBoxLayout(self).setContentsMargins(0, 0, 0, 0)
-
-    @override
-    def showEvent(self, event: QShowEvent) -> None:
-        QTimer.singleShot(0, self, self._fill)
-        super().showEvent(event)
 
 
 class CampaignDock(QObject):
@@ -72,16 +55,13 @@ class CampaignDock(QObject):
         self._rig = rig
         self._scene = scene
         self._policy = policy
-        self._panel: CampaignPanel | None = None
-        self._holder = _Holder(lambda: self.panel)
-        window.add_panel(CAMPAIGN, self._holder, scroll=False, beside=beside, tabbed=True)
+        self._late: LatePanel[CampaignPanel] = LatePanel(self._made)
+        window.add_panel(CAMPAIGN, self._late, scroll=False, beside=beside, tabbed=True)
 
     @property
     def panel(self) -> "CampaignPanel":
         """The panel, made now if need be."""
-        if self._panel is None:
-            self._panel = self._made()
-        return self._panel
+        return self._late.panel
 
     def _made(self) -> "CampaignPanel":
         from cosmic.app.campaign_panel import CampaignPanel
@@ -90,22 +70,20 @@ class CampaignDock(QObject):
         panel = CampaignPanel(self._rig.campaign, campaigns_folder(), self._policy)
         self._replay = SceneReplay(self._scene, self)
         panel.replay_requested.connect(self._on_replay)
-        layout = self._holder.layout()
-        if layout is not None:
-            layout.addWidget(panel)
         return panel
 
     @property
     def running(self) -> bool:
         """True while a campaign that was begun here is under way."""
-        campaign = self._panel.campaign if self._panel is not None else None
+        panel = self._late.made
+        campaign = panel.campaign if panel is not None else None
         return campaign is not None and not campaign.over
 
     def shut_down(self) -> None:
         """End what runs; what it did is kept."""
-        if self._panel is not None:
+        if self._late.made is not None:
             self._replay.stop()
-            self._panel.shut_down()
+            self._late.made.shut_down()
 
     def _on_replay(self, record: "FibreRecord") -> None:
         self.replayed.emit()

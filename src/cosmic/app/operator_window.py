@@ -24,6 +24,7 @@ from cosmic.app.window_bridge import WindowBridge
 from cosmic.app.window_stations import WindowStations
 from cosmic.frame.failure import Failure
 from cosmic.frame.gui.console_panel import ConsolePanel
+from cosmic.frame.gui.late_panel import LatePanel
 from cosmic.frame.gui.log_panel import LogPanel
 from cosmic.frame.gui.palette import ThemeName
 from cosmic.frame.gui.server_gui import LOG_TITLE, CosmicServerGui
@@ -85,7 +86,6 @@ class OperatorWindow(CosmicServerGui):
         self._guide: WayGuide | None = None
         self._bridge = WindowBridge()
         self._forget_policy = platform.policy.subscribe(self._bridge.tell_failure)
-        self._stop_filter = StopKeyFilter(_application(), stop_key, self, moving=self._is_moving)
         self._add_mico(settings)
         pictures = self._add_instruments()
         if self._mico_gui is not None and self._scene is not None:
@@ -93,7 +93,7 @@ class OperatorWindow(CosmicServerGui):
                 self, self._mico_gui, self._scene, self._rig.control, beside=SCENE
             )
         self._campaign: CampaignDock | None = None
-        self._calibrations: CalibrationPanel | None = None
+        self._calibrations: LatePanel[CalibrationPanel] | None = None
         if self._scene is not None and can_run(platform):
             self._campaign = CampaignDock(
                 self, self._rig, self._scene, platform.policy, beside=MICO
@@ -112,6 +112,8 @@ class OperatorWindow(CosmicServerGui):
         self._mode.changed.connect(self._on_mode_changed)
         self._mode.restore()
         self._add_log(ring, console=console)
+        # Last, for it sees every event: some ten thousand while the panels are made.
+        self._stop_filter = StopKeyFilter(_application(), stop_key, self, moving=self._is_moving)
         self._connect_all()
         self._show_platform()
 
@@ -331,8 +333,8 @@ class OperatorWindow(CosmicServerGui):
             self._mico_gui.release_keys()
         if self._campaign is not None:
             self._campaign.shut_down()
-        if self._calibrations is not None:
-            self._calibrations.shut_down()
+        if self._calibrations is not None and self._calibrations.made is not None:
+            self._calibrations.made.shut_down()
         if self._procedures is not None:
             self._procedures.shut_down()
         self._rig.close()

@@ -2,9 +2,12 @@
 
 from typing import Final
 
+from PySide6.QtWidgets import QWidget
+
 from cosmic.app.control_panel import ControlPanel, make_control_panel
 from cosmic.app.scene_panel import ScenePanel
 from cosmic.autonomy.control.control import Control
+from cosmic.frame.gui.late_panel import LatePanel
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.mico.gui.teleoperation_panel import TeleoperationPanel, make_teleoperation_panel
@@ -17,6 +20,8 @@ CONTROL: Final = "Control loop"
 
 class ProcedurePanels:
     """Trajectories, teleoperation and control loops, in tabs with another panel; GUI thread.
+
+    Each is made when it is first seen or asked for.
 
     Parameters
     ----------
@@ -32,20 +37,42 @@ class ProcedurePanels:
         control: Control,
         beside: str,
     ) -> None:
-        self.trajectories: TrajectoryPanel = make_trajectory_panel(gui.mico)
-        self.trajectories.preview_changed.connect(scene.set_planned)
-        self.trajectories.refused.connect(gui.verdict_given)
-        self.teleoperation: TeleoperationPanel = make_teleoperation_panel(gui.mico)
-        self.control: ControlPanel = make_control_panel(control)
-        panels = {
-            TRAJECTORIES: self.trajectories,
-            TELEOPERATION: self.teleoperation,
-            CONTROL: self.control,
+        self._gui = gui
+        self._scene = scene
+        self._trajectories = LatePanel(self._make_trajectories)
+        self._teleoperation = LatePanel(lambda: make_teleoperation_panel(gui.mico))
+        self._control = LatePanel(lambda: make_control_panel(control))
+        panels: dict[str, QWidget] = {
+            TRAJECTORIES: self._trajectories,
+            TELEOPERATION: self._teleoperation,
+            CONTROL: self._control,
         }
         for title, panel in panels.items():
             window.add_panel(title, panel, beside=beside, tabbed=True)
         window.dock(beside).raise_()
 
+    def _make_trajectories(self) -> TrajectoryPanel:
+        panel = make_trajectory_panel(self._gui.mico)
+        panel.preview_changed.connect(self._scene.set_planned)
+        panel.refused.connect(self._gui.verdict_given)
+        return panel
+
+    @property
+    def trajectories(self) -> TrajectoryPanel:
+        """The panel of SCM, made now if need be."""
+        return self._trajectories.panel
+
+    @property
+    def teleoperation(self) -> TeleoperationPanel:
+        """The panel that steers by an input device, made now if need be."""
+        return self._teleoperation.panel
+
+    @property
+    def control(self) -> ControlPanel:
+        """The panel of control loops, made now if need be."""
+        return self._control.panel
+
     def shut_down(self) -> None:
         """Let go of the input device."""
-        self.teleoperation.shut_down()
+        if self._teleoperation.made is not None:
+            self._teleoperation.made.shut_down()

@@ -94,10 +94,13 @@ class HoldKeys(QObject):
 
     @override
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        # Everything that happens to any widget comes by; the class is quick to ask, the type slow.
+        if not isinstance(event, QKeyEvent):
+            if self._held and event.type() == QEvent.Type.WindowDeactivate:
+                self.release_all()
+            return False
         kind = event.type()
-        if kind == QEvent.Type.WindowDeactivate and self._held:
-            self.release_all()
-        if kind not in _KEY_EVENTS or not isinstance(event, QKeyEvent):
+        if kind not in _KEY_EVENTS:
             return False
         if event.key() in self._held:
             return self._on_held_key(event)

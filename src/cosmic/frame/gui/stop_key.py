@@ -75,7 +75,8 @@ class StopKeyFilter(QObject):
 
     @override
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() not in _KEY_EVENTS or not isinstance(event, QKeyEvent):
+        # Everything that happens to any widget comes by; the class is quick to ask, the type slow.
+        if not isinstance(event, QKeyEvent) or event.type() not in _KEY_EVENTS:
             return False
         if event.key() == self._key:
             return self._on_stop_key(event)

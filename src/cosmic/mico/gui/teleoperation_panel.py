@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.late_panel import is_seen
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.overrides import override
 from cosmic.mico.api.mico import Mico
@@ -125,9 +126,9 @@ class TeleoperationPanel(QWidget):
         self.fine.edited.connect(self._on_fine_edited)
         self._app.applicationStateChanged.connect(self._on_attention)
         self._refresh_timer = QTimer(self, interval=REFRESH_MS)
-        self._refresh_timer.timeout.connect(self.refresh)
+        self._refresh_timer.timeout.connect(self._on_refresh_timer)
         self._look_timer = QTimer(self, interval=LOOK_MS)
-        self._look_timer.timeout.connect(self.look_for_devices)
+        self._look_timer.timeout.connect(self._on_look_timer)
 
     # Choosing
 
@@ -149,6 +150,10 @@ class TeleoperationPanel(QWidget):
                     self.devices.addItem(text, key)
                 self.devices.setCurrentIndex(max(0, self.devices.findData(chosen)))
         self._allow()
+
+    def _on_look_timer(self) -> None:
+        if is_seen(self):
+            self.look_for_devices()
 
     def _show_profiles(self) -> None:
         with QSignalBlocker(self.profiles):
@@ -205,6 +210,12 @@ class TeleoperationPanel(QWidget):
     def _on_attention(self) -> None:
         active = self._app.applicationState() == Qt.ApplicationState.ApplicationActive
         self._teleoperation.set_focus(active)
+
+    def _on_refresh_timer(self) -> None:
+        # Unseen it goes on while it steers: what is steered has to be paused when asked.
+        state = self._teleoperation.state
+        if self._running(state) or state.words != self._words or is_seen(self):
+            self.refresh()
 
     def refresh(self) -> None:
         """Show how it is now."""
@@ -263,7 +274,7 @@ class TeleoperationPanel(QWidget):
     @override
     def hideEvent(self, event: QHideEvent) -> None:
         super().hideEvent(event)
-        self._look_timer.stop()  # the other goes on: what is steered has to be paused when asked
+        self._look_timer.stop()
 
     def shut_down(self) -> None:
         """End the steering and listen to no key any more; before the window goes."""

@@ -104,7 +104,7 @@ def formats_shown(settings: CameraSettings | None) -> tuple[FormatShown, ...]:
 
 def _format_problem(name: PictureFormat, settings: CameraSettings | None) -> str:
     try:
-        check_codec(name)
+        check_codec(name, load=False)
     except CosmicError as exc:
         return str(exc)
     if settings is not None and not FORMATS[name].holds(settings.pixel_format):

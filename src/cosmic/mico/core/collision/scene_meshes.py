@@ -85,7 +85,7 @@ def _any_mesh(content: bytes, suffix: str) -> Mesh:
 
 def _merged(vertices: Floats, faces: Indices) -> Mesh:
     """Return the mesh with each vertex that a face names once; equal ones are one."""
-    used = np.unique(faces)
+    used = np.flatnonzero(np.bincount(faces.reshape(-1)))
     rows = np.round(vertices[used] / _MERGED) + 0.0  # no -0.0 beside 0.0
     order = np.lexsort(rows.T)
     new = np.ones(len(rows), dtype=bool)

@@ -1,7 +1,10 @@
 """`VideoWriter`: pictures into one video file, through PyAV."""
 
+import sys
 from collections.abc import Mapping
 from fractions import Fraction
+from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -26,8 +29,14 @@ CONTAINER_OPTIONS: Final = {
 }
 
 
-def check_codec(picture_format: PictureFormat) -> None:
+def check_codec(picture_format: PictureFormat, *, load: bool = True) -> None:
     """Refuse a format whose codec is not installed.
+
+    Parameters
+    ----------
+    load : bool
+        Load PyAV to look for the codec in it, which takes a quarter of a second the first time;
+        otherwise, until somebody has loaded it, PyAV that is installed is taken to have it.
 
     Raises
     ------
@@ -35,8 +44,16 @@ def check_codec(picture_format: PictureFormat) -> None:
         PyAV, or the codec in it, is missing.
     """
     codec = traits(picture_format).codec
-    if not codec:
-        return
+    if codec and (load or "av" in sys.modules or not _has_pyav()):
+        _check_loaded(picture_format, codec)
+
+
+@cache
+def _has_pyav() -> bool:
+    return find_spec("av") is not None
+
+
+def _check_loaded(picture_format: PictureFormat, codec: str) -> None:
     help_ = "choose format tiff or png, or install PyAV again"
     try:
         import av
