@@ -125,8 +125,14 @@ def _calibrate(chosen: argparse.Namespace) -> int:
     return run_calibrate(chosen)
 
 
-_BY_THEMSELVES: Final = {"campaign": _campaign, "calibrate": _calibrate}
-"""Commands that carry something out on a platform of their own."""
+def _repair(chosen: argparse.Namespace) -> int:
+    from cosmic.app.left_open import repair
+
+    return repair(chosen)
+
+
+_BY_THEMSELVES: Final = {"campaign": _campaign, "calibrate": _calibrate, "repair": _repair}
+"""Commands that are loaded when they are called."""
 
 
 def _init(folder: Path) -> int:
@@ -235,6 +241,9 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--to", choices=("csv", "tdms"), default="csv", help="format; CSV")
     export.add_argument("--output", type=Path, metavar="FILE", help="beside the recording if none")
     export.add_argument("--overwrite", action="store_true", help="replace a file that exists")
+    repair = commands.add_parser("repair", help="close recordings that a killed process left open")
+    repair.add_argument("recordings", type=Path, nargs="+", metavar="FILE")
+    repair.add_argument("--ended", action="store_true", help="take it that nothing writes them")
     add_station_commands(commands, platform)
     add_campaign_command(commands, platform)
     add_calibrate_command(commands, platform)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import cosmic
 from cosmic.app.faults import SimulationFaults
+from cosmic.app.left_open import close_left_open, open_recordings
 from cosmic.app.platform_file import PlatformFile
 from cosmic.app.scene_fit import load_checker
 from cosmic.daqco.api.application import DaqcoApplication
@@ -100,15 +101,19 @@ def _build_daqco(
         seed=site.seed,
     )
     faults.join_simulated("board", library)
-    return DaqcoApplication(
+    notes = open_recordings()
+    application = DaqcoApplication(
         library,
         settings,
         clock=site.clock,
         policy=site.policy,
         software=f"CoSMic {cosmic.__version__}",
         configuration=site.path.read_text(encoding="utf-8"),
+        notes=notes,
         gui_factory=gui_factory,
     )
+    close_left_open(notes, (application.directory,))
+    return application
 
 
 def _build_vico(

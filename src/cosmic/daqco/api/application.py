@@ -15,6 +15,7 @@ from cosmic.daqco.api.files import LocalFiles
 from cosmic.daqco.api.recorder import Recorder
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.guarded import check_arming, check_guarded, successor
+from cosmic.daqco.core.left_behind import OpenRecordings
 from cosmic.daqco.core.limits import Crossing, Limit, LimitGuard
 from cosmic.daqco.core.plan import AcquisitionPlan, make_plan, restarts
 from cosmic.daqco.core.scale import Scale
@@ -90,6 +91,8 @@ class DaqcoApplication(TaskApplication):
         The driver behind the boards.
     software, configuration : str
         Version and platform file, for the recordings.
+    notes : OpenRecordings or None
+        Where recordings that are being written are noted, for the next start to close.
     """
 
     def __init__(
@@ -101,6 +104,7 @@ class DaqcoApplication(TaskApplication):
         policy: FailurePolicy,
         software: str = "",
         configuration: str = "",
+        notes: OpenRecordings | None = None,
         gui_factory: GuiFactory | None = None,
         parent: QObject | None = None,
     ) -> None:
@@ -122,7 +126,9 @@ class DaqcoApplication(TaskApplication):
         self._errands = Errands(policy)
         self._before_change: tuple[Callable[[DaqcoSettings], None], ...] = ()
         self._restarts = RestartBudget()
-        self.recorder = Recorder(self, policy, software=software, configuration=configuration)
+        self.recorder = Recorder(
+            self, policy, software=software, configuration=configuration, notes=notes
+        )
 
     # What there is
 

@@ -12,10 +12,12 @@ from PySide6.QtCore import Qt
 
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.file_writer import RecordingStats, UDaqFileWriter
+from cosmic.daqco.core.left_behind import OpenRecordings
 from cosmic.daqco.core.limits import Crossing
 from cosmic.daqco.core.plan import restarts
 from cosmic.daqco.core.recording_format import AxisPosition, RecordedEvent, RecordingHeader
 from cosmic.daqco.core.settings import DaqcoSettings
+from cosmic.daqco.core.unclosed_file import is_unclosed
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
@@ -81,9 +83,12 @@ class Recorder:
         *,
         software: str = "",
         configuration: str = "",
+        notes: OpenRecordings | None = None,
     ) -> None:
         self._application = application
         self._policy = policy
+        self._notes = notes
+        self._note: Path | None = None
         self._software, self._configuration = software, configuration
         self._lock = RLock()
         self._writer: UDaqFileWriter | None = None
@@ -139,6 +144,7 @@ class Recorder:
             writer.recorded.connect(self._on_recorded, direct)
             writer.failed.connect(self._on_failed, direct)
             self._failure, self._stats, self._writer = "", None, writer
+            self._note = None if self._notes is None else self._notes.note(writer.path)
             writer.start()
             self._unsubscribe = self._application.buffer.subscribe(self._write)
         logger.info("recording to %s", writer.path)
@@ -163,9 +169,22 @@ class Recorder:
                 self._left_behind.append(writer)
                 self._failure = f"{writer.path}: the disk does not answer; it is still being closed"
                 logger.error("%s", self._failure)
+            self._forget(writer.path)
             duration_s = self._stats.duration_s if self._stats else 0.0
             logger.info("recorded %.1f s to %s", duration_s, writer.path)
         tell(self._listeners)
+
+    def _forget(self, path: Path) -> None:
+        """Take the note of a recording away, if it is closed: else the next start closes it."""
+        note, self._note = self._note, None
+        if self._notes is None or note is None:
+            return
+        try:
+            closed = not is_unclosed(path)
+        except OSError:
+            closed = not path.exists()
+        if closed:
+            self._notes.forget(note)
 
     def mark(self, text: str) -> None:
         """Write a mark with the present time into the recording; nothing where none runs."""

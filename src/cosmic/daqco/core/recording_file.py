@@ -13,6 +13,7 @@ from cosmic.daqco.core.recording_format import AxisPosition, Overrun, RecordedEv
 from cosmic.daqco.core.room import TABLES_BYTES, Room, cut
 from cosmic.daqco.core.scale import Scale
 from cosmic.frame.errors import RecordingError, RecordingExistsError
+from cosmic.frame.process_mark import FileHold, own_mark
 
 BLOCK_S: Final = 0.5
 SMALLEST_BLOCK: Final = 256
@@ -67,6 +68,7 @@ class RecordingFile:
         self._rows: dict[str, list[Any]] = {name: [] for name in form.GROWING}
         self._lost = 0
         self._closing = False
+        self._hold: FileHold | None = None
         self._file = self._created(overwrite=overwrite)
         self._size_bytes = 0
         self._room = Room(self._file, path, 2 * self._block.nbytes + TABLES_BYTES)
@@ -167,6 +169,8 @@ class RecordingFile:
             self._file["complete"][()] = 1
         self._file.close()
         cut(self._path)
+        if self._hold is not None:
+            self._hold.release()
 
     def abandon(self) -> None:
         """Leave the file as it is after a failed write; harmless after `close`.
@@ -208,6 +212,9 @@ class RecordingFile:
         file.attrs["rate_hz"] = header.rate_hz
         file.attrs["start_utc"] = header.start_utc.isoformat()
         file.attrs["start_s"] = header.start_s
+        writer = own_mark()
+        file.attrs["writer_host"], file.attrs["writer_pid"] = writer.host, writer.pid
+        file.attrs["writer_start"] = writer.start
         channels, block = self._block.shape
         self._volts = file.create_dataset(
             "volts", (channels, 0), "<f8", maxshape=(channels, None), chunks=(1, block),
@@ -222,7 +229,8 @@ class RecordingFile:
         file.create_dataset("configuration", data=np.array(text, dtype=kind), dtype=kind)
         file.create_dataset("complete", data=np.uint8(0))
         self._note_scales(header.scales, header.start_s)
-        file.swmr_mode = True
+        file.swmr_mode = True  # with it HDF5 lets go of its own lock
+        self._hold = FileHold(self._path)
         self.flush()
 
     def _note_gap(self, chunk: DataChunk) -> None:

@@ -37,20 +37,27 @@ def is_unclosed(path: Path) -> bool:
     with path.open("rb") as file:
         head = file.read(LENGTH)
         size = file.seek(0, os.SEEK_END)
-    if not _is_ours(head):
+    if not is_recent(head):
         return False
     (end,) = struct.unpack_from("<Q", head, END_AT)
     return head[FLAGS_AT] != 0 or end > size
 
 
 class UnclosedFile(io.RawIOBase):
-    """The bytes of a file, with the head that it would have had it been closed now."""
+    """The bytes of a file, with the head that it would have had it been closed now.
 
-    def __init__(self, path: Path) -> None:
+    Parameters
+    ----------
+    end : int or None
+        Where it would end; where it does, if None.
+    """
+
+    def __init__(self, path: Path, end: int | None = None) -> None:
         self._file = path.open("rb", buffering=0)
-        self._size = self._file.seek(0, os.SEEK_END)
+        size = self._file.seek(0, os.SEEK_END)
+        self._size = size if end is None else min(end, size)
         self._file.seek(0)
-        self._head = _closed_head(self._file.read(LENGTH), self._size)
+        self._head = closed_head(self._file.read(LENGTH), self._size)
         self._at = 0
 
     @override
@@ -95,13 +102,14 @@ class UnclosedFile(io.RawIOBase):
         super().close()
 
 
-def _is_ours(head: bytes) -> bool:
+def is_recent(head: bytes) -> bool:
+    """Return whether a file that begins so is HDF5 as recordings are."""
     return len(head) == LENGTH and head.startswith(SIGNATURE) and head[len(SIGNATURE)] == VERSION
 
 
-def _closed_head(head: bytes, size: int) -> bytes:
+def closed_head(head: bytes, size: int) -> bytes:
     """Return the superblock without its marks of a writer, and with the end that is there."""
-    if not _is_ours(head):
+    if not is_recent(head):
         return head
     changed = bytearray(head)
     changed[FLAGS_AT] = 0
