@@ -93,7 +93,7 @@ def measure(quick: bool) -> list[Figure]:
     """Return the figures; none where the fake camera is not installed."""
     program = shutil.which(PROGRAM)
     if program is None:
-        print(f"{NAME}: {PROGRAM} is not installed (Debian: aravis-tools-cli)", file=sys.stderr)
+        print(f"{NAME}: {PROGRAM} is not installed (Debian: aravis-tools)", file=sys.stderr)
         return []
     seconds = 2.0 if quick else 60.0
     figures = []

@@ -2,10 +2,12 @@
 
 `python -m benchmarks.run --repeat 3` starts each benchmark three times, in turn, each time in a
 process of its own, and prints the medians with the range. The long ones, such as `soak` and
-`campaign`, are commands of their own.
+`campaign`, are run where they are named. `--quick` sees that all of them work; its figures say
+nothing.
 """
 
 import argparse
+import ast
 import importlib
 import platform
 import subprocess
@@ -16,54 +18,49 @@ from pathlib import Path
 
 import PySide6
 
-from benchmarks.figures import Figure, from_json, medians, table
+from benchmarks.figures import Figure, from_json, medians, table, to_json
 
-NAMES = (
-    "commander",
-    "stop",
-    "completion",
-    "load",
-    "start",
-    "simulator",
-    "collision_gate",
-    "gate_process",
-    "planning",
-    "scene_view",
-    "twin_force",
-    "recorder",
-    "plot",
-    "acquisition",
-    "twin_picture",
-    "live_view",
-    "picture_recorder",
-    "aravis_camera",
-    "fibres",
-    "vision_tools",
-    "skew",
-    "trajectory",
-    "teleoperation",
-    "control_loop",
-    "network",
-    "procedure_engine",
-    "bending",
+LONG = frozenset(
+    {
+        "acquisition_soak",
+        "campaign",
+        "campaign_faults",
+        "campaign_kills",
+        "collision_oracles",
+        "soak",
+    }
 )
-ALL = (
-    *NAMES,
-    "collision_oracles",
-    "soak",
-    "acquisition_soak",
-    "campaign",
-    "campaign_faults",
-    "campaign_kills",
-)
+"""Commands of their own: each takes from ten minutes to hours."""
+
+
+def discovered() -> tuple[str, ...]:
+    """Return every benchmark in the folder: the modules with a NAME and a function `measure`.
+
+    They are read, not imported, so that one that is broken is found as well.
+    """
+    found = []
+    for file in sorted(Path(__file__).parent.glob("*.py")):
+        names = set()
+        for part in ast.parse(file.read_text(encoding="utf-8")).body:
+            if isinstance(part, ast.FunctionDef):
+                names.add(part.name)
+            elif isinstance(part, ast.Assign):
+                names |= {each.id for each in part.targets if isinstance(each, ast.Name)}
+        if {"NAME", "measure"} <= names:
+            found.append(file.stem)
+    return tuple(found)
+
+
+ALL = discovered()
+NAMES = tuple(name for name in ALL if name not in LONG)
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def quick_figures(names: Sequence[str]) -> list[Figure]:
-    """Return figures of a few samples each, all in this process; they say nothing."""
+def figures_here(names: Sequence[str], *, quick: bool) -> list[Figure]:
+    """Return the figures of one run of each in this process."""
     found: list[Figure] = []
     for name in names:
-        found += importlib.import_module(f"benchmarks.{name}").measure(quick=True)
+        found += importlib.import_module(f"benchmarks.{name}").measure(quick=quick)
     return found
 
 
@@ -71,8 +68,8 @@ def one_run(name: str) -> list[Figure]:
     """Run one benchmark in a process of its own."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "figures.json"
-        command = [sys.executable, "-m", f"benchmarks.{name}", "--json", str(file)]
-        subprocess.run(command, cwd=ROOT, check=True, timeout=600)
+        command = [sys.executable, "-m", "benchmarks.run", "--only", name, "--json", str(file)]
+        subprocess.run(command, cwd=ROOT, check=True, timeout=None if name in LONG else 600)
         return from_json(file.read_text(encoding="utf-8"))
 
 
@@ -83,9 +80,14 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=ALL)
     parser.add_argument("--quick", action="store_true", help="see that everything works")
     parser.add_argument("--output", type=Path, metavar="FILE", help="write the table there")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="one run, in this process")
     chosen = parser.parse_args()
+    if chosen.json is not None:
+        found = figures_here(chosen.only or NAMES, quick=chosen.quick)
+        chosen.json.write_text(to_json(found), encoding="utf-8")
+        return
     if chosen.quick:
-        text = table(quick_figures(chosen.only or ALL))
+        text = table(figures_here(chosen.only or ALL, quick=True))
     else:
         runs: list[list[Figure]] = []
         for _ in range(chosen.repeat):

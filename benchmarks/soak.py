@@ -89,7 +89,7 @@ def look(bench: Stand, moves: int) -> Look:
         traced_kb=tracemalloc.get_traced_memory()[0] / 1024,
         resident_kb=resident_kb(),
         threads=threading.active_count(),
-        messages=sum(device._inbox.qsize() for device in bench.manager.devices.values()),
+        messages=sum(device._inbox.waiting for device in bench.manager.devices.values()),
         packets=min(packets),
         held=len(bench.manager.gate.held()),
         moves=moves,

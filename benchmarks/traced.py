@@ -4,8 +4,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from cosmic.mico.hw.scu3d_ctypes import python_function
-
 Hook = Callable[[float, tuple[Any, ...]], None]
 
 
@@ -37,9 +35,7 @@ class TracedLibrary:
     def __getattr__(self, name: str) -> Any:
         found = getattr(self._library, name)
         if not name.startswith("SA_"):
-            return False if name == "in_python" else found  # what is handed out is no C function
-        if getattr(self._library, "in_python", False):
-            found = python_function(name, found)
+            return found
         return self._counted(name, found) if self._count_cpu else self._timed(name, found)
 
     def _timed(self, name: str, function: Callable[..., int]) -> Callable[..., int]:

@@ -25,6 +25,8 @@ settings.load_profile("cosmic")
 # Qt keeps these for itself and ends them by its own timers.
 QT_OWN_WINDOWS = {"QTipLabel", "QWhatsThat", "QShapedPixmapWidget"}
 FAILED = pytest.StashKey[bool]()
+# Set where everything that tests skip without was installed: a skip is then a defect.
+NOTHING_MISSING = "COSMIC_TEST_NOTHING_MISSING" in os.environ
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -62,6 +64,11 @@ def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     report = yield
+    hardware = item.get_closest_marker("hardware") is not None
+    if report.skipped and NOTHING_MISSING and not hardware and not hasattr(report, "wasxfail"):
+        reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else ""
+        report.outcome = "failed"
+        report.longrepr = f"skipped, where nothing is missing: {reason}"
     if report.failed:
         item.stash[FAILED] = True
     return report

@@ -17,12 +17,13 @@ from cosmic.autonomy.campaign.records import CampaignError, FibreRecord, Outcome
 from cosmic.autonomy.campaign.steering import CampaignPhase
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.autonomy.handling import sight
 from cosmic.twin.truth import TruthRecord, read_truth
 from system.campaign_bench import CONFIG, Strike, wait_for
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
-RATE = 10.0
+RATE = 20.0
 RECIPE = """
 procedure = "{procedure}"
 [sample]
@@ -302,20 +303,39 @@ def test_a_stop_that_is_reset_at_once_ends_a_campaign_that_only_looks(make: Make
 # ---------------------------------------------------------------------- instruments that fail
 
 
+@pytest.fixture
+def soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have a picture that does not come given up sooner; it is asked for six times."""
+    monkeypatch.setattr(sight, "LIMIT_WALL_S", 3.0)
+
+
+@pytest.mark.usefixtures("soon")
 @pytest.mark.parametrize(
-    ("fault", "where", "operation", "told"),
+    ("fault", "where", "operation", "told", "cause"),
     [
-        ("controller unplugged", {"device": 0}, "lift and see that it follows", "left"),
-        ("controller overheated", {"device": 0}, "carry to the probe", "too hot"),
-        ("controller sensor_lost", {"device": 0, "channel": 2}, "carry to the probe", "left.z"),
-        ("camera unplugged", {}, "carry to the probe", "microscope"),
-        ("board unplugged", {}, "push the spans", "force"),
-        ("sensor_saturated", {}, "carry to the probe", "force"),
-        ("sensor_dead", {}, "push the spans", "dead"),
+        (
+            "controller unplugged",
+            {"device": 0},
+            "lift and see that it follows",
+            "left",
+            "does not answer",
+        ),
+        ("controller overheated", {"device": 0}, "carry to the probe", "too hot", "too hot"),
+        (
+            "controller sensor_lost",
+            {"device": 0, "channel": 2},
+            "carry to the probe",
+            "left.z",
+            "has no sensor",
+        ),
+        ("camera unplugged", {}, "carry to the probe", "microscope", "no simulated camera"),
+        ("board unplugged", {}, "push the spans", "force", "Dev1"),
+        ("sensor_saturated", {}, "carry to the probe", "force", "180 uN"),
+        ("sensor_dead", {}, "push the spans", "dead", "dead"),
     ],
 )
 def test_what_fails_in_mid_lift_leads_to_a_safe_end_that_names_it(
-    make: Make, fault: str, where: dict[str, int], operation: str, told: str
+    make: Make, fault: str, where: dict[str, int], operation: str, told: str, cause: str
 ) -> None:
     bench = make()
     campaign = bench.campaign(count=3)
@@ -327,10 +347,12 @@ def test_what_fails_in_mid_lift_leads_to_a_safe_end_that_names_it(
     bench.check_stands()
     said = [campaign.end_reason, *(each.text for each in bench.fibres)]
     assert any(told in each for each in said), said
+    assert cause in campaign.end_reason
     assert not [each for each in bench.fibres if each.outcome in (Outcome.RUNNING, Outcome.GOOD)]
     bench.check_nothing_ran_into_anything()
 
 
+@pytest.mark.usefixtures("soon")
 @pytest.mark.parametrize(
     ("fault", "told"),
     [

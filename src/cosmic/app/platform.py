@@ -174,8 +174,7 @@ def build_platform(
     file, path = load_platform(config)
     _check_simulation(file, path, rate=rate, only_simulated=cold or bool(sample or truth))
     try:
-        # Where anything is real, or runs in another process, time waits for nobody here.
-        clock = RatedClock(rate, waits=file.all_simulated and not uses.stations)
+        clock = RatedClock(rate)
     except (TypeError, ValueError) as exc:
         raise ConfigError(f"rate: {exc}") from None
     policy = FailurePolicy()

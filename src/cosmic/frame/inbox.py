@@ -43,6 +43,11 @@ class Inbox(Generic[T]):
         """Tell whether there is nothing."""
         return self._queue.empty()
 
+    @property
+    def waiting(self) -> int:
+        """How many wait, for those who count them; it may have changed by now."""
+        return self._queue.qsize()
+
     def close(self) -> None:
         """Say that nothing will be taken any more."""
         self._worker.close()

@@ -44,8 +44,10 @@ class CameraRig(ABC):
         What the camera can.
     key : str
         Of the camera that the tests open.
+    two : bool
+        Whether there is a second camera that runs at the same time.
     other_key : str
-        Of a second camera that runs at the same time; "" where there is none.
+        Of the second camera; "" where there is none.
     clock : Clock
         Given to the library. It runs with the wall but counts from elsewhere, so that a time
         that was not taken from it shows.
@@ -63,6 +65,7 @@ class CameraRig(ABC):
 
     name: ClassVar[str]
     can: ClassVar[frozenset[Can]] = frozenset()
+    two: ClassVar[bool] = False
     key: str
     other_key: str = ""
     library: CameraLibrary

@@ -14,6 +14,7 @@ class GigeRig(CameraRig):
     """A GigE Vision camera on loopback; beside it runs the one without a network."""
 
     name = "aravis-gige"
+    two = True
     can = frozenset(Can)
     other_key = "Fake_1"
     rate_hz = 60.0

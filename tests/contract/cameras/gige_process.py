@@ -23,7 +23,7 @@ DISCOVER = bytes.fromhex("4211000200000001")
 def missing() -> str:
     """Return what this computer lacks for such a camera; "" if nothing."""
     if shutil.which(PROGRAM) is None:
-        return f"{PROGRAM} is not installed (Debian: aravis-tools-cli)"
+        return f"{PROGRAM} is not installed (Debian: aravis-tools)"
     try:
         load_library()
     except NotConnectedError as exc:

@@ -21,6 +21,7 @@ def virtual_producer() -> Path | None:
 
 class HarvestersRig(CameraRig):
     name = "harvesters-viky"
+    two = True
     can = frozenset({Can.RATE, Can.ROI})
     key = "VikyTL_DEV_red"
     other_key = "VikyTL_DEV_green"

@@ -41,6 +41,7 @@ def write_pictures(folder: Path, count: int = 20) -> None:
 
 class FilmRig(CameraRig):
     name = "opencv-film"
+    two = True
     can = frozenset({Can.RATE, Can.ROI})
     rate_hz = 100.0
     roi = Roi(8, 16, 64, 48)

@@ -15,6 +15,7 @@ class SimulatedRig(CameraRig):
     """The microscope and the overview of the shipped twin."""
 
     name = "simulated"
+    two = True
     can = frozenset(Can)
     key = "Sim1"
     other_key = "Sim2"

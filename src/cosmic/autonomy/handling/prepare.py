@@ -39,7 +39,9 @@ class MakeReady(FibreOperation):
             for name in (tool.x_axis, tool.y_axis, *filter(None, [tool.z_axis])):
                 details = work.mico[name].details
                 if details.confidence is not Confidence.KNOWN:
-                    raise OperationFailed("not initialised", f"{name}: initialise the platform")
+                    # What took the position away comes before what brings it back.
+                    lost = f"{name}: {details.error}; then " if details.error else f"{name}: "
+                    raise OperationFailed("not initialised", f"{lost}initialise the platform")
                 if details.zero != 0.0:
                     raise OperationFailed("zero set", f"{name}: clear its zero, then begin again")
 
