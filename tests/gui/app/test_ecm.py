@@ -56,12 +56,12 @@ def choose_mode(window: OperatorWindow, qtbot: QtBot, mode: str) -> None:
 
 
 def go_to(window: OperatorWindow, qtbot: QtBot, target: str, axis: str = "left.y") -> None:
-    enter(qtbot, field(card(window, axis), "MiCoCL_8"), target)
+    enter(qtbot, field(card(window, axis), "target"), target)
     click(qtbot, card(window, axis), "MiCoCL_9")
 
 
 def reason(window: OperatorWindow, axis: str = "left.y") -> str:
-    return field(card(window, axis), "MiCoCL_8").reason
+    return field(card(window, axis), "target").reason
 
 
 def platform_without_scene(folder: Path) -> Path:

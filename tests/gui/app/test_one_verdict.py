@@ -66,7 +66,7 @@ class Guard:
 
 
 def by_field(card: PositionerBaseGUI, qtbot: QtBot, target: float) -> None:
-    enter(qtbot, field(card, "MiCoCL_8"), f"{target:.1f}")
+    enter(qtbot, field(card, "target"), f"{target:.1f}")
     click(qtbot, card, "MiCoCL_9")
 
 
@@ -86,8 +86,7 @@ def test_every_way_in_meets_the_same_verdict(window: OperatorWindow, qtbot: QtBo
     guard, heard = Guard(rig), list[MoveVerdict]()
     mico[AXIS].commander.movement_refused.connect(heard.append, Qt.ConnectionType.DirectConnection)
 
-    entry = field(card, "MiCoCL_8")
-    for give in (by_field, by_button):
+    for give, entry in ((by_field, field(card, "target")), (by_button, field(card, "MiCoCL_8"))):
         heard.clear()
         give(card, qtbot, target)
         qtbot.waitUntil(lambda: bool(heard) and str(heard[-1]) in entry.reason)

@@ -30,7 +30,7 @@ def ready(window: OperatorWindow, qtbot: QtBot) -> MicoWidget:
 def moving(panel: MicoWidget, qtbot: QtBot) -> None:
     """Set left.x going on a long way."""
     card = panel.cards["left.x"]
-    enter(qtbot, field(card, "MiCoCL_8"), "5 mm")
+    enter(qtbot, field(card, "target"), "5 mm")
     click(qtbot, card, "MiCoCL_9")
     qtbot.waitUntil(lambda: card.axis.details.in_motion and position(card) > 1.0)
 
@@ -60,13 +60,13 @@ def test_stop_latches_with_its_reason_and_reset_lets_go(make: Make, qtbot: QtBot
     qtbot.waitUntil(lambda: window.top_bar.latched and not card.axis.details.in_motion)
     stood = position(card)
     click(qtbot, card, "MiCoCL_9")
-    qtbot.waitUntil(lambda: "stopped" in field(card, "MiCoCL_8").reason)
+    qtbot.waitUntil(lambda: "stopped" in field(card, "target").reason)
     assert abs(position(card) - stood) < 1.0
 
     click(qtbot, window.top_bar, "resetButton")
     qtbot.waitUntil(lambda: not window.top_bar.latched)
     assert not card.axis.details.in_motion
-    enter(qtbot, field(card, "MiCoCL_8"), "0")
+    enter(qtbot, field(card, "target"), "0")
     click(qtbot, card, "MiCoCL_9")
     wait_for_position(qtbot, card, 0.0)
 

@@ -31,7 +31,7 @@ def height_um(window: OperatorWindow, body: str) -> float:
 
 def refuse_left_z(window: OperatorWindow, qtbot: QtBot) -> SceneWidget:
     card = mico(window).cards["left.z"]
-    enter(qtbot, field(card, "MiCoCL_8"), "-5000")
+    enter(qtbot, field(card, "target"), "-5000")
     click(qtbot, card, "MiCoCL_9")
     shown = scene(window, qtbot)
     qtbot.waitUntil(lambda: bool(shown.refused_text))
@@ -56,7 +56,7 @@ def test_the_scene_is_made_once_the_window_was_painted(qtbot: QtBot, stored: QSe
 def test_the_bodies_follow_the_axes(window: OperatorWindow, qtbot: QtBot) -> None:
     before = height_um(window, "left_jaw_a")
     card = mico(window).cards["left.z"]
-    enter(qtbot, field(card, "MiCoCL_8"), "500")
+    enter(qtbot, field(card, "target"), "500")
     click(qtbot, card, "MiCoCL_9")
     wait_for_position(qtbot, card, 500.0)
     qtbot.waitUntil(lambda: abs(height_um(window, "left_jaw_a") - before - 500.0) < 2.0)
@@ -64,7 +64,7 @@ def test_the_bodies_follow_the_axes(window: OperatorWindow, qtbot: QtBot) -> Non
 
 def test_a_zero_of_the_user_moves_no_body(window: OperatorWindow, qtbot: QtBot) -> None:
     card = mico(window).cards["left.z"]
-    enter(qtbot, field(card, "MiCoCL_8"), "500")
+    enter(qtbot, field(card, "target"), "500")
     click(qtbot, card, "MiCoCL_9")
     wait_for_position(qtbot, card, 500.0)
     qtbot.wait(120)
@@ -80,7 +80,7 @@ def test_nothing_is_drawn_while_the_panel_is_hidden(window: OperatorWindow, qtbo
     window.dock(SCENE).close()
     before, frames = height_um(window, "left_jaw_a"), shown.view.frames
     card = mico(window).cards["left.z"]
-    enter(qtbot, field(card, "MiCoCL_8"), "500")
+    enter(qtbot, field(card, "target"), "500")
     click(qtbot, card, "MiCoCL_9")
     wait_for_position(qtbot, card, 500.0)
     assert height_um(window, "left_jaw_a") == before
@@ -121,7 +121,7 @@ def test_a_refused_move_is_shown_as_a_ghost(window: OperatorWindow, qtbot: QtBot
     assert shown.content.refused.approach.pose["left.z"] < -500.0
     assert verdict.bodies == shown.content.refused.approach.bodies
     assert not any(body.startswith("right") for body in shown.content.ghosts)
-    reason = field(mico(window).cards["left.z"], "MiCoCL_8").reason
+    reason = field(mico(window).cards["left.z"], "target").reason
     assert "left_jaw" in reason
 
 
@@ -157,7 +157,7 @@ def test_the_next_move_of_the_axis_takes_the_ghost_away(
 ) -> None:
     shown = refuse_left_z(window, qtbot)
     card = mico(window).cards["left.z"]
-    enter(qtbot, field(card, "MiCoCL_8"), "100")
+    enter(qtbot, field(card, "target"), "100")
     click(qtbot, card, "MiCoCL_9")
     qtbot.waitUntil(lambda: not shown.refused_text)
     assert not shown.content.ghosts

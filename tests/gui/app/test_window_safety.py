@@ -30,7 +30,7 @@ ESCAPE = Qt.Key.Key_Escape
 @pytest.fixture
 def moving(make: Make, qtbot: QtBot) -> OperatorWindow:
     """A window whose axis left.x is on a long way."""
-    window = make(rate=4.0)
+    window = make(rate=1.0)
     axis = card(window, "left.x")
     qtbot.waitUntil(part(axis, "MiCoCL_9", QPushButton).isEnabled)
     go_to(window, qtbot, "left.x", 5000.0)

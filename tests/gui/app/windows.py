@@ -45,7 +45,7 @@ def scene(window: OperatorWindow, qtbot: QtBot) -> SceneWidget:
 
 def go_to(window: OperatorWindow, qtbot: QtBot, axis: str, target_um: float) -> None:
     """Send an axis to a place, as the operator does."""
-    enter(qtbot, field(card(window, axis), "MiCoCL_8"), str(target_um))
+    enter(qtbot, field(card(window, axis), "target"), str(target_um))
     click(qtbot, card(window, axis), "MiCoCL_9")
 
 

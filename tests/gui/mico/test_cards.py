@@ -60,16 +60,50 @@ def test_forward_and_backward_move_by_the_distance(panel: MicoWidget, qtbot: QtB
 
 def test_go_to_moves_to_the_position_in_the_field(panel: MicoWidget, qtbot: QtBot) -> None:
     card = panel.cards["right.y"]
-    enter(qtbot, field(card, "MiCoCL_8"), "0.2 mm")
+    enter(qtbot, field(card, "target"), "0.2 mm")
     click(qtbot, card, "MiCoCL_9")
     wait_for_position(qtbot, card, 200.0)
     figures = part(card, "MiCoCL_5", QLabel)
     qtbot.waitUntil(lambda: abs(float(figures.text()) - 200.0) < 1.0)
 
 
+def test_a_button_keeps_its_direction_whatever_was_typed_for_go_to(
+    panel: MicoWidget, qtbot: QtBot
+) -> None:
+    card = panel.cards["left.x"]
+    enter(qtbot, field(card, "target"), "-300", accept=True)
+    click(qtbot, card, "MiCoCL_9")
+    wait_for_position(qtbot, card, -300.0)
+    click(qtbot, card, "MiCoCL_6")
+    wait_for_position(qtbot, card, -200.0)
+    click(qtbot, card, "MiCoCL_7")
+    wait_for_position(qtbot, card, -300.0)
+    assert field(card, "MiCoCL_8").value() == 100.0
+
+
+@pytest.mark.parametrize("text", ["-50", "0", "-0.1 mm"])
+def test_a_step_size_has_no_sign_and_says_so(panel: MicoWidget, qtbot: QtBot, text: str) -> None:
+    card = panel.cards["left.x"]
+    entry = field(card, "MiCoCL_8")
+    enter(qtbot, entry, text)
+    for name in ("MiCoCL_6", "MiCoCL_7"):
+        click(qtbot, card, name)
+        assert "the button says the direction" in entry.reason
+    assert not card.axis.details.in_motion
+    assert position(card) == 0.0
+
+
+def test_the_target_begins_where_the_axis_stands(panel: MicoWidget, qtbot: QtBot) -> None:
+    card = panel.cards["left.z"]
+    entry = field(card, "target")
+    qtbot.waitUntil(lambda: entry.value() == pytest.approx(position(card), abs=0.5))
+    click(qtbot, card, "MiCoCL_9")
+    assert not entry.reason
+
+
 def test_a_rotary_axis_moves_in_degrees(panel: MicoWidget, qtbot: QtBot) -> None:
     card = panel.cards["table.rotation"]
-    enter(qtbot, field(card, "MiCoCL_8"), "2.5")
+    enter(qtbot, field(card, "target"), "2.5")
     click(qtbot, card, "MiCoCL_9")
     wait_for_position(qtbot, card, 2.5, within=0.01)
 
@@ -99,7 +133,7 @@ def test_a_target_outside_the_travel_is_refused_at_its_field(
     panel: MicoWidget, qtbot: QtBot
 ) -> None:
     card = panel.cards["left.x"]
-    entry = field(card, "MiCoCL_8")
+    entry = field(card, "target")
     enter(qtbot, entry, "9 mm")
     click(qtbot, card, "MiCoCL_9")
     qtbot.waitUntil(lambda: "5500.0 µm" in entry.reason)
@@ -114,12 +148,15 @@ def test_what_is_no_length_is_refused_and_moves_nothing(
     panel: MicoWidget, qtbot: QtBot, text: str
 ) -> None:
     card = panel.cards["left.x"]
-    entry = field(card, "MiCoCL_8")
-    entry.setFocus()
-    entry.selectAll()
-    qtbot.keyClick(entry, "\b")
-    qtbot.keyClicks(entry, text)
-    for name in ("MiCoCL_6", "MiCoCL_7", "MiCoCL_9"):
+    for entry, name in (
+        (field(card, "MiCoCL_8"), "MiCoCL_6"),
+        (field(card, "MiCoCL_8"), "MiCoCL_7"),
+        (field(card, "target"), "MiCoCL_9"),
+    ):
+        entry.setFocus()
+        entry.selectAll()
+        qtbot.keyClick(entry, "\b")
+        qtbot.keyClicks(entry, text)
         click(qtbot, card, name)
         assert entry.reason
         assert entry.text() == text
@@ -151,7 +188,7 @@ def test_steps_outside_their_range_are_refused(
 
 def test_the_next_good_command_takes_the_refusal_away(panel: MicoWidget, qtbot: QtBot) -> None:
     card = panel.cards["left.x"]
-    entry = field(card, "MiCoCL_8")
+    entry = field(card, "target")
     enter(qtbot, entry, "9 mm")
     click(qtbot, card, "MiCoCL_9")
     qtbot.waitUntil(lambda: bool(entry.reason))
@@ -166,7 +203,7 @@ def test_the_badge_says_busy_while_it_moves_and_stop_ends_only_that_axis(qtbot: 
     with simulated_panel(qtbot, rate=2.0) as panel:
         moving, other = panel.cards["left.x"], panel.cards["right.x"]
         for card in (moving, other):
-            enter(qtbot, field(card, "MiCoCL_8"), "5 mm")
+            enter(qtbot, field(card, "target"), "5 mm")
             click(qtbot, card, "MiCoCL_9")
         badge = part(moving, "MiCoCL_1", StateBadge)
         qtbot.waitUntil(lambda: badge.state is State.BUSY)

@@ -129,7 +129,7 @@ def test_the_switch_keeps_its_width(card: PositionerBaseGUI, panel: MicoWidget) 
 
 def test_a_refused_move_is_made_after_taking_the_axis_out(panel: MicoWidget, qtbot: QtBot) -> None:
     card = panel.cards["left.z"]
-    entry = field(card, "MiCoCL_8")
+    entry = field(card, "target")
     enter(qtbot, entry, "-2000")
     click(qtbot, card, "MiCoCL_9")
     qtbot.waitUntil(lambda: "left_jaw" in entry.reason)

@@ -67,7 +67,7 @@ def click_box(card: QWidget) -> None:
 def test_the_card_says_which_part_it_is_at_and_its_stop_ends_the_series(qtbot: QtBot) -> None:
     with scripted_panel(qtbot, ("LLN",), instant=False) as (panel, controller):
         card = panel.cards["d0.c0"]
-        enter(qtbot, field(card, "MiCoCL_8"), "1000")
+        enter(qtbot, field(card, "target"), "1000")
         click_box(card)
         click(qtbot, card, "MiCoCL_9")
         line = part(card, "status", QLabel)
@@ -185,7 +185,7 @@ def test_a_missing_device_is_listed_and_greyed_until_a_rescan_finds_it(qtbot: Qt
         qtbot.waitUntil(lambda: part(panel.cards["d1.c0"], "MiCoCL_6", QPushButton).isEnabled())
         assert not part(panel, "missing", QLabel).isVisible()
         assert "Not available" not in part(panel.cards["d1.c0"], "MiCoCL_6", QPushButton).toolTip()
-        enter(qtbot, field(panel.cards["d1.c0"], "MiCoCL_8"), "3")
+        enter(qtbot, field(panel.cards["d1.c0"], "target"), "3")
         click(qtbot, panel.cards["d1.c0"], "MiCoCL_9")
         wait_for_position(qtbot, panel.cards["d1.c0"], 3.0)
 

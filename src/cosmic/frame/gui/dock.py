@@ -1,6 +1,7 @@
 """A panel of the main window: moves, floats, scrolls, and can be shown as failed."""
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
     QDockWidget,
     QHBoxLayout,
@@ -13,6 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from cosmic.frame.gui.build import named, push_button, tipped
+from cosmic.frame.gui.screen_fit import FittedPanel, fit_to_screen
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.stop_button import StopButton
 from cosmic.frame.gui.theme import STEP_PX, State, ui_font
@@ -84,7 +86,8 @@ class PanelDock(QDockWidget):
     panel : QWidget
         The content.
     scroll : bool
-        Put the panel into a scroll area, so that it is never clipped.
+        Scroll downwards only, at the width that the panel wants. Without it the panel is given
+        all the room there is, and scrolls where that is less than it needs at least.
     stop_key : str
         Written on the STOP button that the dock has while it floats.
     """
@@ -115,11 +118,11 @@ class PanelDock(QDockWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         column.addWidget(self._banner)
-        column.addWidget(_scrolled(panel) if scroll else panel, 1)
+        column.addWidget(_scrolled(panel) if scroll else FittedPanel(panel), 1)
         self.setWidget(body)
         self._stop.stop_requested.connect(self.stop_requested)
         self._banner.rescan.clicked.connect(self._on_rescan)
-        self.topLevelChanged.connect(self._stop.setVisible)
+        self.topLevelChanged.connect(self._on_top_level_changed)
 
     @property
     def panel(self) -> QWidget:
@@ -143,6 +146,20 @@ class PanelDock(QDockWidget):
         self._banner.reason.setText("")
         self._banner.hide()
         self._panel.setEnabled(True)
+
+    def _on_top_level_changed(self, floats: bool) -> None:
+        self._stop.setVisible(floats)
+        if floats:
+            QTimer.singleShot(0, self, self._fit)
+
+    def _fit(self) -> None:
+        fit_to_screen(self)
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        if self.isFloating():
+            QTimer.singleShot(0, self, self._fit)
 
     def _on_rescan(self) -> None:
         self.rescan_requested.emit(self.windowTitle())

@@ -12,6 +12,7 @@ from cosmic.frame.gui.keys_dialog import KeyList, KeysDialog
 from cosmic.frame.gui.layout_store import LayoutStore
 from cosmic.frame.gui.menus import ServerMenus
 from cosmic.frame.gui.palette import ThemeName
+from cosmic.frame.gui.screen_fit import DialogFitter, fit_to_screen
 from cosmic.frame.gui.tab_bars import hide_stale_tab_bars
 from cosmic.frame.gui.theme import STEP_PX, apply_theme, current_palette
 from cosmic.frame.gui.top_bar import TopBar
@@ -84,6 +85,7 @@ class CosmicServerGui(QMainWindow):
         app = QApplication.instance()
         if isinstance(app, QApplication):
             self._wheel = WheelGuard(app, self)
+            self._dialogs = DialogFitter(app, self)
         self.set_theme(self._store.theme() or theme)
         self.resize(170 * STEP_PX, 95 * STEP_PX)
 
@@ -237,8 +239,20 @@ class CosmicServerGui(QMainWindow):
             self._size_panels()
             self._store.remember_default(self)
             self._store.restore(self)
-            QTimer.singleShot(0, self, lambda: hide_stale_tab_bars(self))
+            fit_to_screen(self)
+            QTimer.singleShot(0, self, self._after_first_show)
         super().showEvent(event)
+
+    def _after_first_show(self) -> None:
+        hide_stale_tab_bars(self)
+        self._fit()  # now that the desktop has put its frame round it
+        self.windowHandle().screenChanged.connect(self._on_screen_changed)
+
+    def _on_screen_changed(self) -> None:
+        QTimer.singleShot(0, self, self._fit)  # Qt places it there first
+
+    def _fit(self) -> None:
+        fit_to_screen(self)
 
     @override
     def closeEvent(self, event: QCloseEvent) -> None:

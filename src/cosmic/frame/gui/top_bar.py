@@ -123,14 +123,18 @@ class TopBar(QWidget):
         second.addWidget(self._title)
         second.addWidget(self._simulated)
         second.addWidget(self._pages, 1)
-        rows = QVBoxLayout()
+        signs = QWidget()
+        # Cut off at the right where the window is too narrow: STOP never is.
+        signs.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        rows = QVBoxLayout(signs)
+        rows.setContentsMargins(0, 0, 0, 0)
         rows.setSpacing(STEP_PX // 2)
         rows.addLayout(self._first_row)
         rows.addLayout(second)
         whole = QHBoxLayout(self)
         whole.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX)
         whole.setSpacing(2 * STEP_PX)
-        whole.addLayout(rows, 1)
+        whole.addWidget(signs, 1)
         whole.addWidget(self._stop)
 
     def set_menu_bar(self, menu_bar: QMenuBar) -> None:

@@ -62,7 +62,9 @@ class AxisMenu(QObject):
             self._on_backward,
         )
         self.menu.addSeparator()
-        self.more = self._add("Show steps and speed", "Move by steps, and set the speed", None)
+        self.more = self._add(
+            "Show steps, parts and speed", "Move by steps or in parts, and set the speed", None
+        )
         self.more.setCheckable(True)
         self.more.toggled.connect(self.more_toggled)
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from cosmic.frame.errors import CosmicError, MoveRefused
 from cosmic.frame.gui.build import named, push_button
@@ -92,8 +92,8 @@ class ClosedLoopGUI(PositionerBaseGUI):
     @override
     def _second_row(self) -> Sequence[QWidget]:
         move = self._move
-        buttons = (self._backward, move.distance, self._forward, move.go_to)
-        return *buttons, _gap(), move.split, move.largest
+        buttons = (self._backward, move.distance, self._forward)
+        return *buttons, _gap(), move.target, move.go_to
 
     @override
     def _more_row(self) -> QWidget:
@@ -104,21 +104,29 @@ class ClosedLoopGUI(PositionerBaseGUI):
         ahead.clicked.connect(self._on_steps_forward)
         self._step_buttons = (back, ahead)
         self._more = named(QWidget(), "more")
-        row = QHBoxLayout(self._more)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(STEP_PX // 2)
+        column = QVBoxLayout(self._more)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(STEP_PX // 2)
         caption = QLabel("speed")
         caption.setProperty("role", "dim")
-        for widget in (back, self._steps, ahead, _gap(), caption, self._speed):
-            row.addWidget(widget)
-        row.addStretch(1)
+        move = self._move
+        for widgets in (
+            (back, self._steps, ahead),
+            (move.split, move.largest, _gap(), caption, self._speed),
+        ):
+            row = QHBoxLayout()
+            row.setSpacing(STEP_PX // 2)
+            for widget in widgets:
+                row.addWidget(widget)
+            row.addStretch(1)
+            column.addLayout(row)
         self._more.hide()
         return self._more
 
     @override
     def _list_inputs(self) -> Sequence[QWidget]:
         move = self._move
-        own = (move.distance, move.go_to, move.split, self._menu.button, self._speed)
+        own = (move.distance, move.target, move.go_to, move.split, self._menu.button, self._speed)
         return *super()._list_inputs(), *own, *self._step_buttons
 
     # Showing
@@ -128,6 +136,7 @@ class ClosedLoopGUI(PositionerBaseGUI):
         series = self.commands.series
         if series is not None and series.planned > 1:
             self._note = f"part {series.begun} of {series.planned}"
+        self._move.begin_at(state.shown_position)
         super().show_state(state)
 
     def show_links(self, linked: Mapping[str, float], others: Sequence[str]) -> None:
@@ -155,7 +164,7 @@ class ClosedLoopGUI(PositionerBaseGUI):
 
     @override
     def move_once(self, direction: int) -> None:
-        if self._move.commit():
+        if self._move.commit_step():
             self.commands.issue(
                 "move by a distance",
                 lambda consent: self._move.move_by(direction, consent=consent),
@@ -164,11 +173,11 @@ class ClosedLoopGUI(PositionerBaseGUI):
             )
 
     def _on_go_to(self) -> None:
-        if self._move.commit():
+        if self._move.commit_target():
             self.commands.issue(
                 "move to a position",
                 lambda consent: self._move.move_to(consent=consent),
-                self._move.distance,
+                self._move.target,
                 goal=self._move.goal_to(),
             )
 

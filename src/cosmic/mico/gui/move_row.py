@@ -2,9 +2,11 @@
 
 from PySide6.QtWidgets import QCheckBox
 
+from cosmic.frame.errors import QuantityError
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import STEP_PX
+from cosmic.frame.overrides import override
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.core.movement import Movement
@@ -12,15 +14,29 @@ from cosmic.mico.core.settings import MotionDefaults
 from cosmic.mico.gui.way_request import Goal
 
 
+class StepField(QuantityField):
+    """Takes how far one click moves; the button alone says in which direction."""
+
+    @override
+    def _parse(self) -> float:
+        value = super()._parse()
+        if not value > 0.0:
+            raise QuantityError(
+                "a step size is above zero and has no sign: the button says the direction, and "
+                "Go to takes a position"
+            )
+        return value
+
+
 class MoveFields:
-    """Distance, Go to, and the splitting of a move; the card puts the widgets where it wants.
+    """Step size, target, Go to, and the splitting of a move; the card arranges the widgets.
 
     Parameters
     ----------
     axis : Axis
         What moves.
     defaults : MotionDefaults
-        The distance that stands there at first, also for the parts.
+        The step size that stands there at first, also for the parts.
     """
 
     def __init__(self, axis: Axis, defaults: MotionDefaults) -> None:
@@ -29,11 +45,14 @@ class MoveFields:
         usual = defaults.distance_deg if unit == "deg" else defaults.distance_um
         smallest = 0.001 if unit == "deg" else 0.1
         self.distance = named(
-            QuantityField(unit, value=usual, name="Distance of the buttons, target of Go to"),
+            StepField(unit, value=usual, name=f"Step size of {axis.name}, for both buttons"),
             "MiCoCL_8",
         )
+        self.target = named(QuantityField(unit, name=f"Target of {axis.name}, for Go to"), "target")
+        self._target_set = False
         self.go_to = named(
-            push_button("Go to", f"Move {axis.name} to the position in the field"), "MiCoCL_9"
+            push_button("Go to", f"Move {axis.name} to the position in the field beside"),
+            "MiCoCL_9",
         )
         self.split = named(QCheckBox("in parts of"), "MiCoCL_10")
         tipped(self.split, "Make each move as a series of moves of at most this size")
@@ -43,17 +62,31 @@ class MoveFields:
         )
         self.split.toggled.connect(self.largest.setEnabled)
         self.largest.setEnabled(False)
-        for field in (self.distance, self.largest):
+        for field in (self.distance, self.target, self.largest):
             field.setMaximumWidth(16 * STEP_PX)
 
-    def commit(self) -> bool:
-        """Judge the entries that count; False when one was refused."""
-        fields = [self.distance, *([self.largest] if self.split.isChecked() else [])]
-        judged = [field.commit() for field in fields]  # each shows its own reason
+    def begin_at(self, position: float | None) -> None:
+        """Have the target begin where the axis stands: Go to then goes nowhere unasked."""
+        if self._target_set or position is None:
+            return
+        self._target_set = True
+        self.target.set_value(position)
+
+    def commit_step(self) -> bool:
+        """Judge the entries that a button needs; False when one was refused."""
+        return self._commit(self.distance)
+
+    def commit_target(self) -> bool:
+        """Judge the entries that Go to needs; False when one was refused."""
+        return self._commit(self.target)
+
+    def _commit(self, field: QuantityField) -> bool:
+        fields = [field, *([self.largest] if self.split.isChecked() else [])]
+        judged = [each.commit() for each in fields]  # each shows its own reason
         return all(judged)
 
     def move_by(self, direction: int, *, consent: bool) -> Movement | StepwiseMove:
-        """Move by the distance, at once or in parts."""
+        """Move by the step size in `direction`, 1 or -1, at once or in parts."""
         way = direction * self.distance.value()
         if self.split.isChecked():
             return StepwiseMove.by(self._axis, way, self.largest.value(), consent=consent)
@@ -61,7 +94,7 @@ class MoveFields:
 
     def move_to(self, *, consent: bool) -> Movement | StepwiseMove:
         """Move to the position, at once or in parts."""
-        target = self.distance.value()
+        target = self.target.value()
         if self.split.isChecked():
             return StepwiseMove(self._axis, target, self.largest.value(), consent=consent)
         return self._axis.move_to(target, wait=False, consent=consent)
@@ -75,7 +108,7 @@ class MoveFields:
 
     def goal_to(self) -> Goal:
         """Return where `move_to` leads."""
-        return self._goal(self.distance.value())
+        return self._goal(self.target.value())
 
     def _goal(self, shown: float) -> Goal:
         state = self._axis.details
