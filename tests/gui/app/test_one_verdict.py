@@ -86,10 +86,14 @@ def test_every_way_in_meets_the_same_verdict(window: OperatorWindow, qtbot: QtBo
     guard, heard = Guard(rig), list[MoveVerdict]()
     mico[AXIS].commander.movement_refused.connect(heard.append, Qt.ConnectionType.DirectConnection)
 
-    for give, entry in ((by_field, field(card, "target")), (by_button, field(card, "MiCoCL_8"))):
+    entries = {by_field: field(card, "target"), by_button: field(card, "MiCoCL_8")}
+    for give in entries:
         heard.clear()
         give(card, qtbot, target)
-        qtbot.waitUntil(lambda: bool(heard) and str(heard[-1]) in entry.reason)
+        entry = entries[give]
+        qtbot.waitUntil(
+            lambda entry=entry: bool(heard) and str(heard[-1]) in entry.reason
+        )
         same(heard[-1], expected)
 
     console = window.console

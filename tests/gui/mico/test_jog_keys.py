@@ -92,6 +92,57 @@ def test_the_focus_in_a_text_field_ends_the_jog(slow: MicoWidget, qtbot: QtBot) 
     qtbot.waitUntil(lambda: at_rest(slow, "left.x"))
 
 
+def test_a_jog_that_a_text_field_ended_says_so_at_its_axis(
+    slow: MicoWidget, qtbot: QtBot, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO")
+    line = part(slow.cards["left.x"], "status", QLabel)
+    hold(qtbot, slow, Qt.Key.Key_D, "left.x")
+    field(slow.cards["left.y"], "MiCoCL_8").setFocus()
+    qtbot.waitUntil(lambda: "the jog ended: a text field has the keyboard" in line.text())
+    assert "left.x: the jog by the key D ended: a text field" in caplog.text
+
+
+def test_a_jog_that_another_window_ended_says_so_at_its_axis(
+    slow: MicoWidget, qtbot: QtBot
+) -> None:
+    line = part(slow.cards["left.x"], "status", QLabel)
+    hold(qtbot, slow, Qt.Key.Key_D, "left.x")
+    other = QWidget()
+    qtbot.addWidget(other)
+    show(qtbot, other, 200, 200)
+    qtbot.waitUntil(lambda: "another window has the keyboard" in line.text())
+
+
+def test_a_jog_that_came_to_the_limit_says_so_at_its_axis(
+    panel: MicoWidget, qtbot: QtBot
+) -> None:
+    card = panel.cards["left.x"]
+    card.axis.move_to(5400.0)
+    part(panel, "initialise", QPushButton).setFocus()
+    qtbot.keyPress(panel.focusWidget(), Qt.Key.Key_D)
+    line = part(card, "status", QLabel)
+    qtbot.waitUntil(lambda: "limit of its travel, 5500.0 µm, is reached" in line.text())
+    qtbot.keyRelease(panel.focusWidget(), Qt.Key.Key_D)
+
+
+def test_a_window_that_was_busy_says_that_the_jog_ended(
+    slow: MicoWidget, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hold(qtbot, slow, Qt.Key.Key_D, "left.x")
+    monkeypatch.setattr("cosmic.mico.api.jogging.Jogging.renew", lambda _jogging: None)
+    line = part(slow.cards["left.x"], "status", QLabel)
+    qtbot.waitUntil(lambda: "not renewed in time" in line.text())
+    qtbot.keyRelease(slow.focusWidget(), Qt.Key.Key_D)
+
+
+def test_letting_go_says_nothing(slow: MicoWidget, qtbot: QtBot) -> None:
+    hold(qtbot, slow, Qt.Key.Key_D, "left.x")
+    qtbot.keyRelease(slow.focusWidget(), Qt.Key.Key_D)
+    qtbot.waitUntil(lambda: at_rest(slow, "left.x"))
+    assert "jog ended" not in part(slow.cards["left.x"], "status", QLabel).text()
+
+
 def test_the_dead_man_stops_a_window_that_hangs(slow: MicoWidget, qtbot: QtBot) -> None:
     card = slow.cards["left.x"]
     with qtbot.waitSignal(card.axis.commander.movement_ended, timeout=5000) as ended:

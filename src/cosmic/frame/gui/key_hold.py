@@ -15,6 +15,8 @@ from cosmic.frame.overrides import override
 
 GUARD_MS: Final = 50
 GRACE_MS: Final = 25
+WINDOW_LOST: Final = "another window has the keyboard"
+_TEXT: Final = "a text field has the keyboard"
 _MODIFIERS: Final = (
     Qt.KeyboardModifier.ShiftModifier
     | Qt.KeyboardModifier.ControlModifier
@@ -53,6 +55,8 @@ class HoldKeys(QObject):
     """
 
     hold_started = Signal(str)
+    hold_lost = Signal(str, str)
+    """The key is about to end though it did not come up; with what took it away."""
     hold_ended = Signal(str)
 
     def __init__(
@@ -86,10 +90,15 @@ class HoldKeys(QObject):
         self._enabled = enabled
         self.release_all()
 
-    def release_all(self) -> None:
-        """End everything held; the keys must come up before they act again."""
+    def release_all(self, why: str = "") -> None:
+        """End everything held; the keys must come up before they act again.
+
+        With `why`, `hold_lost` tells it of each.
+        """
         self._guard.stop()
         for key in list(self._held):
+            if why:
+                self.hold_lost.emit(self._held[key], why)
             self._end(key)
 
     @override
@@ -97,7 +106,7 @@ class HoldKeys(QObject):
         # Everything that happens to any widget comes by; the class is quick to ask, the type slow.
         if not isinstance(event, QKeyEvent):
             if self._held and event.type() == QEvent.Type.WindowDeactivate:
-                self.release_all()
+                self.release_all(WINDOW_LOST)
             return False
         kind = event.type()
         if kind not in _KEY_EVENTS:
@@ -149,23 +158,26 @@ class HoldKeys(QObject):
 
     def _on_focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
         if takes_text(new):
-            self.release_all()
+            self.release_all(_TEXT)
 
     def _on_guard(self) -> None:
         """End what is held where no event tells that the keyboard was taken away."""
         active = QApplication.applicationState() == Qt.ApplicationState.ApplicationActive
-        if self._held and (not active or _input_is_elsewhere()):
-            self.release_all()
+        why = _input_is_elsewhere() if active else WINDOW_LOST
+        if self._held and why:
+            self.release_all(why)
 
 
-def _input_is_elsewhere() -> bool:
-    return (
-        takes_text(QApplication.focusWidget())
-        or QApplication.activePopupWidget() is not None
-        or QApplication.activeModalWidget() is not None
-        or QWidget.mouseGrabber() is not None
-        or QWidget.keyboardGrabber() is not None
-    )
+def _input_is_elsewhere() -> str:
+    """Return what has the keyboard instead of the program's keys; empty when nothing has."""
+    if takes_text(QApplication.focusWidget()):
+        return _TEXT
+    if QApplication.activePopupWidget() is not None:
+        return "a menu is open"
+    if QApplication.activeModalWidget() is not None:
+        return "a dialog is open"
+    grabbed = QWidget.mouseGrabber() is not None or QWidget.keyboardGrabber() is not None
+    return "something is being dragged" if grabbed else ""
 
 
 def _combination(name: str) -> _Combination:

@@ -45,6 +45,7 @@ class _Command:
     movement: Movement
     consented: bool
     goal: Goal | None = None
+    why: Callable[[], str] = str
 
 
 class AxisCommands(QObject):
@@ -129,9 +130,14 @@ class AxisCommands(QObject):
             self._series.abandon()
             self._series = None
 
-    def follow(self, what: str, movement: Movement) -> None:
-        """Tell how a movement ends that was begun elsewhere, such as a jog."""
-        self._newest = _Command(what, lambda _consent: movement, None, movement, consented=True)
+    def follow(self, what: str, movement: Movement, *, why: Callable[[], str] = str) -> None:
+        """Tell how a movement ends that was begun elsewhere, such as a jog.
+
+        `why` is asked when it ends without an error, or is cancelled; empty is a good end.
+        """
+        self._newest = _Command(
+            what, lambda _consent: movement, None, movement, consented=True, why=why
+        )
         self._blocked = None
         self._moved = False
         self.begun.emit()
@@ -145,11 +151,11 @@ class AxisCommands(QObject):
         if isinstance(error, CosmicError):
             self._fail(command, error)
         else:
-            self.ended.emit("" if error is None else str(error))
+            self.ended.emit(command.why() if error is None else str(error))
 
     def _fail(self, command: _Command, error: CosmicError) -> None:
         if not isinstance(error, MoveRefused):
-            self.ended.emit("" if isinstance(error, MoveCancelled) else str(error))
+            self.ended.emit(command.why() if isinstance(error, MoveCancelled) else str(error))
             return
         reason = error.verdict.reason
         if reason is Reason.COLLISION and command.goal is not None and self.seeks_ways:

@@ -1,5 +1,6 @@
 """Moves axes as long as their keys are held."""
 
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -9,11 +10,16 @@ from PySide6.QtWidgets import QApplication
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.key_hold import HoldKeys
+from cosmic.frame.units import format_quantity
 from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
 from cosmic.mico.hw.interface import PositionerKind
 
+logger = logging.getLogger(__name__)
+
 RENEW_MS: Final = 40
+_AT_LIMIT: Final = 1.0
+"""How near its limit, um or deg, an axis stands that a jog has brought there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +34,8 @@ class JogKeys(QObject):
     """Begins a jog when a key goes down, renews it by a timer, and lets go when it comes up.
 
     A window that hangs renews nothing, so the dead-man of the core stops the axis; a widget that
-    takes text, another window or a stop ends all of them (see `HoldKeys`).
+    takes text, another window or a stop ends all of them (see `HoldKeys`). A jog that ends while
+    its key is held says why at its axis.
 
     Parameters
     ----------
@@ -44,6 +51,8 @@ class JogKeys(QObject):
         self._keys: dict[str, JogKey] = {}
         self._running: dict[str, Jogging] = {}
         self._hold = HoldKeys(app, (), self)
+        self._lost: dict[str, str] = {}
+        self._hold.hold_lost.connect(self._on_hold_lost)
         self._hold.hold_started.connect(self._on_hold_started)
         self._hold.hold_ended.connect(self._on_hold_ended)
         self._timer = QTimer(self, interval=RENEW_MS)
@@ -67,14 +76,30 @@ class JogKeys(QObject):
         jog = self._keys[key]
         axis, commands = jog.card.axis, jog.card.commands
         commands.abandon_series()
+        self._lost.pop(key, None)
         try:
             running = axis.jog(jog.direction, self._speed(axis.kind))
         except CosmicError as exc:
             commands.refused.emit(None, str(exc))
             return
         self._running[key] = running
-        commands.follow("jog", running.movement)
+        commands.follow("jog", running.movement, why=lambda: self._why_ended(key, jog))
         self._timer.start()
+
+    def _why_ended(self, key: str, jog: JogKey) -> str:
+        """Return why a jog has ended that nobody refused; empty where its key came up."""
+        why = self._lost.pop(key, "")
+        if not why and key in self._running:
+            why = _at_limit(jog) or (
+                "it was not renewed in time, as the window was busy; let go and hold the key again"
+            )
+        if why:
+            logger.info("%s: the jog by the key %s ended: %s", jog.card.axis.name, key, why)
+        return f"the jog ended: {why}" if why else ""
+
+    def _on_hold_lost(self, key: str, why: str) -> None:
+        if key in self._running:
+            self._lost[key] = why
 
     def _on_hold_ended(self, key: str) -> None:
         running = self._running.pop(key, None)
@@ -87,3 +112,15 @@ class JogKeys(QObject):
         for running in self._running.values():
             if not running.done:
                 running.renew()
+
+
+def _at_limit(jog: JogKey) -> str:
+    """Return the words for an axis that stands at the limit it was driven towards."""
+    state = jog.card.axis.details
+    position, limits = state.shown_position, state.shown_limits
+    if position is None or limits is None:
+        return ""
+    limit = limits[1] if jog.direction > 0 else limits[0]
+    if abs(position - limit) > _AT_LIMIT:
+        return ""
+    return f"the limit of its travel, {format_quantity(limit, state.unit)}, is reached"
