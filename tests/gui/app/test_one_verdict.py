@@ -91,9 +91,7 @@ def test_every_way_in_meets_the_same_verdict(window: OperatorWindow, qtbot: QtBo
         heard.clear()
         give(card, qtbot, target)
         entry = entries[give]
-        qtbot.waitUntil(
-            lambda entry=entry: bool(heard) and str(heard[-1]) in entry.reason
-        )
+        qtbot.waitUntil(lambda entry=entry: bool(heard) and str(heard[-1]) in entry.reason)
         same(heard[-1], expected)
 
     console = window.console

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QTableView
+from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QPushButton, QTableView
 from pytestqt.qtbot import QtBot
 
 from cosmic.frame.failure import FailurePolicy
@@ -152,3 +152,79 @@ def test_records_that_come_after_the_panel_is_gone_meet_nobody(
     gc.collect()
     log.info("late")
     assert ring._listeners == ()
+
+
+def at_end(panel: LogPanel) -> bool:
+    """Tell whether the newest record is really in view."""
+    view = table(panel)
+    last = view.model().index(view.model().rowCount() - 1, 0)
+    return view.viewport().rect().contains(view.visualRect(last).center())
+
+
+def newest(panel: LogPanel) -> QPushButton:
+    return panel.findChildren(QPushButton)[0]
+
+
+def fill(qtbot: QtBot, panel: LogPanel, log: logging.Logger, count: int, name: str = "x") -> None:
+    for number in range(count):
+        log.info("%s %d", name, number)
+    qtbot.waitUntil(lambda: ends(panel)[-1:] == [f"{name} {count - 1}"])
+
+
+def test_it_goes_on_following_when_the_panel_becomes_lower_or_was_hidden(
+    qtbot: QtBot, panel: LogPanel, log: logging.Logger
+) -> None:
+    fill(qtbot, panel, log, 60)
+    panel.resize(800, 130)
+    QApplication.processEvents()
+    assert panel.follows()
+    assert at_end(panel)
+    fill(qtbot, panel, log, 30, "y")
+    assert at_end(panel)
+    panel.hide()
+    fill(qtbot, panel, log, 50, "z")
+    panel.show()
+    panel.resize(800, 300)
+    fill(qtbot, panel, log, 5, "after")
+    assert panel.follows()
+    assert at_end(panel)
+
+
+def test_it_follows_after_thousands_of_lines_with_a_filter(
+    qtbot: QtBot, panel: LogPanel, log: logging.Logger
+) -> None:
+    panel.set_search("kept")
+    for block in range(5):
+        for number in range(600):
+            log.info("%s %d", "kept" if number % 3 else "other", number)
+        fill(qtbot, panel, log, 1, f"kept {block}")
+        assert panel.follows()
+        assert at_end(panel)
+
+
+def test_scrolled_up_it_keeps_the_place_and_says_how_many_are_new(
+    qtbot: QtBot, panel: LogPanel, log: logging.Logger
+) -> None:
+    fill(qtbot, panel, log, 180)
+    view = table(panel)
+    view.verticalScrollBar().setValue(100)
+    seen = view.indexAt(view.viewport().rect().topLeft()).siblingAtColumn(3).data()
+    assert not panel.follows()
+    fill(qtbot, panel, log, 40, "more")  # beyond the capacity: the oldest go
+    qtbot.waitUntil(lambda: newest(panel).text() == "40 new")
+    assert view.indexAt(view.viewport().rect().topLeft()).siblingAtColumn(3).data() == seen
+    qtbot.mouseClick(newest(panel), Qt.MouseButton.LeftButton)
+    assert at_end(panel)
+    assert newest(panel).text() == "Newest"
+    assert not newest(panel).isEnabled()
+
+
+def test_only_those_that_pass_the_filter_count_as_new(
+    qtbot: QtBot, panel: LogPanel, log: logging.Logger
+) -> None:
+    fill(qtbot, panel, log, 100, "kept")
+    panel.set_search("kept")
+    table(panel).verticalScrollBar().setValue(20)
+    for number in range(10):
+        log.info("%s %d", "kept" if number % 2 else "other", number)
+    qtbot.waitUntil(lambda: newest(panel).text() == "5 new")

@@ -114,9 +114,7 @@ def test_a_jog_that_another_window_ended_says_so_at_its_axis(
     qtbot.waitUntil(lambda: "another window has the keyboard" in line.text())
 
 
-def test_a_jog_that_came_to_the_limit_says_so_at_its_axis(
-    panel: MicoWidget, qtbot: QtBot
-) -> None:
+def test_a_jog_that_came_to_the_limit_says_so_at_its_axis(panel: MicoWidget, qtbot: QtBot) -> None:
     card = panel.cards["left.x"]
     card.axis.move_to(5400.0)
     part(panel, "initialise", QPushButton).setFocus()

@@ -5,8 +5,8 @@ import weakref
 from collections import deque
 from typing import Final
 
-from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QKeyEvent, QKeySequence
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPoint, Qt, QTimer
+from PySide6.QtGui import QKeyEvent, QKeySequence, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QApplication,
@@ -25,7 +25,6 @@ from cosmic.frame.gui.build import push_button, tipped
 from cosmic.frame.gui.log_model import LEVEL, MESSAGE, TIME, WHERE, LogEntry, LogFilter, LogModel
 from cosmic.frame.gui.theme import STEP_PX, code_font, number_font
 from cosmic.frame.log import RingBufferHandler
-from cosmic.frame.log_folding import tell_folded
 from cosmic.frame.overrides import override
 
 REFRESH_MS: Final = 100
@@ -51,6 +50,8 @@ class SearchField(QLineEdit):
 
 class LogPanel(QWidget):
     """Shows what `ring` keeps and receives; follows the newest line unless scrolled up.
+
+    Scrolled up, it keeps what is looked at in its place and says how many came below.
 
     Records arrive in any thread and wait; a timer takes them over at most ten times a second,
     so that no flood of records can block the window.
@@ -78,7 +79,7 @@ class LogPanel(QWidget):
         # A record may come both ways: kept by the ring and told to us, until the first refresh.
         self._shown_at_start = ring.records()
         self._model.append([LogEntry.of(record) for record in self._shown_at_start])
-        self._view.scrollToBottom()
+        self.follow()
         self._timer = QTimer(self, interval=REFRESH_MS)
         self._timer.timeout.connect(self._on_timer)
         self._timer.start()
@@ -91,11 +92,19 @@ class LogPanel(QWidget):
         self._search.setPlaceholderText("Search")
         self._search.setClearButtonEnabled(True)
         self._search.textChanged.connect(self._on_search_changed)
+        self._following, self._new, self._adding = True, 0, False
         self._newest = push_button("Newest", "Go to the newest record and follow it")
-        self._newest.clicked.connect(self._on_newest)
+        self._newest.setMinimumWidth(
+            self._newest.fontMetrics().horizontalAdvance("00000 new") + 3 * STEP_PX
+        )
+        self._newest.clicked.connect(self.follow)
         self._copy = push_button("Copy", "Copy the selected records, or all shown (Ctrl+C)")
         self._copy.clicked.connect(self.copy)
         self._view = _view(self._filter)
+        bar = self._view.verticalScrollBar()
+        bar.valueChanged.connect(self._on_scrolled)
+        bar.rangeChanged.connect(self._on_range_changed)
+        self._filter.rowsInserted.connect(self._on_rows_inserted)
         self._view.selectionModel().currentRowChanged.connect(self._on_row_changed)
         self._details = tipped(QPlainTextEdit(), "The whole story of the selected record")
         self._details.setReadOnly(True)
@@ -141,44 +150,88 @@ class LogPanel(QWidget):
         chosen = [self._entry(row).as_line() for row in rows] or self.lines()
         QApplication.clipboard().setText("\n".join(chosen))
 
+    @property
+    def new(self) -> int:
+        """How many records came below what is looked at."""
+        return self._new
+
     def follows(self) -> bool:
         """Tell whether the newest record is in view, and stays so when others come."""
-        bar = self._view.verticalScrollBar()
-        return bar.value() >= bar.maximum()
+        return self._following
+
+    def follow(self) -> None:
+        """Go to the newest record and stay with those that come."""
+        self._following, self._new = True, 0
+        self._view.scrollToBottom()
+        self._show_new()
 
     def _entry(self, row: int) -> LogEntry:
         source = self._filter.mapToSource(self._filter.index(row, 0))
         return self._model.entry(source.row())
 
     def _on_timer(self) -> None:
-        tell_folded()
         waiting = [self._pending.popleft() for _ in range(len(self._pending))]
         known = {id(record) for record in self._shown_at_start}
         self._shown_at_start = []
         records = [record for record in waiting if id(record) not in known]
         if records:
-            follow = self.follows()
-            self._model.append([LogEntry.of(record) for record in records])
-            if follow:
-                self._view.scrollToBottom()
-        self._newest.setEnabled(not self.follows())
+            self._add([LogEntry.of(record) for record in records])
+        self._show_new()
+
+    def _add(self, entries: list[LogEntry]) -> None:
+        """Take records over; what is looked at keeps its place, unless it was the newest."""
+        looked_at = QPersistentModelIndex(self._view.indexAt(QPoint(0, 0)))
+        self._adding = True  # what moves the bar meanwhile is not the operator
+        self._model.append(entries)
+        if self._following:
+            self._view.scrollToBottom()
+        elif looked_at.isValid():
+            index = self._filter.index(looked_at.row(), 0)
+            self._view.scrollTo(index, QAbstractItemView.ScrollHint.PositionAtTop)
+        self._adding = False
+
+    def _show_new(self) -> None:
+        text = f"{self._new} new" if self._new else "Newest"
+        if text != self._newest.text():
+            self._newest.setText(text)
+        self._newest.setEnabled(not self._following)
+
+    def _on_rows_inserted(self, _parent: QModelIndex, first: int, last: int) -> None:
+        if not self._following and self._adding:
+            self._new += last - first + 1
+
+    def _on_scrolled(self, value: int) -> None:
+        if self._adding:
+            return
+        self._following = value >= self._view.verticalScrollBar().maximum()
+        if self._following:
+            self._new = 0
+        self._show_new()
+
+    def _on_range_changed(self, _low: int, high: int) -> None:
+        """Stay with the newest record in a table that has become lower, too."""
+        if self._following:
+            self._view.verticalScrollBar().setValue(high)
 
     def _on_level_chosen(self, name: str) -> None:
         self._filter.set_level(LEVELS[name])
-        self._view.scrollToBottom()
+        self.follow()
 
     def _on_search_changed(self, text: str) -> None:
         self._filter.set_text(text)
-        self._view.scrollToBottom()
-
-    def _on_newest(self) -> None:
-        self._view.scrollToBottom()
+        self.follow()
 
     def _on_row_changed(self) -> None:
         index = self._view.currentIndex()
         text = self._entry(index.row()).details if index.isValid() else ""
         self._details.setPlainText(text)
         self._details.setVisible("\n" in text)
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        if self._following:
+            self._view.scrollToBottom()
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
