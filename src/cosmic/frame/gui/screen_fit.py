@@ -1,7 +1,7 @@
 """Nothing opens larger than the screen, or beyond its edge: STOP could be out of sight there."""
 
 from PySide6.QtCore import QEvent, QObject, QRect, QSize, Qt, QTimer
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QDialog, QScrollArea, QWidget
 from shiboken6 import isValid
 
@@ -49,7 +49,7 @@ class DialogFitter(QObject):
 
     @override
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.Show and isinstance(watched, QDialog):
+        if isinstance(event, QShowEvent) and isinstance(watched, QDialog):
             QTimer.singleShot(0, lambda: fit_to_screen(watched) if isValid(watched) else None)
         return False
 

@@ -82,10 +82,6 @@ class CosmicServerGui(QMainWindow):
         self.setCorner(Qt.Corner.BottomLeftCorner, Area.BottomDockWidgetArea)
         self.setCorner(Qt.Corner.BottomRightCorner, Area.BottomDockWidgetArea)
         self._connect()
-        app = QApplication.instance()
-        if isinstance(app, QApplication):
-            self._wheel = WheelGuard(app, self)
-            self._dialogs = DialogFitter(app, self)
         self.set_theme(self._store.theme() or theme)
         self.resize(170 * STEP_PX, 95 * STEP_PX)
 
@@ -236,6 +232,9 @@ class CosmicServerGui(QMainWindow):
     def showEvent(self, event: QShowEvent) -> None:
         if not self._restored:
             self._restored = True
+            app = QApplication.instance()
+            if isinstance(app, QApplication):  # not before: making the panels makes many events
+                self._guards = (WheelGuard(app, self), DialogFitter(app, self))
             self._size_panels()
             self._store.remember_default(self)
             self._store.restore(self)

@@ -3,6 +3,7 @@
 from typing import Final
 
 from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractSlider,
     QAbstractSpinBox,
@@ -15,7 +16,6 @@ from PySide6.QtWidgets import (
 
 from cosmic.frame.overrides import override
 
-_EVENTS: Final = (QEvent.Type.Wheel, QEvent.Type.Polish)
 _NEVER: Final = (QComboBox, QTabBar)
 """A list is chosen from when it is open; a tab is clicked."""
 _WITH_FOCUS: Final = (QAbstractSpinBox, QAbstractSlider)
@@ -32,15 +32,14 @@ class WheelGuard(QObject):
     def __init__(self, app: QApplication, parent: QObject | None = None) -> None:
         super().__init__(parent or app)
         app.installEventFilter(self)
-        for widget in app.allWidgets():
-            _refuse_focus_by_wheel(widget)
 
     @override
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() not in _EVENTS:
+        # Everything that happens to any widget comes by; the class is quick to ask.
+        if not isinstance(event, QWheelEvent):
             return False
-        if event.type() == QEvent.Type.Polish:
-            _refuse_focus_by_wheel(watched)
+        if not isinstance(watched, QWidget):
+            _refuse_focus_by_wheel(QApplication.widgetAt(event.globalPosition().toPoint()))
             return False
         if not _is_guarded(watched):
             return False
@@ -56,9 +55,12 @@ def _is_guarded(watched: QObject) -> bool:
     return not watched.hasFocus()
 
 
-def _refuse_focus_by_wheel(watched: QObject) -> None:
-    """Qt gives the focus to these before they see the wheel, which would make them react."""
-    if not isinstance(watched, QWidget) or not isinstance(watched, (*_NEVER, *_WITH_FOCUS)):
-        return
-    if watched.focusPolicy() == Qt.FocusPolicy.WheelFocus:
-        watched.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+def _refuse_focus_by_wheel(widget: QWidget | None) -> None:
+    """Keep Qt from giving the focus to what the wheel is turned over, before it does.
+
+    A combo box, a spin box and what lies in them would react then.
+    """
+    while widget is not None and not widget.isWindow():
+        if widget.focusPolicy() == Qt.FocusPolicy.WheelFocus:
+            widget.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        widget = widget.parentWidget()
