@@ -122,6 +122,29 @@ def test_a_body_left_inside_its_margin_can_only_retreat(rig: cosmic.Rig) -> None
     assert rig.mico.check({"right.x": 100.0}).allowed, "it is none of the right one's business"
 
 
+def test_an_axis_left_inside_its_margin_jogs_and_moves_out_and_no_jog_brings_it_closer(
+    rig: cosmic.Rig,
+) -> None:
+    left_z = rig.mico["left.z"]
+    left_z.collision_detection = False
+    left_z.move_to(-1502.0)  # into the plate by 2 um
+    left_z.collision_detection = True
+    with pytest.raises(cosmic.CollisionError):
+        left_z.jog(-1, speed=5.0).movement.wait(5.0)
+    with left_z.jog(1, speed=40.0) as jog:
+        until_s = WALL.now_s() + 10.0
+        while not jog.done and WALL.now_s() < until_s and left_z.position_um < -1499.0:
+            jog.renew()
+            wait_until(lambda: True)
+    assert isinstance(jog.movement.exception(2.0), cosmic.MoveCancelled), "let go, not refused"
+    here = left_z.position_um
+    assert here > -1500.0
+    with pytest.raises(cosmic.CollisionError):
+        left_z.move_by(-0.5)
+    assert left_z.move_by(1.0) > here
+    left_z.move_to(0.0)
+
+
 def test_an_axis_out_of_collision_detection_moves_unchecked_until_it_is_taken_in(
     rig: cosmic.Rig, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -13,8 +13,8 @@ from cosmic.mico.core.collision.answer import AxisSpan
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.collision.scene_loader import load_scene
 from cosmic.mico.core.collision.sweep import Sweep
-from oracles import convex, poses, trials
-from oracles.scenes import Builder, X, Z, blobs
+from oracles import convex, poses, retreats, trials
+from oracles.scenes import Builder, X, Y, Z, blobs
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +64,58 @@ def test_what_begins_inside_the_margin_never_comes_closer(turning) -> None:
     found = trials.retreat_trial(13, 50, turning=turning)
     assert found["allowed"] > 0
     assert found["closer"] == 0
+
+
+@pytest.mark.parametrize(("turning", "count"), [(False, 6), (True, 4)])
+def test_what_is_inside_its_margin_can_always_retreat_and_never_come_closer(turning, count) -> None:
+    found = retreats.trial(31, count, turning=turning)
+    _check_retreats(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turning", [False, True])
+def test_hundreds_of_bodies_inside_their_margins_retreat(turning) -> None:
+    found = retreats.trial(32, 60, turning=turning)
+    assert found["several inside"] > 10
+    _check_retreats(found)
+
+
+def _check_retreats(found) -> None:
+    assert found["retreat"] > 10
+    assert found["harmful"] > 40
+    assert found["retreat refused"] == 0
+    assert found["harmful and allowed"] == found["turns harmful and allowed"] == 0
+    assert found["turns retreat refused"] == 0
+
+
+def test_what_overlaps_two_pieces_leaves_by_the_way_out_and_not_through_their_seam() -> None:
+    build = Builder()
+    build.box("base", (-1000.0, -1000.0, -1000.0), (3.0, 1000.0, 0.0))
+    build.box("base", (3.0, -1000.0, -1000.0), (1000.0, 1000.0, 0.0))
+    build.body("slide", "base", X, axis="x")
+    build.body("tip", "slide", Z, axis="z")
+    build.box("tip", (-20.0, -20.0, -10.0), (0.0, 20.0, 500.0))
+    sweep = Sweep(build.model([("base", "tip")]))
+
+    def clear(axis: str, way: float) -> bool:
+        spans = {"x": AxisSpan(0.0, 0.0, 0.0), "z": AxisSpan(0.0, 0.0, 0.0)}
+        spans[axis] = AxisSpan(min(0.0, way), max(0.0, way), 0.0, moving=True)
+        return sweep.check(spans).clear
+
+    assert clear("z", 2.0)
+    assert clear("z", 700.0)
+    assert not any(clear("x", way) for way in (-2.0, 2.0, 900.0, -900.0))
+    assert not clear("z", -2.0)
+
+
+def test_a_probe_that_cannot_be_lifted_leaves_a_thin_body_the_way_it_can_move() -> None:
+    build = Builder()
+    build.box("base", (-500.0, -500.0, 0.0), (500.0, 500.0, 20.0))
+    build.body("probe", "base", Y, axis="y")
+    build.box("probe", (-20.0, 400.0, -50.0), (20.0, 2000.0, 50.0))
+    sweep = Sweep(build.model([("base", "probe")]))
+    assert sweep.check({"y": AxisSpan(0.0, 5.0, 0.0, moving=True)}).clear
+    assert not sweep.check({"y": AxisSpan(-5.0, 0.0, 0.0, moving=True)}).clear
 
 
 def test_two_arms_replayed_with_any_speeds_and_delays_keep_their_margin(platform) -> None:

@@ -140,7 +140,7 @@ def test_the_collision_check_sees_what_moves_what_is_in_flight_and_what_rests():
         checker=checker,
     )
     assert checker.swept == {
-        "x": AxisSpan(0.0, 50.0, 0.0, moving=True),
+        "x": AxisSpan(0.0, 50.0, 0.0, moving=True, heading=1),
         "y": AxisSpan(7.0, 7.0, 7.0),
         "z": AxisSpan(1.0, 9.0, 1.0, moving=True),
     }
@@ -209,7 +209,7 @@ def test_an_unknown_axis_may_be_wherever_it_was_driven_since():
     assert checker.swept["x"] == AxisSpan(-20.0, 50.0, None, moving=True)
 
 
-def test_a_movement_that_goes_on_remembers_where_it_began():
+def test_a_movement_that_goes_on_counts_from_where_it_is_but_holds_where_it_was():
     states = {"x": linear(read_wall_s=math.inf)}
     checker = Records()
     one = gate(checker, states=states)
@@ -217,7 +217,7 @@ def test_a_movement_that_goes_on_remembers_where_it_began():
     one.decide([Request("x", MoveTo(50.0, "um"), token)])
     states["x"] = linear(read_wall_s=math.inf, position=20.0)
     one.decide([Request("x", MoveTo(60.0, "um"), token)])
-    assert checker.swept["x"] == AxisSpan(0.0, 60.0, 0.0, moving=True)
+    assert checker.swept["x"] == AxisSpan(0.0, 60.0, 20.0, moving=True, heading=1)
 
 
 def test_a_sweep_takes_the_whole_travel():

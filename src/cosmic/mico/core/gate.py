@@ -24,6 +24,7 @@ class _Hold:
     interval: Interval
     target: float | None
     begun_at: float | None
+    heading: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +107,8 @@ class Gate:
                 state = picture.states[axis]
                 if state.confidence is Confidence.UNKNOWN:
                     self._regions[axis] = interval  # wherever that ends, it is somewhere there
-                hold = _Hold(grant, interval, target, origin(state, picture.begun_at))
+                way = decision.headings.get(axis)
+                hold = _Hold(grant, interval, target, origin(state, picture.begun_at), way)
                 self._holds.setdefault(axis, {})[grant.number] = hold
                 self._given = grant.number
                 self._unused[id(grant)] = _Unused(grant, asked[axis])
@@ -216,6 +218,10 @@ class Gate:
             if holds
         }
 
+    def _headings(self) -> dict[str, int]:
+        newest = {axis: holds[max(holds)] for axis, holds in self._holds.items() if holds}
+        return {axis: hold.heading for axis, hold in newest.items() if hold.heading is not None}
+
     def _targets(self) -> dict[str, float]:
         newest = {axis: holds[max(holds)] for axis, holds in self._holds.items() if holds}
         return {axis: hold.target for axis, hold in newest.items() if hold.target is not None}
@@ -241,6 +247,7 @@ class Gate:
             states=states,
             held=self._held(),
             begun_at=self._begun_at(),
+            headings=self._headings(),
             regions=self._regions_now(states),
             links=self._links(),
             targets=self._targets(),

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision.answer import AxisSpan
@@ -10,7 +10,14 @@ from cosmic.mico.core.collision.checker import CollisionChecker
 from cosmic.mico.core.lease import Guard
 from cosmic.mico.core.orders import Interval, Motion
 from cosmic.mico.core.positioner import Confidence, PositionerState
-from cosmic.mico.core.rules import EVERYWHERE, Limits, check_axis, planned_target, swept_interval
+from cosmic.mico.core.rules import (
+    EVERYWHERE,
+    Limits,
+    check_axis,
+    heading,
+    planned_target,
+    swept_interval,
+)
 from cosmic.mico.hw.interface import PositionerKind
 
 logger = logging.getLogger(__name__)
@@ -40,6 +47,8 @@ class Picture:
         What axes in flight may sweep.
     begun_at : mapping of (float or None)
         Where axes in flight stood before; None where that was not known.
+    headings : mapping of int
+        Which way axes in flight go, 1 or -1; those are left out that may go either way.
     regions : mapping of Interval
         Where axes may be whose position is unknown.
     links : mapping of frozenset of str
@@ -56,6 +65,7 @@ class Picture:
     now_wall_s: float
     rules: Limits
     begun_at: Mapping[str, float | None] = field(default_factory=dict)
+    headings: Mapping[str, int] = field(default_factory=dict)
     regions: Mapping[str, Interval] = field(default_factory=dict)
     links: Mapping[str, frozenset[str]] = field(default_factory=dict)
     holder: str = "somebody else"
@@ -79,6 +89,7 @@ class Decision:
     verdict: MoveVerdict
     intervals: Mapping[str, Interval]
     targets: Mapping[str, float]
+    headings: Mapping[str, int]
 
 
 def judge(
@@ -91,23 +102,30 @@ def judge(
     """Decide several movements together; pure: state in, answer out, nothing else touched."""
     intervals: dict[str, Interval] = {}
     targets: dict[str, float] = {}
+    headings = dict(picture.headings)
     asked = {request.axis for request in requests}
     for request in requests:
         verdict = _first_refusal(request, picture)
         if verdict is None:
             verdict = _torn_apart(request, asked, picture)
         if verdict is not None:
-            return Decision(verdict, {}, {})
+            return Decision(verdict, {}, {}, {})
         state = picture.states[request.axis]
         target = planned_target(request.motion, state, picture.targets.get(request.axis))
         if target is not None:
             targets[request.axis] = target
         place = picture.place(state)
+        way = heading(request.motion, state, target)
+        headings.pop(request.axis, None)
+        if way is not None:
+            headings[request.axis] = way
         intervals[request.axis] = swept_interval(
             request.motion, state, target, place, picture.rules
         )
-    verdict = _clear_of_everything(intervals, picture, checker, advice=advice)
-    return Decision(verdict, intervals if verdict.allowed else {}, targets)
+    verdict = _clear_of_everything(
+        intervals, replace(picture, headings=headings), checker, advice=advice
+    )
+    return Decision(verdict, intervals if verdict.allowed else {}, targets, headings)
 
 
 def _first_refusal(request: Request, picture: Picture) -> MoveVerdict | None:
@@ -187,12 +205,17 @@ def span_of(state: PositionerState, asked: Interval | None, picture: Picture) ->
     fresh = not sensed or picture.now_wall_s - state.read_wall_s <= picture.rules.stale_s
     sure = state.present and fresh and (moving or state.activity.at_rest)
     place = asked or (picture.place(state) if sure else EVERYWHERE)
+    now = origin(state, picture.begun_at) if sure else None
+    way = picture.headings.get(state.name) if moving else None
+    if way is not None and now is not None:
+        now = state.position  # what lies behind it, it does not go to again
     return AxisSpan(
         place.low,
         place.high,
-        origin(state, picture.begun_at) if sure else None,
+        now,
         moving=moving,
         estimated=state.confidence is Confidence.ESTIMATED,
+        heading=way if now is not None else None,
     )
 
 

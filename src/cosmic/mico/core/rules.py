@@ -94,6 +94,23 @@ def planned_target(
             return None
 
 
+def heading(motion: Motion, state: PositionerState, target: float | None) -> int | None:
+    """Return which way a movement goes from where the axis stands, 1 or -1; None if either."""
+    direction: Direction | None = None
+    if target is not None and state.position is not None and target != state.position:
+        return 1 if target > state.position else -1
+    match motion:
+        case Step() if motion.steps != 0:
+            return 1 if motion.steps > 0 else -1
+        case ToEndStop():
+            direction = motion.direction
+        case Reference():
+            found = state.positioner
+            if found is not None and found.reference is ReferenceKind.END_STOP:
+                direction = state.safe_direction
+    return None if direction is None else 1 if direction is Direction.FORWARD else -1
+
+
 def swept_interval(
     motion: Motion,
     state: PositionerState,

@@ -26,6 +26,9 @@ class AxisSpan:
         The position is believed, not measured: the span is widened by the drive's uncertainty.
     free : bool
         It was taken out of collision detection: on its own it makes no pair worth looking at.
+    heading : int or None
+        Which way it goes on from `now` while it moves, 1 or -1; None: either, or nobody knows.
+        What lies behind is part of the span, but is not gone to again.
     """
 
     low: float
@@ -34,12 +37,15 @@ class AxisSpan:
     moving: bool = False
     estimated: bool = False
     free: bool = False
+    heading: int | None = None
 
     @property
     def end(self) -> float | None:
         """Where a movement goes; None when it has two ends or nobody knows where it starts."""
         if self.now is None or not self.low <= self.now <= self.high:
             return None
+        if self.heading is not None:
+            return self.high if self.heading > 0 else self.low
         ends = [end for end in (self.low, self.high) if end != self.now]
         return ends[0] if len(ends) == 1 else None
 

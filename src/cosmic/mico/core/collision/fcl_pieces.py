@@ -129,11 +129,10 @@ def separation(one: ConvexPiece, other: ConvexPiece) -> Separation:
     return Separation(gap, _point(normal), *places)
 
 
-def least_overlap(one: ConvexPiece, other: ConvexPiece) -> Floats:
-    """Return the normal of a face, from one to the other, along which they overlap least."""
+def overlaps(one: ConvexPiece, other: ConvexPiece) -> list[tuple[float, Floats]]:
+    """Return how far two pieces overlap along the normal of each face, from one to the other."""
     normals = np.concatenate((one.normals(), -other.normals()))
-    gaps = [gap_along(one, other, normal) for normal in normals]
-    return np.asarray(normals[int(np.argmax(gaps))])
+    return [(-gap_along(one, other, normal), normal) for normal in normals]
 
 
 def _collision_object(shape: Shape) -> fcl.CollisionObject:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -12,7 +12,7 @@ from cosmic.mico.core.collision.answer import AxisSpan, Spans
 from cosmic.mico.core.collision.model import Drive, Floats, Joint, JointKind, SceneModel
 
 Flags = npt.NDArray[np.bool_]
-_Row = tuple[float, float, float, float, float, float, float]
+_Row = tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,23 +23,33 @@ class MotionBox:
     ----------
     low, high
         All places, where everything stands among them, with overshoot.
-    asked_low, asked_high
-        The same without overshoot.
     origin
-        Where everything stands, as far as it is known; else the middle of the interval.
+        Where everything stands, as far as it is known; else the middle of the interval. An
+        estimated axis that goes one way only: the place farthest behind at which it may stand.
     origin_known
         False for joints whose axis moves from somewhere in its interval.
     moving
         Joints of moving axes that collision detection looks after.
+    lowest, highest
+        How far down and up the joints can go from `origin`, overshoot included.
+
+        An axis sent to one side does not overshoot to the other: else nothing could be driven
+        away from where it is too close. One sent nowhere may overshoot to both.
+    sure
+        False for joints whose axis is only estimated and moves.
+    goes
+        Joints of all axes that move, also of those taken out of collision detection.
     """
 
     low: Floats
     high: Floats
-    asked_low: Floats
-    asked_high: Floats
     origin: Floats
     origin_known: Flags
     moving: Flags
+    lowest: Floats
+    highest: Floats
+    sure: Flags
+    goes: Flags
 
     @property
     def centre(self) -> Floats:
@@ -52,17 +62,12 @@ class MotionBox:
         return (self.high - self.low) / 2.0
 
     @property
-    def outward(self) -> tuple[Floats, Floats]:
-        """How far down and up the joints can go from `origin`.
-
-        An axis sent to one side does not overshoot to the other: else nothing could be driven
-        away from where it is too close. One sent nowhere may overshoot to both.
-        """
-        down, up = self.asked_low < self.origin, self.asked_high > self.origin
-        still = ~(down | up)
-        lowest = np.where(down | still, self.low - self.origin, 0.0)
-        highest = np.where(up | still, self.high - self.origin, 0.0)
-        return np.minimum(lowest, 0.0), np.maximum(highest, 0.0)
+    def onward(self) -> "MotionBox":
+        """The part that is still gone to: from `origin`, what rests where it is believed to be."""
+        lowest = np.where(self.goes, self.lowest, 0.0)
+        highest = np.where(self.goes, self.highest, 0.0)
+        low, high = self.origin + lowest, self.origin + highest
+        return replace(self, low=low, high=high, lowest=lowest, highest=highest)
 
 
 class SpanError(ValueError):
@@ -87,15 +92,17 @@ def make_box(model: SceneModel, spans: Spans) -> MotionBox:
     for drive in model.drives:
         number = number_of[drive.joint]
         rows[number] = _row(drive, model.joints[number], spans.get(drive.axis, _ANYWHERE))
-    table = np.array(rows, dtype=float).reshape(-1, 7).T
-    low, high, asked_low, asked_high, origin, known, moving = table
+    table = np.array(rows, dtype=float).reshape(-1, 9).T
+    low, high, origin, known, moving, lowest, highest, sure, goes = table
     if not np.isfinite(table).all():
         raise SpanError("a joint without end has no interval")
-    return MotionBox(low, high, asked_low, asked_high, origin, known > 0.0, moving > 0.0)
+    return MotionBox(
+        low, high, origin, known > 0.0, moving > 0.0, lowest, highest, sure > 0.0, goes > 0.0
+    )
 
 
 _ANYWHERE: Final = AxisSpan(-math.inf, math.inf)
-_REST: Final[_Row] = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+_REST: Final[_Row] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
 def _check(axis: str, span: AxisSpan, model: SceneModel) -> None:
@@ -110,19 +117,40 @@ def _row(drive: Drive, joint: Joint, span: AxisSpan) -> _Row:
     """Return one joint's numbers in the order of the fields of `MotionBox`."""
     if span.low == span.now == span.high and not (span.moving or span.estimated):
         rest = drive.offset + drive.factor * span.now
-        return rest, rest, rest, rest, rest, 1.0, 0.0
+        return rest, rest, rest, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0
     spread = drive.uncertainty if span.estimated else 0.0
     over = drive.overshoot if span.moving else 0.0
     now = None if span.now is None else drive.offset + drive.factor * span.now
-    asked_low, asked_high = low, high = _interval(drive, joint, span, spread, now)
+    asked = low, high = _interval(drive, joint, span, spread, now)
     if over != 0.0:
         low, high = _interval(drive, joint, span, spread + over, now)
-    origin = (low + high) / 2.0 if now is None else now
+    heading = (span.heading or 0) if drive.factor > 0.0 else -(span.heading or 0)
+    sure = not (span.estimated and span.moving)
     # An axis at rest whose place is only believed keeps nobody from retreating: the gap that
     # counts is then the one where it is believed to be.
-    known = now is not None and not (span.estimated and span.moving)
+    known = now is not None and (sure or heading != 0)
+    origin = (low + high) / 2.0 if now is None else now
+    if heading and not sure and now is not None:
+        around = _within(
+            now - abs(drive.factor) * spread, now + abs(drive.factor) * spread, joint, now
+        )
+        origin = around[0] if heading > 0 else around[1]
+    down = heading < 0 or (heading == 0 and asked[0] < origin) or not span.moving
+    up = heading > 0 or (heading == 0 and asked[1] > origin) or not span.moving
+    lowest = min(low - origin, 0.0) if down or not up else 0.0
+    highest = max(high - origin, 0.0) if up or not down else 0.0
     moves = span.moving and not span.free
-    return low, high, asked_low, asked_high, origin, float(known), float(moves)
+    return (
+        low,
+        high,
+        origin,
+        float(known),
+        float(moves),
+        lowest,
+        highest,
+        float(sure),
+        float(span.moving),
+    )
 
 
 def _interval(

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from cosmic.mico.core.collision.fcl_pieces import ConvexPiece, gap_along, least_overlap, separation
+from cosmic.mico.core.collision.fcl_pieces import ConvexPiece, gap_along, separation
 from cosmic.mico.core.collision.model import Floats
 from cosmic.mico.core.collision.swept_gap import decide
 
@@ -36,7 +36,7 @@ class Slide:
     start : ndarray, shape (m,)
         Where the joints stand, from the middle of the box.
     lowest, highest : ndarray, shape (m,)
-        From `start`: how far the joints can go from where they stand; see `MotionBox.outward`.
+        From `start`: how far the joints can go from where they stand; see `MotionBox.lowest`.
     known : bool
         All joints stand where they are said to.
     """
@@ -63,14 +63,11 @@ class Finding:
         From the middle of the box.
     normal : ndarray, shape (3,), or None
         Direction that proved the gap: a good first guess the next time.
-    inside : bool
-        They are closer than the margin already where the movement begins.
     """
 
     clear: bool
     at: Floats | None = None
     normal: Floats | None = None
-    inside: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,10 +103,8 @@ def smallest_gap(slide: Slide, margin_um: float, guess: Floats | None = None) ->
     if slide.known:
         second.put(slide.rotation, slide.place_um + slide.ways @ slide.start)
         found = separation(first, second)
-        if _leaves(slide, np.array(found.normal) @ slide.ways, found.gap_um):
+        if found.gap_um > 0.0 and leaves(slide, np.array(found.normal)):
             return Finding(clear=True)
-        if not found.gap_um > margin_um:
-            return Finding(clear=False, at=slide.start, inside=True)
     if answer is not None:
         return Finding(clear=False, at=answer[1])
     return by_advancement(slide, margin_um)
@@ -140,17 +135,17 @@ def by_advancement(slide: Slide, margin_um: float) -> Finding:
     return _by_hull(slide, margin_um, closest)
 
 
-def _leaves(slide: Slide, slope: Floats, gap_um: float) -> bool:
-    """Return True for a movement that brings the two nowhere closer than they are.
+def leaves(slide: Slide, normal: Floats, *, strictly: bool = False) -> bool:
+    """Return True for a movement that goes nowhere against `normal`, the nearest way apart.
 
-    A pair inside its margin may do nothing else, and a pair outside it needs no more proof.
+    The gap of two convex bodies is then nowhere less than where the movement begins. `strictly`
+    it also goes along it.
     """
-    if gap_um <= 0.0:
-        slope = least_overlap(slide.first, slide.second) @ slide.ways
+    slope = normal @ slide.ways
     low, high = slope * slide.lowest, slope * slide.highest
     if not float(np.minimum(low, high).sum()) >= -NOTHING_UM:
         return False
-    return gap_um > 0.0 or float(np.maximum(low, high).sum()) > NOTHING_UM
+    return not strictly or float(np.maximum(low, high).sum()) > NOTHING_UM
 
 
 def _mix(one: _Bound, other: _Bound, half: Floats) -> _Bound:

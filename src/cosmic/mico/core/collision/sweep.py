@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping, Set
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from cosmic.mico.core.collision.answer import INSIDE_TEXT, Approach, Spans, SweepAnswer
 from cosmic.mico.core.collision.arrangement import Arrangement, Turned
-from cosmic.mico.core.collision.fcl_pieces import ConvexPiece, separation
+from cosmic.mico.core.collision.fcl_pieces import ConvexPiece, gap_along, overlaps, separation
 from cosmic.mico.core.collision.model import BodyPair, Floats, SceneModel
 from cosmic.mico.core.collision.motion_box import (
     MotionBox,
@@ -16,10 +17,13 @@ from cosmic.mico.core.collision.motion_box import (
     axis_positions,
     make_box,
 )
-from cosmic.mico.core.collision.sliding import Slide, guess_holds, smallest_gap
+from cosmic.mico.core.collision.sliding import Slide, guess_holds, leaves, smallest_gap
 from cosmic.mico.core.collision.turning import Turn, TurningPairs
 
 _Numbers = npt.NDArray[np.intp]
+_ACROSS: Final = 1e-6
+"""A joint that moves less than this along a direction does not move along it."""
+_BEYOND_UM: Final = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +45,26 @@ class _Stand:
     places: Floats
     low: Floats
     high: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class _Inside:
+    """Two bodies that begin closer than their margin.
+
+    Attributes
+    ----------
+    rows : list of int
+        All pairs of their pieces.
+    gaps : mapping of float
+        Gap of those that are near each other, um.
+    sure : bool
+        False where one of them is only believed to stand there.
+    """
+
+    rows: list[int]
+    gaps: Mapping[int, float]
+    nearest: int
+    sure: bool
 
 
 class Sweep:
@@ -105,16 +129,23 @@ class Sweep:
             return SweepAnswer(clear=False, reason=str(exc))
         centre = box.centre
         stand = self._stand(centre)
+        retreating: set[int] = set()
         for row in self._candidates(box, stand):
-            pair = self.model.pairs[self._pair[row]]
-            if pair.bodies in ignored:
+            number = int(self._pair[row])
+            pair = self.model.pairs[number]
+            if pair.bodies in ignored or number in retreating:
                 continue
-            touch = self._first_touch(row, box, stand, pair.margin_um)
-            if touch is not None:
-                values, inside = touch
-                approach = self._approach(row, values)
-                reason = INSIDE_TEXT if inside else ""
-                return SweepAnswer(clear=False, approach=approach, reason=reason)
+            values = self._first_touch(row, box, stand, pair.margin_um)
+            if values is None:
+                continue
+            begin = self._inside(number, box)
+            if begin is not None and self._retreats(begin, box.onward):
+                retreating.add(number)
+            elif begin is not None and begin.sure:
+                approach = self._approach(begin.nearest, box.origin)
+                return SweepAnswer(clear=False, approach=approach, reason=INSIDE_TEXT)
+            else:
+                return SweepAnswer(clear=False, approach=self._approach(row, values))
         return SweepAnswer(clear=True)
 
     def _stand(self, values: Floats) -> _Stand:
@@ -180,10 +211,8 @@ class Sweep:
         first, second = int(self._first[row]), int(self._second[row])
         return Turn(first, second, int(self._body[first]), int(self._body[second]))
 
-    def _first_touch(
-        self, row: int, box: MotionBox, stand: _Stand, margin: float
-    ) -> tuple[Floats, bool] | None:
-        """Return joint values at which a pair is too close, and whether it begins so."""
+    def _first_touch(self, row: int, box: MotionBox, stand: _Stand, margin: float) -> Floats | None:
+        """Return joint values at which a pair is too close, or None."""
         used = np.flatnonzero(self._between[row] & (box.half > 0.0))
         if self._arrangement.swings[used].any():
             return self._turning.first_touch(self._turn(row), box, margin)
@@ -199,14 +228,129 @@ class Sweep:
         values = box.centre
         if finding.at is not None:
             values[used] += finding.at
-        return values, finding.inside
+        return values
+
+    # Pairs that begin inside their margin
+
+    def _inside(self, number: int, box: MotionBox) -> _Inside | None:
+        """Return how two bodies begin that are closer than their margin; None of any others.
+
+        None too where nobody knows how they begin.
+        """
+        rows = np.flatnonzero(self._pair == number)
+        wide = self._between[rows[0]] & ((box.half > 0.0) | ~box.sure)
+        if not box.origin_known[wide].all():
+            return None
+        stand = self._stand(box.origin)
+        first, second = self._first[rows], self._second[rows]
+        apart = np.maximum(stand.low[second] - stand.high[first], 0.0)
+        apart = np.maximum(apart, stand.low[first] - stand.high[second])
+        margin = self.model.pairs[number].margin_um
+        near = rows[np.linalg.norm(apart, axis=1) <= margin].tolist()
+        gaps = {row: self._approach(row, box.origin, stand).distance_um for row in near}
+        if not gaps or not min(gaps.values()) <= margin:
+            return None
+        nearest = min(gaps, key=gaps.__getitem__)
+        return _Inside(rows.tolist(), gaps, nearest, sure=bool(box.sure[wide].all()))
+
+    def _retreats(self, begin: _Inside, onward: MotionBox) -> bool:
+        """Return True when two bodies come nowhere closer than they begin.
+
+        Bodies count, not pieces: while one piece is left, another may come nearer, but not nearer
+        than the first one was. Where they overlap they leave by the shortest way that leads out.
+        """
+        least = begin.gaps[begin.nearest]
+        overlapping = [row for row, gap in begin.gaps.items() if not gap > 0.0]
+        normal = self._way_out(overlapping, begin.rows, onward.origin) if overlapping else None
+        stand = self._stand(onward.centre)
+        for row in begin.rows:
+            used = np.flatnonzero(self._between[row] & (onward.half > 0.0))
+            if not used.size:
+                continue
+            turns = bool(self._arrangement.swings[used].any())
+            if row in overlapping:
+                if normal is None or not self._parts(row, onward, stand, used, normal, turns=turns):
+                    return False
+            elif turns:
+                if not self._turning.keeps(self._turn(row), onward, least):
+                    return False
+            elif not self._keeps(row, onward, stand, used, least, sure=begin.sure):
+                return False
+        return True
+
+    def _keeps(
+        self,
+        row: int,
+        onward: MotionBox,
+        stand: _Stand,
+        used: _Numbers,
+        least: float,
+        *,
+        sure: bool,
+    ) -> bool:
+        """Return True when a piece that slides comes nowhere closer than `least`."""
+        slide = self._slide(row, onward, stand, used)
+        slide.second.put(slide.rotation, slide.place_um + slide.ways @ slide.start)
+        found = separation(slide.first, slide.second)
+        if found.gap_um > 0.0 and leaves(slide, np.array(found.normal)):
+            return True
+        return sure and smallest_gap(slide, least).clear
+
+    def _parts(
+        self,
+        row: int,
+        onward: MotionBox,
+        stand: _Stand,
+        used: _Numbers,
+        normal: Floats,
+        *,
+        turns: bool,
+    ) -> bool:
+        """Return True when a piece that overlaps another comes out along `normal`."""
+        if turns:
+            return self._turning.parts(self._turn(row), onward, normal)
+        return leaves(self._slide(row, onward, stand, used), normal, strictly=True)
+
+    def _way_out(self, overlapping: list[int], rows: list[int], values: Floats) -> Floats | None:
+        """Return the direction in which the second body is out of the first after least way.
+
+        Only directions count in which the two can be moved against each other, and that do not
+        lead into another piece.
+        """
+        stand = self._stand(values)
+        choices: list[tuple[float, Floats]] = []
+        for row in overlapping:
+            choices += overlaps(*self._put(row, stand))
+        ways = self._ways[rows[0]][:, self._between[rows[0]]]
+        steady = not self._arrangement.swings[self._between[rows[0]]].any()
+        for _, normal in sorted(choices, key=lambda choice: choice[0]):
+            if steady and not np.abs(normal @ ways).max(initial=0.0) > _ACROSS:
+                continue
+            deepest = max(self._overlap(row, stand, normal) for row in overlapping)
+            shift = (deepest + _BEYOND_UM) * normal
+            if all(separation(*self._put(row, stand, shift)).gap_um > 0.0 for row in rows):
+                return normal
+        return None
+
+    def _overlap(self, row: int, stand: _Stand, normal: Floats) -> float:
+        return -gap_along(*self._put(row, stand), normal)
+
+    def _put(
+        self, row: int, stand: _Stand, shift: Floats | float = 0.0
+    ) -> tuple[ConvexPiece, ConvexPiece]:
+        """Put the two pieces of a pair where they stand, the second one shifted."""
+        pieces = []
+        for number, further in ((self._first[row], 0.0), (self._second[row], shift)):
+            body = self._body[number]
+            self._pieces[number].put(stand.rotations[body], stand.places[body] + further)
+            pieces.append(self._pieces[number])
+        return pieces[0], pieces[1]
 
     def _slide(self, row: int, box: MotionBox, stand: _Stand, used: _Numbers) -> Slide:
         first, second = self._first[row], self._second[row]
         self._pieces[first].put(stand.rotations[self._body[first]], stand.places[self._body[first]])
         body = self._body[second]
         half = box.half[used]
-        lowest, highest = box.outward
         return Slide(
             first=self._pieces[first],
             second=self._pieces[second],
@@ -215,8 +359,8 @@ class Sweep:
             ways=self._ways[row][:, used],
             half=half,
             start=np.clip(box.origin[used] - box.centre[used], -half, half),
-            lowest=lowest[used],
-            highest=highest[used],
+            lowest=box.lowest[used],
+            highest=box.highest[used],
             known=bool(box.origin_known[used].all()),
         )
 

@@ -1,6 +1,7 @@
 """Two pieces of which one turns: the joint box is split until every part is proved or refuted."""
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -16,6 +17,9 @@ from cosmic.mico.core.collision.sliding import NOTHING_UM
 MOST_QUERIES: Final = 600
 FLOOR_UM: Final = 1.0
 """A part that brings the two less than this closer and is not proved free counts as not free."""
+
+CREEP_UM: Final = 0.01
+"""So much closer two may come on the way apart: less than a stage can be told to move."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,13 +70,8 @@ class TurningPairs:
         self._normals: dict[Turn, Floats] = {}
         self._values = np.zeros(len(self._joints))
 
-    def first_touch(
-        self, turn: Turn, box: MotionBox, margin_um: float
-    ) -> tuple[Floats, bool] | None:
-        """Return joint values at which the margin is not kept, or None where it always is.
-
-        The second value is True where the pair begins so.
-        """
+    def first_touch(self, turn: Turn, box: MotionBox, margin_um: float) -> Floats | None:
+        """Return joint values at which the margin is not kept, or None where it always is."""
         riders = self._riders(turn, box)
         low, high = box.centre, box.centre
         joints = [rider.joint for rider in riders]
@@ -80,14 +79,42 @@ class TurningPairs:
         if self._remembered(turn, riders, _part(low, high), margin_um):
             return None
         if box.origin_known[joints].all():
-            start = _Part(box.origin, *box.outward)
+            start = _Part(box.origin, box.lowest, box.highest)
             gap, normal = self._measure(turn, start.values)
             if gap > 0.0 and sum(self._losses(riders, start, normal)) <= NOTHING_UM:
                 return None
-            if not gap > margin_um:
-                return box.origin.copy(), True
-        touch = self._search(turn, riders, (low, high), margin_um)
-        return None if touch is None else (touch, False)
+        return self._search(turn, riders, (low, high), margin_um)
+
+    def keeps(self, turn: Turn, onward: MotionBox, least_um: float) -> bool:
+        """Return True when a movement from inside the margin comes nowhere closer than `least_um`.
+
+        On the way it may by `CREEP_UM`, for no part that begins there could be proved otherwise;
+        where it ends it may not.
+        """
+        riders = self._riders(turn, onward)
+        low, high = onward.origin.copy(), onward.origin.copy()
+        joints = sorted({rider.joint for rider in riders})
+        low[joints], high[joints] = onward.low[joints], onward.high[joints]
+        for ends in product(*((low[joint], high[joint]) for joint in joints)):
+            values = onward.origin.copy()
+            values[joints] = ends
+            if not self._measure(turn, values)[0] >= least_um - NOTHING_UM:
+                return False
+        bound = least_um - CREEP_UM
+        return self._search(turn, riders, (low, high), bound, CREEP_UM / 8.0) is None
+
+    def parts(self, turn: Turn, onward: MotionBox, normal: Floats) -> bool:
+        """Return True when two that overlap come apart along `normal`, and never go back."""
+        riders = self._riders(turn, onward)
+        start = _Part(onward.origin, onward.lowest, onward.highest)
+        self._put(turn, start.values)
+        if not sum(self._losses(riders, start, normal)) <= NOTHING_UM:
+            return False
+        before = gap_along(*self._put(turn, start.values), normal)
+        for end in (onward.low, onward.high):
+            if gap_along(*self._put(turn, end), normal) > before + NOTHING_UM:
+                return True
+        return False
 
     def widen(self, piece: int, body: int, box: MotionBox, corners: tuple[Floats, Floats]) -> None:
         """Widen the box round a piece, put in the middle, by all that joints can turn it."""
@@ -126,7 +153,12 @@ class TurningPairs:
         ]
 
     def _search(
-        self, turn: Turn, riders: list[_Rider], whole: tuple[Floats, Floats], margin_um: float
+        self,
+        turn: Turn,
+        riders: list[_Rider],
+        whole: tuple[Floats, Floats],
+        margin_um: float,
+        floor_um: float = FLOOR_UM,
     ) -> Floats | None:
         parts = [whole]
         for _ in range(MOST_QUERIES):
@@ -143,7 +175,7 @@ class TurningPairs:
             if gap - sum(losses) > margin_um:
                 self._normals[turn] = normal
                 continue
-            if not sum(losses) > FLOOR_UM:
+            if not sum(losses) > floor_um:
                 return part.values
             widest = riders[int(np.argmax(losses))].joint
             upper, lower = low.copy(), high.copy()
