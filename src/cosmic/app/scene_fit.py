@@ -26,7 +26,11 @@ def load_checker(file: PlatformFile, path: Path) -> CollisionChecker:
     mistakes = misfits(file, path, scene)
     if mistakes:
         raise ConfigError("\n".join(mistakes))
-    return CollisionManager(scene, axes=(each.name for each in file.mico.positioner))
+    return CollisionManager(
+        scene,
+        answer_s=file.mico.watch.collision_answer_s,
+        axes=(each.name for each in file.mico.positioner),
+    )
 
 
 def misfits(file: PlatformFile, path: Path, scene: SceneModel) -> list[str]:

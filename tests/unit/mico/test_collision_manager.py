@@ -188,7 +188,7 @@ def test_no_answer_is_a_refusal_that_says_so(
     verdict = ask(manager, 0.0, 1.0)
     assert not verdict.allowed
     assert verdict.reason is Reason.NO_ANSWER
-    assert "nothing was moved" in str(verdict)
+    assert "The move was refused." in str(verdict)
 
 
 def test_an_answer_that_is_neither_clear_nor_names_a_pair_is_a_refusal(

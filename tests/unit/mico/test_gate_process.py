@@ -416,3 +416,17 @@ def test_a_script_without_a_main_guard_can_start_it(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert len(done.stdout.split()) == 1
+
+
+# --- a slow host ------------------------------------------------------------------------------
+
+
+def test_a_process_that_is_starved_for_a_while_is_waited_for(gate: GateProcess) -> None:
+    pid = signalled(gate, signal.SIGSTOP)
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(gate.check, FREE)
+        wait_until(lambda: gate.busy)
+        WALL.sleep(1.5)
+        os.kill(pid, signal.SIGCONT)
+        assert waiting.result(5.0).clear
+    assert gate.restarts == 0

@@ -5,17 +5,32 @@ from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import count
 from threading import Lock
+from typing import Final
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.mico.core.collision import words
 from cosmic.mico.core.collision.answer import AxisSpan
 from cosmic.mico.core.collision.checker import CollisionChecker
-from cosmic.mico.core.judgement import Picture, Request, judge, origin, span_of
+from cosmic.mico.core.judgement import (
+    Decision,
+    Picture,
+    Request,
+    judge,
+    origin,
+    span_of,
+    still_true,
+)
 from cosmic.mico.core.lease import Lease, LeaseHolder
 from cosmic.mico.core.orders import Grant, Interval, Motion
 from cosmic.mico.core.positioner import Confidence, PositionerState
 from cosmic.mico.core.rules import Limits
 from cosmic.mico.core.stop_latch import StopLatch, StopState
+
+SOON_S: Final = 0.05
+"""An answer that took no longer is as new as the positions, which are asked for so often."""
+MOST_JUDGED: Final = 3
+"""How often movements are judged because the platform changed meanwhile."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,10 +110,19 @@ class Gate:
     def decide(self, requests: Sequence[Request]) -> tuple[MoveVerdict, dict[str, Grant]]:
         """Decide `requests` together; when allowed, hold their intervals and grant each axis."""
         holder = self._lease.holder  # first, for it may tell listeners that it has lapsed
+        verdict, grants = self._decide(requests, holder)
+        if self._lease.holder.token == holder.token:
+            return verdict, grants
+        for grant in grants.values():
+            self.withdraw(grant)
+        return self.decide(requests)  # control passed meanwhile
+
+    def _decide(
+        self, requests: Sequence[Request], holder: LeaseHolder
+    ) -> tuple[MoveVerdict, dict[str, Grant]]:
         with self._lock:
             epoch = self._latch.state.epoch
-            picture = self._picture(holder)
-            decision = judge(requests, picture, self._checker)
+            picture, decision = self._judge(requests, holder)
             grants: dict[str, Grant] = {}
             asked = {request.axis: request.motion for request in requests}
             for axis, interval in decision.intervals.items():
@@ -114,6 +138,20 @@ class Gate:
                 self._unused[id(grant)] = _Unused(grant, asked[axis])
                 grants[axis] = grant
             return decision.verdict, grants
+
+    def _judge(self, requests: Sequence[Request], holder: LeaseHolder) -> tuple[Picture, Decision]:
+        """Judge `requests` by the platform as it still is when the answer comes; under the lock."""
+        picture = self._picture(holder)
+        for _ in range(MOST_JUDGED):
+            decision = judge(requests, picture, self._checker)
+            soon = WALL.now_s() - picture.now_wall_s <= SOON_S
+            if soon or not decision.verdict.allowed:
+                return picture, decision
+            now = self._picture(holder)
+            if still_true(requests, picture, now):
+                return picture, decision
+            picture = now
+        return picture, Decision(words.changed(), {}, {}, {})
 
     def spans(self) -> dict[str, AxisSpan]:
         """Return where every axis may be as things are now."""

@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Final
 
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision.answer import AxisSpan
@@ -21,6 +22,9 @@ from cosmic.mico.core.rules import (
 from cosmic.mico.hw.interface import PositionerKind
 
 logger = logging.getLogger(__name__)
+
+STILL: Final = {"um": 0.1, "deg": 0.001}
+"""By unit: a reading that changed by less says that the axis stands."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +130,37 @@ def judge(
         intervals, replace(picture, headings=headings), checker, advice=advice
     )
     return Decision(verdict, intervals if verdict.allowed else {}, targets, headings)
+
+
+def still_true(requests: Sequence[Request], then: Picture, now: Picture) -> bool:
+    """Return whether what was judged by the picture `then` may be done by the picture `now`.
+
+    Axes in flight may go on within what they hold; nothing else may have changed. Stops are
+    counted by the reservations.
+    """
+    if (then.token, then.links) != (
+        now.token,
+        now.links,
+    ) or then.states.keys() != now.states.keys():
+        return False
+    if any(_no_right(request, now) for request in requests):
+        return False
+    return all(
+        _as_judged(state, now.states[name], then, now) for name, state in then.states.items()
+    )
+
+
+def _as_judged(then: PositionerState, now: PositionerState, old: Picture, new: Picture) -> bool:
+    known = then.present, then.confidence, then.limits, then.std, then.position is None
+    if known != (now.present, now.confidence, now.limits, now.std, now.position is None):
+        return False
+    sensed = now.kind is not PositionerKind.OPEN_LOOP
+    if sensed and now.present and new.now_wall_s - now.read_wall_s > new.rules.stale_s:
+        return False
+    if then.position is None or now.position is None:
+        return True
+    place, off = old.place(then), STILL[now.unit]
+    return place.low - off <= now.position <= place.high + off
 
 
 def _first_refusal(request: Request, picture: Picture) -> MoveVerdict | None:

@@ -71,6 +71,9 @@ class PositionerState:
         Its device answers.
     safe_direction : Direction or None
         Which way a search for the reference begins; None where the controller has not told.
+    std : float
+        Standard deviation of an estimated position, in `unit`; infinite where nobody knows, 0 of a
+        measured one.
     """
 
     name: str
@@ -88,6 +91,7 @@ class PositionerState:
     error: str = ""
     present: bool = True
     safe_direction: Direction | None = None
+    std: float = 0.0
 
     @property
     def status(self) -> Status:

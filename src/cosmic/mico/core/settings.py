@@ -64,6 +64,7 @@ class WatchSettings(StrictModel):
     stale_s: float = Field(default=5.0, ge=1, le=60)
     stall_s: float = Field(default=5.0, ge=0.5, le=120)
     answer_s: float = Field(default=5.0, ge=0.5, le=60)
+    collision_answer_s: float = Field(default=5.0, ge=0.5, le=10)
     tolerance_um: float = Field(default=2.0, gt=0)
     tolerance_deg: float = Field(default=0.01, gt=0)
 

@@ -14,7 +14,7 @@ from cosmic.mico.core.collision.answer import INSIDE_TEXT, Approach, Spans, Swee
 from cosmic.mico.core.collision.callback import CollisionCallbackBase, RefuseContact, Response
 from cosmic.mico.core.collision.checker import CollisionChecker
 from cosmic.mico.core.collision.exemptions import Exemptions
-from cosmic.mico.core.collision.helper_link import GateProcess, NoAnswerError
+from cosmic.mico.core.collision.helper_link import GateProcess, LateAnswerError, NoAnswerError
 from cosmic.mico.core.collision.model import BodyPair, SceneModel, pair_of
 
 logger = logging.getLogger(__name__)
@@ -22,6 +22,8 @@ logger = logging.getLogger(__name__)
 _NOBODY: Final[frozenset[BodyPair]] = frozenset()
 
 
+MOST_JUDGED: Final = 3
+"""How often a question is put again because what is left out of it changed meanwhile."""
 JUST_BEHIND: Final = 2.0
 """How far behind the free part of a way its end is looked at, um or degrees."""
 
@@ -64,7 +66,7 @@ class CollisionManager(Exemptions, CollisionChecker):
         self,
         model: SceneModel,
         *,
-        answer_s: float = 1.0,
+        answer_s: float = 5.0,
         process: Answering | None = None,
         axes: Iterable[str] = (),
     ) -> None:
@@ -97,7 +99,14 @@ class CollisionManager(Exemptions, CollisionChecker):
     @override
     def check(self, spans: Spans, *, advice: bool = True) -> MoveVerdict:
         try:
-            return self._judge(self._with_freed(spans), advice=advice)
+            for _ in range(MOST_JUDGED):
+                before = self.taken_out, self.ignored_pairs
+                verdict = self._judge(self._with_freed(spans), advice=advice)
+                if not verdict.allowed or before == (self.taken_out, self.ignored_pairs):
+                    return verdict
+            return words.changed()
+        except LateAnswerError as exc:
+            return words.late_answer(str(exc))
         except NoAnswerError as exc:
             return words.no_answer(str(exc))
         except Exception as exc:  # a check that cannot answer says no

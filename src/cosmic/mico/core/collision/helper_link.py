@@ -13,6 +13,7 @@ from cosmic.frame.errors import CosmicError
 from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
 from cosmic.mico.core.collision.helper_spawn import (
     HelperFaultError,
+    HelperLateError,
     HelperProcess,
     HelperRefusalError,
     pickle_scene,
@@ -34,8 +35,15 @@ class NoAnswerError(CosmicError):
     """The collision gate gave no answer, so the answer is no; the text says why."""
 
 
+class LateAnswerError(NoAnswerError):
+    """The answer did not come in time; the text says within which."""
+
+
 class GateProcess:
     """The pure gate in a process of its own; any thread.
+
+    A process that dies is seen at once by its pipe. One that is only slow, on a busy computer, is
+    waited for until `answer_s`; then it counts as hanging. Whoever waits can be stopped meanwhile.
 
     A process that dies, hangs or answers nonsense costs the question that met it a
     `NoAnswerError` and is replaced at once; until the new one has loaded the scene, questions
@@ -45,7 +53,7 @@ class GateProcess:
     Parameters
     ----------
     answer_s : float
-        How long to wait for an answer, in wall time.
+        How long to wait for an answer, in wall time; see `WatchSettings.collision_answer_s`.
     start_s : float
         How long the process may take to come up.
     handlers : mapping of str
@@ -57,7 +65,7 @@ class GateProcess:
         self,
         model: SceneModel,
         *,
-        answer_s: float = 1.0,
+        answer_s: float = 5.0,
         start_s: float = 15.0,
         handlers: Mapping[str, str] | None = None,
     ) -> None:
@@ -197,13 +205,15 @@ class GateProcess:
                 raise NoAnswerError(str(exc)) from exc
             except HelperFaultError as exc:
                 self._replace(str(exc))
+                if isinstance(exc, HelperLateError):
+                    raise LateAnswerError(f"within {timeout_s:g} s") from exc
                 raise NoAnswerError(f"{exc}; {self._down or 'it is being restarted'}") from exc
             return answer
 
     @contextmanager
     def _turn(self, timeout_s: float) -> Iterator[None]:
         if not self._lock.acquire(timeout=timeout_s):
-            raise NoAnswerError(f"it was busy for {timeout_s:g} s")
+            raise LateAnswerError(f"within {timeout_s:g} s; it was busy")
         try:
             yield
         finally:

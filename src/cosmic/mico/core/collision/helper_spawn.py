@@ -43,6 +43,10 @@ class HelperFaultError(CosmicError):
     """The process is dead, hangs or talks rubbish: it must be replaced."""
 
 
+class HelperLateError(HelperFaultError):
+    """The process did not answer in time."""
+
+
 class HelperRefusalError(CosmicError):
     """The process is well, but cannot answer this question; the text is its reason."""
 
@@ -128,7 +132,7 @@ class HelperProcess:
         while True:
             left_s = until_s - WALL.now_s()
             if left_s <= 0.0 or not self._poll(left_s):
-                raise HelperFaultError(f"it gave no answer within {timeout_s:g} s")
+                raise HelperLateError(f"it did not answer within {timeout_s:g} s")
             reply = self._receive()
             # An older one belongs to a question whose asker was interrupted.
             if reply.number == number:

@@ -23,12 +23,25 @@ def unit_of(model: SceneModel, axis: str) -> str:
     return ""
 
 
+_REFUSED = "The move was refused. Press Rescan if it happens again."
+
+
 def no_answer(why: str) -> MoveVerdict:
     """Return the refusal for want of an answer."""
+    return refuse(Reason.NO_ANSWER, f"Collision check did not answer ({why}). {_REFUSED}")
+
+
+def late_answer(how: str) -> MoveVerdict:
+    """Return the refusal for want of an answer in time, such as "within 5 s"."""
+    return refuse(Reason.NO_ANSWER, f"Collision check did not answer {how}. {_REFUSED}")
+
+
+def changed() -> MoveVerdict:
+    """Return the refusal where what was judged was not true any more when the answer came."""
     return refuse(
         Reason.NO_ANSWER,
-        f"the collision check gave no answer ({why}); nothing was moved. Try again in a moment; "
-        "if it stays so, search the devices again",
+        "The platform changed while the collision check looked at it. The move was refused. "
+        "Try again.",
     )
 
 
