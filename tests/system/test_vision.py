@@ -380,3 +380,17 @@ def test_a_lens_that_was_not_homed_says_so_and_nothing_is_told_in_um() -> None:
                 task.wait(10.0)
         with pytest.raises(cosmic.CosmicError):
             rig.vico.calibrate_stage("left").wait(10.0)
+
+
+def test_a_gripper_out_of_focus_across_the_picture_does_not_end_the_finding_of_fibres() -> None:
+    with cosmic.connect(rate=20.0, applications=("mico", "vico")) as rig:
+        rig.mico["left.x"].move_to(3600.0)
+        rig.mico["left.z"].move_to(-800.0)
+        assert rig.vico.lens is not None
+        rig.vico.lens.zoom_to(1.0)
+        assert rig.vico.find_fibres()
+        camera = rig.vico.camera()
+        camera.switch("fibres", on=True)
+        wait_until(lambda: camera.analysis is not None and camera.analysis.fibres)
+        (link,) = [each for each in camera.algorithms if each.name == "fibres"]
+        assert (link.on, link.failing) == (True, False)

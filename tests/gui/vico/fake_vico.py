@@ -94,6 +94,7 @@ class Link:
     description: str = "Centre lines, ends and measures of the fibres in the picture"
     on: bool = False
     problem: str = ""
+    failing: bool = False
 
 
 @dataclass(frozen=True)

@@ -174,3 +174,13 @@ def test_a_background_is_taken_and_cleared(qtbot, shown, camera):
     qtbot.waitUntil(shown.chain.clear.isEnabled)
     shown.chain.clear.click()
     assert camera.calls == [("set background",), ("clear background",)]
+
+
+def test_a_step_of_machine_vision_that_fails_is_told_on_the_picture_until_it_works(shown, camera):
+    well = camera.algorithms
+    camera.change(algorithms=(replace(well[0], on=True, failing=True, problem="finds: broken"),))
+    shown.read_out()
+    assert "finds: broken" in shown.message.text
+    camera.change(algorithms=well)
+    shown.read_out()
+    assert shown.message.text == ""

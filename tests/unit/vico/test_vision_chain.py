@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import ConfigError
 from cosmic.vico.core.picture import Circumstances, Picture
 from cosmic.vico.core.vision.algorithms import FindTools, TrackFibre, TrackPlace, make_chain
@@ -94,23 +95,35 @@ def test_one_that_raises_is_named_and_the_rest_runs(caplog: pytest.LogCaptureFix
         analysis = chain.run(picture(number=17))
     assert dict(analysis.results) == {"mean": 100.0}
     assert analysis.failures["moody"].text == "moody: divided the picture by nothing"
-    assert not analysis.failures["moody"].switched_off
+    assert not analysis.failures["moody"].resting
     assert "moody failed on frame 17" in caplog.text
 
 
-def test_after_three_failures_in_a_row_it_is_switched_off_and_says_why() -> None:
+def test_after_three_failures_in_a_row_it_rests_says_why_and_is_tried_again(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = ManualClock()
+    monkeypatch.setattr("cosmic.vico.core.vision.chain.WALL", clock)
     moody = Moody()
     chain = Chain([moody, Mean()])
-    seen = [chain.run(picture()).failures for _ in range(5)]
-    assert moody.runs == 3
-    assert [each["moody"].switched_off for each in seen if each] == [False, False, True]
-    state = chain.states[0]
-    assert not state.on
-    assert "3 times in a row: moody: divided" in state.reason
-    chain.switch("moody", on=True)
-    moody.raises = False
-    assert chain.run(picture()).results["moody"] == "well"
+    with caplog.at_level(logging.INFO):
+        seen = [chain.run(picture()).failures for _ in range(5)]
+        assert moody.runs == 3
+        assert [each["moody"].resting for each in seen if each] == [False, False, True]
+        state = chain.states[0]
+        assert state.on, "nobody switched it off"
+        assert "3 times in a row, is tried again every 2 s: moody: divided" in state.reason
+        clock.advance(2.1)
+        chain.run(picture())
+        chain.run(picture())
+        assert moody.runs == 4
+        assert caplog.text.count("moody failed") == 1, "it is said once"
+        moody.raises = False
+        clock.advance(2.1)
+        assert chain.run(picture()).results["moody"] == "well"
+        assert chain.run(picture()).results["moody"] == "well"
     assert chain.states[0].reason == ""
+    assert caplog.text.count("moody works again") == 1
 
 
 def test_failures_now_and_then_switch_nothing_off() -> None:

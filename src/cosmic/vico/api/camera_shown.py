@@ -33,12 +33,15 @@ class LinkShown:
     ----------
     problem : str
         Why it says nothing; empty when all is well.
+    failing : bool
+        It says nothing because it fails, and not because there is nothing to be said.
     """
 
     name: str
     description: str
     on: bool
     problem: str
+    failing: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +83,7 @@ def links_shown(states: Sequence[LinkState], newest: Analysis | None) -> tuple[L
             DESCRIPTIONS.get(state.name, state.name),
             state.on,
             state.reason or (_reason(newest, state.name) if state.on else ""),
+            failing=bool(state.reason),
         )
         for state in states
     )

@@ -71,6 +71,7 @@ class CameraView(QWidget):
         self._came, self._came_s, self._drawn_s = "", WALL.now_s(), 0.0
         self._histogram: Histogram | None = None
         self._readouts, self._was_running, self._refused = 0, False, ""
+        self._failing = ""
         self._pointed: Pixel | None = None
         self.view = PictureView()
         self.cross, self.scale_bar = Crosshair(), ScaleBar()
@@ -208,7 +209,15 @@ class CameraView(QWidget):
         if self._camera.recording.active or self._readouts % SELDOM == 0:
             self.recorder.refresh()
         self._show_state()
+        self._show_failing()
         self._show_pointer()
+
+    def _show_failing(self) -> None:
+        """Say over the picture that a step of machine vision fails, once, and until it works."""
+        failing = next((each.problem for each in self._camera.algorithms if each.failing), "")
+        if failing != self._failing:
+            self._failing = failing
+            self.say(f"{state_look(State.ERROR).glyph} {failing}" if failing else "")
 
     def _show_state(self) -> None:
         camera, settings = self._camera, self._camera.settings

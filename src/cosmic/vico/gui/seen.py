@@ -116,3 +116,8 @@ class Algorithm(Protocol):
     @abstractmethod
     def problem(self) -> str:
         """Why it found nothing to say or failed; empty when all is well."""
+
+    @property
+    @abstractmethod
+    def failing(self) -> bool:
+        """It fails, and is tried again."""

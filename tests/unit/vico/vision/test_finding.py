@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cosmic.frame.errors import ConfigError
+from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.vico.api import Fibre, fibre_mask, find_fibres
+from cosmic.vico.core.vision.smoothing import UndeterminedError, smooth
 from unit.vico.vision.drawn_fibres import arc, loop, picture
 
 BOW = arc((120.0, 180.0), 0.2, 400.0, 0.9)
@@ -245,3 +246,23 @@ def test_dirt_less_dark_than_the_fibre_at_its_end_makes_the_length_doubtful() ->
     clean = cv2.GaussianBlur(image, (0, 0), 1.2) + rough
     assert only(np.clip(clean, 0, 255).astype(np.uint8)).certain
     assert not certain(np.clip(dirty, 0, 255).astype(np.uint8))
+
+
+def test_points_of_which_too_few_count_determine_no_curve() -> None:
+    line = np.column_stack([np.arange(120.0), np.zeros(120)])
+    weights = np.zeros(120)
+    weights[:2] = 1.0
+    with pytest.raises(UndeterminedError, match="2 of 120 points count"):
+        smooth(line, weights, 600.0)
+    np.testing.assert_allclose(smooth(line, np.ones(120), 60.0), line, atol=1e-3)
+
+
+def test_what_nobody_foresaw_of_a_picture_is_told_and_no_error_of_numpy(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def broken(*_: object) -> None:
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr("cosmic.vico.core.vision.finding.find_relief", broken)
+    with pytest.raises(NotAvailable, match=r"LinAlgError: Singular matrix\); take another"):
+        find_fibres(np.full((64, 64), 200, np.uint8))

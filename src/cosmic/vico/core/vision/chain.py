@@ -26,6 +26,8 @@ from cosmic.vico.core.picture import Picture
 logger = logging.getLogger(__name__)
 
 MOST_FAILURES: Final = 3
+RETRY_S: Final = 2.0
+"""How long one rests that failed so often in a row, in wall time; then it is tried again."""
 
 Results = Mapping[str, object]
 T = TypeVar("T")
@@ -50,7 +52,8 @@ class Algorithm(Protocol):
         -------
         object
             `Unavailable` where there is nothing to be found, with the reason. An exception is
-            for what nobody foresaw: after some of them in a row the algorithm is switched off.
+            for what nobody foresaw: after some of them in a row it runs now and then only, until
+            it succeeds.
         """
 
 
@@ -66,7 +69,7 @@ class Failure:
     """An algorithm that raised."""
 
     text: str
-    switched_off: bool
+    resting: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +105,7 @@ class LinkState:
     Attributes
     ----------
     reason : str
-        Why it was switched off by the chain; empty where a person did or it is on.
+        Why it rests: it failed, and is tried again in a while; empty where all is well.
     last_s : float or None
         What it took last time.
     """
@@ -119,6 +122,7 @@ class _Link:
         self.on = on
         self.failures = 0
         self.reason = ""
+        self.due_s = 0.0
         self.last_s: float | None = None
 
 
@@ -139,9 +143,11 @@ class Chain:
         *,
         off: Iterable[str] = (),
         most_failures: int = MOST_FAILURES,
+        retry_s: float = RETRY_S,
     ) -> None:
         idle = set(off)
         self._most_failures = most_failures
+        self._retry_s = retry_s
         self._lock = threading.Lock()
         self._links: dict[str, _Link] = {}
         for each in algorithms:
@@ -175,7 +181,7 @@ class Chain:
         """
         link = self._link(name)
         with self._lock:
-            link.on, link.failures, link.reason = on, 0, ""
+            link.on, link.failures, link.reason, link.due_s = on, 0, "", 0.0
 
     def algorithm(self, name: str) -> Algorithm:
         """Return an algorithm, for its own settings; raises `ConfigError` as `switch` does."""
@@ -189,16 +195,15 @@ class Chain:
         failures: dict[str, Failure] = {}
         seen = MappingProxyType(results)
         for name, link in self._links.items():
-            if not link.on:
-                continue
             start_s = WALL.now_s()
+            if not link.on or start_s < link.due_s:
+                continue
             try:
                 results[name] = link.algorithm.run(picture, seen)
-            except Exception as exc:
-                logger.exception("vision: %s failed on frame %d", name, picture.frame.frame_id)
-                failures[name] = self._failed(link, exc)
+            except Exception as exc:  # noqa: BLE001 - said once, and it does not end the others
+                failures[name] = self._failed(link, exc, picture.frame.frame_id)
             else:
-                link.failures = 0
+                self._succeeded(link)
             durations_s[name] = link.last_s = WALL.now_s() - start_s
         return Analysis(
             picture,
@@ -208,16 +213,30 @@ class Chain:
             MappingProxyType(failures),
         )
 
-    def _failed(self, link: _Link, exc: Exception) -> Failure:
-        text = f"{link.algorithm.name}: {str(exc) or type(exc).__name__}"
+    def _failed(self, link: _Link, exc: Exception, frame: int) -> Failure:
+        name = link.algorithm.name
+        text = f"{name}: {str(exc) or type(exc).__name__}"
         with self._lock:
             link.failures += 1
-            off = link.failures >= self._most_failures
-            if off:
-                link.on = False
-                link.reason = f"switched off after it failed {link.failures} times in a row: {text}"
-                logger.error("vision: %s", link.reason)
-        return Failure(text, off)
+            rests = link.failures >= self._most_failures
+            if rests:
+                link.due_s = WALL.now_s() + self._retry_s
+                link.reason = (
+                    f"failed {link.failures} times in a row, is tried again every "
+                    f"{self._retry_s:g} s: {text}"
+                )
+            first = link.failures == 1
+        if first:  # the same at every picture says nothing new
+            logger.error(
+                "vision: %s failed on frame %d; it is tried again", name, frame, exc_info=exc
+            )
+        return Failure(text, rests)
+
+    def _succeeded(self, link: _Link) -> None:
+        with self._lock:
+            failures, link.failures, link.reason = link.failures, 0, ""
+        if failures:
+            logger.info("vision: %s works again, after %d failures", link.algorithm.name, failures)
 
     def _link(self, name: str) -> _Link:
         if name not in self._links:

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from cosmic.frame.errors import NotAvailable
 from cosmic.vico.core.vision import checks
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre, paint
@@ -31,6 +32,7 @@ from cosmic.vico.core.vision.section import (
     pooled,
 )
 from cosmic.vico.core.vision.smoothing import arc_lengths, resampled
+from cosmic.vico.hw.interface import Pixels
 
 MOST_FORKS = 400
 # A fibre is at least so many times longer than wide.
@@ -59,8 +61,20 @@ def find_fibres(image: npt.NDArray[np.generic]) -> list[Fibre]:
     ------
     ConfigError
         The picture has another type or shape, or is smaller than 16 x 16.
+    NotAvailable
+        They cannot be looked for on this picture.
     """
     pixels = grey_picture(image)
+    try:
+        return _found(pixels)
+    except (ValueError, ArithmeticError, IndexError) as exc:  # numpy's and scipy's among them
+        raise NotAvailable(
+            f"fibres cannot be looked for on this picture ({type(exc).__name__}: {exc}); take "
+            "another, or change zoom, focus or light"
+        ) from exc
+
+
+def _found(pixels: Pixels) -> list[Fibre]:
     relief = find_relief(pixels)
     if relief.crowded or not relief.mask.any():
         return []

@@ -18,7 +18,7 @@ from cosmic.vico.core.vision.profiles import (
     cross_sections,
     find_edges,
 )
-from cosmic.vico.core.vision.smoothing import arc_lengths, resampled, smooth
+from cosmic.vico.core.vision.smoothing import UndeterminedError, arc_lengths, resampled, smooth
 
 STEP_PX = 2.0
 ROUNDS = 2
@@ -70,6 +70,13 @@ class Neighbours:
 
 def refine(scene: Scene, strand: Strand, neighbours: Neighbours) -> Course | None:
     """Return the exact course of a strand, or None where there is no fibre after all."""
+    try:
+        return _refined(scene, strand, neighbours)
+    except UndeterminedError:
+        return None  # wide as a tool out of focus, and covered by others: nothing to be measured
+
+
+def _refined(scene: Scene, strand: Strand, neighbours: Neighbours) -> Course | None:
     width = max(2.0, (2.0 * strand.half_width - 0.5) * scene.factor)
     line = first_line(scene, strand, max(3.0 * width, 6.0 * scene.factor))
     if len(line) < 6:

@@ -1,11 +1,15 @@
 """A curve through uncertain points: as smooth as they allow, across gaps as well."""
 
 import numpy as np
-from scipy.linalg import solveh_banded
+from scipy.linalg import LinAlgError, solveh_banded
 
 from cosmic.vico.core.vision.grey import Floats
 
 ORDER = 3
+
+
+class UndeterminedError(Exception):
+    """Points of which too few count to say where a curve of such stiffness runs."""
 
 
 def smooth(values: Floats, weights: Floats, wave: float) -> Floats:
@@ -13,6 +17,11 @@ def smooth(values: Floats, weights: Floats, wave: float) -> Floats:
 
     The third difference is kept small (Whittaker, Henderson), so that arcs are left as they are
     and gaps are bridged with an even change of curvature.
+
+    Raises
+    ------
+    UndeterminedError
+        Too few of them have a weight.
     """
     count = len(values)
     if count <= ORDER + 1:
@@ -29,7 +38,12 @@ def smooth(values: Floats, weights: Floats, wave: float) -> Floats:
     for offset in range(ORDER + 1):
         lower[offset, : count - offset] = bands[offset, : count - offset]
     right = values * (weights + 1e-9)[:, None]
-    return np.asarray(solveh_banded(lower, right, lower=True, check_finite=False))
+    try:
+        return np.asarray(solveh_banded(lower, right, lower=True, check_finite=False))
+    except LinAlgError as exc:
+        raise UndeterminedError(
+            f"{np.count_nonzero(weights)} of {count} points count, for {wave:.0f} points a wave"
+        ) from exc
 
 
 def arc_lengths(line: Floats) -> Floats:
