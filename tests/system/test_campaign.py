@@ -1,6 +1,7 @@
 """A campaign on the simulated platform: from the sample to the report, ended and gone on with."""
 
 import csv
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from cosmic.twin.truth import TruthRecord, read_truth
 from system.campaign_bench import Bench, bench
 from system.campaign_trial import Trial
 
-RATE = 10.0
+RATE = 20.0
 RECIPE = """
 procedure = "{procedure}"
 [sample]
@@ -79,6 +80,22 @@ def test_a_fibre_is_measured_and_its_record_agrees_with_the_truth(
     assert {each.name for each in record.series} >= {"left.x", "probe.y", "force"}
     assert record.pictures
     assert any(each.name == "push the spans" for each in record.operations)
+
+
+def test_the_fibre_was_truly_taken_up_bent_and_put_away(done: Campaign, truth: TruthRecord) -> None:
+    assert done.over
+    (number,) = {each.facts["fibre"] for each in truth.of("grasped")}
+    events = [each for each in truth.events if each.facts.get("fibre") == number]
+    names = [each.event for each in events]
+    assert names[:2] == ["grasped", "lifted"]
+    assert set(names[2:-2]) == {"touched", "left"}
+    assert names.count("touched") == names.count("left") >= 2
+    assert names[-2:] == ["released", "landed"]
+    bent = [each.facts["peak_un"] for each in events if each.event == "left"]
+    assert all(5.0 < peak_un < 0.8 * 180.0 for peak_un in bent)
+    assert not events[-2].facts["sticks"]
+    lay, lies = truth.fibres[number], events[-1].facts
+    assert math.dist((lay.x_um, lay.y_um), (lies["x_um"], lies["y_um"])) > 3000.0
 
 
 def test_every_operation_is_in_the_journal_before_it_is_done(done: Campaign) -> None:
