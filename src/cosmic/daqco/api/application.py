@@ -36,7 +36,7 @@ logger = logging.getLogger(__name__)
 T = TypeVar("T")
 
 FIRST_DATA_S: Final = 1.0
-MORE_CHUNKS: Final = 1.0
+MORE_CHUNKS: Final = 2.0
 """How many times more chunks a simulation at a rate makes, on the wall; then they grow."""
 LONGEST_CHUNK_S: Final = 0.25
 """They must come, at the pace of the wall too, before they are missed."""

@@ -90,7 +90,8 @@ class UDaqBuffer(QObject):
         """Take a chunk and hand it on; acquisition thread."""
         self._latest = chunk
         self._samples = chunk.first_sample + chunk.samples
-        self._filled.set()
+        if not self._filled.is_set():
+            self._filled.set()
         tell(self._receivers, chunk)
         self.data_ready.emit()
         self.data_chunk_ready.emit(chunk)

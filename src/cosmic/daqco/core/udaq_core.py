@@ -57,7 +57,8 @@ class UDaqCore(WorkerThread):
         self._clocked = tuple(clocked)
         self._scales = tuple(scales[each.name] for each in plan.channels)
         self._names = tuple(each.name for each in plan.channels)
-        self._rows = np.array(plan.rows)
+        in_order = plan.rows == tuple(range(len(plan.rows)))
+        self._rows = None if in_order else np.array(plan.rows)
         self.rate_hz = plan.rate_hz
 
     def set_scales(self, scales: Mapping[str, Scale]) -> None:
@@ -126,7 +127,8 @@ class UDaqCore(WorkerThread):
                 )
         volts = first.volts
         if len(pieces) > 1:
-            volts = np.concatenate([piece.volts for piece in pieces])[self._rows]
+            volts = np.concatenate([piece.volts for piece in pieces])
+            volts = volts if self._rows is None else volts[self._rows]
         return DataChunk(
             first_sample=first.first_sample,
             time_s=first.time_s,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 from typing_extensions import override
 
 from cosmic.daqco.hw.board_checks import check_chunk, check_inputs, check_rate
@@ -38,6 +39,8 @@ class _Setup:
     rate_hz: float
     chunk_samples: int
     signal: Signal
+    offsets_s: npt.NDArray[np.float64]
+    """Of the samples of a chunk, from its first."""
 
 
 @dataclass(slots=True)
@@ -115,7 +118,8 @@ class SimulatedBoard(Board):
                 raise self._taken("configure")
         real_hz = self._nearest_rate_hz(rate_hz)
         signal = self._make_signal(inputs, chunk_samples)
-        self._setup = _Setup(tuple(inputs), real_hz, chunk_samples, signal)
+        offsets_s = np.arange(chunk_samples) / real_hz
+        self._setup = _Setup(tuple(inputs), real_hz, chunk_samples, signal, offsets_s)
         logger.debug("%s: %d inputs at %g Hz", self._info.name, len(inputs), real_hz)
         return real_hz
 
@@ -135,7 +139,7 @@ class SimulatedBoard(Board):
         if run is None:
             return None
         setup, first = run.setup, run.next_sample
-        times_s = run.start_s + (first + np.arange(setup.chunk_samples)) / setup.rate_hz
+        times_s = setup.offsets_s + run.time_s(first)
         # Outside the lock: a source may be slow, and a stop must not wait for it.
         volts = setup.signal.volts(first, times_s)
         run.next_sample = first + setup.chunk_samples

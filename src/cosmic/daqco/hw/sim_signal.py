@@ -87,28 +87,35 @@ class BoardSignal(Signal):
             for bank, length in zip(self._banks, _BANKS, strict=True):
                 bank[row, :length] = random.standard_normal(length) * sigma[row, 0]
                 bank[row, length:] = np.resize(bank[row, :length], chunk_samples)
+        # Chunks are short and come 500 times a second: what can be done once is done here, and
+        # the rest reckons in steps of the converter.
+        self._banks[0] += self._offset - self._low
+        self._banks = [bank / self._step for bank in self._banks]
+        self._hum /= self._step
+        self._hums = bool(self._hum.any())
+        self._steps_v = self._step[:, 0].tolist()
 
     @override
     def volts(self, first: int, times_s: npt.NDArray[np.float64]) -> Volts:
         count = times_s.size
-        starts = [first % length for length in _BANKS]
-        one, two = (
-            bank[:, start : start + count] for bank, start in zip(self._banks, starts, strict=True)
-        )
-        volts = one + two
-        turns = (2.0 * np.pi * MAINS_HZ) * times_s
-        volts += self._hum @ np.stack((np.sin(turns), np.cos(turns)))
-        volts += self._offset
+        one, two = self._banks
+        start, other = first % _BANKS[0], first % _BANKS[1]
+        steps: Volts = one[:, start : start + count] + two[:, other : other + count]
+        if self._hums:
+            turns = np.empty((2, count))
+            np.multiply(times_s, 2.0 * np.pi * MAINS_HZ, out=turns[1])
+            np.sin(turns[1], out=turns[0])
+            np.cos(turns[1], out=turns[1])
+            steps += self._hum @ turns
         for row, source in self._sources.items():
-            volts[row] += source.volts(times_s)
-        return self._converted(volts)
+            steps[row] += source.volts(times_s) / self._steps_v[row]
+        return self._converted(steps)
 
     def _converted(self, volts: Volts) -> Volts:
-        """Return what the converter reads, written over `volts`."""
-        volts -= self._low
-        volts /= self._step
+        """Return what the converter reads, written over steps that are no whole ones."""
         np.rint(volts, out=volts)
-        np.clip(volts, 0.0, STEPS - 1.0, out=volts)
+        np.maximum(volts, 0.0, out=volts)
+        np.minimum(volts, STEPS - 1.0, out=volts)
         volts *= self._step
         volts += self._low
         return volts
