@@ -3,11 +3,13 @@
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
 from cosmic.app.elsewhere import Elsewhere, open_stations
 from cosmic.app.faults import SimulationFaults
+from cosmic.app.garbage_watch import GarbageWatch
 from cosmic.app.hosting import Site, build_applications
 from cosmic.app.joins import join_here, join_stations
 from cosmic.app.network_settings import own_certificates
@@ -85,13 +87,21 @@ class Platform:
             self.vico.wait_until_known(KNOWN_LIMIT_S)
         join_stations(self.mico, self.daqco, self.elsewhere, self.policy)
 
+    @cached_property
+    def garbage(self) -> GarbageWatch:
+        """Keeps garbage collection from what moves, while the platform is open."""
+        own = self.daqco if isinstance(self.daqco, DaqcoApplication) else None
+        return GarbageWatch(self.mico, own, self.policy)
+
     def initialize(self) -> None:
         """Open the hardware of every application that runs here."""
         for each in self.own.values():
             each.initialize()
+        self.garbage.begin()
 
     def initialize_later(self) -> None:
-        """Begin to open the hardware of every application that runs here; for windows."""
+        """Begin to open the hardware of every application that runs here; a window's thread."""
+        self.garbage.begin(window=True)
         own = self.own.values()
         if self.mico in own and self.mico is not None:
             self.mico.initialize_later()
@@ -105,6 +115,7 @@ class Platform:
         with ExitStack() as at_end:  # from the last line to the first, whatever fails
             if self.end is not None:
                 at_end.callback(self.end)
+            at_end.callback(self.garbage.end)
             at_end.callback(self.elsewhere.close)
             for each in (self.vico, self.daqco, self.mico):
                 if each is not None:

@@ -1,3 +1,5 @@
+import gc
+
 import pytest
 from PySide6.QtCore import QSettings, Qt
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPushButton, QWidget
@@ -10,6 +12,7 @@ from cosmic.app.platform_file import load_platform
 from cosmic.frame.clock import WALL, RatedClock
 from cosmic.frame.errors import DeviceError, DeviceFault, MoveCancelled, StoppedError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.garbage import GARBAGE
 from cosmic.frame.threads import running_threads
 from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.gui.mico_widget import MicoWidget, make_mico_gui
@@ -119,6 +122,22 @@ def test_closing_while_something_moves_ends_everything_in_time(
     assert isinstance(movement.exception(), (MoveCancelled, StoppedError))
     assert not running_threads()
     assert stored.value("window/docks") is not None
+
+
+def test_no_collection_of_old_objects_stops_a_window_while_something_moves(
+    make: Make, qtbot: QtBot
+) -> None:
+    window = make(rate=1.0, hardware=False)
+    panel = ready(window, qtbot)
+    assert GARBAGE.in_force
+    assert gc.get_freeze_count() > 10_000
+    assert "garbage" not in {thread.name for thread in running_threads()}  # it may be a widget
+    moving(panel, qtbot)
+    assert window.platform.garbage.moves()
+    window.close()
+    assert not GARBAGE.in_force
+    assert gc.get_freeze_count() == 0
+    assert gc.get_threshold()[2] < 1000
 
 
 def test_closing_while_initialising_ends_in_time(make: Make, qtbot: QtBot) -> None:

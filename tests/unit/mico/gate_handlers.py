@@ -1,5 +1,6 @@
 """Questions that the gate's process is told to answer badly; loaded in that process only."""
 
+import gc
 import os
 import signal
 import sys
@@ -10,7 +11,18 @@ from cosmic.mico.core.collision.sweep import Sweep
 
 HANDLERS = {
     name: f"unit.mico.gate_handlers:{name}"
-    for name in ("echo", "hang", "crash", "rubbish", "half", "endless", "say", "loaded", "fail")
+    for name in (
+        "echo",
+        "hang",
+        "crash",
+        "rubbish",
+        "half",
+        "endless",
+        "say",
+        "loaded",
+        "frozen",
+        "fail",
+    )
 }
 
 
@@ -57,6 +69,11 @@ def say(sweep: Sweep, payload: list[tuple[object, ...]]) -> str:
 
 def loaded(sweep: Sweep, payload: object) -> list[str]:
     return sorted({name.split(".")[0] for name in sys.modules})
+
+
+def frozen(sweep: Sweep, payload: object) -> tuple[int, int]:
+    """Return how many objects are frozen, and how many old ones are not."""
+    return gc.get_freeze_count(), len(gc.get_objects(generation=2))
 
 
 def fail(sweep: Sweep, payload: object) -> None:

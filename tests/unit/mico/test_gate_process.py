@@ -171,6 +171,16 @@ def test_the_process_loads_neither_qt_nor_what_reads_scenes(gate: GateProcess) -
     assert unwanted.isdisjoint(loaded)
 
 
+def test_the_process_has_frozen_what_it_loaded_and_makes_little_since(gate: GateProcess) -> None:
+    for _ in range(200):
+        gate.check(FREE)
+    answer = gate.ask("frozen", None)
+    assert isinstance(answer, tuple)
+    frozen, old = answer
+    assert frozen > 10_000
+    assert old < 1000  # a full collection looks through these only
+
+
 def test_a_file_in_the_working_directory_is_not_taken_for_a_module(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -6,7 +6,6 @@ closes, so that it outlives nobody.
 """
 
 import faulthandler
-import gc
 import pickle
 import signal
 import sys
@@ -14,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import Any, Final
 
+from cosmic.frame.garbage import freeze_what_is_loaded
 from cosmic.mico.core.collision.answer import Approach, SweepAnswer
 from cosmic.mico.core.collision.free_way import free_way
 from cosmic.mico.core.collision.helper_wire import READY, End, encode, unpack_spans
@@ -88,7 +88,7 @@ def main(arguments: Sequence[str]) -> int:
     try:
         sweep = Sweep(pickle.load(sys.stdin.buffer))
         handlers = load_handlers(arguments[1:])
-        gc.freeze()  # the scene stays: nothing to look through at every collection
+        freeze_what_is_loaded()  # the scene stays: nothing to look through at every collection
         pipe.send_bytes(encode((READY, True, None)))
         serve(pipe, sweep, handlers)
     except (EOFError, BrokenPipeError, ConnectionResetError):

@@ -1,0 +1,185 @@
+"""Old objects are looked through when nothing moves, and everything is put back at the end."""
+
+import gc
+import weakref
+from collections.abc import Iterator
+
+import pytest
+
+from cosmic.frame import garbage
+from cosmic.frame.garbage import LONG_REST_S, LONGEST_S, MOST, WORTHWHILE, Garbage
+
+
+class Ring:
+    """Refers to itself, so that only the collector can find it."""
+
+    def __init__(self, objects: int) -> None:
+        self.itself = self
+        self.many = [[number] for number in range(objects)]
+
+
+class Bench:
+    """A collector with a time and a motion of its own."""
+
+    def __init__(self) -> None:
+        self.time_s = 100.0
+        self.moves = False
+        self.garbage = Garbage(lambda: self.time_s)
+        self.end = self.garbage.begin(lambda: self.moves)
+
+    def after(self, seconds: float) -> garbage.Collection | None:
+        at_once = self.garbage.tick()
+        self.time_s += seconds
+        return at_once or self.garbage.tick()
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    gc.collect()
+    made = Bench()
+    yield made
+    made.end()
+
+
+def old_ring(objects: int) -> tuple[list[Ring], "weakref.ref[Ring]"]:
+    """Return a ring among the old objects; it is garbage once the list is cleared."""
+    ring = Ring(objects)
+    gc.collect(1)
+    gc.collect(1)
+    return [ring], weakref.ref(ring)
+
+
+def test_old_garbage_is_collected_at_a_rest(bench: Bench) -> None:
+    kept, found = old_ring(WORTHWHILE)
+    kept.clear()
+    assert found() is not None
+    done = bench.after(1.0)
+    assert found() is None
+    assert done is not None
+    assert done.at_rest
+    assert not done.whole
+    assert done.found >= WORTHWHILE
+
+
+def test_nothing_old_is_looked_through_while_something_moves(bench: Bench) -> None:
+    kept, found = old_ring(WORTHWHILE)
+    kept.clear()
+    bench.moves = True
+    assert bench.after(10.0) is None
+    assert found() is not None
+    bench.moves = False
+    bench.after(1.0)
+    assert found() is None
+
+
+def test_motion_that_goes_on_for_ever_does_not_let_memory_grow(bench: Bench) -> None:
+    bench.moves = True
+    kept, found = old_ring(MOST)
+    kept.clear()
+    done = bench.after(1.0)
+    assert found() is None
+    assert done is not None
+    assert not done.at_rest
+
+
+def test_a_little_garbage_is_found_within_a_minute_for_it_may_hold_much(bench: Bench) -> None:
+    bench.moves = True
+    kept, found = old_ring(10)
+    kept.clear()
+    bench.after(1.0)
+    assert found() is not None
+    bench.after(LONGEST_S)
+    assert found() is None
+
+
+def test_what_was_frozen_is_looked_through_at_a_long_rest(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(garbage, "MANY_FROZEN", WORTHWHILE)
+    kept, found = old_ring(WORTHWHILE)
+    assert bench.after(1.0) is not None  # it survives and is frozen
+    kept.clear()
+    gc.collect()
+    assert found() is not None
+    bench.moves = True
+    assert bench.after(LONG_REST_S) is None
+    bench.moves = False
+    done = bench.after(LONG_REST_S)
+    assert found() is None
+    assert done is not None
+    assert done.whole
+
+
+def test_frozen_objects_beyond_bounds_are_looked_through_whatever_moves(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(garbage, "MOST_FROZEN", WORTHWHILE)
+    kept, found = old_ring(WORTHWHILE)
+    assert bench.after(1.0) is not None
+    kept.clear()
+    bench.moves = True
+    done = bench.after(1.0)
+    assert found() is None
+    assert done is not None
+    assert (done.whole, done.at_rest) == (True, False)
+
+
+def test_young_garbage_is_collected_by_python_as_usual(bench: Bench) -> None:
+    found = weakref.ref(Ring(0))
+    young = [[number] for number in range(2 * gc.get_threshold()[0])]
+    assert found() is None
+    assert young
+
+
+def test_python_does_not_look_through_old_objects_by_itself(bench: Bench) -> None:
+    seen: list[int] = []
+    gc.callbacks.append(lambda _phase, info: seen.append(info["generation"]))
+    kept = [[[number]] for number in range(200_000)]
+    gc.callbacks.pop()
+    assert kept
+    assert seen
+    assert 2 not in seen
+
+
+def test_at_the_end_everything_is_as_it_was() -> None:
+    before = gc.get_threshold()
+    first, second = Garbage(), Garbage()
+    end_one = first.begin(lambda: False)
+    end_two = first.begin(lambda: False)
+    assert gc.get_threshold() != before
+    assert gc.get_freeze_count() > 0
+    end_one()
+    end_one()
+    assert first.in_force
+    assert gc.get_freeze_count() > 0
+    end_two()
+    assert not first.in_force
+    assert gc.get_threshold() == before
+    assert gc.get_freeze_count() == 0
+    assert gc.isenabled()
+    assert second.tick() is None
+
+
+def test_what_a_script_has_set_itself_stays() -> None:
+    before = gc.get_threshold()
+    gc.freeze()
+    try:
+        end = Garbage().begin(lambda: False)
+        gc.set_threshold(1000, 20, 30)
+        end()
+        assert gc.get_threshold() == (1000, 20, 30)
+        assert gc.get_freeze_count() > 0
+    finally:
+        gc.unfreeze()
+        gc.set_threshold(*before)
+
+
+def test_a_script_that_switched_collection_off_is_obeyed(bench: Bench) -> None:
+    kept, found = old_ring(WORTHWHILE)
+    kept.clear()
+    gc.disable()
+    try:
+        assert bench.after(1.0) is None
+        assert found() is not None
+    finally:
+        gc.enable()
