@@ -71,7 +71,7 @@ def bench() -> Iterator[Bench]:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
-            env=os.environ | {"PYTHONPATH": str(ROOT)},
+            env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "src")])},
         )
         stack.callback(process.wait, 20)
         stack.callback(process.kill)

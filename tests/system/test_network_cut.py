@@ -18,6 +18,7 @@ from cosmic.frame.network.line_settings import Line
 from cosmic.frame.network.station import Station
 
 CHILD = Path(__file__).with_name("network_child.py")
+TESTS = CHILD.parents[1]
 HERE, THERE = "10.231.7.1", "10.231.7.2"
 SPACE, BRIDGE, OUTER, INNER = "cosmic-cut", "cosmic-cut-br", "cosmic-cut-o", "cosmic-cut-i"
 
@@ -78,7 +79,8 @@ def test_a_cut_stops_the_motion_and_no_old_command_is_carried_out_later(
         process = subprocess.Popen(
             [*command, endpoint, str(tmp_path / "holder")],
             stdout=subprocess.DEVNULL,
-            env=os.environ | {"PYTHONPATH": str(CHILD.parents[1])},
+            env=os.environ
+            | {"PYTHONPATH": os.pathsep.join([str(TESTS), str(TESTS.parent / "src")])},
         )
         stack.callback(process.wait, 10)
         stack.callback(process.kill)

@@ -1,5 +1,6 @@
 """A client's questions to a station: numbered, dated, and answered."""
 
+import logging
 import secrets
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,12 +12,16 @@ from cosmic.frame.errors import ProtocolError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.addresses import asks, client_signs, greetings, session_events
 from cosmic.frame.network.delivery import InboxReader
+from cosmic.frame.network.direct_line import DirectLine, LineLost
+from cosmic.frame.network.direct_lines import DirectLines
 from cosmic.frame.network.errors import StationAway, StationTimeout
 from cosmic.frame.network.freshness import StationTime
 from cosmic.frame.network.messages import Order, Request, read_answer
 from cosmic.frame.network.station import checked_name
 from cosmic.frame.network.transport import Rule
-from cosmic.frame.network.wire import Sign, Wire
+from cosmic.frame.network.wire import Sign, Wire, WithLine
+
+logger = logging.getLogger(__name__)
 
 GREETING_LIMIT_S: Final = 0.5
 
@@ -29,6 +34,8 @@ class What:
     ----------
     valid_s : float
         How long it may take until it is begun there.
+    at_once : bool
+        It overtakes every other call.
     """
 
     order: Order
@@ -36,6 +43,7 @@ class What:
     function: str
     arguments: Mapping[str, object]
     valid_s: float
+    at_once: bool = False
 
 
 class ClientSession:
@@ -70,6 +78,7 @@ class ClientSession:
         self._answered_s = float("-inf")
         self._sign: Sign | None = None
         self._events: InboxReader[bytes] | None = None
+        self._direct: DirectLines | None = None
 
     @property
     def unanswered_s(self) -> float:
@@ -102,7 +111,23 @@ class ClientSession:
             raise ProtocolError("the station greets in a way that this program does not know")
         self._token, self._key = said["token"], asks(self._station, client)
         self._find_handler(wire)
+        self._direct = self._opened_directly(wire, client, said.get("direct"))
         return said.get("hosted")
+
+    def _opened_directly(self, wire: Wire, client: str, port: object) -> DirectLines | None:
+        """Return lines for calls alone; None where the station offers none, or a wall stands."""
+        if not isinstance(wire, WithLine) or type(port) is not int or not 0 < port < 65536:
+            return None
+        line, token = wire.line, self._token
+
+        def opened(urgent: bool) -> DirectLine:
+            return DirectLine(line, port, client, token, urgent=urgent, clock=self._clock)
+
+        try:
+            return DirectLines(opened)
+        except LineLost as exc:
+            logger.info("%s: calls go the slower way: %s", self._station, exc)
+            return None
 
     def _find_handler(self, wire: Wire) -> None:
         """Wait until what we ask reaches the handler, which has only just been made."""
@@ -120,6 +145,9 @@ class ClientSession:
 
     def end(self) -> None:
         """Take back what shows the station that this client is here; it notices at once."""
+        direct, self._direct = self._direct, None
+        if direct is not None:
+            direct.close()
         sign, self._sign = self._sign, None
         if sign is not None:
             sign.close()
@@ -138,9 +166,11 @@ class ClientSession:
         ProtocolError
             Something cannot travel.
         """
-        message = self._request(what).encoded()
         try:
-            answer = wire.ask(self._key, message, timeout_s=timeout_s)
+            answer = self._ask_directly(what, timeout_s)
+            if answer is None:
+                message = self._request(what).encoded()
+                answer = wire.ask(self._key, message, timeout_s=timeout_s)
         except StationTimeout as exc:
             where = f"{what.application}.{what.function}".strip(".") or what.order.value
             raise StationTimeout(f"{self._station}, {where}: {exc}") from exc
@@ -150,6 +180,21 @@ class ClientSession:
         if error is not None:
             raise error
         return result
+
+    def _ask_directly(self, what: What, timeout_s: float) -> bytes | None:
+        """Return the answer over a direct line; None where the engine has to ask."""
+        direct = self._direct
+        if direct is None or what.order is not Order.CALL:
+            return None
+        try:
+            message = self._request(what).encoded()
+            return direct.ask(message, timeout_s, urgent=what.at_once)
+        except LineLost as exc:
+            if what.at_once:
+                return None  # a stop may be carried out twice, and is not left out
+            raise StationAway(
+                f"the line was lost ({exc}); whether the call was carried out is not known"
+            ) from exc
 
     def _request(self, what: What) -> Request:
         with self._lock:

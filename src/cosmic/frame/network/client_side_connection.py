@@ -127,7 +127,7 @@ class ClientSideConnection(WorkerThread):
         if not at_once:
             forbid_waiting_here(f"calling {application}.{function} at {self._station}")
         valid_s = min(timeout_s, MOVE_AGE_LIMIT_S) if moves else timeout_s
-        what = What(Order.CALL, application, function, arguments or {}, valid_s)
+        what = What(Order.CALL, application, function, arguments or {}, valid_s, at_once)
         result = self._exchange(wire, what, timeout_s)
         return self._tasks.made(result) if isinstance(result, Ticket) else result
 

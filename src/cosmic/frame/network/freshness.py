@@ -50,9 +50,10 @@ class StationTime:
 
 
 class SequenceGuard:
-    """Lets each number of a session pass once, though not always in order; one thread."""
+    """Lets each number of a session pass once, though not always in order; any thread."""
 
     def __init__(self) -> None:
+        self._lock = Lock()
         self._newest = 0
         self._seen: set[int] = set()
 
@@ -64,12 +65,13 @@ class SequenceGuard:
         CommandExpired
             It was here before, or is too far behind to know.
         """
-        if number in self._seen or number <= self._newest - _WINDOW:
-            raise CommandExpired(f"command {number} came a second time and was not carried out")
-        self._seen.add(number)
-        self._newest = max(self._newest, number)
-        if len(self._seen) > 2 * _WINDOW:
-            self._seen = {each for each in self._seen if each > self._newest - _WINDOW}
+        with self._lock:
+            if number in self._seen or number <= self._newest - _WINDOW:
+                raise CommandExpired(f"command {number} came a second time and was not carried out")
+            self._seen.add(number)
+            self._newest = max(self._newest, number)
+            if len(self._seen) > 2 * _WINDOW:
+                self._seen = {each for each in self._seen if each > self._newest - _WINDOW}
 
 
 def check_age(clock: Clock, until_s: float, what: str) -> None:

@@ -95,6 +95,11 @@ class Line:
         """True for TLS with certificates on both sides."""
         return self.endpoint.startswith("tls/")
 
+    @property
+    def host(self) -> str:
+        """Name or address of the station's computer, without the brackets of IPv6."""
+        return self.endpoint.partition("/")[2].rpartition(":")[0].strip("[]")
+
     def settings(self) -> dict[str, Any]:
         """Return what differs from the engine's own settings, which listen everywhere."""
         limit_bytes = PUBLISH_LIMIT_BYTES if self.listens else MESSAGE_LIMIT_BYTES

@@ -20,12 +20,14 @@ from cosmic.frame.network.addresses import (
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.connection_handler import Client, ConnectionHandler
 from cosmic.frame.network.delivery import Backlog, InboxReader
+from cosmic.frame.network.direct_line import FramedSocket
+from cosmic.frame.network.direct_listener import DirectListener
 from cosmic.frame.network.errors import CallRefused
 from cosmic.frame.network.messages import Order, read_request, refusal_of
 from cosmic.frame.network.outbox import Outbox
 from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Presence, Rule
-from cosmic.frame.network.wire import Question, Wire
+from cosmic.frame.network.wire import Question, Wire, WithLine
 from cosmic.frame.threads import WorkerThread
 
 logger = logging.getLogger(__name__)
@@ -69,6 +71,8 @@ class ServerListener(WorkerThread):
         self._woken = Event()
         self._remove: list[Callable[[], None]] = []
         self._readers: list[WorkerThread] = []
+        self._direct: DirectListener | None = None
+        self._leaving: list[ConnectionHandler] = []
         self._shut = False
 
     @property
@@ -80,13 +84,14 @@ class ServerListener(WorkerThread):
     @override
     def run_body(self) -> None:
         name, policy = self._station.name, self._station.policy
+        self._direct = self._made_direct()
         questions = InboxReader(
             f"{name} hears", policy, self._wire.questions(greetings(name)), self._greet
         )
         signs = InboxReader(
             f"{name} watches", policy, self._wire.signs(client_signs(name)), self._on_sign
         )
-        self._readers = [questions, signs]
+        self._readers = [questions, signs, *([self._direct] if self._direct else [])]
         self._remove = [
             self._station.bus.tap(self._outbox.publish, self._outbox.wants),
             self._station.lease.subscribe(lambda _: self._end_motion_without_lease()),
@@ -126,6 +131,8 @@ class ServerListener(WorkerThread):
             reader.join()
         for key in self.clients:
             self._end(key, "the station closes")
+        for handler in self._leaving:
+            handler.join_direct()
         with self._lock:
             lanes, self._lanes = list(self._lanes.values()), {}
         for lane in lanes:
@@ -161,7 +168,7 @@ class ServerListener(WorkerThread):
             handler = self._handlers[key] = self._made_handler(Client(key, name, access))
         handler.start()
         self._station.note_client(key, Presence(name, here=True))
-        handler.greet(question)
+        handler.greet(question, self._direct.port if self._direct is not None else 0)
 
     def _made_handler(self, client: Client) -> ConnectionHandler:
         name = self._station.name
@@ -173,6 +180,32 @@ class ServerListener(WorkerThread):
             self._wire.outlet(session_events(name, client.key), Rule.ALL),
             self._run_in,
         )
+
+    # Direct lines, in the thread "connects"
+
+    def _made_direct(self) -> DirectListener | None:
+        if not isinstance(self._wire, WithLine):
+            return None
+        name = f"{self._station.name} connects"
+        try:
+            return DirectListener(name, self._wire.line, self._station.policy, self._attach)
+        except OSError as exc:
+            logger.warning("%s: calls go the slower way: %s", self._station.name, exc)
+            return None
+
+    def _attach(
+        self, key: str, token: str, proven: str | None, urgent: bool, framed: FramedSocket
+    ) -> None:
+        with self._lock:
+            handler = self._handlers.get(key)
+        if handler is None:
+            raise CallRefused("the session is unknown: connect again")
+
+        def lost() -> None:
+            if urgent:  # its process has ended, or a line was cut: the session may go on
+                handler.lose_motion(f"the line to {handler.client.name} was lost")
+
+        handler.attach(token, proven, framed, lost)
 
     def _run_in(self, application: str, job: Callable[[], None]) -> None:
         with self._lock:
@@ -204,6 +237,7 @@ class ServerListener(WorkerThread):
         self._station.lease.poll()
         while len(self._gone):
             self._end(self._gone.take(), "its sign of life is gone")
+        self._leaving = [each for each in self._leaving if not each.ended]
         with self._lock:
             silent = [
                 key for key, each in self._handlers.items() if each.silent_s > SILENCE_LIMIT_S
@@ -216,6 +250,7 @@ class ServerListener(WorkerThread):
             handler = self._handlers.pop(key, None)
         if handler is not None:
             handler.close(why)
+            self._leaving.append(handler)
             self._station.note_client(key, Presence(handler.client.name, here=False, why=why))
 
     def _end_motion_without_lease(self) -> None:

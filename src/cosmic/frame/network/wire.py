@@ -1,9 +1,10 @@
 """What an engine between processes has to do: carry bytes under keys. It knows no application."""
 
 from abc import abstractmethod
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from cosmic.frame.network.delivery import Inbox
+from cosmic.frame.network.line_settings import Line
 from cosmic.frame.network.transport import Rule
 
 
@@ -88,3 +89,13 @@ class Wire(Protocol):
     @abstractmethod
     def close(self) -> None:
         """Close it and release everything; every inbox then raises. Any state."""
+
+
+@runtime_checkable
+class WithLine(Protocol):
+    """A wire beside which direct lines may be opened."""
+
+    @property
+    @abstractmethod
+    def line(self) -> Line:
+        """Where it goes, and what both sides prove themselves with."""

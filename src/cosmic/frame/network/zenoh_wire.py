@@ -49,10 +49,16 @@ class ZenohWire(Wire):
             self._session = zenoh.open(config(line))
         except zenoh.ZError as exc:
             raise StationAway(f"the line cannot be opened: {exc}") from exc
+        self._line = line
         self._lock = Lock()
         self._inboxes: weakref.WeakSet[_Channel[Any]] = weakref.WeakSet()
         self._closed = False
         _open_wires.add(self)
+
+    @property
+    def line(self) -> Line:
+        """Where it goes; direct lines go there as well."""
+        return self._line
 
     @override
     def ask(self, key: str, message: bytes, *, timeout_s: float) -> bytes:
