@@ -237,6 +237,52 @@ def beside_frames(
     return calls, received.ages_ms or [float("nan")], share
 
 
+def stops(client: ClientSideConnection, count: int) -> list[float]:
+    """Return how long stops took to be carried out there, in ms, one every 20 ms."""
+    found = []
+    for _ in range(count):
+        began_s = time.monotonic()
+        there_s = float(client.call("source", "stop", timeout_s=5.0))  # type: ignore[arg-type]
+        found.append(1e3 * (there_s - began_s))
+        time.sleep(0.02)
+    return found
+
+
+def stops_in_a_flood(client: ClientSideConnection, count: int) -> list[float]:
+    """Return the same while 60 frames a second come and eight threads call without a pause."""
+    received = Received(client, "frames", Rule.ALL)
+    settled(client, received, "frames", rate_hz=0.0)
+    client.call("source", "frames", {"count": 100_000, "rate_hz": 60.0}, timeout_s=5.0)
+    ended = threading.Event()
+
+    def flood() -> None:
+        while not ended.is_set():
+            client.call("source", "work", {"a": 1.0}, timeout_s=10.0)
+
+    threads = [threading.Thread(target=flood) for _ in range(8)]
+    for each in threads:
+        each.start()
+    try:
+        return stops(client, count)
+    finally:
+        ended.set()
+        for each in threads:
+            each.join()
+        client.call("source", "quiet", timeout_s=5.0)
+        received.subscription.close()
+
+
+def _stop_figures(bench_: Bench, count: int) -> list[Figure]:
+    alone, flooded = stops(bench_.secure, count), stops_in_a_flood(bench_.secure, count)
+    return [
+        Figure(NAME, "stop with mTLS, until it is carried out, p50", percentile(alone, 50), "ms"),
+        Figure(NAME, "stop with mTLS, p99", percentile(alone, 99), "ms", 5),
+        Figure(NAME, "stop in a flood of calls and frames, p50", percentile(flooded, 50), "ms"),
+        Figure(NAME, "stop in a flood of calls and frames, p99", percentile(flooded, 99), "ms", 50),
+        Figure(NAME, "stop in a flood of calls and frames, worst", max(flooded), "ms"),
+    ]
+
+
 def _call_figures(bench_: Bench, raw: list[float], calls: int) -> list[Figure]:
     tls = tls_calls(bench_, calls)
     secure = timed(own_call(bench_.secure), calls)
@@ -246,7 +292,7 @@ def _call_figures(bench_: Bench, raw: list[float], calls: int) -> list[Figure]:
         Figure(NAME, "bare TCP echo, p50", raw_us, "us"),
         Figure(NAME, "bare TLS with msgpack, p50", tls_us, "us"),
         Figure(NAME, "call with mTLS, p50", secure_us, "us"),
-        Figure(NAME, "call with mTLS, p50 to bare TLS", secure_us / tls_us, "", 3),
+        Figure(NAME, "call with mTLS, p50 to bare TLS", secure_us / tls_us, "", 5),
         Figure(NAME, "call with mTLS, p50 to bare TCP", secure_us / raw_us, ""),
         Figure(NAME, "bare TLS with msgpack, p99", percentile(tls, 99) / 1e3, "ms"),
         Figure(NAME, "call with mTLS, p99", percentile(secure, 99) / 1e3, "ms", 5),
@@ -277,6 +323,7 @@ def measure(quick: bool = False) -> list[Figure]:
     with bench() as bench_:
         raw, raw_mb_s = raw_figures(bench_.raw_port, calls, frames)
         figures = _call_figures(bench_, raw, calls)
+        figures += _stop_figures(bench_, 10 if quick else 500)
         figures += _stream_figures(bench_, raw_mb_s, frames, events)
         times, ages_ms, share = beside_frames(bench_.secure, seconds, 15.0, 0.0)
         figures += [

@@ -99,6 +99,19 @@ class Source:
         return a
 
     @remote
+    def work(self, a: float) -> float:
+        """Return `a` after some work, as a call that asks the gate."""
+        until_s = time.perf_counter() + 0.002
+        while time.perf_counter() < until_s:
+            a += 0.0
+        return a
+
+    @remote(at_once=True)
+    def stop(self) -> float:
+        """Return when it was carried out, on the clock that both processes share."""
+        return time.monotonic()
+
+    @remote
     def cpu_s(self) -> float:
         """Return the CPU time of this process so far."""
         return time.process_time()

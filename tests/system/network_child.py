@@ -2,7 +2,9 @@
 
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Event
 
 from contract.station_rig import Application, connected, wait_until
 from cosmic.frame.errors import CosmicError, MoveRefused
@@ -58,5 +60,32 @@ def watch(endpoint: str) -> None:
         sys.stdin.readline()
 
 
+def flood(endpoint: str) -> None:
+    """Call from eight threads, receive frames, and stop in between: say how long the worst took."""
+    with connected(endpoint, "flooder") as client:
+        frames = client.subscribe("frames", Rule.ALL, lambda _: None)
+        ended = Event()
+
+        def call() -> None:
+            while not ended.is_set():
+                client.call("stage", "add", {"a": 1.0}, timeout_s=10.0)
+
+        with ThreadPoolExecutor(8) as pool:
+            calls = [pool.submit(call) for _ in range(8)]
+            say("flooding")
+            worst_s = 0.0
+            for _ in range(20):
+                wait_until(lambda: False, 0.02)
+                began_s = time.monotonic()
+                client.call("stage", "stop")
+                worst_s = max(worst_s, time.monotonic() - began_s)
+            sys.stdin.readline()
+            ended.set()
+        for each in calls:
+            each.result()
+        say(f"{worst_s}")
+        frames.close()
+
+
 if __name__ == "__main__":
-    {"hold": hold, "serve": serve, "watch": watch}[sys.argv[1]](*sys.argv[2:])
+    {"hold": hold, "flood": flood, "serve": serve, "watch": watch}[sys.argv[1]](*sys.argv[2:])

@@ -4,6 +4,7 @@ import os
 import random
 import signal
 import socket
+import struct
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -167,6 +168,13 @@ def request(token: str, *rest: object, order: str = "call", number: int = 1) -> 
     return encode([order, token, number, 0.0, 1e18, *rest])
 
 
+def nested(token: str, times: int) -> bytes:
+    """Return a call whose argument is a list in a list in a list."""
+    empty = request(token, "stage", "echo", {"value": None}, number=45 + times)
+    head = empty[6:].replace(b"\xa5value\xc0", b"\xa5value" + b"\x91" * times + b"\xc0")
+    return empty[:2] + struct.pack(">I", len(head)) + head
+
+
 def bad_messages(token: str) -> list[bytes]:
     chance = random.Random(7)
     good = request(token, "stage", "add", {"a": 1.0})
@@ -187,6 +195,8 @@ def bad_messages(token: str) -> list[bytes]:
         request(token, "stage", "add", {"a": "x" * 70_000}),
         request(token, "stage", "add", {"a": deep}),
         request(token, "stage", "echo", {"value": float("nan")}, number=-(2**62)),
+        nested(token, 1000),
+        nested(token, 40),
         request(token, "", "station/lease", {}, order="publish", number=38),
         request(token, "\0" * 100, "", {}, number=39),
         request("", "stage", "add", {"a": 1.0}, number=40),
@@ -277,6 +287,29 @@ def test_a_frozen_receiver_delays_no_command_of_others(served: Served) -> None:
                 longest_s = max(longest_s, WALL.now_s() - began_s)
             assert longest_s < 1.0
             assert wait_until(lambda: len(served.listener.clients) == 1, 8.0), "it is dropped"
+
+
+def test_a_stop_overtakes_a_flood_of_calls_and_frames_of_its_own_and_of_others(
+    served: Served,
+) -> None:
+    frame = bytes(1_000_000)
+    with child("flood", served.endpoint) as process, connected(served.endpoint, "other") as other:
+        assert first_line(process) == "flooding"
+        longest_s = 0.0
+        for number in range(60):  # 60 frames a second for a second
+            served.station.publish("frames", frame)
+            assert not wait_until(lambda: False, 0.01)
+            if number % 3 == 0:
+                began_s = WALL.now_s()
+                other.call("stage", "stop")
+                longest_s = max(longest_s, WALL.now_s() - began_s)
+        assert wait_until(lambda: served.application.stops == 40)
+        assert process.stdin is not None
+        process.stdin.write("\n")
+        process.stdin.flush()
+        own_s = float(first_line(process))
+    sys.stdout.write(f"worst stop {1e3 * longest_s:.1f} ms, own {1e3 * own_s:.1f} ms\n")
+    assert max(longest_s, own_s) < 0.3, "some milliseconds, on a quiet machine"
 
 
 # --- nothing is left over ---------------------------------------------------------------------

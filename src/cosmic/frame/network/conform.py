@@ -24,7 +24,10 @@ def conform(value: object, annotation: Any) -> object:
         return value
     if annotation is float:
         if isinstance(value, (int, float)) and not isinstance(value, bool):
-            return float(value)
+            try:
+                return float(value)
+            except OverflowError:
+                raise _mismatch("an integer beyond all floats", annotation) from None
         raise _mismatch(value, annotation)
     if annotation is None:
         annotation = type(None)
@@ -120,5 +123,5 @@ def _mismatch(value: object, annotation: Any) -> Mismatch:
 
 
 def _short(value: object) -> str:
-    text = repr(value) if isinstance(value, (str, int, float, bool, type(None))) else ""
+    text = repr(value) if isinstance(value, (str, bytes, int, float, bool, type(None))) else ""
     return text[:60] if text else f"a {type(value).__name__}"

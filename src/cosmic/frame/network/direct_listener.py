@@ -22,6 +22,7 @@ from cosmic.frame.network.direct_line import (
 )
 from cosmic.frame.network.line_settings import Line
 from cosmic.frame.network.messages import refusal_of
+from cosmic.frame.network.refusals import AT_ONCE, RefusalCount
 from cosmic.frame.threads import WorkerThread
 
 logger = logging.getLogger(__name__)
@@ -78,6 +79,7 @@ class DirectListener(WorkerThread):
         self._selector.register(self._server, selectors.EVENT_READ)
         self._selector.register(self._woken, selectors.EVENT_READ)
         self._pending: dict[socket.socket, _Pending] = {}
+        self._refused = RefusalCount(WALL)
 
     @property
     def port(self) -> int:
@@ -122,6 +124,10 @@ class DirectListener(WorkerThread):
             except OSError:  # nobody is there any more, or there are too many open files
                 return
             where = f"{address[0]}:{address[1]}"
+            if self._refused.of(address[0]) >= AT_ONCE:  # calls of its own go over the engine
+                stream.close()
+                logger.warning("%s: %s was turned away: too often", self.name, where)
+                continue
             stream.setblocking(False)
             if len(self._pending) >= PENDING_LIMIT:
                 self._turn_away(next(iter(self._pending.values())), "others wait as well")
@@ -133,6 +139,7 @@ class DirectListener(WorkerThread):
                     )
             except OSError as exc:
                 stream.close()
+                self._refused.note(address[0])
                 logger.warning("%s: %s was turned away: %s", self.name, where, exc)
                 continue
             self._pending[stream] = _Pending(
@@ -186,6 +193,7 @@ class DirectListener(WorkerThread):
                 self._turn_away(each, f"it did not say who it is within {GREETING_LIMIT_S:g} s")
 
     def _turn_away(self, pending: _Pending, why: str) -> None:
+        self._refused.note(pending.where.rpartition(":")[0])
         logger.warning("%s: %s was turned away: %s", self.name, pending.where, why)
         self._drop(pending)
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Any, Final
 
 from cosmic.frame.errors import CosmicError, ProtocolError
 from cosmic.frame.network.codec import CALL_LIMIT_BYTES, decode, encode
@@ -77,6 +77,7 @@ class Request:
 
 
 _ORDERS = frozenset(order.value for order in Order)
+_NESTING_LIMIT: Final = 32
 _KINDS = (str, str, int, float, float, str, str, dict)
 
 
@@ -96,7 +97,24 @@ def read_request(message: bytes) -> Request:
         raise ProtocolError("a broken request came")
     if order != Order.PUBLISH and len(message) > CALL_LIMIT_BYTES:
         raise ProtocolError(f"a call of {len(message)} bytes came; {CALL_LIMIT_BYTES} are allowed")
+    if _too_deep(rest[-1]):
+        raise ProtocolError(f"an argument is nested more than {_NESTING_LIMIT} times")
     return Request(Order(order), *rest)
+
+
+def _too_deep(value: object) -> bool:
+    """Return whether lists and dictionaries are nested so deeply that showing them would fail."""
+    level: list[Any] = [value]
+    for _ in range(_NESTING_LIMIT):
+        level = [
+            inner
+            for outer in level
+            for inner in (outer.values() if isinstance(outer, dict) else outer)
+            if isinstance(inner, (list, tuple, dict))
+        ]
+        if not level:
+            return False
+    return True
 
 
 def answer(stamp_s: float, value: object) -> bytes:

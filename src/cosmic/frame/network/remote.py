@@ -99,12 +99,15 @@ class Offered:
                 f"unknown: {', '.join(surplus) or 'none'}, "
                 f"missing: {', '.join(sorted(missing)) or 'none'}"
             )
-        try:
-            return {
-                name: conform(value, self.parameters[name]) for name, value in arguments.items()
-            }
-        except Mismatch as exc:
-            raise CallRefused(f"{self.name} was called with a wrong argument: {exc}") from exc
+        checked = {}
+        for name, value in arguments.items():
+            try:
+                checked[name] = conform(value, self.parameters[name])
+            except Mismatch as exc:
+                raise CallRefused(
+                    f"{self.name} was called with a wrong argument {name}: {exc}"
+                ) from exc
+        return checked
 
 
 def offered_by(application: object) -> dict[str, Offered]:

@@ -25,6 +25,7 @@ from cosmic.frame.network.direct_listener import DirectListener
 from cosmic.frame.network.errors import CallRefused
 from cosmic.frame.network.messages import Order, read_request, refusal_of
 from cosmic.frame.network.outbox import Outbox
+from cosmic.frame.network.refusals import Refusals
 from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Presence, Rule
 from cosmic.frame.network.wire import Question, Wire, WithLine
@@ -36,6 +37,8 @@ LOOK_EVERY_S: Final = 0.05
 SILENCE_LIMIT_S: Final = 5.0
 """A session of which nothing was heard for so long has ended, whatever its sign of life says."""
 CLIENTS_LIMIT: Final = 32
+OF_ONE_NAME: Final = 16
+"""One client alone cannot keep all others out."""
 _JOBS_LIMIT: Final = 1024
 
 
@@ -68,6 +71,7 @@ class ServerListener(WorkerThread):
         self._handlers: dict[str, ConnectionHandler] = {}
         self._gone: Backlog[str] = Backlog(Rule.ALL)
         self._lanes: dict[str, _Lane] = {}
+        self._refusals = Refusals(station.clock)
         self._woken = Event()
         self._remove: list[Callable[[], None]] = []
         self._readers: list[WorkerThread] = []
@@ -149,7 +153,8 @@ class ServerListener(WorkerThread):
             self._let_in(key, question)
         except CosmicError as exc:
             logger.warning("%s refused %s: %s", self._station.name, key, exc)
-            question.answer(refusal_of(self._station.clock.now_s(), exc))
+            message = refusal_of(self._station.clock.now_s(), exc)
+            self._refusals.answer(key.partition("/")[0], question, message)
 
     def _let_in(self, key: str, question: Question) -> None:
         if read_request(question.message).order is not Order.HELLO:
@@ -165,6 +170,8 @@ class ServerListener(WorkerThread):
                 raise CallRefused("this session is here already")
             if len(self._handlers) >= CLIENTS_LIMIT or self.end_requested:
                 raise CallRefused(f"{CLIENTS_LIMIT} clients are here already")
+            if sum(each.client.name == name for each in self._handlers.values()) >= OF_ONE_NAME:
+                raise CallRefused(f"{name} is here {OF_ONE_NAME} times already")
             handler = self._handlers[key] = self._made_handler(Client(key, name, access))
         handler.start()
         self._station.note_client(key, Presence(name, here=True))
@@ -235,6 +242,7 @@ class ServerListener(WorkerThread):
     def _look(self) -> None:
         tell_folded()  # of a flood that has ended nobody else may tell for long
         self._station.lease.poll()
+        self._refusals.answer_due()
         while len(self._gone):
             self._end(self._gone.take(), "its sign of life is gone")
         self._leaving = [each for each in self._leaving if not each.ended]

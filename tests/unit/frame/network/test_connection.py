@@ -8,13 +8,15 @@ import pytest
 from contract.station_rig import Application, wait_until
 from cosmic.frame.errors import MoveRefused
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.addresses import greetings
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.client_side_connection import ClientSideConnection
-from cosmic.frame.network.codec import decode
+from cosmic.frame.network.codec import decode, encode
 from cosmic.frame.network.delivery import Backlog
 from cosmic.frame.network.errors import CallRefused, CommandExpired, StationAway, StationTimeout
-from cosmic.frame.network.messages import Order
-from cosmic.frame.network.server_listener import ServerListener
+from cosmic.frame.network.messages import Order, read_answer
+from cosmic.frame.network.refusals import AT_ONCE, HELD_LIMIT
+from cosmic.frame.network.server_listener import OF_ONE_NAME, ServerListener
 from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Presence, Rule
 from unit.frame.network.memory_wire import MemoryHub, MemoryQuestion, MemoryWire
@@ -240,3 +242,43 @@ def test_a_stale_stop_stops_all_the_same(bench: Bench) -> None:
     assert inbox is not None
     inbox.put(stale[0])
     assert wait_until(lambda: bench.application.stops == 1)
+
+
+# --- whoever asks again and again
+
+
+def greet(bench: Bench, key: str, order: str = "hello") -> MemoryQuestion:
+    """Greet as `key` without waiting for the answer."""
+    message = encode([order, "", 1, 0.0, 1e18, "", "", {}])
+    question = MemoryQuestion(greetings("fibres", key), message)
+    inbox = bench.hub.find(question.key)
+    assert inbox is not None
+    inbox.put(question)
+    return question
+
+
+def test_a_flood_of_refused_greetings_is_answered_later_and_later_and_keeps_nobody_out(
+    bench: Bench,
+) -> None:
+    asked = [greet(bench, f"stranger/{number}") for number in range(2000)]
+    begun = greet(bench, "vision/new")
+    assert read_answer(begun.answers.get(timeout=5.0))[2] is None, "an honest one gets in"
+    at_once = sum(not each.answers.empty() for each in asked)
+    assert at_once <= AT_ONCE + HELD_LIMIT
+    assert bench.client.call("stage", "add", {"a": 1.0}) == 2.0
+    assert wait_until(lambda: not asked[AT_ONCE].answers.empty()), "a second later, or two"
+    assert asked[-1].answers.empty(), "there is no room for as many"
+
+
+def test_a_flood_in_an_honest_name_does_not_keep_its_owner_out(bench: Bench) -> None:
+    for number in range(500):
+        greet(bench, f"vision/x{number}", order="call")
+    begun = greet(bench, "vision/honest")
+    assert read_answer(begun.answers.get(timeout=5.0))[2] is None
+
+
+def test_one_name_cannot_take_every_place(bench: Bench) -> None:
+    answers = [greet(bench, f"viewer/{number}") for number in range(32)]
+    errors = [read_answer(each.answers.get(timeout=5.0))[2] for each in answers]
+    assert sum(error is None for error in errors) == OF_ONE_NAME
+    assert read_answer(greet(bench, "vision/2").answers.get(timeout=5.0))[2] is None

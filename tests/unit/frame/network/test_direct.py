@@ -332,6 +332,21 @@ def test_strangers_that_are_silent_slow_half_or_huge_disturb_nobody(
         assert WALL.now_s() - began_s < 0.5
 
 
+def test_a_flood_of_connections_leaves_those_who_are_here_and_lets_others_in(
+    served: Served, wire: ZenohWire
+) -> None:
+    port = Session(wire).port
+    with connected(served.endpoint) as client, ExitStack() as stack:
+        for _ in range(300):
+            rude = socket.create_connection(("127.0.0.1", port), 2.0)
+            with suppress(OSError):
+                rude.sendall(b"GET / HTTP/1.1\r\n\r\n")
+            rude.close()
+        assert client.call("stage", "thread") == "fibres answers vision"
+        late = stack.enter_context(connected(served.endpoint, "late"))
+        assert late.call("stage", "add", {"a": 1.0}) == 2.0, "over the engine, if need be"
+
+
 def secure_line(port: int, files: Certificates) -> ssl.SSLSocket:
     with ExitStack() as stack:
         bare = stack.enter_context(socket.create_connection(("127.0.0.1", port), 2.0))

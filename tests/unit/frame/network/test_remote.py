@@ -58,6 +58,10 @@ DOES_NOT: list[tuple[Any, Any]] = [
     (float, True),
     (float, "1"),
     (float, None),
+    (float, b"5"),
+    (float, "5"),
+    (float, 10**400),
+    (int, b"5"),
     (bool, 1),
     (str, b"a"),
     (bytes, "a"),
@@ -83,6 +87,11 @@ def test_what_fits_is_let_through(annotation: Any, value: Any) -> None:
 def test_what_does_not_fit_is_refused(annotation: Any, value: Any) -> None:
     with pytest.raises(CallRefused, match="wrong argument"):
         checker(annotation).checked({"value": value})
+
+
+def test_a_refusal_names_the_argument_and_what_came() -> None:
+    with pytest.raises(CallRefused, match="wrong argument value: b'5' is not float"):
+        checker(float).checked({"value": b"5"})
 
 
 def test_an_integer_arrives_as_the_float_that_was_asked_for() -> None:
