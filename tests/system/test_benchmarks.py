@@ -1,6 +1,7 @@
 """The benchmarks still run; what they measure here says nothing."""
 
 import importlib
+import re
 import subprocess
 import sys
 
@@ -45,6 +46,34 @@ def test_every_benchmark_offers_the_same_command(repository, monkeypatch):
     monkeypatch.syspath_prepend(repository)
     for name in importlib.import_module("benchmarks.run").ALL:
         assert callable(importlib.import_module(f"benchmarks.{name}").measure), name
+
+
+def sections(repository):
+    """Return the sections of the page of figures by their titles."""
+    page = (repository / "docs" / "reference" / "benchmarks.md").read_text(encoding="utf-8")
+    _, *parts = re.split(r"^## (.*)$", page, flags=re.MULTILINE)
+    return dict(zip(parts[::2], parts[1::2], strict=True))
+
+
+def test_each_section_of_figures_names_commands_that_exist_and_when_it_was_measured(repository):
+    for title, text in sections(repository).items():
+        commands = re.findall(r"python -m benchmarks\.(\w+)([^`\n#]*)", text)
+        assert commands, f"{title}: with which command?"
+        for name, options in commands:
+            assert name in {*ALL, "run", "guard"}, f"{title}: there is no benchmark {name}"
+            sources = [repository / "benchmarks" / f"{each}.py" for each in (name, "figures")]
+            offered = "".join(each.read_text(encoding="utf-8") for each in sources)
+            for option in re.findall(r"--\w+", options):
+                assert f'"{option}"' in offered, f"{title}: {name} has no {option}"
+        if "\n|" in text:
+            assert re.search(r"\b20\d\d-\d\d-\d\d\b", text), f"{title}: when?"
+            assert re.search(r"`[0-9a-f]{7,12}`", text), f"{title}: with which commit?"
+
+
+def test_every_benchmark_has_its_place_among_the_figures(repository):
+    told = "".join(sections(repository).values())
+    missing = [name for name in ALL if f"benchmarks.{name}" not in told]
+    assert missing == []
 
 
 @pytest.mark.slow
