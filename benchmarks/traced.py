@@ -4,6 +4,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from cosmic.mico.hw.scu3d_ctypes import python_function
+
 Hook = Callable[[float, tuple[Any, ...]], None]
 
 
@@ -35,7 +37,9 @@ class TracedLibrary:
     def __getattr__(self, name: str) -> Any:
         found = getattr(self._library, name)
         if not name.startswith("SA_"):
-            return found
+            return False if name == "in_python" else found  # what is handed out is no C function
+        if getattr(self._library, "in_python", False):
+            found = python_function(name, found)
         return self._counted(name, found) if self._count_cpu else self._timed(name, found)
 
     def _timed(self, name: str, function: Callable[..., int]) -> Callable[..., int]:

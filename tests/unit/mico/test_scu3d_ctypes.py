@@ -1,11 +1,17 @@
 """The binding against what the header says, written down here a second time."""
 
 import ctypes
+import sys
+import threading
+import time
+from collections.abc import Iterator
 from ctypes import c_int32, c_uint32
 
 import pytest
 
+from cosmic.frame.clock import ManualClock
 from cosmic.mico.hw import scu3d_ctypes as sa
+from cosmic.mico.hw.sim_scu3d import load_simulated_library
 
 UINTS = ctypes.POINTER(c_uint32)
 LATER = {"Scale", "PhysicalPositionKnown", "ChannelProperty", "SystemProperty"}
@@ -117,3 +123,45 @@ def test_a_missing_or_null_function_answers_that_it_is_not_supported(missing: st
 def test_a_function_that_no_header_declares_is_a_programming_error() -> None:
     with pytest.raises(KeyError):
         sa.Scu3dLibrary(OneFunction()).call("SA_FlushOutput_A", 0)
+
+
+class Computing(threading.Thread):
+    """A thread that never lets go of the interpreter by itself."""
+
+    def __init__(self) -> None:
+        super().__init__(daemon=True)
+        self.ended = False
+
+    def run(self) -> None:
+        while not self.ended:
+            sum(range(100))
+
+
+@pytest.fixture
+def computing() -> Iterator[None]:
+    before_s = sys.getswitchinterval()
+    sys.setswitchinterval(0.02)
+    thread = Computing()
+    thread.start()
+    yield
+    thread.ended = True
+    sys.setswitchinterval(before_s)
+    thread.join()
+
+
+@pytest.mark.usefixtures("computing")
+def test_a_library_in_python_need_not_win_the_interpreter_back_after_each_call() -> None:
+    library = load_simulated_library(clock=ManualClock(auto_advance=True))
+    calls = sa.Scu3dLibrary(library)
+    assert calls.call("SA_InitDevices", sa.SA_ASYNCHRONOUS_COMMUNICATION) == sa.SA_OK
+    calls.call("SA_Stop_A", 0, 0)
+    began_s = time.perf_counter()
+    for _ in range(20):
+        assert calls.call("SA_Stop_A", 0, 0) == sa.SA_OK
+    assert time.perf_counter() - began_s < 0.2  # else twice 0.02 s for each
+
+
+def test_a_client_in_c_gets_the_pointers_as_they_are() -> None:
+    library = load_simulated_library(clock=ManualClock(auto_advance=True))
+    for name in sa.PROTOTYPES:
+        assert isinstance(getattr(library, name), sa.function_type(name))

@@ -210,13 +210,30 @@ def function_type(name: str) -> type[Any]:
     return ctypes.CFUNCTYPE(c_uint32, *PROTOTYPES[name])
 
 
+def python_function(name: str, pointer: Any) -> Any:
+    """Return the C function at `pointer`, which is written in Python, for callers in Python.
+
+    A call into C lets go of the interpreter and has to win it back, twice where the function is
+    Python itself, against every thread that computes. This one keeps it; where the function waits,
+    it lets others run as any Python does.
+
+    Raises
+    ------
+    KeyError
+        The header declares no such function.
+    """
+    address = ctypes.cast(pointer, c_void_p).value or 0
+    return ctypes.PYFUNCTYPE(c_uint32, *PROTOTYPES[name])(address)
+
+
 class Scu3dLibrary:
     """The functions of one SCU3DControl library, each bound when it is first called.
 
     Parameters
     ----------
     library : ctypes.CDLL or object
-        A loaded library, or anything that has the C function pointers as attributes `SA_...`.
+        A loaded library, or anything that has the C function pointers as attributes `SA_...`. One
+        whose functions are Python says so by an attribute `in_python` that is true.
 
     Notes
     -----
@@ -258,4 +275,7 @@ class Scu3dLibrary:
             return pointer
         found: Callable[..., int] | None = getattr(self._library, name, None)
         # A NULL pointer is false; calling it would end the process.
+        if found and getattr(self._library, "in_python", False):
+            kept: Callable[..., int] = python_function(name, found)
+            return kept
         return found or None

@@ -96,7 +96,11 @@ class SimulatedLibrary:
         What it drives.
     faults : Faults
         Trouble, by name.
+    in_python : bool
+        Callers in Python may keep the interpreter during a call.
     """
+
+    in_python: Final = True
 
     def __init__(self, scene: Scene, version: str) -> None:
         old = version.startswith("1.2.")
