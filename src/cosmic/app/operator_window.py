@@ -3,7 +3,7 @@
 import logging
 from typing import Final
 
-from PySide6.QtCore import QSettings, Qt
+from PySide6.QtCore import QSettings, Qt, QTimer
 from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
 import cosmic
@@ -39,6 +39,7 @@ logger = logging.getLogger(__name__)
 MICO: Final = "MiCo"
 CONSOLE: Final = "Console"
 SCENE: Final = "Scene"
+RATE_MS: Final = 1000
 
 _SHARES: Final = [3, 2]
 """How log and console share the width at a first start."""
@@ -180,7 +181,10 @@ class OperatorWindow(CosmicServerGui):
     def _show_platform(self) -> None:
         bar, platform = self.top_bar, self._platform
         bar.set_simulated(platform.simulated)
-        bar.set_rate(platform.clock.rate)
+        self._show_rate()
+        looks = QTimer(self, interval=RATE_MS)
+        looks.timeout.connect(self._show_rate)
+        looks.start()
         stop_key = platform.file.platform.stop_key
         keys = [
             (stop_key, "stop every movement and keep it stopped, from anywhere"),
@@ -194,6 +198,10 @@ class OperatorWindow(CosmicServerGui):
             f"CoSMic {cosmic.__version__}\nControl software for a microrobotic platform.\n"
             f"Platform file: {platform.path}" + (f"\n{self._host.address}" if self._host else "")
         )
+
+    def _show_rate(self) -> None:
+        clock = self._platform.clock
+        self.top_bar.set_rate(clock.rate, clock.rate_reached if self._platform.simulated else None)
 
     @property
     def platform(self) -> Platform:

@@ -185,7 +185,8 @@ def build_platform(
     file, path = load_platform(config)
     _check_simulation(file, path, rate=rate, only_simulated=cold or bool(sample or truth))
     try:
-        clock = RatedClock(rate)
+        # Where anything is real, or runs in another process, time waits for nobody here.
+        clock = RatedClock(rate, waits=file.all_simulated and not uses.stations)
     except (TypeError, ValueError) as exc:
         raise ConfigError(f"rate: {exc}") from None
     policy = FailurePolicy()

@@ -38,6 +38,17 @@ class PlatformFile(StrictModel):
     control: ControlSettings = ControlSettings()
     network: NetworkSettings = NetworkSettings()
 
+    @property
+    def all_simulated(self) -> bool:
+        """Whether no part of the platform is real; what is left out counts as simulated."""
+        backends: set[str] = {self.mico.backend}
+        if self.daqco is not None:
+            backends.add(self.daqco.backend)
+        if self.vico is not None:
+            backends |= {each.backend for each in self.vico.camera}
+            backends |= {self.vico.lens.backend, self.vico.light.backend} - {"none"}
+        return backends == {"simulated"}
+
 
 def platform_path(config: str | Path | None) -> Path:
     """Return the platform file that `config` names: a file, a folder with one, or None."""

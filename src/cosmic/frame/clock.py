@@ -13,7 +13,7 @@ from typing import Final, Protocol
 
 from typing_extensions import override
 
-from cosmic.frame.pace import Pace, PacedWorker, Worker
+from cosmic.frame.pace import Horizon, Pace, PacedHorizon, PacedWorker, Worker
 
 
 class Clock(Protocol):
@@ -43,6 +43,15 @@ class Clock(Protocol):
         """Return the time of the wall, for what is done so often by it; a test moves both."""
         return time.monotonic()
 
+    @property
+    def rate_reached(self) -> float:
+        """Platform seconds per second of the wall that were reached of late."""
+        return self.rate
+
+    def horizon(self) -> Horizon:
+        """Return the horizon of somebody who must keep up with this time, if it waits for any."""
+        return Horizon()
+
     def worker(self, *, leads: bool = False) -> Worker:  # noqa: ARG002 - for clocks with a rate
         """Return somebody whose work takes wall time, whatever the rate.
 
@@ -71,19 +80,28 @@ class RatedClock(Clock):
     While a procedure is under way that is the most: it runs as the wall does while a worker is
     busy, and from when a thread that waits is due until it goes on. See `cosmic.frame.pace`.
 
+    Parameters
+    ----------
+    rate : float
+        Seconds for each second of the wall.
+    waits : bool
+        It waits for who must keep up with it: for a platform of which no part is real.
+
     Raises
     ------
     ValueError
         `rate` is not a positive finite number.
     """
 
-    def __init__(self, rate: float = 1.0) -> None:
+    def __init__(self, rate: float = 1.0, *, waits: bool = False) -> None:
         if not 0.0 < rate < 1e6:
             raise ValueError(f"a clock's rate must lie between 0 and 1e6, got {rate!r}")
         self._rate = rate
         self._start_s = time.monotonic()
+        self._waits = waits
         # Nobody can be hurried by a clock that is no faster than the wall.
-        self._pace = Pace(rate, time.monotonic) if rate > 1.0 else None
+        self._hurries = rate > 1.0
+        self._pace = Pace(rate, time.monotonic) if waits or self._hurries else None
 
     @property
     @override
@@ -126,7 +144,18 @@ class RatedClock(Clock):
 
     @override
     def worker(self, *, leads: bool = False) -> Worker:
-        return Worker() if self._pace is None else PacedWorker(self._pace, leads=leads)
+        if self._pace is None or not self._hurries:
+            return Worker()
+        return PacedWorker(self._pace, leads=leads)
+
+    @property
+    @override
+    def rate_reached(self) -> float:
+        return self._rate if self._pace is None else self._pace.reached
+
+    @override
+    def horizon(self) -> Horizon:
+        return PacedHorizon(self._pace) if self._pace is not None and self._waits else Horizon()
 
 
 class WallClock(RatedClock):

@@ -4,11 +4,15 @@ What takes time on the simulated platform may be over sooner on the wall. What t
 may not: it takes as long on a real platform, and does not become longer there because the rest is
 hurried. So while a procedure is under way the time runs at its rate only as long as everybody
 waits for it, and as the wall does while somebody is at work.
+
+What a busy computer is late with is no trouble of the platform either: who must keep up with the
+time says how far it may go, and it waits there for everybody at once.
 """
 
 import math
 import threading
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -18,6 +22,25 @@ LOOK_S: Final = 0.02
 """How often somebody looks again who waits while others work, and may miss their end; wall time."""
 LATE_S: Final = 0.0005
 """How much too late somebody may wake who is not woken for it, wall time."""
+
+
+LONGEST_HOLD_S: Final = 5.0
+"""The time waits so long for somebody and then goes on without, wall time."""
+REACHED_EVERY_S: Final = 0.25
+REACHED_MARKS: Final = 8
+"""The rate reached is that of the last two seconds."""
+
+
+class Horizon:
+    """How far the time may go before somebody has kept up; any thread. This one is for ever."""
+
+    def move_to(self, until_s: float) -> None:  # noqa: ARG002 - for clocks that wait
+        """Let the time go to `until_s`, inf for without end."""
+        return
+
+    def close(self) -> None:
+        """Be no limit any more; harmless the second time."""
+        return
 
 
 class Worker:
@@ -48,6 +71,10 @@ class _Wait:
 class Pace:
     """A time that runs `rate` times as fast as the wall, and never slower than the smaller of both.
 
+    It does not run beyond the nearest horizon, and does not make up for it later. After
+    `LONGEST_HOLD_S` at a horizon that does not move it goes on without the one whose it is, until
+    that one moves it again: somebody who hangs must not stop everybody for ever.
+
     It is bound to the wall only while there is a worker that leads: one who waits for the time,
     and whose next step depends on when it comes. Then it runs like the wall while a worker is
     busy, and from when one who waits is due until that one goes on.
@@ -69,6 +96,37 @@ class Pace:
         self._leading = 0
         self._busy = 0
         self._waits: dict[object, _Wait] = {}
+        self._slow = min(rate, 1.0)
+        self._horizons: dict[object, float] = {}
+        self._limit_s = math.inf
+        self._held_wall_s: float | None = None
+        self._marks = deque([(self._wall_s, 0.0)], maxlen=REACHED_MARKS)
+
+    @property
+    def reached(self) -> float:
+        """Seconds for each second of the wall, over the last two of them."""
+        with self._lock:
+            now_s = self._settle()
+            wall_s, then_s = self._marks[0]
+            passed_s = self._wall_s - wall_s
+            return (now_s - then_s) / passed_s if passed_s > 0.1 else self._rate
+
+    def move_horizon(self, token: object, until_s: float | None) -> None:
+        """Let the time run to `until_s` as far as `token` goes; None: it has no horizon."""
+        with self._lock:
+            now_s = self._settle()
+            before_s, held = self._limit_s, self._held_wall_s is not None
+            if until_s is None or until_s == math.inf:
+                self._horizons.pop(token, None)
+            else:
+                self._horizons[token] = until_s
+            self._limit_s = min(self._horizons.values(), default=math.inf)
+            if self._limit_s <= before_s:
+                return
+            self._held_wall_s = None
+            late = [each for each in self._waits.values() if self._late(each, now_s)]
+        if held:
+            _wake(late)
 
     def now_s(self) -> float:
         """Return the time."""
@@ -85,6 +143,8 @@ class Pace:
             if left_s <= 0.0:
                 return 0.0
             wait_s = left_s / self._rate
+            if self._held_wall_s is not None:
+                wait_s += LOOK_S  # and is woken when the time goes on
             if self._leading and self._busy:
                 wait_s = max(wait_s, min(left_s, LOOK_S))
             self._waits[token] = _Wait(condition, until_s, self._wall_s + wait_s)
@@ -104,11 +164,7 @@ class Pace:
             self._leading += leading
             waits = () if self._busy else tuple(self._waits.values())
             late = [each for each in waits if self._late(each, now_s)]
-        for wait in late:
-            # The caller may hold any lock, so it waits for none: who is missed here looks again.
-            if wait.condition.acquire(blocking=False):
-                wait.condition.notify_all()
-                wait.condition.release()
+        _wake(late)
 
     def _late(self, wait: _Wait, now_s: float) -> bool:
         due_wall_s = self._wall_s + (wait.due_s - now_s) / self._rate
@@ -123,8 +179,50 @@ class Pace:
             due_s = min((each.due_s for each in self._waits.values()), default=math.inf)
             ahead_s = due_s - self._now_s
             fast_s = 0.0 if self._busy else min(passed_s, max(0.0, ahead_s / self._rate))
-        self._now_s += fast_s * self._rate + (passed_s - fast_s)
+        self._go_on(fast_s * self._rate + (passed_s - fast_s) * self._slow)
+        if wall_s - self._marks[-1][0] >= REACHED_EVERY_S:
+            self._marks.append((wall_s, self._now_s))
         return self._now_s
+
+    def _go_on(self, by_s: float) -> None:
+        """Move the time on, but not beyond the nearest horizon while that is waited for."""
+        to_s = self._now_s + by_s
+        if to_s < self._limit_s:
+            self._now_s, self._held_wall_s = to_s, None
+            return
+        if self._held_wall_s is None:
+            self._held_wall_s = self._wall_s
+        if self._wall_s - self._held_wall_s <= LONGEST_HOLD_S:
+            self._now_s = max(self._now_s, self._limit_s)
+            return
+        for token, until_s in list(self._horizons.items()):
+            if until_s <= max(self._limit_s, self._now_s):
+                del self._horizons[token]
+        self._limit_s = min(self._horizons.values(), default=math.inf)
+        self._held_wall_s = None
+
+
+def _wake(waits: Iterable[_Wait]) -> None:
+    for wait in waits:
+        # The caller may hold any lock, so it waits for none: who is missed here looks again.
+        if wait.condition.acquire(blocking=False):
+            wait.condition.notify_all()
+            wait.condition.release()
+
+
+class PacedHorizon(Horizon):
+    """A horizon of a `Pace`; it is none before it is moved for the first time."""
+
+    def __init__(self, pace: Pace) -> None:
+        self._pace = pace
+
+    @override
+    def move_to(self, until_s: float) -> None:
+        self._pace.move_horizon(self, until_s)
+
+    @override
+    def close(self) -> None:
+        self._pace.move_horizon(self, None)
 
 
 class PacedWorker(Worker):

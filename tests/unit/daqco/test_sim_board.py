@@ -20,6 +20,8 @@ from cosmic.frame.errors import (
     LimitError,
     NotConnectedError,
 )
+from cosmic.twin.scene import Scene
+from cosmic.twin.settings import shipped_settings
 
 Array = npt.NDArray[np.float64]
 
@@ -424,3 +426,83 @@ def test_the_fast_source_gives_a_fresh_array_each_time() -> None:
     first.volts[:] = 0.0
     assert second.volts.any()
     assert np.array_equal(second.volts, chunks(board, 1)[0].volts)
+
+
+class Wall:
+    """Stands in for the module `time`: a wall that a test moves."""
+
+    def __init__(self) -> None:
+        self.now_s = 50.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+
+@pytest.mark.parametrize("rate", [1.0, 20.0])
+def test_no_sample_is_lost_however_late_the_receiver_is(
+    rate: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wall = Wall()
+    monkeypatch.setattr("cosmic.frame.clock.time", wall)
+    clock = RatedClock(rate, waits=True)
+    scene = Scene.from_settings(shipped_settings(), clock)
+    stage = scene.stages["left.x"]
+    route = stage.route(0.0)
+    route.go(4000.0, 100.0)
+    stage.follow(route, held_until_s=0.0)
+    board = SimulatedLibrary(clock, {("Dev1", "ai0"): Ramp(0.01)}).open("Dev1")
+    board.configure(inputs(1), 1000.0, 10)
+    board.start()
+    next_sample = 0
+    for late_s in (0.01, 2.0, 0.01, 4.0, 0.01):
+        wall.now_s += late_s  # what a busy computer does to the thread that receives
+        while (chunk := board.receive(0.0)) is not None:
+            assert chunk.first_sample == next_sample
+            next_sample += 10
+            # Stages, what cameras are asked for, and samples are all at the same time.
+            assert clock.now_s() - chunk.time_s <= 0.02 + 0.04 * rate
+            assert stage.position(clock.now_s()) == pytest.approx(100.0 * clock.now_s(), abs=0.01)
+    assert next_sample >= 20
+    assert clock.now_s() < rate * 0.3  # and what was waited for is not made up for
+    board.close()
+    before_s = clock.now_s()
+    wall.now_s += 2.0
+    assert clock.now_s() == pytest.approx(before_s + 2.0 * rate)
+
+
+@pytest.mark.parametrize("fault", ["stalled", "unplugged"])
+def test_a_board_that_is_silent_by_a_fault_does_not_stop_the_time(
+    fault: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wall = Wall()
+    monkeypatch.setattr("cosmic.frame.clock.time", wall)
+    clock = RatedClock(1.0, waits=True)
+    library = SimulatedLibrary(clock)
+    board = library.open("Dev1")
+    board.configure(inputs(1), 1000.0, 10)
+    board.start()
+    library.faults.inject(fault)
+    if fault == "stalled":
+        assert board.receive(0.0) is None
+    else:
+        with pytest.raises(NotConnectedError):
+            board.receive(0.0)
+    wall.now_s += 3.0
+    assert clock.now_s() == pytest.approx(3.0)
+
+
+def test_a_receiver_that_hangs_is_given_up_and_told_what_it_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    wall = Wall()
+    monkeypatch.setattr("cosmic.frame.clock.time", wall)
+    clock = RatedClock(1.0, waits=True)
+    board = SimulatedLibrary(clock).open("Dev1")
+    board.configure(inputs(1), 1000.0, 10)
+    board.start()
+    for _ in range(60):  # somebody else looks at the clock
+        wall.now_s += 0.5
+        clock.now_s()
+    assert clock.now_s() > 20.0
+    with pytest.raises(DeviceError, match="samples of each channel were lost"):
+        board.receive(0.0)

@@ -1,5 +1,6 @@
 """A hurried clock lets a procedure think as long as it would on a real platform."""
 
+import math
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -9,7 +10,7 @@ from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock, ManualClock, RatedClock
 from cosmic.frame.inbox import Inbox
-from cosmic.frame.pace import Pace, PacedWorker
+from cosmic.frame.pace import Pace, PacedHorizon, PacedWorker
 
 RATE = 20.0
 
@@ -105,6 +106,87 @@ def test_who_waits_while_others_work_is_woken_at_their_end(bench: Bench) -> None
     with ThreadPoolExecutor(1) as pool, condition:
         pool.submit(working.idle).result(5.0)  # and never waits for one
     assert woken == ["told"]
+
+
+def test_the_time_waits_at_the_nearest_horizon_and_makes_up_for_nothing(bench: Bench) -> None:
+    near, far = PacedHorizon(bench.pace), PacedHorizon(bench.pace)
+    near.move_to(10.0)
+    far.move_to(30.0)
+    assert bench.passes(2.0) == pytest.approx(10.0)
+    near.move_to(11.0)
+    assert bench.passes(2.0) == pytest.approx(1.0)
+    near.close()
+    near.close()
+    assert bench.passes(0.1) == pytest.approx(2.0)  # as if the four seconds had not been
+    far.move_to(math.inf)
+    assert bench.passes(2.0) == pytest.approx(40.0)
+
+
+def test_a_horizon_behind_the_time_takes_none_of_it_back(bench: Bench) -> None:
+    bench.passes(1.0)
+    now_s = bench.pace.now_s()
+    PacedHorizon(bench.pace).move_to(now_s - 5.0)
+    assert bench.passes(1.0) == 0.0
+
+
+def test_who_hangs_stops_nobody_for_ever(bench: Bench) -> None:
+    hanging, other = PacedHorizon(bench.pace), PacedHorizon(bench.pace)
+    hanging.move_to(1.0)
+    other.move_to(500.0)
+    assert sum(bench.passes(0.5) for _ in range(10)) == pytest.approx(1.0)
+    assert bench.passes(1.0) + bench.passes(1.0) >= 20.0  # it goes on without it
+    hanging.move_to(bench.pace.now_s() + 1.0)  # there it is again, and is waited for
+    assert bench.passes(2.0) == pytest.approx(1.0)
+
+
+def test_who_waits_is_woken_when_the_time_goes_on_and_does_not_spin_before(bench: Bench) -> None:
+    woken = list[str]()
+
+    class Told(threading.Condition):
+        @override
+        def notify_all(self) -> None:
+            woken.append("told")
+            super().notify_all()
+
+    horizon = PacedHorizon(bench.pace)
+    horizon.move_to(1.0)
+    bench.passes(1.0)
+    assert bench.pace.begin_wait("a", Told(), 1.001) > 0.01
+    horizon.move_to(3.0)
+    assert woken == ["told"]
+
+
+def test_the_rate_reached_is_told(bench: Bench) -> None:
+    horizon = PacedHorizon(bench.pace)
+    for _ in range(20):
+        bench.passes(0.2)
+    assert bench.pace.reached == pytest.approx(RATE)
+    for _ in range(20):
+        horizon.move_to(bench.pace.now_s() + 1.0)
+        bench.passes(0.2)
+    assert bench.pace.reached == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize("rate", [0.5, 1.0])
+def test_a_clock_that_waits_runs_at_its_rate_below_that_of_the_wall_too(rate: float) -> None:
+    wall_s = [0.0]
+    pace = Pace(rate, lambda: wall_s[0])
+    wall_s[0] = 10.0
+    assert pace.now_s() == pytest.approx(10.0 * rate)
+
+
+def test_only_a_clock_that_was_told_so_waits() -> None:
+    for rate in (1.0, 20.0):
+        clock = RatedClock(rate)
+        clock.horizon().move_to(clock.now_s())
+        before_s = clock.now_s()
+        WALL.sleep(0.001)
+        assert clock.now_s() > before_s
+        waiting = RatedClock(rate, waits=True)
+        waiting.horizon().move_to(waiting.now_s())
+        before_s = waiting.now_s()
+        WALL.sleep(0.001)
+        assert waiting.now_s() == before_s
 
 
 @pytest.fixture

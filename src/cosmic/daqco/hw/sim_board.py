@@ -22,13 +22,16 @@ from cosmic.daqco.hw.sim_faults import BoardFaults
 from cosmic.daqco.hw.sim_signal import Signal
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
-from cosmic.frame.pace import Worker
+from cosmic.frame.pace import Horizon, Worker
 
 logger = logging.getLogger(__name__)
 
 TIMEBASE_HZ: Final = 20e6
 FIFO_SAMPLES: Final = 4095
 BUFFER_S: Final = 10.0
+
+LATE_S: Final = 0.04
+"""So late may the receiver be, by the wall, before the platform's time waits for it."""
 
 MakeSignal = Callable[[Sequence[InputSettings], int], Signal]
 
@@ -49,6 +52,7 @@ class _Run:
 
     setup: _Setup
     start_s: float
+    horizon: Horizon
     next_sample: int = 0
 
     def time_s(self, sample: int) -> float:
@@ -131,7 +135,9 @@ class SimulatedBoard(Board):
         with self._faults.changed:
             if self._run is not None:
                 raise self._error("start: it is acquiring already", DeviceFault.STATE)
-            self._run = _Run(self._setup, self._clock.now_s())
+            run = _Run(self._setup, self._clock.now_s(), self._clock.horizon())
+            run.horizon.move_to(self._horizon_s(run))
+            self._run = run
 
     @override
     def receive(self, timeout_s: float) -> BoardChunk | None:
@@ -150,8 +156,7 @@ class SimulatedBoard(Board):
     @override
     def stop(self) -> None:
         with self._faults.changed:
-            self._run = None
-            self._receiver.idle()
+            self._end_run()
             self._faults.changed.notify_all()
 
     @override
@@ -170,6 +175,7 @@ class SimulatedBoard(Board):
             run = self._run
             while run is not None and self._run is run:
                 self._check_going(run)
+                run.horizon.move_to(self._horizon_s(run))
                 now_s = self._clock.now_s()
                 due_s = self._due_s(run)
                 if due_s <= now_s:
@@ -192,15 +198,26 @@ class SimulatedBoard(Board):
             return -math.inf
         return run.time_s(run.next_sample + run.setup.chunk_samples)
 
+    def _horizon_s(self, run: _Run) -> float:
+        """Return how far the platform's time may go before the next chunk is fetched."""
+        due_s = self._due_s(run)
+        return due_s + LATE_S * max(1.0, self._clock.rate) if due_s > -math.inf else math.inf
+
     def _check_going(self, run: _Run) -> None:
         """End the acquisition and raise when it failed; the lock is held."""
         try:
             self._check_there("receive")
             self._check_overrun(run)
         except DeviceError:
-            self._run = None
-            self._receiver.idle()
+            self._end_run()
             raise
+
+    def _end_run(self) -> None:
+        """Acquire no more, and let the time run without this board; the lock is held."""
+        if self._run is not None:
+            self._run.horizon.close()
+        self._run = None
+        self._receiver.idle()
 
     def _check_overrun(self, run: _Run) -> None:
         setup = run.setup

@@ -28,6 +28,10 @@ NO_COLLISION_MODEL = "no collision model"
 _NAMES_SHOWN: Final = 2
 
 
+SLOW_PART: Final = 0.95
+"""A clock that runs slower than this part of its rate is shown, in real time too."""
+
+
 class TopBar(QWidget):
     """Shows what it is told and asks for what is clicked; it decides nothing itself.
 
@@ -213,12 +217,13 @@ class TopBar(QWidget):
         self._contacts.setVisible(bool(operations))
 
     def set_rate(self, rate: float, reached: float | None = None) -> None:
-        """Show how fast the platform's clock runs where it is not real time."""
+        """Show how fast the platform's clock may run, and runs, where it is not real time."""
         text = f"time ×{rate:g}"
         if reached is not None:
             text += f" (reached ×{reached:.1f})"
         self._rate.setText(text)
-        self._rate.setVisible(rate != 1.0)
+        slow = reached is not None and reached < SLOW_PART * rate
+        self._rate.setVisible(rate != 1.0 or slow)
 
     def set_message(self, text: str, state: State = State.ERROR) -> None:
         """Show one line, such as the last error; empty takes it away."""
