@@ -18,6 +18,8 @@ class TracedLibrary:
         By C name: called with time and arguments before the function.
     left : dict
         By C name: called with time and arguments after the function.
+    lets_go : bool
+        Every call gives the interpreter up once, as one into a library in C does.
     cpu_s : float
         CPU time spent in the library's functions, where `count_cpu` is set.
     """
@@ -28,6 +30,7 @@ class TracedLibrary:
         self._cpu_s: dict[str, float] = {}
         self.entered: dict[str, Hook] = {}
         self.left: dict[str, Hook] = {}
+        self.lets_go = False
 
     @property
     def cpu_s(self) -> float:
@@ -48,6 +51,8 @@ class TracedLibrary:
             if hook is not None:
                 hook(time.perf_counter(), args)
             status = function(*args)
+            if self.lets_go:
+                time.sleep(0.0)
             hook = self.left.get(name)
             if hook is not None:
                 hook(time.perf_counter(), args)

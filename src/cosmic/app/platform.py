@@ -22,6 +22,7 @@ from cosmic.frame.application import CosmicApplicationBase, GuiFactory
 from cosmic.frame.clock import Clock, RatedClock
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.threads import share_interpreter
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.twin.scene import Scene
 from cosmic.vico.api.application import VicoApplication
@@ -182,6 +183,7 @@ def build_platform(
     StationAway
         A station does not answer.
     """
+    share_interpreter()
     file, path = load_platform(config)
     _check_simulation(file, path, rate=rate, only_simulated=cold or bool(sample or truth))
     try:
