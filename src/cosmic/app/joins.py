@@ -4,7 +4,12 @@ import cosmic
 from cosmic.app.elsewhere import Elsewhere
 from cosmic.app.hosting import Hosted, Site
 from cosmic.autonomy.couplings import join_teleoperation
-from cosmic.autonomy.interlocks import join_force_limits, join_positions, join_stage_positions
+from cosmic.autonomy.interlocks import (
+    join_force_cautions,
+    join_force_limits,
+    join_positions,
+    join_stage_positions,
+)
 from cosmic.autonomy.places import join_places
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.remote_application import RemoteDaqcoApplication
@@ -17,6 +22,7 @@ def join_here(own: Hosted, site: Site) -> None:
     mico, daqco, vico = own.mico, own.daqco, own.vico
     if daqco is not None and mico is not None:
         join_force_limits(daqco, mico)
+        join_force_cautions(daqco, mico)
         join_teleoperation(mico, daqco)
         join_positions(daqco.recorder, mico, site.clock)
     if vico is not None and mico is not None:

@@ -138,6 +138,7 @@ class OperatorWindow(CosmicServerGui):
         application.manager.latch.subscribe(self._bridge.tell_latch)
         self._scene = ScenePanel(gui, settings)
         self.add_panel(SCENE, self._scene, Qt.DockWidgetArea.RightDockWidgetArea, scroll=False)
+        gui.undo_planned.connect(self._scene.set_planned)
         self._collision_bar = CollisionBar(self.top_bar, gui, self)
         way_bar = WayBar()
         self._scene.set_bar(way_bar)
@@ -295,6 +296,7 @@ class OperatorWindow(CosmicServerGui):
         self.top_bar.set_latched(state.reason)
         if self._mico_gui is not None:
             self._mico_gui.release_keys()
+            self._mico_gui.show_stopped(state.reason)
         if self._guide is not None and state.reason is not None:
             self._guide.cancel()
 

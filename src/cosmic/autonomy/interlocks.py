@@ -1,13 +1,19 @@
 """Interlocks between subsystems: what one sees stops the other (D7, thesis 5.2)."""
 
 from collections.abc import Iterator
+from typing import Final
 
 from cosmic.daqco.api.application import DaqcoApplication
+from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.api.recorder import Recorder
 from cosmic.daqco.core.recording_format import AxisPosition
 from cosmic.frame.clock import WALL, Clock
+from cosmic.frame.errors import CosmicError
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.vico.api.application import VicoApplication
+
+_UN: Final = {"nN": 1e-3, "uN": 1.0, "µN": 1.0, "mN": 1e3, "N": 1e6}
+"""How many micronewtons a unit of force is."""
 
 
 def join_force_limits(daqco: DaqcoApplication, mico: MicoApplicationBase) -> None:
@@ -17,6 +23,29 @@ def join_force_limits(daqco: DaqcoApplication, mico: MicoApplicationBase) -> Non
     this process, limits are watched and told, and stop nothing.
     """
     daqco.guard.trip = mico.manager.stop
+
+
+def join_force_cautions(daqco: DaqcoApplication, mico: MicoApplicationBase) -> None:
+    """Have undo and initialisation ask where a force is felt beyond ``[mico.undo] felt_un``.
+
+    Only channels whose unit is one of force count.
+    """
+    board = Daqco(daqco)
+
+    def doubt() -> str:
+        least_un = mico.manager.settings.undo.felt_un
+        try:
+            values, units = board.latest(), board.units
+        except CosmicError:
+            return ""
+        felt = {
+            name: f"{value:.1f} {units[name]}"
+            for name, value in values.items()
+            if not abs(value) * _UN.get(units.get(name, ""), 0.0) <= least_un
+        }
+        return "; ".join(f"{name} feels {text}" for name, text in sorted(felt.items()))
+
+    mico.cautions.add(doubt)
 
 
 def join_positions(recorder: Recorder, mico: MicoApplicationBase, clock: Clock) -> None:

@@ -55,13 +55,16 @@ def test_the_bar_says_what_is_in_force(make: Make) -> None:
 
 
 def test_stop_latches_with_its_reason_and_reset_lets_go(make: Make, qtbot: QtBot) -> None:
-    window = make(rate=4.0, hardware=False)
+    window = make(rate=1.0, hardware=False)
     panel = ready(window, qtbot)
     moving(panel, qtbot)
     card = panel.cards["left.x"]
     qtbot.mousePress(part(window.top_bar, "stopButton", QPushButton), Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: window.top_bar.latched and not card.axis.details.in_motion)
     stood = position(card)
+    for each in panel.cards.values():
+        line = part(each, "status", QLabel)
+        qtbot.waitUntil(lambda line=line: "stopped: stop button" in line.text().lower())
     click(qtbot, card, "MiCoCL_9")
     qtbot.waitUntil(lambda: "stopped" in field(card, "target").reason)
     assert abs(position(card) - stood) < 1.0
@@ -69,6 +72,7 @@ def test_stop_latches_with_its_reason_and_reset_lets_go(make: Make, qtbot: QtBot
     click(qtbot, window.top_bar, "resetButton")
     qtbot.waitUntil(lambda: not window.top_bar.latched)
     assert not card.axis.details.in_motion
+    assert "STOPPED" not in part(panel.cards["right.x"], "status", QLabel).text()
     enter(qtbot, field(card, "target"), "0")
     click(qtbot, card, "MiCoCL_9")
     wait_for_position(qtbot, card, 0.0)
@@ -144,6 +148,8 @@ def test_closing_while_initialising_ends_in_time(make: Make, qtbot: QtBot) -> No
     window = make(rate=1.0, hardware=False)
     panel = ready(window, qtbot)
     panel.initialise()
+    assert panel.caution is not None
+    panel.caution.go.click()
     qtbot.waitUntil(lambda: any(axis.details.in_motion for axis in panel.mico))
     began_s = WALL.now_s()
     window.close()

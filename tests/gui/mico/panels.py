@@ -91,3 +91,10 @@ def wait_for_position(
         return abs(position(card) - wanted) <= within and not card.axis.details.in_motion
 
     qtbot.waitUntil(arrived, timeout=8000)
+
+
+def initialise(qtbot: QtBot, panel: MicoWidget) -> None:
+    """Press Initialise, and agree where it asks about what may be held."""
+    click(qtbot, panel, "initialise")
+    if panel.caution is not None:
+        panel.caution.go.click()

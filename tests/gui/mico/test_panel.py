@@ -21,6 +21,7 @@ from gui.mico.panels import (
     click,
     enter,
     field,
+    initialise,
     part,
     position,
     show,
@@ -125,6 +126,8 @@ def test_a_move_from_an_unknown_position_asks_and_moves_on_consent(
 def test_the_dialog_can_initialise_instead(cold: MicoWidget, qtbot: QtBot) -> None:
     choose(cold.cards["left.x"], "Find reference")
     asked(cold, qtbot).initialise_first.click()
+    assert cold.caution is not None
+    cold.caution.go.click()
     message = part(cold, "message", QLabel)
     qtbot.waitUntil(lambda: "Initialisation finished" in message.text(), timeout=20000)
     assert part(cold.cards["left.x"], "chip", ConfidenceMark).text() == "✓ known"
@@ -153,7 +156,7 @@ def test_other_refusals_ask_nothing(panel: MicoWidget, qtbot: QtBot) -> None:
 
 def test_initialising_shows_progress_and_can_be_cancelled(qtbot: QtBot) -> None:
     with simulated_panel(qtbot, rate=2.0, cold=True) as panel:
-        click(qtbot, panel, "initialise")
+        initialise(qtbot, panel)
         bar, button = part(panel, "progress", QProgressBar), part(panel, "initialise", QPushButton)
         qtbot.waitUntil(bar.isVisible)
         assert not button.isEnabled()

@@ -1,5 +1,6 @@
 """Links, Undo and the steps of the initialisation, as the operator meets them."""
 
+import re
 from collections.abc import Iterator
 
 import pytest
@@ -7,10 +8,20 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QCheckBox, QComboBox, QLabel, QLineEdit, QListWidget, QPushButton
 from pytestqt.qtbot import QtBot
 
+from cosmic.frame.clock import WALL
 from cosmic.mico.gui.initialisation_panel import InitialisationPanel
 from cosmic.mico.gui.link_switch import LinkForm
 from cosmic.mico.gui.mico_widget import MicoWidget
-from gui.mico.panels import click, field, part, position, show, wait_for_position
+from gui.mico.panels import (
+    click,
+    field,
+    initialise,
+    part,
+    position,
+    show,
+    simulated_panel,
+    wait_for_position,
+)
 from unit.mico.rigs import mico
 
 STEPS = (
@@ -142,7 +153,7 @@ def test_a_step_that_asks_is_answered_in_the_panel(
     asking: tuple[MicoWidget, InitialisationPanel], qtbot: QtBot
 ) -> None:
     panel, steps = asking
-    click(qtbot, panel, "initialise")
+    initialise(qtbot, panel)
     qtbot.waitUntil(part(steps, "confirmYes", QPushButton).isVisible)
     assert part(steps, "confirmText", QLabel).text() == "Is the table empty?"
     assert listed(steps)[0].startswith("▶")
@@ -156,7 +167,7 @@ def test_a_no_ends_the_sequence_there(
     asking: tuple[MicoWidget, InitialisationPanel], qtbot: QtBot
 ) -> None:
     panel, steps = asking
-    click(qtbot, panel, "initialise")
+    initialise(qtbot, panel)
     qtbot.waitUntil(part(steps, "confirmNo", QPushButton).isVisible)
     click(qtbot, steps, "confirmNo")
     qtbot.waitUntil(lambda: "answered with no" in part(panel, "message", QLabel).text())
@@ -167,8 +178,90 @@ def test_a_stop_ends_the_question_as_well(
     asking: tuple[MicoWidget, InitialisationPanel], qtbot: QtBot
 ) -> None:
     panel, steps = asking
-    click(qtbot, panel, "initialise")
+    initialise(qtbot, panel)
     qtbot.waitUntil(part(steps, "confirmNo", QPushButton).isVisible)
     panel.mico.application.manager.stop("test")
     qtbot.waitUntil(lambda: not part(steps, "confirmNo", QPushButton).isVisible())
     qtbot.waitUntil(lambda: listed(steps)[0].startswith("■"))
+
+
+PLANNED = re.compile(r"left\.x from (99\.\d|100\.\d) µm to -?0\.0 µm")
+
+
+def test_undo_says_where_it_goes_and_goes_slowly(qtbot: QtBot) -> None:
+    with simulated_panel(qtbot, rate=1.0) as panel:
+        card = panel.cards["left.x"]
+        click(qtbot, card, "MiCoCL_6")
+        wait_for_position(qtbot, card, 100.0)
+        button = part(panel, "undo", QPushButton)
+        qtbot.waitUntil(lambda: PLANNED.search(button.toolTip()) is not None)
+        plans: list[object] = []
+        panel.undo_planned.connect(plans.append)
+        click(qtbot, panel, "undo")
+        now, then = plans[0]  # type: ignore[misc]
+        assert (round(now["left.x"]), then["left.x"]) == (100, 0.0)
+        began_s = WALL.now_s()
+        qtbot.waitUntil(lambda: card.axis.details.in_motion)
+        wait_for_position(qtbot, card, 0.0)
+        assert WALL.now_s() - began_s > 0.3  # 100 um at 200 um/s; 13 ms at travel speed
+        qtbot.waitUntil(lambda: plans[-1] is None)
+
+
+def test_undo_asks_where_a_force_was_felt_and_no_is_the_answer_of_enter(
+    panel: MicoWidget, qtbot: QtBot
+) -> None:
+    card = panel.cards["left.x"]
+    panel.mico.application.cautions.add(lambda: "force feels 40.0 uN")
+    click(qtbot, card, "MiCoCL_6")
+    wait_for_position(qtbot, card, 100.0)
+    qtbot.waitUntil(part(panel, "undo", QPushButton).isEnabled)
+    click(qtbot, panel, "undo")
+    question = panel.undoing.question
+    assert question is not None
+    assert PLANNED.search(question.text())
+    assert "force feels 40.0 uN" in question.informativeText()
+    qtbot.keyClick(question, Qt.Key.Key_Return)
+    assert panel.undoing.question is None
+    assert abs(position(card) - 100.0) < 1.0
+    click(qtbot, panel, "undo")
+    question = panel.undoing.question
+    assert question is not None
+    question.go.click()
+    wait_for_position(qtbot, card, 0.0)
+
+
+def test_a_gripper_that_was_closed_and_not_opened_again_makes_undo_ask(
+    panel: MicoWidget, qtbot: QtBot
+) -> None:
+    card, gripper = panel.cards["left.x"], panel.cards["left.gripper"]
+    opened = position(gripper)
+    click(qtbot, gripper, "MiCoOL_4")
+    qtbot.waitUntil(lambda: position(gripper) < opened - 20.0 and at_rest(panel, "left.gripper"))
+    click(qtbot, card, "MiCoCL_6")
+    wait_for_position(qtbot, card, 100.0)
+    reasons = panel.mico.application.cautions.reasons()
+    assert any("left.gripper was closed by" in each for each in reasons)
+    click(qtbot, gripper, "MiCoOL_3")
+    qtbot.waitUntil(lambda: not panel.mico.application.cautions.reasons())
+
+
+def test_initialise_asks_where_a_gripper_may_hold_something(
+    panel: MicoWidget, qtbot: QtBot
+) -> None:
+    before = position(panel.cards["left.x"])
+    click(qtbot, panel, "initialise")
+    caution = panel.caution
+    assert caution is not None
+    assert "left.gripper is taken to be 30.0 µm open" in caution.informativeText()
+    qtbot.keyClick(caution, Qt.Key.Key_Escape)
+    qtbot.waitUntil(lambda: panel.caution is None)
+    assert panel.mico.application.running_task is None
+    assert position(panel.cards["left.x"]) == before
+    initialise(qtbot, panel)
+    task = panel.mico.application.running_task
+    assert task is not None
+    task.cancel()
+
+
+def at_rest(panel: MicoWidget, name: str) -> bool:
+    return not panel.cards[name].axis.details.in_motion

@@ -185,6 +185,19 @@ def test_a_lost_camera_leaves_its_last_picture_greyed_and_says_since_when(qtbot,
     assert colour_at(shown, (1400, 300)) == bright
 
 
+def test_a_picture_that_is_not_live_is_greyed_with_its_age(qtbot, shown, camera):
+    bright = colour_at(shown, (1400, 300))
+    camera.change(running=False)
+    qtbot.waitUntil(lambda: "not live: picture of 12:16:40, " in shown.note.text)
+    assert shown.note.text.endswith("s ago")
+    assert colour_at(shown, (1400, 300)) != bright
+    camera.change(running=True)
+    newest = camera.push()
+    qtbot.waitUntil(lambda: shown.view.picture is newest)
+    qtbot.waitUntil(lambda: shown.note.text == "")
+    assert colour_at(shown, (1400, 300)) == bright
+
+
 def test_a_camera_that_says_nothing_is_told_after_a_while(qtbot, shown, monkeypatch):
     monkeypatch.setattr("cosmic.vico.gui.camera_view.STALE_S", -1.0)
     monkeypatch.setattr(

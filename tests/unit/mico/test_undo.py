@@ -132,3 +132,42 @@ def test_what_moved_is_still_known_after_a_rescan():
         wait_until(lambda: len(rig.undo_entries) == 2)
         rig.undo()
         assert rig.undo() == {"d0.c0": 0.0}
+
+
+# What was felt, and how fast it goes back
+
+
+def test_the_way_back_is_gone_at_the_speed_of_the_configuration():
+    with mico(TWO, **GROUPS, undo={"speed_um_s": 30.0}) as (rig, controller):
+        rig["d0.c0"].move_to(100.0)
+        wait_until(lambda: rig.undo_entries)
+        rig.undo()
+        begun = controller.calls.index(controller.of("move_to")[-1])
+        limits = [call for call in controller.calls[:begun] if call[0] == "frequency"]
+        assert limits[-1][1:] == (Channel(0, 0), 20)  # 30 um/s at 1.5 um a step
+
+
+def test_undo_is_refused_where_a_force_was_felt_since_until_it_is_confirmed():
+    felt = ["force feels 40.0 uN"]
+    with mico(TWO, **GROUPS) as (rig, _):
+        rig.application.cautions.add(lambda: felt[0])
+        rig["d0.c0"].move_to(100.0)
+        wait_until(lambda: rig.undo_entries)
+        felt[0] = ""
+        rig["d0.c0"].move_to(80.0)
+        wait_until(lambda: len(rig.undo_entries) == 2)
+        assert rig.undo() == {"d0.c0": 100.0}  # nothing was felt after that
+        with pytest.raises(cosmic.NotAvailable, match=r"100\.0 µm to 0\.0 µm.*feels 40\.0 uN"):
+            rig.undo()
+        assert where(rig, "d0.c0") == [100.0]
+        assert rig.undo(confirm=True) == {"d0.c0": 0.0}
+
+
+def test_initialising_is_refused_where_something_may_be_held_until_it_is_said():
+    with mico(TWO, **GROUPS) as (rig, controller):
+        rig.application.cautions.add(lambda: "left.gripper was closed and may hold something")
+        with pytest.raises(cosmic.NotAvailable, match=r"was closed .*may_hold=True"):
+            rig.initialise()
+        assert not controller.of("reference")
+        rig.initialise(may_hold=True)
+        assert controller.of("reference")

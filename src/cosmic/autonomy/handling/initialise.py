@@ -78,7 +78,7 @@ class _Homing:
 def _initialise(work: FibreWork) -> Steps:
     for left in reversed(range(TRIES)):
         try:
-            yield work.mico.initialise(wait=False)
+            yield work.mico.initialise(wait=False, may_hold=True)
         except MoveRefused as refusal:
             if refusal.verdict.reason is not Reason.NO_ANSWER or not left:
                 raise

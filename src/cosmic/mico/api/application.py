@@ -15,6 +15,7 @@ from cosmic.frame.task import Task
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.ways import Way, way_from_plan
+from cosmic.mico.core.caution import Cautions, ClosedGrippers
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT, CollisionChecker
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.collision_manager import CollisionManager
@@ -62,7 +63,10 @@ class MicoApplication(MicoApplicationBase):
         self.way_finder = (
             WayFinder(self.manager, self.collision.model) if self.collision is not None else None
         )
-        self.undo = UndoHistory(self.manager)
+        self.cautions = Cautions()
+        self._grippers = ClosedGrippers(self.manager)
+        self.cautions.add(self._grippers.doubt)
+        self.undo = UndoHistory(self.manager, self.cautions)
         self.teleoperation = Teleoperation(self.manager, policy, folder=folder)
         self.trajectories = TrajectorySite(self, policy, platform, folder)
         self._failure = ""

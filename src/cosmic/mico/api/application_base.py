@@ -6,13 +6,14 @@ from typing import Final
 
 from PySide6.QtCore import Signal
 
-from cosmic.frame.errors import CosmicError, MoveRefused
+from cosmic.frame.errors import CosmicError, MoveRefused, NotAvailable
 from cosmic.frame.task import Task
 from cosmic.frame.task_application import TaskApplication
 from cosmic.mico.api.initialisation import Confirm, InitialisationRun
 from cosmic.mico.api.ports import CollisionPort, UndoPort
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.ways import Way, follow
+from cosmic.mico.core.caution import Cautions
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
@@ -43,6 +44,7 @@ class MicoApplicationBase(TaskApplication):
     collision: CollisionPort | None
     clearance_watch: ClearanceWatch | None
     undo: UndoPort
+    cautions: Cautions
     teleoperation: Teleoperation
     trajectories: TrajectorySite
 
@@ -78,7 +80,11 @@ class MicoApplicationBase(TaskApplication):
         """
 
     def initialise_platform(
-        self, *, skip_known: bool = False, confirm: Confirm | None = None
+        self,
+        *,
+        skip_known: bool = False,
+        confirm: Confirm | None = None,
+        may_hold: bool = False,
     ) -> Task:
         """Carry the initialisation sequence out; returns at once.
 
@@ -88,8 +94,15 @@ class MicoApplicationBase(TaskApplication):
         Raises
         ------
         NotAvailable
-            Another long operation is under way.
+            Another long operation is under way, or something may be held or touched and `may_hold`
+            does not say that this was looked at.
         """
+        doubts = () if may_hold else self.cautions.reasons()
+        if doubts:
+            raise NotAvailable(
+                f"the initialisation drives every axis: {'; '.join(doubts)}. Put away what is held "
+                "and go clear of it, or initialise with may_hold=True"
+            )
         run = InitialisationRun(
             self.manager,
             skip_known=skip_known,

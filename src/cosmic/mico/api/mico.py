@@ -23,7 +23,7 @@ from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.links import Link
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
-from cosmic.mico.core.undo import UndoEntry
+from cosmic.mico.core.undo import UndoEntry, undo_text
 
 
 class Mico(AxesTogether):
@@ -57,6 +57,7 @@ class Mico(AxesTogether):
         wait: bool = True,
         skip_known: bool = False,
         confirm: Confirm | None = None,
+        may_hold: bool = False,
     ) -> Task:
         """Carry out the initialisation sequence of the platform file, step by step.
 
@@ -72,16 +73,20 @@ class Mico(AxesTogether):
             Leave out of the steps that find positions those axes whose position is known.
         confirm : callable
             Called with the text of a step that asks; True goes on. Without one the answer is no.
+        may_hold : bool
+            Go on although something may be held or touched: a gripper that was closed, a force.
 
         Raises
         ------
         NotAvailable
-            Another long operation is under way.
+            Another long operation is under way, or something may be held, without `may_hold`.
         CosmicError
             A step failed, was refused, stopped or answered with no; the text says which and what
             to do. What moved with it was stopped, and no further step is made.
         """
-        task = self._application.initialise_platform(skip_known=skip_known, confirm=confirm)
+        task = self._application.initialise_platform(
+            skip_known=skip_known, confirm=confirm, may_hold=may_hold
+        )
         return self._follow(task, progress, wait=wait)
 
     def rescan(
@@ -211,16 +216,20 @@ class Mico(AxesTogether):
 
     @overload
     def undo(
-        self, group: str | None = None, *, wait: Literal[True] = True
+        self, group: str | None = None, *, wait: Literal[True] = True, confirm: bool = False
     ) -> dict[str, float | None]: ...
 
     @overload
-    def undo(self, group: str | None = None, *, wait: Literal[False]) -> GroupMovement: ...
+    def undo(
+        self, group: str | None = None, *, wait: Literal[False], confirm: bool = False
+    ) -> GroupMovement: ...
 
     def undo(
-        self, group: str | None = None, *, wait: bool = True
+        self, group: str | None = None, *, wait: bool = True, confirm: bool = False
     ) -> dict[str, float | None] | GroupMovement:
         """Take the last movement of an assembly back, whoever made it, through the gate.
+
+        It goes at the speed of ``[mico.undo]``.
 
         Parameters
         ----------
@@ -228,11 +237,14 @@ class Mico(AxesTogether):
             Title of the assembly in the platform file; None takes the one that moved last.
         wait : bool
             False returns the `GroupMovement` at once.
+        confirm : bool
+            Go back although something was felt since, or may be held.
 
         Raises
         ------
         NotAvailable
-            There is nothing to take back, no such assembly, or it moves.
+            There is nothing to take back, no such assembly, or it moves; or something was felt
+            since or may be held, and `confirm` does not say that this was looked at.
         MoveRefused
             The gate refused the way back; it can be tried again.
         DeviceError, MoveCancelled
@@ -240,6 +252,12 @@ class Mico(AxesTogether):
         """
         history = self._application.undo
         entry = history.newest(group)
+        doubts = () if confirm else self.undo_doubts(entry)
+        if doubts:
+            raise NotAvailable(
+                f"going back would move {undo_text(entry, self._manager.states())}, but "
+                f"{'; '.join(doubts)}. Look where it goes, then undo with confirm=True"
+            )
         movement = GroupMovement.of(history.order(entry))
 
         def forget(ended: GroupMovement) -> None:
@@ -252,6 +270,13 @@ class Mico(AxesTogether):
         reached = waited_for(movement)
         history.drop(entry)
         return reached
+
+    def undo_doubts(self, entry: UndoEntry) -> tuple[str, ...]:
+        """Return what speaks against taking `entry` back: felt since, or so now."""
+        since = [each for each in self.undo_entries if each.number >= entry.number]
+        told = [f"when a movement ended, {text}" for each in since for text in each.felt]
+        now = self._application.cautions.reasons()
+        return tuple(dict.fromkeys([*now, *(told if not now else ())]))
 
     # Collisions
 

@@ -21,6 +21,7 @@ from cosmic.mico.api.remote_mirrors import RemoteCollision
 from cosmic.mico.api.station_words import EVENTS, POSITIONS, MicoFacts, MicoPicture
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.ways import Way
+from cosmic.mico.core.caution import Cautions
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
@@ -70,6 +71,7 @@ class RemoteMicoApplication(MicoApplicationBase):
         self.collision = self.manager.collision
         self.clearance_watch = ClearanceWatch(self.collision, self.manager.positions, policy)
         self.undo = self.manager.undo
+        self.cautions = Cautions()  # what the station felt stands in the entries it tells
         self.teleoperation = Teleoperation(self.manager, policy)
         self.trajectories = TrajectorySite(self, policy)
         self.trajectories.poses = self.manager.poses

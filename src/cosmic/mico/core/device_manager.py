@@ -242,8 +242,12 @@ class DeviceManager(DeviceTable):
         linked: bool = True,
         match_arrival: bool = False,
         follows: Mapping[str, Movement] | None = None,
+        slow_hz: Mapping[str, int] | None = None,
     ) -> dict[str, Order]:
-        """Decide `motions` together and start them back to back, or none; see `ManagerPort`."""
+        """Decide `motions` together and start them back to back, or none; see `ManagerPort`.
+
+        `slow_hz` limits the steps per second of single axes for this movement.
+        """
         return self._groups.order(
             motions,
             source=source,
@@ -251,6 +255,7 @@ class DeviceManager(DeviceTable):
             linked=linked,
             match_arrival=match_arrival,
             follows=follows or {},
+            slow_hz=slow_hz,
         )
 
     def _check_ready(self) -> None:

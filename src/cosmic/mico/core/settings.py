@@ -55,6 +55,14 @@ class JogSettings(StrictModel):
     dead_man_s: float = Field(default=0.25, ge=0.05, le=1.0)
 
 
+class UndoSettings(StrictModel):
+    """How a movement is taken back, and from which force on that is asked about first."""
+
+    speed_um_s: float = Field(default=200.0, gt=0)
+    speed_deg_s: float = Field(default=2.0, gt=0)
+    felt_un: float = Field(default=15.0, gt=0)
+
+
 class WatchSettings(StrictModel):
     """How closely positions are watched; all times but `stall_s` count on the wall clock."""
 
@@ -166,6 +174,7 @@ class MicoSettings(StrictModel):
     serials: Annotated[tuple[int, ...], Field(strict=False)] = ()
     defaults: MotionDefaults = MotionDefaults()
     jog: JogSettings = JogSettings()
+    undo: UndoSettings = UndoSettings()
     watch: WatchSettings = WatchSettings()
     initialisation: InitialisationSettings = InitialisationSettings()
     poses: str = "poses.toml"

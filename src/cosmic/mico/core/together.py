@@ -64,6 +64,7 @@ class GroupOrders:
         linked: bool,
         match_arrival: bool,
         follows: Mapping[str, Movement],
+        slow_hz: Mapping[str, int] | None = None,
     ) -> dict[str, Order]:
         """Start `motions` together, or none of them; see `ManagerPort.order_together`."""
         self._check_names(motions)
@@ -75,6 +76,7 @@ class GroupOrders:
         self._check_ready()
         grants = self._granted(requests, source)
         speeds = self._matched_speeds(grants) if match_arrival else {}
+        speeds |= {name: hertz for name, hertz in (slow_hz or {}).items() if name in motions}
         start = GroupStart(len(motions), self._on_started) if len(motions) > 1 else None
         token, guard = self._lease.local_token, self._lease.guard()
         orders = {

@@ -1,6 +1,7 @@
 """What each assembly did last, so that it can be taken back."""
 
 import logging
+import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,10 +14,11 @@ from PySide6.QtCore import QObject, Qt, Signal
 from cosmic.frame.errors import NotAvailable, refusal
 from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import Reason, refuse
+from cosmic.mico.core.caution import Cautions
 from cosmic.mico.core.device import Device
 from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.messages import MovementBegun
-from cosmic.mico.core.orders import LARGEST_STEPS, Motion, MoveTo, Order, Step
+from cosmic.mico.core.orders import FREQUENCY_HZ, LARGEST_STEPS, Motion, MoveTo, Order, Step
 from cosmic.mico.core.positioner import Confidence, PositionerState
 from cosmic.mico.hw.interface import PositionerKind
 
@@ -41,11 +43,14 @@ class UndoEntry:
         Where its axes stood before, by name, in gate coordinates.
     number : int
         Grows with each entry.
+    felt : tuple of str
+        What spoke against moving on when it ended: something held, or a force.
     """
 
     group: str
     before: Mapping[str, float]
     number: int
+    felt: tuple[str, ...] = ()
 
 
 class UndoHistory(QObject):
@@ -62,9 +67,15 @@ class UndoHistory(QObject):
 
     changed = Signal()
 
-    def __init__(self, manager: DeviceManager, parent: QObject | None = None) -> None:
+    def __init__(
+        self,
+        manager: DeviceManager,
+        cautions: Cautions | None = None,
+        parent: QObject | None = None,
+    ) -> None:
         super().__init__(parent)
         self._manager = manager
+        self._cautions = cautions or Cautions()
         self._lock = RLock()
         self._numbers = count(1)
         self._entries: dict[str, deque[UndoEntry]] = {}
@@ -129,9 +140,10 @@ class UndoHistory(QObject):
         moved = {name: where for name, where in before.items() if not self._stands_at(name, where)}
         if not moved:
             return
+        felt = self._cautions.reasons()
         with self._lock:
             entries = self._entries.setdefault(group, deque(maxlen=DEPTH))
-            entries.append(UndoEntry(group, moved, next(self._numbers)))
+            entries.append(UndoEntry(group, moved, next(self._numbers), felt))
         self.changed.emit()
 
     def _stands_at(self, name: str, where: float) -> bool:
@@ -197,9 +209,26 @@ class UndoHistory(QObject):
             raise NotAvailable(f"{', '.join(moving)} is moving; undo when it stands")
 
     def order(self, entry: UndoEntry) -> dict[str, Order]:
-        """Begin to move back; raises `MoveRefused`, and the entry stays."""
+        """Begin to move back at the speed of `[mico.undo]`; raises `MoveRefused`, the entry stays.
+
+        What was come to carefully must not be left, or come back to, at travel speed.
+        """
         motions = {name: self._way_back(name, where) for name, where in entry.before.items()}
-        return self._manager.order_together(motions, source=UNDO)
+        slow_hz = {
+            name: self._slow_hz(motion.unit)
+            for name, motion in motions.items()
+            if isinstance(motion, MoveTo)
+        }
+        return self._manager.order_together(motions, source=UNDO, slow_hz=slow_hz)
+
+    def _slow_hz(self, unit: str) -> int:
+        defaults, undo = self._manager.settings.defaults, self._manager.settings.undo
+        if unit == "deg":
+            hertz = undo.speed_deg_s / defaults.nominal_step_deg
+        else:
+            hertz = undo.speed_um_s / defaults.nominal_step_um
+        low, high = FREQUENCY_HZ
+        return max(low, min(high, math.ceil(hertz)))
 
     def _way_back(self, name: str, where: float) -> Motion:
         state = self._manager.state(name)
@@ -213,7 +242,8 @@ class UndoHistory(QObject):
         if not abs(steps) <= LARGEST_STEPS:
             text = f"{name}: {format_quantity(way_um, 'um')} back is more than it can step at once"
             raise refusal(refuse(Reason.LIMIT, text, axis=name))
-        return Step(steps, defaults.amplitude_v, defaults.frequency_hz)
+        slow_hz = min(defaults.frequency_hz, self._manager.settings.jog.frequency_hz)
+        return Step(steps, defaults.amplitude_v, slow_hz)
 
     def drop(self, entry: UndoEntry) -> None:
         """Forget an entry that was taken back; harmless the second time."""
@@ -223,3 +253,18 @@ class UndoHistory(QObject):
                 return
             entries.remove(entry)
         self.changed.emit()
+
+
+def undo_text(entry: UndoEntry, states: Mapping[str, PositionerState]) -> str:
+    """Return where taking `entry` back leads, such as "left.x from 100.0 µm to 0.0 µm"."""
+    texts = []
+    for name, where in entry.before.items():
+        state = states.get(name)
+        if state is None or state.position is None:
+            texts.append(name)
+            continue
+        now, then = (
+            format_quantity(each - state.zero, state.unit) for each in (state.position, where)
+        )
+        texts.append(f"{name} from {now} to {then}")
+    return ", ".join(texts)

@@ -17,9 +17,12 @@ from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.theme import STEP_PX, State, state_look, ui_font
 from cosmic.frame.task import Task
+from cosmic.frame.units import format_quantity
 from cosmic.mico.api.initialisation import Asker, plan
 from cosmic.mico.api.mico import Mico
+from cosmic.mico.core.positioner import Confidence, PositionerState
 from cosmic.mico.core.sequence.report import SequenceReport, StepReport, StepState
+from cosmic.mico.hw.interface import PositionerKind
 
 _GLYPHS: Final = {
     StepState.WAITING: "○",
@@ -30,6 +33,8 @@ _GLYPHS: Final = {
 }
 _LOUD: Final = (StepState.RUNNING, StepState.FAILED)
 _ROWS: Final = 6
+_OPEN_UM: Final = 50.0
+"""A gripper that is further open than a fibre is thick holds none."""
 _START_TIP: Final = "Make these steps, one after the other"
 
 
@@ -40,9 +45,12 @@ class InitialisationPanel(QWidget):
     -------
     refused(str)
         It could not be begun; the text says why.
+    doubted(object)
+        It was not begun, as something may be held or touched; a tuple of reasons.
     """
 
     refused = Signal(str)
+    doubted = Signal(object)
 
     def __init__(self, mico: Mico, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -136,11 +144,22 @@ class InitialisationPanel(QWidget):
         )
 
     def start(self) -> None:
+        """Begin the sequence, unless something may be held: `doubted` tells that."""
+        states = self._application.manager.states().values()
+        grippers = (_may_hold(each) for each in states if each.present)
+        reasons = self._application.cautions.reasons()
+        doubts = (*reasons, *(text for text in grippers if text))
+        if doubts:
+            self.doubted.emit(doubts)
+        else:
+            self.start_anyway()
+
+    def start_anyway(self) -> None:
         """Begin the sequence; `refused` tells why where it cannot be begun."""
         asker = Asker(self._is_over)
         try:
             task = self._application.initialise_platform(
-                skip_known=self._skip.isChecked(), confirm=asker.ask
+                skip_known=self._skip.isChecked(), confirm=asker.ask, may_hold=True
             )
         except CosmicError as exc:
             self.refused.emit(str(exc))
@@ -200,6 +219,18 @@ class InitialisationPanel(QWidget):
         item.setFont(ui_font(bold=loud))
         if loud:
             self._list.scrollToItem(item)
+
+
+def _may_hold(state: PositionerState) -> str:
+    """Return why an actuator without sensor, a gripper, may hold something; empty for others."""
+    if state.kind is not PositionerKind.OPEN_LOOP:
+        return ""
+    if state.position is None or state.confidence is Confidence.UNKNOWN:
+        return f"the opening of {state.name} is unknown: it may hold something"
+    if not state.position > _OPEN_UM:
+        opening = format_quantity(state.position, state.unit)
+        return f"{state.name} is taken to be {opening} open: it may hold something"
+    return ""
 
 
 def make_initialisation_panel(mico: Mico) -> InitialisationPanel:

@@ -15,6 +15,7 @@ from cosmic.mico.core.group_start import GroupStarted
 from cosmic.mico.core.settings import GroupSettings, MicoSettings, PositionerSettings
 from cosmic.mico.gui.arrangement import arranged_groups
 from cosmic.mico.gui.axis_commands import ConsentRequest
+from cosmic.mico.gui.caution_dialog import CautionDialog
 from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI
 from cosmic.mico.gui.collision_status import CollisionStatus
 from cosmic.mico.gui.columns import GroupColumns
@@ -50,6 +51,8 @@ class MicoWidget(QWidget):
         There may be other devices now.
     verdict_given(MoveVerdict)
         A command of this panel was refused, or a jog stopped in front of something.
+    undo_planned(object)
+        The poses that Undo leads through, while it is asked about or under way; None afterwards.
     way_wanted(WayRequest)
         Something stands in the way of a move, while ways round are sought.
     """
@@ -57,6 +60,7 @@ class MicoWidget(QWidget):
     failure_changed = Signal(str)
     refreshed = Signal()
     verdict_given = Signal(object)
+    undo_planned = Signal(object)
     way_wanted = Signal(object)
 
     def __init__(self, mico: Mico, parent: QWidget | None = None) -> None:
@@ -68,7 +72,9 @@ class MicoWidget(QWidget):
         self._cards: dict[str, PositionerBaseGUI] = {}
         self._shape: list[tuple[str, str]] = []
         self._dialog: ConsentDialog | None = None
+        self._caution: CautionDialog | None = None
         self._seeks_ways = False
+        self._stopped: str | None = None
         self._collision = CollisionStatus(self._application.collision)
         self._header = MicoHeader(self._settings.jog)
         self._steps = make_initialisation_panel(mico)
@@ -92,6 +98,8 @@ class MicoWidget(QWidget):
         self._header.undo_requested.connect(self._undoing.undo)
         self._header.steps_toggled.connect(self._on_steps_toggled)
         self._steps.refused.connect(self._on_refused)
+        self._steps.doubted.connect(self._on_initialisation_doubted)
+        self._undoing.planned.connect(self.undo_planned)
         self._undoing.said.connect(self._header.set_message)
         self._undoing.available.connect(self._header.set_undo)
         self._undoing.show_available()
@@ -133,6 +141,16 @@ class MicoWidget(QWidget):
         """The question that waits for an answer."""
         return self._dialog
 
+    @property
+    def caution(self) -> CautionDialog | None:
+        """The question before an initialisation that could lose something."""
+        return self._caution
+
+    @property
+    def undoing(self) -> UndoGui:
+        """What takes the last movement back."""
+        return self._undoing
+
     def keys(self) -> list[tuple[str, str]]:
         """Return the keys that jog, and what each moves, and that of Undo."""
         jogs = [
@@ -149,6 +167,12 @@ class MicoWidget(QWidget):
     def release_keys(self) -> None:
         """Let go of every key that jogs."""
         self._keys.release_all()
+
+    def show_stopped(self, reason: str | None) -> None:
+        """Show on every card that the stop is latched, and why; None: no longer."""
+        self._stopped = reason
+        for card in self._cards.values():
+            card.show_stopped(reason)
 
     def set_seeking_ways(self, on: bool) -> None:
         """Ask with `way_wanted` instead of refusing a move that something stands in the way of."""
@@ -202,6 +226,7 @@ class MicoWidget(QWidget):
             card.commands.verdict_given.connect(self.verdict_given)
             card.commands.way_wanted.connect(self.way_wanted)
             card.commands.seeks_ways = self._seeks_ways
+            card.show_stopped(self._stopped)
             if isinstance(card, ClosedLoopGUI):
                 join_links(card, self._mico)
             self._cards[name] = card
@@ -255,6 +280,25 @@ class MicoWidget(QWidget):
         """Begin the initialisation sequence and show its steps, as the button does."""
         self._header.set_steps_shown(True)
         self._steps.start()
+
+    def _on_initialisation_doubted(self, doubts: tuple[str, ...]) -> None:
+        if self._caution is not None:
+            self._caution.raise_()
+            return
+        caution = CautionDialog(
+            "Initialise",
+            "The initialisation drives every axis to its reference.",
+            doubts,
+            "Initialise anyway",
+            self._steps.start_anyway,
+            self,
+        )
+        caution.destroyed.connect(self._on_caution_destroyed)
+        self._caution = caution
+        caution.show()
+
+    def _on_caution_destroyed(self) -> None:
+        self._caution = None
 
     def _on_steps_toggled(self, shown: bool) -> None:
         self._steps.setVisible(shown)

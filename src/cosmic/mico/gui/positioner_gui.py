@@ -80,8 +80,9 @@ class PositionerBaseGUI(Card):
         self._defaults = defaults
         self._note = ""
         self._watched = True
+        self._stopped = ""
         self._state: PositionerState | None = None
-        self._shown: tuple[State, str] | None = None
+        self._shown: tuple[State, str, State] | None = None
         self._inputs: list[QWidget] = []
         self._usual_tips: dict[QWidget, str] = {}
         self._make_common()
@@ -181,11 +182,21 @@ class PositionerBaseGUI(Card):
         if self._state is not None:
             self._show_line(self._state)
 
+    def show_stopped(self, reason: str | None) -> None:
+        """Show that the stop is latched, and why; None: movements are allowed again."""
+        self._stopped = f"■ STOPPED: {reason}; Reset allows movements again" if reason else ""
+        if self._state is not None:
+            self._show_badge(
+                STATES[self._state.status], self._state.error or self._activity_text(self._state)
+            )
+            self._show_line(self._state)
+
     def _show_badge(self, badge: State, detail: str) -> None:
-        if (badge, detail) != self._shown:  # most states differ in the position alone
-            self._shown = (badge, detail)
+        edge = State.ERROR if self._stopped else badge
+        if (badge, detail, edge) != self._shown:  # most states differ in the position alone
+            self._shown = (badge, detail, edge)
             self._badge.set_state(badge, detail)
-            self.set_edge(badge)
+            self.set_edge(edge)
 
     @staticmethod
     def _activity_text(state: PositionerState) -> str:
@@ -210,7 +221,7 @@ class PositionerBaseGUI(Card):
             look = state_look(State.UNKNOWN if not state.present else State.ERROR)
             text = f"{look.glyph} {state.error}"
         else:
-            text = self._note or ("" if self._watched else UNWATCHED_TEXT)
+            text = self._note or self._stopped or ("" if self._watched else UNWATCHED_TEXT)
         loud = bool(text)
         self._line.set_text(text or self._usual_line(state))
         set_style_property(self._line, "role", "" if loud else "dim")

@@ -229,7 +229,7 @@ class CameraView(QWidget):
             self._show_old(f"{camera.problem}\n{since}")
             self.status.show_state(State.ERROR, camera.problem)
         elif not camera.running:
-            self._show_old("" if self._came else "not started")
+            self._show_old(f"not live: {self._age}" if self._came else "not started")
             self.status.show_state(State.UNKNOWN, f"stopped; {since}")
         elif settings is not None and settings.trigger is not Trigger.FREE_RUN:
             self._show_old("")
@@ -240,6 +240,11 @@ class CameraView(QWidget):
         else:
             self._show_old("")
             self.status.show_state(State.OK, "live")
+
+    @property
+    def _age(self) -> str:
+        """How old the picture shown is."""
+        return f"picture of {self._came}, {WALL.now_s() - self._came_s:.0f} s ago"
 
     @property
     def _patience_s(self) -> float:
