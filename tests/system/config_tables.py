@@ -23,6 +23,7 @@ from cosmic.mico.core.settings import (
     MicoSettings,
     MotionDefaults,
     PositionerSettings,
+    UndoSettings,
     WatchSettings,
 )
 from cosmic.mico.core.teleoperation.settings import (
@@ -69,6 +70,7 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[mico]": MicoSettings,
     "[mico.defaults]": MotionDefaults,
     "[mico.jog]": JogSettings,
+    "[mico.undo]": UndoSettings,
     "[mico.watch]": WatchSettings,
     "[mico.initialisation]": InitialisationSettings,
     "[[mico.initialisation.step]]": StepSettings,
