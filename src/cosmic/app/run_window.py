@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from PySide6.QtCore import QCoreApplication, QObject, QSettings, QStandardPaths, QTimer
+from PySide6.QtCore import QCoreApplication, QObject, QSettings, QStandardPaths, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
 from cosmic.app.check import key_mistakes
@@ -132,6 +132,8 @@ def log_file() -> Path:
 def _application() -> QApplication:
     QCoreApplication.setOrganizationName("CoSMic")
     QCoreApplication.setApplicationName("CoSMic")
+    # The stop key is not seen in a dialog that the desktop makes.
+    QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_DontUseNativeDialogs)
     existing = QApplication.instance()
     return existing if isinstance(existing, QApplication) else QApplication(sys.argv[:1])
 

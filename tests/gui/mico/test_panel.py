@@ -3,6 +3,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QProgressBar, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -131,6 +132,16 @@ def test_the_dialog_can_initialise_instead(cold: MicoWidget, qtbot: QtBot) -> No
     message = part(cold, "message", QLabel)
     qtbot.waitUntil(lambda: "Initialisation finished" in message.text(), timeout=20000)
     assert part(cold.cards["left.x"], "chip", ConfidenceMark).text() == "✓ known"
+
+
+def test_enter_in_the_question_moves_nothing(cold: MicoWidget, qtbot: QtBot) -> None:
+    before = position(cold.cards["left.x"])
+    choose(cold.cards["left.x"], "Find reference")
+    qtbot.keyClick(asked(cold, qtbot), Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: cold.dialog is None)
+    assert cold.caution is None
+    assert cold.mico.application.running_task is None
+    assert position(cold.cards["left.x"]) == before
 
 
 def test_declining_moves_nothing(cold: MicoWidget, qtbot: QtBot) -> None:

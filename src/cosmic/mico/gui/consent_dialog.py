@@ -36,7 +36,7 @@ class ConsentDialog(QMessageBox):
         self.initialise_first.setToolTip("Find the reference of every axis in the safe order")
         cancel = self.addButton("Cancel", role.RejectRole)
         cancel.setToolTip("Do nothing")
-        self.setDefaultButton(self.initialise_first)
+        self.setDefaultButton(cancel)  # an Enter too many must not set axes going
         self.setEscapeButton(cancel)
         self.setModal(False)
         self.move_anyway.clicked.connect(self._on_move_anyway)
