@@ -1,0 +1,231 @@
+"""Hostile commands through all ways in at once, judged by an oracle that shares no code.
+
+`python -m benchmarks.adversary --commands 1000000` takes about an hour or two and is run at night. Threads
+of this process command axes, groups, jogs, trajectories, detours, forged orders, force limits and
+control loops, and stop everything again and again; a client in a process of its own does the same
+through a station. DAQCo records, ViCo is live. The oracle (tests/oracles/clearance.py, with its
+own reading of URDF, SRDF and scene) follows the true stages and says whether any watched pair came
+nearer than its margin by more than a sensor's step, whether anything moved after a stop, and
+whether an axis left its soft limits. A run that is not harmless exits with 1 and prints what it saw.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+from benchmarks.adversary_attacks import (
+    Attack,
+    AxisAttack,
+    ForceAttack,
+    OrderAttack,
+    StopAttack,
+    TrajectoryAttack,
+)
+from benchmarks.adversary_watch import Findings, Watch
+from benchmarks.figures import Figure, table
+from tests.oracles.clearance import PlatformClearance
+
+from cosmic.app.network_settings import serving
+from cosmic.app.platform import Platform, build_platform
+from cosmic.app.rig import Rig
+from cosmic.app.simulation import make_scene
+from cosmic.app.station_host import StationHost
+from cosmic.frame.errors import CosmicError
+from cosmic.twin.scene import Scene
+
+NAME = "adversary"
+ROOT = Path(__file__).resolve().parents[1]
+SCENE = ROOT / "config" / "scenes" / "fiberstation.toml"
+LISTEN = "tcp/127.0.0.1:0"
+
+
+class Result:
+    """What a run found."""
+
+    def __init__(self, found: Findings, attacks: Sequence[Attack], remote: tuple[int, list[str]]):
+        self.found = found
+        self.commands = sum(each.calls for each in attacks) + remote[0]
+        self.refused = sum(each.refused for each in attacks)
+        self.raw = [text for each in attacks for text in each.raw] + remote[1]
+        self.by_way = {each.name: each.calls for each in attacks} | {"station": remote[0]}
+
+
+def _free_port() -> int:
+    import socket
+
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@contextmanager
+def served(rate: float, seed: int) -> Iterator[tuple[Platform, Rig, str, Scene]]:
+    """Run a platform with everything, as a station too; last comes the truth of its twin."""
+    scenes: list[Scene] = []
+
+    def keep(*args: Any, **more: Any) -> Scene:
+        scenes.append(make_scene(*args, **more))
+        return scenes[-1]
+
+    with patch("cosmic.app.platform.make_scene", keep):
+        platform = build_platform(rate=rate, seed=seed)
+    rig = Rig(platform, "adversary")
+    try:
+        platform.initialize()
+        endpoint = f"tcp/127.0.0.1:{_free_port()}"
+        how = serving(
+            platform.file.network,
+            platform.file.platform.name,
+            platform.path.parent,
+            listen=endpoint,
+        )
+        host = StationHost(platform, how)
+        try:
+            yield platform, rig, endpoint, scenes[0]
+        finally:
+            host.close()
+    finally:
+        rig.close()
+
+
+def attack(commands: int, *, rate: float, seed: int, client: bool = True) -> Result:
+    """Give so many commands, and return what was seen."""
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        served(rate, seed) as (platform, rig, endpoint, scene),
+    ):
+        limits = {axis.details.name: axis.limits for axis in rig.mico if axis.limits is not None}
+        watch = Watch(PlatformClearance(SCENE), scene.stages, platform.clock, limits)
+        for name in ("probe.y", "table.rotation"):
+            watch.may_leave_limits(name)
+        stop = StopAttack(rig, seed, watch, platform.clock.now_s)
+        stop.coast_s = 0.05 * max(rate, 1.0)
+        attacks: list[Attack] = [
+            AxisAttack(rig, seed, "axes 1"),
+            AxisAttack(rig, seed, "axes 2"),
+            OrderAttack(rig, seed),
+            ForceAttack(rig, seed, Path(folder)),
+            TrajectoryAttack(rig, seed),
+            stop,
+        ]
+        ended = threading.Event()
+
+        def go(each: Attack) -> None:
+            while not ended.wait(each.pause_s):
+                if not watch.behind:
+                    each.act()
+
+        threads = [threading.Thread(target=go, args=(each,), name=each.name) for each in attacks]
+        watch.start()
+        remote = _Client(endpoint, seed) if client else None
+        for thread in threads:
+            thread.start()
+        while sum(each.calls for each in attacks) + (remote.calls if remote else 0) < commands:
+            time.sleep(0.05)
+            if remote is not None:
+                _lend(rig)
+        ended.set()
+        for thread in threads:
+            thread.join()
+        told = remote.end() if remote is not None else (0, [])
+        watch.may_move()
+        watch.end()
+        return Result(watch.found, attacks, told)
+
+
+def _lend(rig: Rig) -> None:
+    """Leave the lease where it is: the client takes it when it can."""
+    with suppress(CosmicError):
+        rig.mico.names  # noqa: B018
+
+
+class _Client:
+    """A hostile program at another computer."""
+
+    def __init__(self, endpoint: str, seed: int) -> None:
+        command = [sys.executable, "-m", "benchmarks.adversary_client", endpoint, str(seed)]
+        self._process = subprocess.Popen(
+            command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        self.calls = 0
+        self._raw: list[str] = []
+        self._reader = threading.Thread(target=self._read, name="client's words")
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            if line.startswith("calls "):
+                self.calls = int(line.split()[1])
+            else:
+                self._raw.append(f"station: {line.strip()}")
+
+    def end(self) -> tuple[int, list[str]]:
+        """End it, and return how much it did and what went wrong."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        try:
+            self._process.wait(30.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+        self._reader.join()
+        return self.calls, self._raw
+
+
+def figures(result: Result) -> list[Figure]:
+    """Return what a run found as figures."""
+    found = result.found
+    least = found.least.spare_um if found.least is not None else float("nan")
+    return [
+        Figure(NAME, "hostile commands", result.commands, ""),
+        Figure(NAME, "of these through a station", result.by_way["station"], ""),
+        Figure(NAME, "looks of the oracle", found.looks, ""),
+        Figure(NAME, "pairs nearer than their margin", len(found.too_near), "", 0),
+        Figure(NAME, "movements after a stop", len(found.late_stops), "", 0),
+        Figure(NAME, "axes outside their soft limits", len(found.outside), "", 0),
+        Figure(NAME, "axes that the oracle lost sight of", len(found.unseen), "", 0),
+        Figure(NAME, "raw errors", len(result.raw), "", 0),
+        Figure(NAME, "least that a pair had to spare", least, "um"),
+    ]
+
+
+def measure(quick: bool = False) -> list[Figure]:
+    """Return the figures of one run."""
+    return figures(attack(400 if quick else 20_000, rate=5.0, seed=1))
+
+
+def main() -> int:
+    """Read the command line and run."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--commands", type=int, default=20_000)
+    parser.add_argument("--rate", type=float, default=5.0)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--no-station", action="store_true")
+    options = parser.parse_args()
+    began_s = time.perf_counter()
+    result = attack(
+        options.commands, rate=options.rate, seed=options.seed, client=not options.no_station
+    )
+    print(table(figures(result)))
+    print(f"\n{time.perf_counter() - began_s:.0f} s; {result.by_way}; refused {result.refused}")
+    for title in ("too_near", "late_stops", "outside"):
+        for line in getattr(result.found, title)[:10]:
+            print(f"{title}: {line}")
+    for line in result.raw[:20]:
+        print(f"raw: {line}")
+    return 0 if result.found.harmless and not result.raw else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,40 @@
+"""The client of `benchmarks.adversary`: hostile commands through a station, until its input ends."""
+
+import os
+import sys
+import threading
+import time
+from contextlib import suppress
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+import cosmic
+from benchmarks.adversary_attacks import AxisAttack
+from cosmic.frame.errors import CosmicError
+
+
+def main(endpoint: str, seed: str) -> None:
+    """Attack until standard input is closed."""
+    ended = threading.Event()
+    threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
+    with cosmic.connect(stations={"fiberstation": endpoint}) as rig:
+        attack = AxisAttack(rig, int(seed) + 1, "station", sweeps=False)
+        told_s = 0.0
+        while not ended.is_set():
+            if attack.calls % 20 == 0:
+                with suppress(CosmicError):
+                    rig.take_control()
+            attack.act()
+            if time.monotonic() - told_s > 0.1:
+                told_s = time.monotonic()
+                print(f"calls {attack.calls}", flush=True)
+            if attack.chance.random() < 0.02:
+                with suppress(CosmicError):
+                    rig.release_control()
+        print(f"calls {attack.calls}", flush=True)
+        for line in attack.raw:
+            print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

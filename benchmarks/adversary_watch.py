@@ -1,0 +1,145 @@
+"""Follows where the stages of a simulated platform truly are, and judges what it sees.
+
+Knows the twin's truth and the platform's files; nothing of the gate, the device or the stop.
+"""
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from tests.oracles.clearance import Near, PlatformClearance
+
+from cosmic.frame.clock import Clock
+from cosmic.twin.stage import Stage
+
+STEP_UM: Final = 0.1
+"""The finest that a sensor of the platform tells apart, with room; a pair may lack so much."""
+FINEST_UM: Final = 0.5
+"""So far two bodies may approach between two looks near their margin."""
+BEHIND_S: Final = 0.05
+"""The watch looks so far behind the present, s of the platform."""
+FORGOTTEN_S: Final = 0.5
+"""Attacks wait while the watch is farther behind than this, s of the platform."""
+STANDING_PER_S: Final = 1e-3
+COARSEST_S: Final = 0.05
+
+
+@dataclass
+class Findings:
+    """What was seen; harmless while the lists are empty."""
+
+    too_near: list[str] = field(default_factory=list)
+    late_stops: list[str] = field(default_factory=list)
+    outside: list[str] = field(default_factory=list)
+    unseen: set[str] = field(default_factory=set)
+    least: Near | None = None
+    looks: int = 0
+    behind_s: float = 0.0
+
+    @property
+    def harmless(self) -> bool:
+        """True while nothing went wrong."""
+        return not (self.too_near or self.late_stops or self.outside or self.unseen)
+
+
+class Watch(threading.Thread):
+    """Marches behind the platform's time, as far at a step as no pair can come inside its margin.
+
+    Parameters
+    ----------
+    limits : mapping of (float, float)
+        Soft limits by axis, for those that have any.
+    """
+
+    def __init__(
+        self,
+        scene: PlatformClearance,
+        stages: Mapping[str, Stage],
+        clock: Clock,
+        limits: Mapping[str, tuple[float, float]],
+    ) -> None:
+        super().__init__(name="oracle", daemon=True)
+        self.found = Findings()
+        self._scene = scene
+        self._stages = dict(stages)
+        self._clock = clock
+        self._limits = dict(limits)
+        self._lock = threading.Lock()
+        self._stopped_from_s: float | None = None
+        self._swept: set[str] = set()
+        self._end = threading.Event()
+        self._at_s = clock.now_s()
+
+    def must_stand(self, from_s: float) -> None:
+        """Have everything stand from `from_s` of the platform on, until `may_move`."""
+        with self._lock:
+            self._stopped_from_s = from_s
+
+    def may_move(self) -> None:
+        """Let things move again: a stop is about to be reset."""
+        with self._lock:
+            self._stopped_from_s = None
+
+    def may_leave_limits(self, axis: str) -> None:
+        """Excuse an axis that is calibrated, referenced or driven to its end stop."""
+        with self._lock:
+            self._swept.add(axis)
+
+    @property
+    def behind(self) -> bool:
+        """True while it has to catch up before more may happen."""
+        return self._clock.now_s() - self._at_s > FORGOTTEN_S * max(self._clock.rate, 1.0)
+
+    def end(self) -> None:
+        """Come up to the present and end."""
+        self._end.set()
+        self.join()
+
+    def run(self) -> None:
+        """March until the end."""
+        while not self._end.wait(0.002):
+            self._march(self._clock.now_s() - BEHIND_S)
+        self._march(self._clock.now_s())
+
+    def _march(self, until_s: float) -> None:
+        while self._at_s < until_s:
+            at_s = self._at_s
+            for name, stage in self._stages.items():
+                if at_s < stage.paths[0].times_s[0] and len(stage.paths) > 1:
+                    self.found.unseen.add(name)
+            positions = {name: each.position_then(at_s) for name, each in self._stages.items()}
+            legs = {name: each.leg_then(at_s) for name, each in self._stages.items()}
+            speeds = {name: speed for name, (speed, _) in legs.items()}
+            near = self._judge(at_s, positions, speeds)
+            knot_s = min(end_s for _, end_s in legs.values())
+            fastest = self._scene.speed_um_s(speeds)
+            step_s = max(near.spare_um, FINEST_UM) / fastest if fastest > 0.0 else COARSEST_S
+            # A leg that ends is followed by another one, which may be faster.
+            step_s = min(step_s, max(knot_s - at_s, 1e-5), COARSEST_S)
+            self._at_s = at_s + step_s
+            self.found.behind_s = max(self.found.behind_s, self._clock.now_s() - self._at_s)
+
+    def _judge(
+        self, at_s: float, positions: Mapping[str, float], speeds: Mapping[str, float]
+    ) -> Near:
+        found = self.found
+        found.looks += 1
+        near = self._scene.nearest(positions, beyond_um=50.0)
+        if found.least is None or near.spare_um < found.least.spare_um:
+            found.least = near
+        if near.spare_um < -STEP_UM and len(found.too_near) < 100:
+            found.too_near.append(f"{at_s:.4f} s: {near} at {dict(positions)}")
+        with self._lock:
+            stopped_from_s, swept = self._stopped_from_s, set(self._swept)
+        if stopped_from_s is not None and at_s > stopped_from_s:
+            moving = {name: speed for name, speed in speeds.items() if speed > STANDING_PER_S}
+            if moving and len(found.late_stops) < 100:
+                found.late_stops.append(
+                    f"{at_s:.4f} s, {at_s - stopped_from_s:.4f} s after it had to stand: {moving}"
+                )
+        for name, (low, high) in self._limits.items():
+            if name not in swept and not low - 2.0 <= positions[name] <= high + 2.0:
+                if len(found.outside) < 100:
+                    found.outside.append(f"{at_s:.4f} s: {name} at {positions[name]:.3f}")
+        return near
