@@ -1,12 +1,12 @@
 """Hostile commands through all ways in at once, judged by an oracle that shares no code.
 
-`python -m benchmarks.adversary --commands 1000000` takes about an hour or two and is run at night. Threads
-of this process command axes, groups, jogs, trajectories, detours, forged orders, force limits and
-control loops, and stop everything again and again; a client in a process of its own does the same
-through a station. DAQCo records, ViCo is live. The oracle (tests/oracles/clearance.py, with its
-own reading of URDF, SRDF and scene) follows the true stages and says whether any watched pair came
-nearer than its margin by more than a sensor's step, whether anything moved after a stop, and
-whether an axis left its soft limits. A run that is not harmless exits with 1 and prints what it saw.
+`python -m benchmarks.adversary --commands 1000000` takes hours and is run at night. Threads of this
+process command axes, groups, jogs, trajectories, detours, forged orders, force limits and control
+loops, and stop everything again and again; a client in a process of its own does the same through
+a station. DAQCo records, ViCo is live. The oracle (tests/oracles/clearance.py, which reads URDF,
+SRDF and scene by itself) follows the true stages and says whether any watched pair came nearer than
+its margin by more than a sensor's step, whether anything moved after a stop, and whether an axis
+left its soft limits. A run that is not harmless ends with exit code 1 and what was seen.
 """
 
 import argparse
@@ -17,12 +17,14 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+from tests.oracles.clearance import PlatformClearance
 
 from benchmarks.adversary_attacks import (
     Attack,
@@ -34,20 +36,16 @@ from benchmarks.adversary_attacks import (
 )
 from benchmarks.adversary_watch import Findings, Watch
 from benchmarks.figures import Figure, table
-from tests.oracles.clearance import PlatformClearance
-
 from cosmic.app.network_settings import serving
 from cosmic.app.platform import Platform, build_platform
 from cosmic.app.rig import Rig
 from cosmic.app.simulation import make_scene
 from cosmic.app.station_host import StationHost
-from cosmic.frame.errors import CosmicError
 from cosmic.twin.scene import Scene
 
 NAME = "adversary"
 ROOT = Path(__file__).resolve().parents[1]
 SCENE = ROOT / "config" / "scenes" / "fiberstation.toml"
-LISTEN = "tcp/127.0.0.1:0"
 
 
 class Result:
@@ -133,8 +131,6 @@ def attack(commands: int, *, rate: float, seed: int, client: bool = True) -> Res
             thread.start()
         while sum(each.calls for each in attacks) + (remote.calls if remote else 0) < commands:
             time.sleep(0.05)
-            if remote is not None:
-                _lend(rig)
         ended.set()
         for thread in threads:
             thread.join()
@@ -142,12 +138,6 @@ def attack(commands: int, *, rate: float, seed: int, client: bool = True) -> Res
         watch.may_move()
         watch.end()
         return Result(watch.found, attacks, told)
-
-
-def _lend(rig: Rig) -> None:
-    """Leave the lease where it is: the client takes it when it can."""
-    with suppress(CosmicError):
-        rig.mico.names  # noqa: B018
 
 
 class _Client:

@@ -11,7 +11,7 @@ from cosmic.app.rig import Rig
 from cosmic.daqco.core.scale import Scale
 from cosmic.frame.errors import CosmicError
 from cosmic.mico.api.axis import Axis
-from cosmic.mico.core.orders import Calibrate, MoveBy, MoveTo, Order, Reference, Step
+from cosmic.mico.core.orders import Calibrate, Grant, MoveBy, MoveTo, Order, Reference, Step
 
 NONSENSE: Final[Sequence[Any]] = (
     None, "abc", "5 kg", b"5", float("nan"), float("inf"), -float("inf"), 1e308, 2**70, -1, 0,
@@ -63,13 +63,14 @@ class AxisAttack(Attack):
         self._axes = list(rig.mico)
         self._jogs: list[Any] = []
         self.acts = [
-            (15, self.move_to), (15, self.move_by), (15, self.rush), (25, self.edge), (6, self.steps),
-            (8, self.jog), (8, self.renew), (4, self.halt), (3, self.speed), (1, self.zero),
-            (5, self.nonsense), (3, self.check), (4, self.group), (4, self.group_by),
-            (1, self.link), (1, self.unlink), (1, self.undo),
+            (15, self._move_to), (15, self._move_by), (15, self._rush), (25, self._edge),
+            (6, self._steps),
+            (8, self._jog), (8, self._renew), (4, self._halt), (3, self._speed), (1, self._zero),
+            (5, self._nonsense), (3, self._check), (4, self._group), (4, self._group_by),
+            (1, self._link), (1, self._unlink), (1, self._undo),
         ]  # fmt: skip
         if sweeps:
-            self.acts += [(0.3, self.sweep)]
+            self.acts += [(0.3, self._sweep)]
 
     def _axis(self) -> Axis:
         return self.chance.choice(self._axes)
@@ -79,15 +80,15 @@ class AxisAttack(Attack):
         span = high - low
         return self.chance.uniform(low - 0.1 * span, high + 0.1 * span)
 
-    def move_to(self) -> None:
+    def _move_to(self) -> None:
         axis = self._axis()
         axis.move_to(self._target(axis), wait=False, consent=self.chance.random() < 0.1)
 
-    def move_by(self) -> None:
+    def _move_by(self) -> None:
         size = 10 ** self.chance.uniform(-2, 4) * self.chance.choice((-1, 1))
         self._axis().move_by(size, wait=False)
 
-    def rush(self) -> None:
+    def _rush(self) -> None:
         """Bring the tools together: down, in, and the probe at them."""
         place = {
             "left.z": -400.0, "right.z": -400.0, "left.x": 3000.0, "right.x": -3000.0,
@@ -96,7 +97,7 @@ class AxisAttack(Attack):
         name = self.chance.choice(sorted(place))
         self._rig.mico[name].move_to(place[name] + self.chance.gauss(0.0, 400.0), wait=False)
 
-    def edge(self) -> None:
+    def _edge(self) -> None:
         """Go as far in one direction as the gate lets it, and try a little further."""
         axis = self._axis()
         here, limits = axis.details.shown_position, axis.limits
@@ -109,7 +110,7 @@ class AxisAttack(Attack):
         axis.move_to(near, wait=False)
         axis.move_by((far - near) * self.chance.uniform(0.5, 3.0), wait=False)
 
-    def steps(self) -> None:
+    def _steps(self) -> None:
         self._axis().steps(
             self.chance.randint(-30_500, 30_500) // 10 ** self.chance.randint(0, 4),
             amplitude_v=self.chance.choice((100.0, 50.0, 15.0, 101.0)),
@@ -117,32 +118,32 @@ class AxisAttack(Attack):
             wait=False,
         )
 
-    def jog(self) -> None:
+    def _jog(self) -> None:
         speed = self.chance.choice((None, 5.0, 500.0, 5000.0))
         self._jogs = [
             *self._jogs[-3:],
             self._axis().jog(self.chance.choice((-1, 1)), speed),
         ]
 
-    def renew(self) -> None:
+    def _renew(self) -> None:
         for jog in self._jogs:
             jog.renew()
 
-    def halt(self) -> None:
+    def _halt(self) -> None:
         self._axis().halt()
 
-    def speed(self) -> None:
+    def _speed(self) -> None:
         self._axis().set_closed_loop_frequency(self.chance.choice((1, 500, 18500, 0, 20_000)))
 
-    def zero(self) -> None:
+    def _zero(self) -> None:
         axis = self._axis()
         self.chance.choice((axis.set_zero, axis.clear_zero))()
 
-    def check(self) -> None:
+    def _check(self) -> None:
         axis = self._axis()
         axis.check(self._target(axis))
 
-    def sweep(self) -> None:
+    def _sweep(self) -> None:
         axis = self._rig.mico[self.chance.choice(SWEPT)]
         self.chance.choice((axis.calibrate, axis.reference))(wait=False)
 
@@ -150,26 +151,26 @@ class AxisAttack(Attack):
         chosen = self.chance.sample(self._axes, self.chance.randint(1, 6))
         return {axis.name.replace("_", ".", 1): value(axis) for axis in chosen}
 
-    def group(self) -> None:
+    def _group(self) -> None:
         self._rig.mico.move(
             self._several(self._target), wait=False, match_arrival=self.chance.random() < 0.3
         )
 
-    def group_by(self) -> None:
+    def _group_by(self) -> None:
         self._rig.mico.move_by(self._several(lambda _: self.chance.gauss(0.0, 800.0)), wait=False)
 
-    def link(self) -> None:
+    def _link(self) -> None:
         one, other = self.chance.sample(self._axes, 2)
         names = (one.name.replace("_", ".", 1), other.name.replace("_", ".", 1))
         self._rig.mico.link(*names, self.chance.choice((1.0, -1.0, 2.0, "abc", 0.0)))
 
-    def unlink(self) -> None:
+    def _unlink(self) -> None:
         self._rig.mico.unlink(self._axis().name.replace("_", ".", 1))
 
-    def undo(self) -> None:
+    def _undo(self) -> None:
         self._rig.mico.undo(wait=False)
 
-    def nonsense(self) -> None:
+    def _nonsense(self) -> None:
         axis, value = self._axis(), self.chance.choice(NONSENSE)
         act: Callable[[Any], object] = self.chance.choice(
             (
@@ -196,7 +197,7 @@ class OrderAttack(Attack):
         self._seen: list[Order] = []
         for axis in self._axes:
             axis.commander.order_issued.connect(self._remember)
-        self.acts = [(1, self.replay), (2, self.forge), (1, self.steal)]
+        self.acts = [(1, self._replay), (2, self._forge), (1, self._steal)]
 
     def _remember(self, order: Order) -> None:
         self._seen = [*self._seen[-200:], order]
@@ -209,13 +210,11 @@ class OrderAttack(Attack):
         mico = self._rig.mico.application
         return int(mico.manager.latch.state.epoch)
 
-    def replay(self) -> None:
+    def _replay(self) -> None:
         if self._seen:
             self._submit(self.chance.choice(self._seen))
 
-    def forge(self) -> None:
-        from cosmic.mico.core.orders import Grant
-
+    def _forge(self) -> None:
         motion = self.chance.choice(
             (
                 MoveTo(self.chance.uniform(-7000.0, 7000.0), "um"),  # type: ignore[arg-type]
@@ -237,7 +236,7 @@ class OrderAttack(Attack):
         token = self._seen[-1].token if self._seen and self.chance.random() < 0.5 else "mine"
         self._submit(Order(self.chance.randint(0, 3), motion, token, "forged", grant=grant))
 
-    def steal(self) -> None:
+    def _steal(self) -> None:
         granted = [order for order in self._seen if order.grant is not None]
         if granted:
             order = self.chance.choice(granted)
@@ -253,27 +252,28 @@ class ForceAttack(Attack):
         self._rig = rig
         self._folder = folder
         self.acts = [
-            (4, self.arm), (2, self.scale), (0.2, self.rate), (1, self.record), (1, self.end_record),
-            (3, self.loop), (1, self.end_loops), (2, self.nonsense), (1, self.latest),
+            (4, self._arm), (2, self._scale), (0.2, self._rate), (1, self._record),
+            (1, self._end_record),
+            (3, self._loop), (1, self._end_loops), (2, self._nonsense), (1, self._latest),
         ]  # fmt: skip
 
-    def arm(self) -> None:
+    def _arm(self) -> None:
         self._rig.daqco.arm_limit("force", high=self.chance.choice((5.0, 150.0, 1e9, -1e9)))
 
-    def scale(self) -> None:
+    def _scale(self) -> None:
         unit = self.chance.choice(("uN", "mN"))
         self._rig.daqco.set_scale("force", Scale("hostile", unit, (0.0, self.chance.random())))
 
-    def rate(self) -> None:
+    def _rate(self) -> None:
         self._rig.daqco.configure(rate_hz=self.chance.choice((10.0, 1000.0, 2000.0, 20_000.0)))
 
-    def record(self) -> None:
+    def _record(self) -> None:
         self._rig.daqco.start_recording(self._folder / "hostile.h5", overwrite=True)
 
-    def end_record(self) -> None:
+    def _end_record(self) -> None:
         self._rig.daqco.stop_recording()
 
-    def loop(self) -> None:
+    def _loop(self) -> None:
         self._rig.control.hold_force(
             "force",
             self.chance.choice(("probe.x", "probe.y", "left.x", "nobody")),
@@ -281,13 +281,13 @@ class ForceAttack(Attack):
             direction=self.chance.choice((1, -1)),
         )
 
-    def end_loops(self) -> None:
+    def _end_loops(self) -> None:
         self._rig.control.stop()
 
-    def latest(self) -> None:
+    def _latest(self) -> None:
         self._rig.daqco.latest()
 
-    def nonsense(self) -> None:
+    def _nonsense(self) -> None:
         value = self.chance.choice(NONSENSE)
         daqco, control = self._rig.daqco, self._rig.control
         act: Callable[[Any], object] = self.chance.choice(
@@ -313,9 +313,9 @@ class StopAttack(Attack):
         self._now_s = now_s
         self._wait = threading.Event()
         self.coast_s = 0.05
-        self.acts = [(1, self.stop)]
+        self.acts = [(1, self._stop)]
 
-    def stop(self) -> None:
+    def _stop(self) -> None:
         self._wait.wait(self.chance.expovariate(1.5))
         self._rig.stop("the adversary")
         self._watch.must_stand(self._now_s() + self.coast_s)
@@ -330,9 +330,9 @@ class TrajectoryAttack(Attack):
     def __init__(self, rig: Rig, seed: int) -> None:
         super().__init__("trajectories", seed)
         self._rig = rig
-        self.acts = [(1, self.run), (1, self.detour)]
+        self.acts = [(1, self._run), (1, self._detour)]
 
-    def run(self) -> None:
+    def _run(self) -> None:
         lines = ["cosmic-trajectory 1", "platform FiberStation"]
         for _ in range(self.chance.randint(1, 8)):
             axis = self.chance.choice(("left.x", "left.z", "right.x", "right.z", "probe.x"))
@@ -342,7 +342,7 @@ class TrajectoryAttack(Attack):
         player = mico.trajectories.run(found, start="straight", wait=False)
         player.wait(self.chance.uniform(0.1, 3.0))
 
-    def detour(self) -> None:
+    def _detour(self) -> None:
         names = ("left.x", "left.y", "left.z")
         target = {name: self.chance.uniform(-5000.0, 5000.0) for name in names}
         self._rig.mico.move_around(target, budget_s=0.2, wait=False)

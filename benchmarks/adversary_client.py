@@ -1,4 +1,4 @@
-"""The client of `benchmarks.adversary`: hostile commands through a station, until its input ends."""
+"""The client of `benchmarks.adversary`: hostile commands by way of a station."""
 
 import os
 import sys

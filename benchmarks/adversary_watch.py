@@ -15,14 +15,13 @@ from cosmic.twin.stage import Stage
 
 STEP_UM: Final = 0.1
 """The finest that a sensor of the platform tells apart, with room; a pair may lack so much."""
-FINEST_UM: Final = 0.5
-"""So far two bodies may approach between two looks near their margin."""
 BEHIND_S: Final = 0.05
 """The watch looks so far behind the present, s of the platform."""
 FORGOTTEN_S: Final = 0.5
 """Attacks wait while the watch is farther behind than this, s of the platform."""
 STANDING_PER_S: Final = 1e-3
 COARSEST_S: Final = 0.05
+RESTING_S: Final = 0.5
 
 
 @dataclass
@@ -108,24 +107,21 @@ class Watch(threading.Thread):
             for name, stage in self._stages.items():
                 if at_s < stage.paths[0].times_s[0] and len(stage.paths) > 1:
                     self.found.unseen.add(name)
-            positions = {name: each.position_then(at_s) for name, each in self._stages.items()}
             legs = {name: each.leg_then(at_s) for name, each in self._stages.items()}
-            speeds = {name: speed for name, (speed, _) in legs.items()}
-            near = self._judge(at_s, positions, speeds)
             knot_s = min(end_s for _, end_s in legs.values())
-            fastest = self._scene.speed_um_s(speeds)
-            step_s = max(near.spare_um, FINEST_UM) / fastest if fastest > 0.0 else COARSEST_S
-            # A leg that ends is followed by another one, which may be faster.
-            step_s = min(step_s, max(knot_s - at_s, 1e-5), COARSEST_S)
-            self._at_s = at_s + step_s
+            # Straight on until the next knot of any stage, a few degrees or a quarter mm.
+            moving = any(speed > 0.0 for speed, _ in legs.values())
+            longest_s = COARSEST_S if moving else RESTING_S
+            self._at_s = min(until_s, max(at_s + 1e-5, min(knot_s, at_s + longest_s)))
+            self._judge(at_s, {name: speed for name, (speed, _) in legs.items()})
             self.found.behind_s = max(self.found.behind_s, self._clock.now_s() - self._at_s)
 
-    def _judge(
-        self, at_s: float, positions: Mapping[str, float], speeds: Mapping[str, float]
-    ) -> Near:
+    def _judge(self, at_s: float, speeds: Mapping[str, float]) -> None:
         found = self.found
         found.looks += 1
-        near = self._scene.nearest(positions, beyond_um=50.0)
+        positions = {name: each.position_then(at_s) for name, each in self._stages.items()}
+        after = {name: each.position_then(self._at_s) for name, each in self._stages.items()}
+        near = self._scene.nearest_on_way(positions, after)
         if found.least is None or near.spare_um < found.least.spare_um:
             found.least = near
         if near.spare_um < -STEP_UM and len(found.too_near) < 100:
@@ -139,7 +135,6 @@ class Watch(threading.Thread):
                     f"{at_s:.4f} s, {at_s - stopped_from_s:.4f} s after it had to stand: {moving}"
                 )
         for name, (low, high) in self._limits.items():
-            if name not in swept and not low - 2.0 <= positions[name] <= high + 2.0:
-                if len(found.outside) < 100:
-                    found.outside.append(f"{at_s:.4f} s: {name} at {positions[name]:.3f}")
-        return near
+            left = name not in swept and not low - 2.0 <= positions[name] <= high + 2.0
+            if left and len(found.outside) < 100:
+                found.outside.append(f"{at_s:.4f} s: {name} at {positions[name]:.3f}")

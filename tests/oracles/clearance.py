@@ -8,7 +8,7 @@ import math
 import struct
 import tomllib
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -20,6 +20,9 @@ from scipy.spatial.transform import Rotation
 from .convex import distance
 
 UM = 1e6
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+REACH_UM = 20_000.0  # of what turns with the table, from its axis: the plate's corners and clip
+FINEST_UM = 1.0
 ROUND = 192  # corners of a cylinder's rim: inside the true one by 2 um at a radius of 15 mm
 
 
@@ -114,7 +117,7 @@ class PlatformClearance:
                 self._bodies.append(link.get("name", ""))
                 self._pieces.append(turn.apply(_points(geometry, scene.parent)) + origin)
         self._read_pairs(facts, scene.parent)
-        self.reach_um = 60_000.0  # no corner is farther from the turning axis of the table
+        self._shared: dict[tuple[int, tuple[float, ...]], float] = {}
 
     def _read_joints(self, robot: ET.Element) -> list[_Joint]:
         joints = []
@@ -160,6 +163,19 @@ class PlatformClearance:
         self._one = np.array([one for one, _ in self._pairs])
         self._other = np.array([other for _, other in self._pairs])
         self._margin = np.array(self._margins)
+        self._between = [
+            self._axes_of(self._bodies[one]) ^ self._axes_of(self._bodies[other])
+            for one, other in self._pairs
+        ]
+
+    def _axes_of(self, body: str) -> frozenset[str]:
+        """Return the axes that carry a body."""
+        above = {joint.child: joint for joint in self._joints}
+        found: set[str] = set()
+        while body in above:
+            found |= {axis for axis, name, *_ in self._drives if name == above[body].name}
+            body = above[body].parent
+        return frozenset(found)
 
     def _firm_groups(self, driven: set[str]) -> dict[str, str]:
         """Return for each body the one that it is screwed to, and that moves by a joint."""
@@ -201,38 +217,103 @@ class PlatformClearance:
             for body, points in zip(self._bodies, self._pieces, strict=True)
         ]
 
-    def nearest(self, positions: Mapping[str, float], *, beyond_um: float = 1000.0) -> Near:
-        """Return the pair with the least to spare; boxes do for what is farther than `beyond_um`.
+    def nearest(self, positions: Mapping[str, float]) -> Near:
+        """Return the pair with the least to spare while the axes stand; see `nearest_on_way`."""
+        return self.nearest_on_way(positions, positions)
+
+    def nearest_on_way(
+        self, start: Mapping[str, float], end: Mapping[str, float], *, beyond_um: float = 30.0
+    ) -> Near:
+        """Return the pair with the least to spare while all axes go evenly from `start` to `end`.
+
+        Exact to 0.1 um for pairs with less than `beyond_um` to spare; others may be farther
+        apart than is said.
 
         Parameters
         ----------
-        positions : mapping of float
-            Where each axis truly stands, um or degrees.
+        start, end : mapping of float
+            Where each axis truly stands, um or degrees; a turn of a few degrees at most.
         """
-        world = self._world(positions)
-        low = np.array([points.min(axis=0) for points in world])
-        high = np.array([points.max(axis=0) for points in world])
+        first, last = self._world(start), self._world(end)
+        turn = max((abs(end[axis] - start[axis]) for axis in self._rotary), default=0.0)
+        bulge = math.radians(turn) ** 2 / 8.0 * REACH_UM
+        low = np.array([np.minimum(p.min(0), q.min(0)) for p, q in zip(first, last, strict=True)])
+        high = np.array([np.maximum(p.max(0), q.max(0)) for p, q in zip(first, last, strict=True)])
         apart = np.maximum(low[self._other] - high[self._one], low[self._one] - high[self._other])
-        gaps = np.linalg.norm(np.maximum(apart, 0.0), axis=1)
-        best = None
+        gaps = np.linalg.norm(np.maximum(apart, 0.0), axis=1) - bulge
+        best = Near(("", ""), math.inf, 0.0)
         for number in np.argsort(gaps - self._margin):
-            spare = gaps[number] - self._margin[number]
-            if best is not None and spare >= best.spare_um:
+            gap, margin = float(gaps[number]), float(self._margin[number])
+            if gap - margin >= best.spare_um:
                 break
             one, other = self._pairs[number]
-            gap = float(gaps[number])
-            if spare < beyond_um:
-                gap = distance(world[one], world[other])
-            bodies = self._bodies[one], self._bodies[other]
-            found = Near(bodies, gap, float(self._margin[number]))
-            if best is None or found.spare_um < best.spare_um:
-                best = found
-        assert best is not None
+            if gap - margin < beyond_um:
+                gap = self._least(int(number), start, end, first, last)
+            if gap - margin < best.spare_um:
+                best = Near((self._bodies[one], self._bodies[other]), gap, margin)
         return best
 
-    def speed_um_s(self, speeds: Mapping[str, float]) -> float:
-        """Return how fast two bodies can approach at most at these speeds of the axes."""
-        return sum(
-            abs(speed) * (math.radians(1.0) * self.reach_um if axis in self._rotary else 1.0)
-            for axis, speed in speeds.items()
+    def _least(
+        self,
+        number: int,
+        start: Mapping[str, float],
+        end: Mapping[str, float],
+        first: list[np.ndarray],
+        last: list[np.ndarray],
+    ) -> float:
+        one, other = self._pairs[number]
+        moving = {axis for axis in self._between[number] if start[axis] != end[axis]}
+        if not moving:
+            # Not asked anew while two stand to each other as before.
+            key = (number, tuple(start[axis] for axis in sorted(self._between[number])))
+            if key not in self._shared:
+                if len(self._shared) > 10_000:
+                    self._shared.clear()
+                self._shared[key] = distance(first[one], first[other])
+            return self._shared[key]
+        if moving & self._rotary:
+            return self._least_turning(number, start, end)
+        shift = (last[one][0] - first[one][0]) - (last[other][0] - first[other][0])
+        return least_of_convex(
+            lambda part: distance(first[one] + part * shift, first[other]),
+            float(np.linalg.norm(shift)),
         )
+
+    def _least_turning(
+        self, number: int, start: Mapping[str, float], end: Mapping[str, float]
+    ) -> float:
+        """Look so often that no corner goes more than `FINEST_UM` in between."""
+        between = self._between[number]
+        way = sum(
+            abs(end[axis] - start[axis])
+            * (math.radians(1.0) * REACH_UM if axis in self._rotary else 1.0)
+            for axis in between
+        )
+        one, other = self._pairs[number]
+        at, least = 0.0, math.inf
+        margin = float(self._margin[number])
+        while True:
+            positions = {axis: start[axis] + at * (end[axis] - start[axis]) for axis in start}
+            world = self._world(positions)
+            gap = distance(world[one], world[other])
+            least = min(least, gap)
+            if at >= 1.0 or gap < margin - FINEST_UM:  # that is enough to be told
+                return least
+            at = min(1.0, at + max(gap - margin, FINEST_UM) / way)
+
+
+def least_of_convex(of: Callable[[float], float], slope: float) -> float:
+    """Return the least of a convex function between 0 and 1 that rises by at most `slope`."""
+    low, high = 0.0, 1.0
+    inner = low + (high - low) * (1.0 - GOLDEN), low + (high - low) * GOLDEN
+    values = [of(inner[0]), of(inner[1])]
+    least = min(of(0.0), of(1.0), *values)
+    while slope * (high - low) > 0.1:
+        if values[0] < values[1]:
+            high, inner = inner[1], (inner[1] - (inner[1] - low) * GOLDEN, inner[0])
+            values = [of(inner[0]), values[0]]
+        else:
+            low, inner = inner[0], (inner[1], inner[0] + (high - inner[0]) * GOLDEN)
+            values = [values[1], of(inner[1])]
+        least = min(least, *values)
+    return least
