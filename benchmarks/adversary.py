@@ -24,7 +24,6 @@ from unittest.mock import patch
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
-from tests.oracles.clearance import PlatformClearance
 
 from benchmarks.adversary_attacks import (
     Attack,
@@ -32,6 +31,7 @@ from benchmarks.adversary_attacks import (
     ForceAttack,
     OrderAttack,
     StopAttack,
+    StopSwitch,
     TrajectoryAttack,
 )
 from benchmarks.adversary_watch import Findings, Watch
@@ -104,18 +104,18 @@ def attack(commands: int, *, rate: float, seed: int, client: bool = True) -> Res
         served(rate, seed) as (platform, rig, endpoint, scene),
     ):
         limits = {axis.details.name: axis.limits for axis in rig.mico if axis.limits is not None}
-        watch = Watch(PlatformClearance(SCENE), scene.stages, platform.clock, limits)
+        watch = Watch(SCENE, scene.stages, platform.clock, limits)
         for name in ("probe.y", "table.rotation"):
             watch.may_leave_limits(name)
-        stop = StopAttack(rig, seed, watch, platform.clock.now_s)
-        stop.coast_s = 0.05 * max(rate, 1.0)
+        coast_s = 0.05 * max(rate, 1.0)
+        switch = StopSwitch(rig, watch, platform.clock.now_s, coast_s)
         attacks: list[Attack] = [
-            AxisAttack(rig, seed, "axes 1"),
-            AxisAttack(rig, seed, "axes 2"),
+            AxisAttack(rig, seed, "axes 1", switch),
+            AxisAttack(rig, seed, "axes 2", switch),
             OrderAttack(rig, seed),
             ForceAttack(rig, seed, Path(folder)),
             TrajectoryAttack(rig, seed),
-            stop,
+            StopAttack(switch, seed),
         ]
         ended = threading.Event()
 
@@ -192,14 +192,14 @@ def figures(result: Result) -> list[Figure]:
 
 def measure(quick: bool = False) -> list[Figure]:
     """Return the figures of one run."""
-    return figures(attack(400 if quick else 20_000, rate=5.0, seed=1))
+    return figures(attack(400 if quick else 20_000, rate=1.0, seed=1))
 
 
 def main() -> int:
     """Read the command line and run."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--commands", type=int, default=20_000)
-    parser.add_argument("--rate", type=float, default=5.0)
+    parser.add_argument("--rate", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--no-station", action="store_true")
     options = parser.parse_args()

@@ -54,10 +54,33 @@ class Attack:
                 self.raw.append(f"{self.name}, {getattr(act, '__name__', act)}: {exc!r}")
 
 
+class StopSwitch:
+    """Stops and resets, and tells the watch in the same breath; any thread."""
+
+    def __init__(self, rig: Rig, watch: Any, now_s: Callable[[], float], coast_s: float) -> None:
+        self._rig, self._watch, self._now_s = rig, watch, now_s
+        self._coast_s = coast_s
+        self._lock = threading.Lock()
+
+    def stop(self) -> None:
+        """Stop all; from `coast_s` on everything has to stand."""
+        with self._lock:
+            self._rig.stop("the adversary")
+            self._watch.must_stand(self._now_s() + self._coast_s)
+
+    def reset(self) -> None:
+        """Let everything move again."""
+        with self._lock:
+            self._watch.may_move()
+            self._rig.reset_stop()
+
+
 class AxisAttack(Attack):
     """One axis at a time, as a script, the console or a station's client does."""
 
-    def __init__(self, rig: Rig, seed: int, name: str = "axes", sweeps: bool = True) -> None:
+    def __init__(
+        self, rig: Rig, seed: int, name: str = "axes", switch: StopSwitch | None = None
+    ) -> None:
         super().__init__(name, seed)
         self._rig = rig
         self._axes = list(rig.mico)
@@ -69,8 +92,8 @@ class AxisAttack(Attack):
             (5, self._nonsense), (3, self._check), (4, self._group), (4, self._group_by),
             (1, self._link), (1, self._unlink), (1, self._undo),
         ]  # fmt: skip
-        if sweeps:
-            self.acts += [(0.3, self._sweep)]
+        if switch is not None:
+            self.acts += [(0.3, self._sweep), (2, switch.reset)]
 
     def _axis(self) -> Axis:
         return self.chance.choice(self._axes)
@@ -258,7 +281,9 @@ class ForceAttack(Attack):
         ]  # fmt: skip
 
     def _arm(self) -> None:
-        self._rig.daqco.arm_limit("force", high=self.chance.choice((5.0, 150.0, 1e9, -1e9)))
+        self._rig.daqco.arm_limit(
+            "force", high=self.chance.choice((5.0, 150.0, 150.0, 150.0, 1e9, -1e9))
+        )
 
     def _scale(self) -> None:
         unit = self.chance.choice(("uN", "mN"))
@@ -306,22 +331,17 @@ class ForceAttack(Attack):
 class StopAttack(Attack):
     """Stops everything, looks whether it stands, and resets; from a thread of its own."""
 
-    def __init__(self, rig: Rig, seed: int, watch: Any, now_s: Callable[[], float]) -> None:
+    def __init__(self, switch: StopSwitch, seed: int) -> None:
         super().__init__("stop", seed)
-        self._rig = rig
-        self._watch = watch
-        self._now_s = now_s
+        self._switch = switch
         self._wait = threading.Event()
-        self.coast_s = 0.05
         self.acts = [(1, self._stop)]
 
     def _stop(self) -> None:
-        self._wait.wait(self.chance.expovariate(1.5))
-        self._rig.stop("the adversary")
-        self._watch.must_stand(self._now_s() + self.coast_s)
+        self._wait.wait(self.chance.expovariate(0.7))
+        self._switch.stop()
         self._wait.wait(self.chance.uniform(0.02, 0.2))
-        self._watch.may_move()
-        self._rig.reset_stop()
+        self._switch.reset()
 
 
 class TrajectoryAttack(Attack):

@@ -18,7 +18,7 @@ def main(endpoint: str, seed: str) -> None:
     ended = threading.Event()
     threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
     with cosmic.connect(stations={"fiberstation": endpoint}) as rig:
-        attack = AxisAttack(rig, int(seed) + 1, "station", sweeps=False)
+        attack = AxisAttack(rig, int(seed) + 1, "station")
         told_s = 0.0
         while not ended.is_set():
             if attack.calls % 20 == 0:

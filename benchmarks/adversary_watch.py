@@ -3,9 +3,13 @@
 Knows the twin's truth and the platform's files; nothing of the gate, the device or the stop.
 """
 
+import pickle
+import subprocess
+import sys
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Final
 
 from tests.oracles.clearance import Near, PlatformClearance
@@ -13,6 +17,7 @@ from tests.oracles.clearance import Near, PlatformClearance
 from cosmic.frame.clock import Clock
 from cosmic.twin.stage import Stage
 
+ROOT: Final = Path(__file__).resolve().parents[1]
 STEP_UM: Final = 0.1
 """The finest that a sensor of the platform tells apart, with room; a pair may lack so much."""
 BEHIND_S: Final = 0.05
@@ -53,14 +58,19 @@ class Watch(threading.Thread):
 
     def __init__(
         self,
-        scene: PlatformClearance,
+        scene: Path,
         stages: Mapping[str, Stage],
         clock: Clock,
         limits: Mapping[str, tuple[float, float]],
     ) -> None:
         super().__init__(name="oracle", daemon=True)
         self.found = Findings()
-        self._scene = scene
+        command = [sys.executable, "-m", "benchmarks.adversary_watch", str(scene)]
+        self._oracle = subprocess.Popen(
+            command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
+        assert self._oracle.stdin is not None
+        self._to_oracle = self._oracle.stdin
         self._stages = dict(stages)
         self._clock = clock
         self._limits = dict(limits)
@@ -94,6 +104,10 @@ class Watch(threading.Thread):
         """Come up to the present and end."""
         self._end.set()
         self.join()
+        self._to_oracle.close()
+        assert self._oracle.stdout is not None
+        self.found.too_near, self.found.least = pickle.load(self._oracle.stdout)
+        self._oracle.wait()
 
     def run(self) -> None:
         """March until the end."""
@@ -121,11 +135,7 @@ class Watch(threading.Thread):
         found.looks += 1
         positions = {name: each.position_then(at_s) for name, each in self._stages.items()}
         after = {name: each.position_then(self._at_s) for name, each in self._stages.items()}
-        near = self._scene.nearest_on_way(positions, after)
-        if found.least is None or near.spare_um < found.least.spare_um:
-            found.least = near
-        if near.spare_um < -STEP_UM and len(found.too_near) < 100:
-            found.too_near.append(f"{at_s:.4f} s: {near} at {dict(positions)}")
+        pickle.dump((at_s, positions, after), self._to_oracle)
         with self._lock:
             stopped_from_s, swept = self._stopped_from_s, set(self._swept)
         if stopped_from_s is not None and at_s > stopped_from_s:
@@ -138,3 +148,25 @@ class Watch(threading.Thread):
             left = name not in swept and not low - 2.0 <= positions[name] <= high + 2.0
             if left and len(found.outside) < 100:
                 found.outside.append(f"{at_s:.4f} s: {name} at {positions[name]:.3f}")
+
+
+def oracle(scene: Path) -> None:
+    """Judge every piece of the way that comes in; say at the end what was too near, and least."""
+    clearance = PlatformClearance(scene)
+    too_near: list[str] = []
+    least: Near | None = None
+    while True:
+        try:
+            at_s, start, end = pickle.load(sys.stdin.buffer)
+        except EOFError:
+            break
+        near = clearance.nearest_on_way(start, end)
+        if least is None or near.spare_um < least.spare_um:
+            least = near
+        if near.spare_um < -STEP_UM and len(too_near) < 100:
+            too_near.append(f"{at_s:.4f} s: {near} from {start} to {end}")
+    pickle.dump((too_near, least), sys.stdout.buffer)
+
+
+if __name__ == "__main__":
+    oracle(Path(sys.argv[1]))
