@@ -23,10 +23,12 @@ from benchmarks.figures import Figure, from_json, medians, table, to_json
 LONG = frozenset(
     {
         "acquisition_soak",
+        "adversary",
         "campaign",
         "campaign_faults",
         "campaign_kills",
         "collision_oracles",
+        "full_soak",
         "soak",
     }
 )
