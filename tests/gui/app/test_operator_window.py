@@ -59,6 +59,7 @@ def test_stop_latches_with_its_reason_and_reset_lets_go(make: Make, qtbot: QtBot
     panel = ready(window, qtbot)
     moving(panel, qtbot)
     card = panel.cards["left.x"]
+    panel.cards["right.y"].commands.ended.emit("something of before")
     qtbot.mousePress(part(window.top_bar, "stopButton", QPushButton), Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: window.top_bar.latched and not card.axis.details.in_motion)
     stood = position(card)

@@ -185,6 +185,8 @@ class PositionerBaseGUI(Card):
     def show_stopped(self, reason: str | None) -> None:
         """Show that the stop is latched, and why; None: movements are allowed again."""
         self._stopped = f"■ STOPPED: {reason}; Reset allows movements again" if reason else ""
+        if reason:
+            self._note = ""  # of before; what the stop ends says so afterwards
         if self._state is not None:
             self._show_badge(
                 STATES[self._state.status], self._state.error or self._activity_text(self._state)
