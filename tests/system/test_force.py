@@ -149,6 +149,9 @@ def test_rates_and_recordings_that_cannot_be_are_refused(rig: cosmic.Rig, tmp_pa
 
 def test_a_limit_needs_a_rate_that_is_fast_enough() -> None:
     with cosmic.connect(rate=2.0, applications=("daqco",)) as rig:
+        with pytest.raises(cosmic.NotAvailable, match="isarm the limit first"):
+            rig.daqco.configure(rate_hz=100.0)
+        rig.daqco.disarm_limit("force")
         rig.daqco.configure(rate_hz=100.0)
         with pytest.raises(cosmic.NotAvailable, match="200 Hz"):
             rig.daqco.arm_limit("force", high=100.0)
@@ -188,3 +191,14 @@ def test_real_boards_have_no_rate(tmp_path: Path) -> None:
     file.write_text(text[:start] + real, encoding="utf-8")
     with pytest.raises(cosmic.ConfigError, match=r"daqco\.backend"):
         cosmic.connect(folder, rate=2.0)
+
+
+def test_the_shipped_platform_watches_the_force_of_its_probe_from_the_start() -> None:
+    with cosmic.connect(applications=("daqco",)) as fresh:
+        wait_until(lambda: fresh.daqco.limits[0].settings.armed)
+        (limit,) = fresh.daqco.limits
+        assert (limit.settings.channel, limit.settings.low, limit.settings.high) == (
+            "force",
+            -150.0,
+            150.0,
+        )

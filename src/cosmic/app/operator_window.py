@@ -22,6 +22,8 @@ from cosmic.app.way_bar import Stage, WayBar
 from cosmic.app.way_guide import WayGuide
 from cosmic.app.window_bridge import WindowBridge
 from cosmic.app.window_stations import WindowStations
+from cosmic.daqco.api.window_port import WindowPort
+from cosmic.daqco.gui.limit_indicator import LimitIndicator
 from cosmic.frame.failure import Failure
 from cosmic.frame.gui.console_panel import ConsolePanel
 from cosmic.frame.gui.late_panel import LatePanel
@@ -151,6 +153,8 @@ class OperatorWindow(CosmicServerGui):
             self.top_bar.set_collision_model(present=True)  # nothing moves that could collide
         scene = SCENE if self._scene is not None else ""
         self._instruments = instruments_of(self._platform)
+        if self._platform.daqco is not None:
+            self.top_bar.add_indicator(LimitIndicator(WindowPort(self._platform.daqco)))
         return self._instruments.place(self, scene, MICO if scene else "")
 
     def _add_log(self, ring: RingBufferHandler, *, console: bool) -> None:

@@ -399,3 +399,22 @@ def test_a_plotter_that_goes_stops_listening(qtbot, port):
     qtbot.waitUntil(lambda: port.listened == 0)
     port.push(np.zeros((2, 10)))
     port.change(problem="gone")
+
+
+def test_values_that_are_not_measured_any_more_are_grey_with_their_age(qtbot, port, plotter):
+    acquire(port, [1.0, 2.0], 0.3)
+    plotter.refresh()
+    plotter.read_out()
+    assert plotter.state.text() == "LIVE"
+    port.change(running=False)
+    plotter.read_out()
+    model = plotter.channels.channels
+    assert plotter.state.text().startswith("NOT MEASURED")
+    assert model.data(model.index(0, 1), Qt.ItemDataRole.ForegroundRole) is not None
+    assert model.headerData(1, Qt.Orientation.Horizontal).endswith("s ago")
+    port.change(running=True)
+    acquire(port, [1.0, 2.0], 0.3)
+    plotter.refresh()
+    plotter.read_out()
+    assert plotter.state.text() == "LIVE"
+    assert model.data(model.index(0, 1), Qt.ItemDataRole.ForegroundRole) is None

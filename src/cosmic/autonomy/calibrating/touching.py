@@ -12,7 +12,7 @@ from cosmic.autonomy.handling.force import ForceMean
 from cosmic.autonomy.handling.jaws import move_jaws
 from cosmic.autonomy.handling.patience import PatientMove
 from cosmic.autonomy.handling.prepare import CONTACT, PROBE, retract_probe
-from cosmic.autonomy.handling.push import arm
+from cosmic.autonomy.handling.push import arm, limit_of, put_back
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import Steps, Wish
 from cosmic.frame.errors import NotAvailable
@@ -43,10 +43,11 @@ class TouchJaw(Calibrated):
             work.daqco.start()
         yield from move_jaws(work, -(work.settings.grasp.full_um + settings.touch_closing_um))
         work.gap_um = 0.0
+        before = limit_of(work)
         try:
             found = yield from self._touched(work)
         finally:
-            arm(work, armed=False)
+            put_back(work, before)
         yield from move_jaws(work, work.settings.grasp.gap_um)
         self._keep(work, found)
 
@@ -66,7 +67,7 @@ class TouchJaw(Calibrated):
         work.calibration.touching = True
         with work.mico.collision.contact(CONTACT):
             yield work.go({work.probe.x_axis: x - work.probe.tip_um[0]})
-            arm(work, armed=True)
+            arm(work)
             near = face - off_y + side * settings.touch_stand_off_um
             yield self._to(work, near + side * FAR_UM)
             base = yield from _mean_un(work, 0.1)

@@ -13,6 +13,7 @@ from cosmic.autonomy.campaign.resume import ResumePlan
 from cosmic.autonomy.campaign.steering import OVER, CampaignPhase
 from cosmic.autonomy.campaign.stop_rule import StopRule
 from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.handling.push import armed_while_pushing
 from cosmic.autonomy.handling.survey import NONE_LEFT
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.failures import STOPPED, ProcedureAborted
@@ -175,7 +176,8 @@ class Campaign(CampaignKeeping):
         failed = False
         leading = self.work.clock.worker(leads=True)  # between two runs as well
         try:
-            self._end_reason = self._treat_all()
+            with armed_while_pushing(self.work):
+                self._end_reason = self._treat_all()
         except CosmicError as exc:
             failed, self._end_reason = True, str(exc)
         except Exception as exc:  # noqa: BLE001 - it must be said, and the store closed in order

@@ -1,5 +1,8 @@
 """Operations of the probe: it looks for the held fibre and pushes it, span after span."""
 
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Final
 
 from typing_extensions import override
@@ -15,6 +18,9 @@ from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.daqco.core.settings import LimitSettings
+from cosmic.frame.errors import NotAvailable
+
+logger = logging.getLogger(__name__)
 
 TOO_SHORT: Final = "too short"
 NOT_TRUSTED: Final = "not trusted"
@@ -39,11 +45,11 @@ class PushSpans(FibreOperation):
         yield from ready_force(work)
         if work.beside_another and not fibre.peak_un:
             work.forces.take_peak_un()  # was that of the fibre before
-        arm(work, armed=True)
+        before = arm(work)
         try:
             yield from self._spans(work, fibre)
         finally:
-            arm(work, armed=False)
+            put_back(work, before)
             fibre.peak_un = max(fibre.peak_un, work.forces.take_peak_un())
 
     @staticmethod
@@ -69,23 +75,51 @@ def span_limits(work: FibreWork) -> SpanLimits:
     return push.spans.model_copy(update={"longest_um": longest})
 
 
-def arm(work: FibreWork, *, armed: bool) -> None:
-    """Arm the force limit that stops everything, or disarm it.
+def limit_of(work: FibreWork) -> LimitSettings | None:
+    """Return the force limit that is in force for the channel of the probe."""
+    channel = work.settings.push.channel
+    limits = (each.settings for each in work.daqco.limits)
+    return next((each for each in limits if each.channel == channel), None)
 
-    It is armed while the probe pushes and not longer: while pictures are searched, samples may
-    come later than its dead man allows.
-    """
-    push = work.settings.push
+
+def arm(work: FibreWork) -> LimitSettings | None:
+    """Arm the force limit of a push, which stops everything; return the one that was there."""
+    push, before = work.settings.push, limit_of(work)
     if push.stop_un > 0.0:
-        work.daqco.set_limit(
-            LimitSettings(
-                channel=push.channel,
-                low=-push.stop_un,
-                high=push.stop_un,
-                hysteresis=5.0,
-                armed=armed,
-            )
+        limit = LimitSettings(
+            channel=push.channel, low=-push.stop_un, high=push.stop_un, hysteresis=5.0, armed=True
         )
+        work.daqco.set_limit(limit)
+    return before
+
+
+def put_back(work: FibreWork, before: LimitSettings | None) -> None:
+    """Have the force limit as it was before `arm`."""
+    now = limit_of(work)
+    if now is None or work.settings.push.stop_un <= 0.0:
+        return
+    try:
+        work.daqco.set_limit(before or now.model_copy(update={"armed": False}))
+    except NotAvailable as exc:  # nothing is acquired: that has stopped everything already
+        logger.warning("the force limit is not armed again: %s", exc)
+
+
+@contextmanager
+def armed_while_pushing(work: FibreWork) -> Iterator[None]:
+    """Have the force limit armed while the probe pushes, and afterwards as it was.
+
+    Between pushes a campaign deals itself with a board or a sensor that fails.
+    """
+    before = limit_of(work)
+    if before is None or not before.armed:
+        yield
+        return
+    logger.warning("the force limit is armed while the probe pushes, until the campaign ends")
+    work.daqco.disarm_limit(before.channel)
+    try:
+        yield
+    finally:
+        put_back(work, before)
 
 
 class FitSpans(FibreOperation):

@@ -12,7 +12,7 @@ from PySide6.QtCore import (
     Qt,
     Signal,
 )
-from PySide6.QtGui import QColor, QPainter
+from PySide6.QtGui import QBrush, QColor, QPainter
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -56,6 +56,18 @@ class ChannelModel(QAbstractTableModel):
         self._traces: tuple[Trace, ...] = ()
         self._values: list[Sequence[float] | None] = [None] * len(VALUES)
         self._decimals: tuple[int, ...] = ()
+        self._age_s: float | None = None
+
+    def set_age(self, age_s: float | None) -> None:
+        """Say how old the values are; None while they are the present ones."""
+        shown = None if age_s is None else float(round(age_s))
+        if shown == self._age_s:
+            return
+        self._age_s = shown
+        self.headerDataChanged.emit(Qt.Orientation.Horizontal, 1, 1)
+        last = len(self._traces) - 1
+        if last >= 0:
+            self.dataChanged.emit(self.index(0, 1), self.index(last, 1))
 
     def set_traces(self, traces: Sequence[Trace]) -> None:
         """List these channels."""
@@ -95,6 +107,8 @@ class ChannelModel(QAbstractTableModel):
         self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
     ) -> Any:
         if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
+            if section == 1 and self._age_s is not None:
+                return f"{self._age_s:.0f} s ago"
             return ("channel", *VALUES)[section]
         return None
 
@@ -123,6 +137,11 @@ class ChannelModel(QAbstractTableModel):
         if role == Qt.ItemDataRole.DisplayRole:
             value = values[row] if values is not None and row < len(values) else None
             return value_text(value, self._decimals[row])
+        if column == 0 and self._age_s is not None:
+            if role == Qt.ItemDataRole.ForegroundRole:
+                return QBrush(Qt.GlobalColor.gray)
+            if role == Qt.ItemDataRole.ToolTipRole:
+                return f"Measured {self._age_s:.0f} s ago; nothing is measured now"
         if role == Qt.ItemDataRole.ToolTipRole and column == 0:
             return "Mean of the last 0.2 s"
         return None

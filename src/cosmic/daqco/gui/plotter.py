@@ -20,6 +20,7 @@ from cosmic.daqco.gui.plot.unit_ranges import UnitRanges
 from cosmic.daqco.gui.plot.units import AxisRange
 from cosmic.daqco.gui.ports import DaqPort
 from cosmic.daqco.gui.scaling_bar import ScalingBar
+from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.elided_label import ElidedLabel
@@ -28,6 +29,8 @@ from cosmic.frame.gui.theme import STEP_PX, number_font
 from cosmic.frame.overrides import override
 
 READOUT_MS: Final = 200
+OLD_S: Final = 1.0
+"""A value that is older is not the present one."""
 MEAN_S: Final = 0.2
 
 _Key = tuple[tuple[str, ...], float, tuple[object, ...]]
@@ -61,6 +64,7 @@ class UDaqPlotter(QWidget):
         self.state = Chip("LIVE", tip="Whether the picture follows the newest samples")
         self.lost = Chip("lost 0", tip="Samples a channel that were lost")
         self.window_text, self.problem = QLabel(), ElidedLabel()
+        self._heard_s = WALL.now_s()
         self._timer = QTimer(self, timerType=Qt.TimerType.PreciseTimer)
         self._readout = QTimer(self, interval=READOUT_MS)
         self._build()
@@ -152,6 +156,7 @@ class UDaqPlotter(QWidget):
         """Draw what has come since the last time."""
         pending: list[DataChunk] = []
         for chunk in self.inbox.take():
+            self._heard_s = WALL.now_s()
             key = (chunk.channels, chunk.rate_hz, chunk.scales)
             if key != self._key:
                 self.chart.feed(pending)
@@ -175,10 +180,22 @@ class UDaqPlotter(QWidget):
         samples = view.samples(first, view.end)[1] if view.end else np.empty((0, 0))
         values = samples.mean(axis=1).tolist() if samples.shape[1] else None
         self.channels.channels.set_values(0, values)
+        self._show_age()
         self._show_cursors()
         lost, skipped = self._port.counters.lost, self.inbox.skipped
         self.lost.setText(f"lost {lost}" + (f", not shown {skipped}" if skipped else ""))
         self.lost.set_tone("alarm" if lost else "quiet")
+
+    def _show_age(self) -> None:
+        """Show values that are not measured any more as old ones."""
+        age_s = WALL.now_s() - self._heard_s
+        measured = self._port.running and age_s <= OLD_S
+        self.channels.channels.set_age(None if measured else age_s)
+        if self.chart.frozen:
+            self.state.setText("HISTORY")
+        else:
+            self.state.setText("LIVE" if measured else f"NOT MEASURED for {age_s:.0f} s")
+        self.state.set_tone("quiet" if measured and not self.chart.frozen else "warning")
 
     # Following the application
 
@@ -267,8 +284,7 @@ class UDaqPlotter(QWidget):
 
     def _on_frozen_changed(self, frozen: bool) -> None:
         self.bar.show_frozen(frozen)
-        self.state.setText("HISTORY" if frozen else "LIVE")
-        self.state.set_tone("warning" if frozen else "quiet")
+        self._show_age()
 
     def _on_time_changed(self) -> None:
         begin_s, end_s = self.chart.window_s()

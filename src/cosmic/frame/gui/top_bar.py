@@ -141,6 +141,10 @@ class TopBar(QWidget):
         whole.addWidget(signs, 1)
         whole.addWidget(self._stop)
 
+    def add_indicator(self, indicator: QWidget) -> None:
+        """Add what must be seen from everywhere, stopped or not."""
+        self._first_row.insertWidget(self._first_row.indexOf(self._theme), indicator)
+
     def set_menu_bar(self, menu_bar: QMenuBar) -> None:
         """Put `menu_bar` into the first row, at the left."""
         menu_bar.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)

@@ -1,6 +1,7 @@
 """The probe finds a held fibre and pushes it, however stiff it is and wherever it is."""
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from cosmic.autonomy.handling.push import PushSpans
 from cosmic.autonomy.handling.settings import HandlingSettings, PushSettings
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps
+from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.clock import ManualClock
 from cosmic.vico.core.tool_settings import ToolSettings
 
@@ -73,9 +75,11 @@ class Daqco:
 
     def __init__(self) -> None:
         self.armed: list[bool] = []
+        self.limits: list[Any] = []
 
     def set_limit(self, limit: Any) -> None:
         self.armed.append(limit.armed)
+        self.limits = [SimpleNamespace(settings=limit)]
 
 
 class Bench(FibreWork):
@@ -197,3 +201,12 @@ def test_a_soft_fibre_gets_shorter_spans_once_the_first_has_shown_it():
     carried_out(PushSpans().run(bench))
     nominal = [span.nominal_um for span in bench.in_hand().spans]
     assert nominal[0] > 1.5 * nominal[1]
+
+
+def test_a_limit_that_was_armed_before_is_as_it_was_after_the_push():
+    bench = Bench(5e-11)
+    mine = LimitSettings(channel="force", low=-150.0, high=150.0, hysteresis=5.0, armed=True)
+    bench.daqco.set_limit(mine)
+    carried_out(PushSpans().run(bench))
+    assert bench.daqco.armed == [True, True, True]  # type: ignore[attr-defined]
+    assert bench.daqco.limits[0].settings == mine

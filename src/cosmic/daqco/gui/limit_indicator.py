@@ -1,0 +1,93 @@
+"""Shows which force limit is in force, whether it is watched, and how far the force is from it."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QWidget
+
+from cosmic.daqco.api.window_port import WindowPort
+from cosmic.daqco.gui.limit_banner import limit_text
+from cosmic.daqco.gui.plot.units import display_unit
+from cosmic.daqco.gui.ports import LimitState
+from cosmic.frame.errors import NotAvailable
+from cosmic.frame.gui.chip import Chip, Tone
+
+LOOK_MS: Final = 200
+
+
+@dataclass(frozen=True, slots=True)
+class LimitReading:
+    """A limit in one line, and what the pointer over it tells."""
+
+    text: str
+    tone: Tone
+    tip: str
+
+
+def distance(limit: LimitState, value: float) -> float:
+    """Return how far a value is from the nearer side of a limit; negative beyond it."""
+    low, high = limit.settings.low, limit.settings.high
+    below = math.inf if high is None else high - value
+    return min(below, math.inf if low is None else value - low)
+
+
+def reading(limit: LimitState, unit: str, value: float | None) -> LimitReading:
+    """Return what is shown of a limit; `value` is None where the channel is not measured."""
+    given, shown = limit.settings, display_unit(unit)
+    sides = " to ".join("free" if each is None else f"{each:g}" for each in (given.low, given.high))
+    name = f"{given.channel} limit {sides} {shown}"
+    if limit.crossed:
+        return LimitReading(f"■ {name}: STOPPED", "alarm", limit_text(limit, unit))
+    if not given.armed:
+        why = limit.reason or "Arm it in Acquisition > Limits…"
+        word = "NOT WATCHED" if limit.reason else "DISARMED"
+        return LimitReading(f"▲ {name}: {word}", "warning", f"Nothing stops at it. {why}")
+    if value is None:
+        return LimitReading(f"■ {name}: NO DATA", "alarm", "The channel is not measured")
+    left = distance(limit, value)
+    text = f"{name}: armed, {left:.0f} {shown} to go"
+    return LimitReading(text, "quiet", "Crossing it stops every actuator at once")
+
+
+class LimitIndicator(Chip):
+    """The limit that matters most: crossed, not watched, or else the nearest; GUI thread."""
+
+    def __init__(self, port: WindowPort, parent: QWidget | None = None) -> None:
+        super().__init__("", parent=parent)
+        self._port = port
+        self._timer = QTimer(self, interval=LOOK_MS)
+        self._timer.timeout.connect(self.look)
+        self._timer.start()
+        self.look()
+
+    def look(self) -> None:
+        """Show how things stand now."""
+        port = self._port
+        try:
+            values = port.latest() if port.running and not port.away else {}
+        except NotAvailable:
+            values = {}
+        self.show_limits(port.limits, port.units, values)
+
+    def show_limits(
+        self, limits: Sequence[LimitState], units: Mapping[str, str], values: Mapping[str, float]
+    ) -> None:
+        """Show the most urgent of `limits`; nothing where there are none."""
+        self.setVisible(bool(limits))
+        if not limits:
+            return
+
+        def urgency(limit: LimitState) -> tuple[bool, bool, float]:
+            value = values.get(limit.settings.channel, math.nan)
+            left = distance(limit, value)
+            return (not limit.crossed, limit.settings.armed, left if math.isfinite(left) else 0.0)
+
+        first = min(limits, key=urgency)
+        channel = first.settings.channel
+        shown = reading(first, units.get(channel, ""), values.get(channel))
+        self.setText(shown.text)
+        self.setToolTip(shown.tip)
+        self.set_tone(shown.tone)
