@@ -83,7 +83,7 @@ def measure(quick: bool = False) -> list[Figure]:
     figures = [
         Figure(NAME, "idle, window open", idle_percent, "% of a core", 5),
         Figure(NAME, "4 devices, 11 axes moving", eleven, "% of a core"),
-        Figure(NAME, title, many, "% of a core", 40),
+        Figure(NAME, title, many, "% of a core", 30),
         Figure(NAME, "of these: the simulated library", of_library, "% of a core"),
     ]
     biggest = sorted(kinds.items(), key=lambda item: -item[1])

@@ -27,7 +27,7 @@ def child_figures(run: list[str]) -> dict[str, float]:
         [*run, "-m", "benchmarks.start_child", repr(began_s)],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=120,
         check=True,
         cwd=ROOT,
         env=os.environ | {"QT_QPA_PLATFORM": "offscreen"},
@@ -40,7 +40,7 @@ def prelude_s() -> float:
     """Return how long `./run` takes before it starts Python, in s."""
     began_s = time.perf_counter()
     command = ["sh", "-c", PRELUDE, "sh", str(ROOT)]
-    subprocess.run(command, capture_output=True, timeout=60, check=False)
+    subprocess.run(command, capture_output=True, timeout=120, check=False)
     return time.perf_counter() - began_s
 
 
@@ -48,7 +48,7 @@ def bare_cpu_s() -> float:
     """Return the CPU time of a Python that imports Qt's widgets and numpy, in s: the yardstick."""
     program = "import time, numpy, PySide6.QtWidgets; print(time.process_time())"
     done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=True
     )
     return float(done.stdout)
 
@@ -59,7 +59,7 @@ def heaviest_imports(count: int) -> list[tuple[str, float]]:
         [sys.executable, "-X", "importtime", "-c", "import cosmic.app.run_window"],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=120,
         check=True,
         cwd=ROOT,
     )

@@ -55,7 +55,7 @@ class Watch(QObject):
         gui = self._window.mico_gui
         if gui is None:
             raise RuntimeError("the window has no MiCo panel")
-        self._movement = gui.mico["left.x"].move_by(100.0, wait=False)
+        self._movement = gui.mico["left.x"].move_by(4000.0, wait=False)
         self._timer.timeout.disconnect(self._look)
         self._timer.timeout.connect(self._stop)
         self._timer.start()
@@ -91,6 +91,6 @@ if __name__ == "__main__":
     times_s["imported"] = time.monotonic() - BEGAN_S
     open_hardware = OperatorWindow.open_hardware
     run_window.OperatorWindow.open_hardware = _watched  # type: ignore[method-assign]
-    code = main(["--offscreen", "20"])
+    code = main(["--offscreen", "60"])
     sys.stdout.write(json.dumps(times_s) + "\n")
     sys.exit(code or ("usable" not in times_s) or QApplication.instance() is None)
