@@ -4,7 +4,8 @@ import atexit
 import sys
 import threading
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from typing import ClassVar, Final
 
 import shiboken6
@@ -17,6 +18,8 @@ from cosmic.frame.failure import FailurePolicy
 JOIN_TIMEOUT_S: Final = 5.0
 SWITCH_S: Final = 0.001
 """So long may one thread of Python keep the others waiting for the interpreter."""
+URGENT_SWITCH_S: Final = 0.0001
+"""The same while something is urgent."""
 
 
 class WorkerThread(QThread):
@@ -117,6 +120,21 @@ def share_interpreter() -> None:
     of the processor while three threads do nothing but compute in Python.
     """
     sys.setswitchinterval(min(sys.getswitchinterval(), SWITCH_S))
+
+
+@contextmanager
+def urgent() -> Generator[None]:
+    """Let who needs the interpreter have it at once meanwhile; any thread, takes no lock.
+
+    For a few calls into a library in C, each of which has to win the interpreter back.
+    """
+    before_s = sys.getswitchinterval()
+    sys.setswitchinterval(min(before_s, URGENT_SWITCH_S))
+    try:
+        yield
+    finally:
+        # Of two that overlap neither leaves it short for ever.
+        sys.setswitchinterval(max(before_s, SWITCH_S))
 
 
 def declare_gui_thread() -> Callable[[], None]:

@@ -18,6 +18,7 @@ from cosmic.frame.threads import (
     declare_gui_thread,
     forbid_waiting_here,
     running_threads,
+    urgent,
 )
 
 
@@ -222,3 +223,17 @@ def test_waiting_is_forbidden_in_a_declared_gui_thread_only() -> None:
         pool.submit(forbid_waiting_here, "moving").result()
     take_back()
     forbid_waiting_here("moving")
+
+
+def test_what_is_urgent_waits_for_the_interpreter_a_tenth_of_a_millisecond_each_time() -> None:
+    before_s = sys.getswitchinterval()
+    try:
+        sys.setswitchinterval(0.005)
+        with urgent():
+            assert sys.getswitchinterval() <= 0.0001
+            with urgent():
+                pass
+            assert sys.getswitchinterval() <= 0.001
+        assert sys.getswitchinterval() == pytest.approx(0.005)
+    finally:
+        sys.setswitchinterval(before_s)

@@ -16,6 +16,7 @@ from cosmic.frame.errors import (
     refusal,
 )
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.threads import urgent
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
 from cosmic.mico.core.collision.exemptions import Exemptions
@@ -277,9 +278,10 @@ class DeviceManager(DeviceTable):
         devices = list(self._devices.values())
         for device in devices:
             device.stop_later(error)
-        for device in devices:
-            if device.isRunning():
-                self._threads.stop_channels(device)
+        with urgent():
+            for device in devices:
+                if device.isRunning():
+                    self._threads.stop_channels(device)
         logger.warning("stop: %s", reason)
         self.latch.announce()
 
