@@ -41,8 +41,8 @@ class FramedSocket:
         """Let messages of that size come."""
         self._limit_bytes = limit_bytes
 
-    def send(self, message: bytes) -> None:
-        """Send one.
+    def send(self, message: bytes, timeout_s: float | None = None) -> None:
+        """Send one; None waits for ever for a line that is full.
 
         Raises
         ------
@@ -50,6 +50,7 @@ class FramedSocket:
             It could not be sent as a whole.
         """
         try:
+            self._set_timeout(timeout_s)
             self._stream.sendall(_LENGTH.pack(len(message)) + message)
         except (OSError, ValueError) as exc:
             raise LineLost(str(exc)) from exc
@@ -88,8 +89,7 @@ class FramedSocket:
 
     def _read(self, size: int, timeout_s: float | None) -> bytes:
         try:
-            if self._stream.gettimeout() != timeout_s:
-                self._stream.settimeout(timeout_s)
+            self._set_timeout(timeout_s)
             found = self._stream.recv(size)
         except (BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError) as exc:
             raise TimeoutError from exc
@@ -100,6 +100,10 @@ class FramedSocket:
         if not found:
             raise LineLost("the other side has closed it")
         return found
+
+    def _set_timeout(self, timeout_s: float | None) -> None:
+        if self._stream.gettimeout() != timeout_s:
+            self._stream.settimeout(timeout_s)
 
     def shut(self) -> None:
         """End it: whoever waits for it wakes; any thread."""
@@ -154,7 +158,7 @@ class DirectLine:
             The line broke.
         """
         until_s = self._clock.now_s() + timeout_s
-        self._framed.send(message)
+        self._framed.send(message, timeout_s)
         self._owed += 1
         try:
             answer = self._framed.receive(max(0.001, until_s - self._clock.now_s()))

@@ -180,9 +180,8 @@ class DirectListener(WorkerThread):
             self._attach(client, token, name, urgent, pending.framed)
         except CosmicError as exc:
             try:
-                stream.setblocking(False)
-                pending.framed.send(refusal_of(0.0, exc))
-            except (OSError, LineLost):
+                pending.framed.send(refusal_of(0.0, exc), 0.0)
+            except LineLost:
                 logger.debug("%s is gone", pending.where)
             self._turn_away(pending, str(exc))
 

@@ -232,10 +232,10 @@ def test_a_line_lost_in_a_call_says_that_nobody_knows_and_a_stop_goes_the_other_
     with connected(served.endpoint) as client:
         send = FramedSocket.send
 
-        def cut(framed: FramedSocket, message: bytes) -> None:
+        def cut(framed: FramedSocket, message: bytes, timeout_s: float | None = None) -> None:
             if threading.current_thread() is threading.main_thread():
                 raise LineLost("cut")
-            send(framed, message)
+            send(framed, message, timeout_s)
 
         monkeypatch.setattr(FramedSocket, "send", cut)
         client.call("stage", "stop")
