@@ -82,7 +82,7 @@ def test_stop_latches_with_its_reason_and_reset_lets_go(make: Make, qtbot: QtBot
 def test_f12_stops_from_a_text_field_and_escape_only_takes_the_entry_back(
     make: Make, qtbot: QtBot
 ) -> None:
-    window = make(rate=4.0, hardware=False)
+    window = make(rate=1.0, hardware=False)
     panel = ready(window, qtbot)
     moving(panel, qtbot)
     entry = field(panel.cards["right.x"], "MiCoCL_8")
@@ -106,7 +106,7 @@ def test_a_failure_anywhere_stands_in_the_bar(make: Make, qtbot: QtBot) -> None:
 
 @pytest.mark.defects
 def test_a_defect_stops_everything(make: Make, qtbot: QtBot) -> None:
-    window = make(rate=4.0, hardware=False)
+    window = make(rate=1.0, hardware=False)
     panel = ready(window, qtbot)
     moving(panel, qtbot)
     window.platform.policy.report(ValueError("a mistake"), "somewhere")
