@@ -106,6 +106,21 @@ def test_a_move_returns_where_the_axis_stands_and_the_axis_says_the_same(mico: M
     assert axis.locate()["readback"] == pytest.approx(0.0, abs=1.0)
 
 
+def test_the_estimate_of_an_axis_without_sensor_can_be_set_and_says_how_sure_it_is(
+    mico: Mico,
+) -> None:
+    axis = mico["left.gripper"]
+    axis.set_estimate("0.2 mm", std_um=4.0)
+    assert (axis.position_um, axis.position_std_um) == (200.0, 4.0)
+    axis.steps(100, frequency_hz=5000)
+    assert axis.position_um == pytest.approx(300.0)
+    assert axis.position_std_um == pytest.approx(14.0)
+    with pytest.raises(LimitError, match="end stop"):
+        axis.set_estimate(2000.0)
+    with pytest.raises(LimitError, match="Make fewer steps"):
+        axis.steps(-900)
+
+
 def test_axes_move_together_or_not_at_all(mico: Mico) -> None:
     reached = mico.move({"left.x": 30.0, "right.x": -30.0})
     assert reached == pytest.approx({"left.x": 30.0, "right.x": -30.0}, abs=1.0)

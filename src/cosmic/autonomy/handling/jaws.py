@@ -1,11 +1,17 @@
 """The jaws of a gripper without a sensor: opened and closed by steps, and counted."""
 
+import logging
 from typing import Final
 
 from cosmic.autonomy.handling.patience import PatientMove
 from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import Steps
+from cosmic.frame.errors import MoveRefused, NotAvailable
 
+logger = logging.getLogger(__name__)
+
+CLOSED_STD_UM: Final = 10.0
+"""How well jaws that were run against their stop are known to be closed."""
 OVER: Final = 0.1
 """Part of the travel by which the jaws are closed too far, to be closed for sure."""
 COUNT_UM: Final = 130.0
@@ -24,8 +30,18 @@ def zero_jaws(work: FibreWork) -> Steps:
     yield from move_jaws(work, max(0.0, full - (count.position_um or 0.0)))
     # From closed again: nothing is between jaws that come down no wider than they should be.
     yield from move_jaws(work, close)
-    work.gap_um = 0.0
+    note_gap(work, 0.0, CLOSED_STD_UM)
     yield from move_jaws(work, work.settings.grasp.gap_um)
+
+
+def note_gap(work: FibreWork, gap_um: float, std_um: float) -> None:
+    """Take the opening that is known by an end stop or by sight; the gate counts from it."""
+    work.gap_um = gap_um
+    axis = work.mico[work.gripper.gap_axis]
+    try:
+        axis.set_estimate(gap_um, std_um=std_um)
+    except (MoveRefused, NotAvailable) as exc:
+        logger.warning("the opening seen is not taken: %s", exc)
 
 
 def in_step(work: FibreWork) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 from typing_extensions import override
 
 from cosmic.autonomy.handling.in_hand import FibreInHand
-from cosmic.autonomy.handling.jaws import move_jaws
+from cosmic.autonomy.handling.jaws import move_jaws, note_gap
 from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.plate import along, ways
 from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen, trace_along
@@ -25,6 +25,7 @@ SAME_LENGTH: Final = 0.05
 LOOKS: Final = 2
 FORETOLD_UM: Final = 25.0
 FORETOLD_PART: Final = 0.6
+GAP_STD_PX: Final = 2.0
 
 
 class Turn(FibreOperation):
@@ -183,7 +184,8 @@ def _off_um(work: FibreWork, fibre: FibreInHand, picture: Picture) -> float | No
         return None
     mapped = work.mapped(picture)
     hold = mapped.to_um(found.hold_px)
-    work.gap_um = found.gap_px * mapped.scale_um_px
+    gap_um = found.gap_px * mapped.scale_um_px
+    note_gap(work, gap_um, GAP_STD_PX * mapped.scale_um_px)
     line = line_of(fibre)
     order = np.argsort(line[:, 0])
     beside = float(np.interp(hold[0], line[order, 0], line[order, 1]))

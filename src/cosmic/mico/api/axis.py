@@ -276,6 +276,27 @@ class Axis(AxisFacts):
     def _set_zero(self, zero: float) -> None:
         self._manager.device(self._name).set_zero(self._channel, zero)
 
+    def set_estimate(self, position: Number, *, std_um: Number = 5.0) -> None:
+        """Say where an axis without sensor stands, as seen or measured by hand; nothing moves.
+
+        Parameters
+        ----------
+        position : float or str
+            In um, from the user's zero; of a gripper the opening.
+        std_um : float
+            How well that is known, a standard deviation.
+
+        Raises
+        ------
+        NotAvailable
+            It has a sensor, or is moving.
+        MoveRefused
+            The numbers are none, or lie outside its travel.
+        """
+        where = self._number(position) + self.details.zero
+        std = as_number(std_um, "um", self._name)
+        self._manager.device(self._name).set_estimate(self._channel, where, std)
+
     def set_closed_loop_frequency(self, frequency_hz: Number) -> None:
         """Limit the speed of movements to a position, 1 to 18500 Hz.
 

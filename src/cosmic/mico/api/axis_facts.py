@@ -96,6 +96,21 @@ class AxisFacts(AxisShape):
         return self._position("um", "angle_deg")
 
     @property
+    def position_std_um(self) -> float:
+        """Standard deviation of the position in um: 0 where it is measured, inf where unknown.
+
+        It grows with the steps of an axis without sensor, until its end stop or
+        `set_estimate` says where it is.
+
+        Raises
+        ------
+        NotAvailable
+            The axis is rotary.
+        """
+        self._position("um", "angle_deg")
+        return self.details.std
+
+    @property
     def angle_deg(self) -> float | None:
         """Angle in degrees; None before the first reading.
 

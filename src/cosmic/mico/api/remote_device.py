@@ -158,6 +158,11 @@ class RemoteDevice(QObject):
         """Show the positions of one channel relative to `zero`, in gate coordinates."""
         self._line.do("set_zero", {"axis": self.container.name(channel), "zero": zero})
 
+    def set_estimate(self, channel: int, position: float, std: float) -> None:
+        """Say where an axis without sensor stands; see `Device.set_estimate`."""
+        arguments = {"axis": self.container.name(channel), "position": position, "std": std}
+        self._line.do("set_estimate", arguments)
+
 
 class CommanderSlots(QObject):
     """A device as commanders are joined to it: out of a slot no exception may come."""

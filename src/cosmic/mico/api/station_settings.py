@@ -40,6 +40,14 @@ class SettingsSide:
         return self._teller.note(axis)
 
     @remote(moves=True)
+    def set_estimate(self, axis: str, position: float, std: float) -> StampedState | None:
+        """Say where an axis without sensor stands, in gate coordinates."""
+        self._log(f"{axis}: estimated at {position:g} ± {std:g}", "")
+        channel = self._manager.address(axis).channel
+        self._manager.device(axis).set_estimate(channel, position, std)
+        return self._teller.note(axis)
+
+    @remote(moves=True)
     def set_frequency(self, axis: str, frequency_hz: int) -> None:
         """Limit the closed-loop speed."""
         low, high = FREQUENCY_HZ

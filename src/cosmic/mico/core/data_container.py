@@ -7,7 +7,8 @@ from threading import Condition
 from typing import Final
 
 from cosmic.frame.clock import WALL
-from cosmic.frame.errors import DeviceFault
+from cosmic.frame.errors import DeviceFault, NotAvailable
+from cosmic.mico.core.estimate import CountedTravel, check_estimate
 from cosmic.mico.core.positioner import (
     Confidence,
     PositionerBase,
@@ -44,6 +45,7 @@ class Memory:
     zero: float
     frequency_hz: int | None
     counted: float | None
+    std: float = 0.0
 
 
 class DeviceDataContainer:
@@ -95,7 +97,9 @@ class DeviceDataContainer:
         kept = dict(self._memories)
         for each in self._positioners.values():
             counted = None if each.has_sensor else each.state.position
-            kept[each.state.name] = Memory(each.state.zero, each.frequency_hz, counted)
+            kept[each.state.name] = Memory(
+                each.state.zero, each.frequency_hz, counted, each.state.std
+            )
         return kept
 
     # What is there
@@ -135,7 +139,7 @@ class DeviceDataContainer:
             positioner.frequency_hz = memory.frequency_hz
             positioner.update(zero=memory.zero)
             if memory.counted is not None and not positioner.has_sensor:
-                positioner.update(position=memory.counted)
+                positioner.update(position=memory.counted, std=memory.std)
         if channel not in self._configured:
             text = "not in the configuration; add it there, then start again"
             positioner.update(present=False, error=text)
@@ -191,6 +195,17 @@ class DeviceDataContainer:
         with self._changed:
             positioner = self._positioners.get(channel)
             return positioner.update(**changes) if positioner else None
+
+    def set_estimate(
+        self, channel: int, travel: CountedTravel | None, position: float, std: float
+    ) -> None:
+        """Say where an axis without sensor stands; raises as `check_estimate`."""
+        with self._changed:
+            positioner = self._positioners.get(channel)
+            if positioner is None:
+                raise NotAvailable(f"device {self.device} channel {channel} has no axis")
+            check_estimate(positioner.state, travel, position, std)
+            positioner.update(position=position, std=std)
 
     def lose(self, reason: str) -> list[PositionerState]:
         """Say that the whole device is gone; positions are worth nothing from now on."""

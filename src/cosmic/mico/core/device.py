@@ -25,6 +25,7 @@ from cosmic.frame.inbox import Inbox
 from cosmic.frame.threads import WorkerThread
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.core.data_container import DeviceDataContainer
+from cosmic.mico.core.estimate import CountedTravel
 from cosmic.mico.core.flight import PilotContext
 from cosmic.mico.core.gate import Gate
 from cosmic.mico.core.introduction import Introduction
@@ -216,6 +217,22 @@ class Device(WorkerThread):
     def set_zero(self, channel: int, zero: float) -> None:
         """Show the positions of one channel relative to `zero`, in gate coordinates."""
         self.container.update(channel, zero=zero)
+        self._inbox.put(Tell(channel))
+
+    def set_estimate(self, channel: int, position: float, std: float) -> None:
+        """Say where an axis without sensor stands, in gate coordinates, and how well that is known.
+
+        Raises
+        ------
+        NotAvailable
+            It has a sensor, or is moving.
+        MoveRefused
+            The numbers are none, or lie outside its travel.
+        """
+        found = self.container.positioner(channel)
+        counts = found is not None and not found.has_sensor
+        travel = CountedTravel.of(found.settings, self._settings) if found and counts else None
+        self.container.set_estimate(channel, travel, position, std)
         self._inbox.put(Tell(channel))
 
     def wait_until_introduced(self, timeout_s: float) -> bool:

@@ -136,8 +136,8 @@ def missed_target(
     return DeviceError(f"{state.name}: stopped at {where} instead of {wanted}")
 
 
-def counted_position(flight: Flight, state: PositionerState, step_um: float, now_s: float) -> float:
-    """Estimate where an axis without sensor is after `flight`, in um."""
+def counted_way(flight: Flight, step_um: float, now_s: float) -> float:
+    """Estimate how far an axis without sensor went during `flight`, in um."""
     motion, made = flight.order.motion, 0.0
     elapsed_s = now_s - flight.started_s
     if isinstance(motion, Step):
@@ -145,4 +145,4 @@ def counted_position(flight: Flight, state: PositionerState, step_um: float, now
         made = math.copysign(ran, motion.steps) * motion.amplitude_v / 100.0
     elif isinstance(motion, Jog):
         made = motion.direction * motion.speed * elapsed_s
-    return (state.position or 0.0) + made * step_um
+    return made * step_um

@@ -5,7 +5,8 @@ import logging
 from cosmic.frame.errors import CosmicError, DeviceError, DeviceFault, DeviceTimeout, MoveCancelled
 from cosmic.mico.core.channel_speed import ChannelSpeed
 from cosmic.mico.core.enquiry import Enquiry
-from cosmic.mico.core.flight import Flight, PilotContext, counted_position, missed_target
+from cosmic.mico.core.estimate import CountedTravel
+from cosmic.mico.core.flight import Flight, PilotContext, counted_way, missed_target
 from cosmic.mico.core.movement import Movement
 from cosmic.mico.core.orders import Grant, Jog
 from cosmic.mico.core.positioner import Confidence, PositionerBase
@@ -262,11 +263,15 @@ class ChannelFollower:
         """Estimate where an axis without sensor is after `flight`."""
         if self._positioner.has_sensor:
             return
-        nominal_um = self._context.settings.defaults.nominal_step_um
-        step_um = self._positioner.settings.step_um or nominal_um
-        now_s = self._context.clock.now_s()
-        where = counted_position(flight, self._positioner.state, step_um, now_s)
-        self._context.container.update(self._address.channel, position=where)
+        travel = CountedTravel.of(self._positioner.settings, self._context.settings)
+        way = counted_way(flight, travel.step_um, self._context.clock.now_s())
+        state = self._positioner.state
+        where, std = travel.after(state.position or 0.0, state.std, way)
+        if where != (state.position or 0.0) + way:
+            logger.info(
+                "%s: counted to its end stop; the estimate stays at %g um", self.name, where
+            )
+        self._context.container.update(self._address.channel, position=where, std=std)
 
     def _conclude(self, error: CosmicError | None) -> None:
         """End the movement under way; its interval stays held unless it has landed."""

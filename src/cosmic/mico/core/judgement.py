@@ -1,6 +1,7 @@
 """The gate's pure part: the platform at one moment in, an answer out."""
 
 import logging
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
@@ -8,6 +9,7 @@ from typing import Final
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision.answer import AxisSpan
 from cosmic.mico.core.collision.checker import CollisionChecker
+from cosmic.mico.core.estimate import TIMES_STD
 from cosmic.mico.core.lease import Guard
 from cosmic.mico.core.orders import Interval, Motion
 from cosmic.mico.core.positioner import Confidence, PositionerState
@@ -244,13 +246,16 @@ def span_of(state: PositionerState, asked: Interval | None, picture: Picture) ->
     way = picture.headings.get(state.name) if moving else None
     if way is not None and now is not None:
         now = state.position  # what lies behind it, it does not go to again
+    estimated = state.confidence is Confidence.ESTIMATED
+    counted = estimated and state.name in picture.rules.counted and math.isfinite(state.std)
     return AxisSpan(
         place.low,
         place.high,
         now,
         moving=moving,
-        estimated=state.confidence is Confidence.ESTIMATED,
+        estimated=estimated,
         heading=way if now is not None else None,
+        spread=TIMES_STD * state.std if counted else None,
     )
 
 

@@ -45,6 +45,10 @@ class DevicePort(Commanded, Protocol):
     def set_zero(self, channel: int, zero: float) -> None:
         """Show the positions of one channel relative to `zero`, in gate coordinates."""
 
+    @abstractmethod
+    def set_estimate(self, channel: int, position: float, std: float) -> None:
+        """Say where an axis without sensor stands; see `Device.set_estimate`."""
+
 
 class ControllerPort(Protocol):
     """What is asked of the controller itself."""

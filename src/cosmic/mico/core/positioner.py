@@ -186,7 +186,9 @@ class PositionerOL(PositionerBase):
         hold_s: float = math.inf,
     ) -> None:
         super().__init__(settings, address, positioner, hold_s)
-        self.update(position=settings.start_um or 0.0, confidence=Confidence.ESTIMATED)
+        self.update(
+            position=settings.start_um or 0.0, confidence=Confidence.ESTIMATED, std=math.inf
+        )
 
 
 class PositionerCL(PositionerBase):

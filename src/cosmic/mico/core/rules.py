@@ -1,12 +1,13 @@
 """The gate's checks of a single axis, as pure functions in the order they are made."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Final, Self
 
 from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.mico.core.estimate import CountedTravel, counted_travels
 from cosmic.mico.core.orders import (
     AMPLITUDE_V,
     FREQUENCY_HZ,
@@ -40,10 +41,13 @@ class Limits:
         By unit, the longest way that one step can go: bounds what open-loop steps may sweep.
     stale_s : float
         Age in wall seconds beyond which a position is no answer.
+    counted : mapping of CountedTravel
+        Bounds and uncertainty of the axes without sensor, by name.
     """
 
     largest_step: dict[str, float]
     stale_s: float
+    counted: Mapping[str, CountedTravel] = field(default_factory=dict)
 
     @classmethod
     def of(cls, settings: MicoSettings) -> Self:
@@ -52,6 +56,7 @@ class Limits:
         return cls(
             largest_step={"um": defaults.largest_step_um, "deg": defaults.largest_step_deg},
             stale_s=settings.watch.stale_s,
+            counted=counted_travels(settings),
         )
 
 
@@ -286,6 +291,10 @@ def _limit(
     held: Interval | None,
     rules: Limits,
 ) -> MoveVerdict | None:
+    travel = rules.counted.get(state.name)
+    if travel is not None and isinstance(motion, Step):
+        way = motion.steps * travel.step_um * motion.amplitude_v / AMPLITUDE_V[1]
+        return travel.refuse_beyond(state, way, held)
     if state.limits is None:
         return None
     low, high = state.limits

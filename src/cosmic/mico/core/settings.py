@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -17,6 +17,9 @@ from cosmic.mico.hw.interface import Channel, PositionerKind
 Range = Annotated[tuple[float, float], Field(strict=False)]
 Names = Annotated[tuple[str, ...], Field(strict=False)]
 Text = Annotated[str, Field(min_length=1)]
+
+
+_COUNTED: Final = ("travel_um", "step_std", "end_std_um")
 
 
 class MotionDefaults(StrictModel):
@@ -98,6 +101,9 @@ class PositionerSettings(StrictModel):
     start_region_um: Range | None = None
     start_region_deg: Range | None = None
     step_um: Annotated[float, Field(gt=0)] | None = None
+    travel_um: Range | None = None
+    step_std: Annotated[float, Field(ge=0, le=0.3)] | None = None
+    end_std_um: Annotated[float, Field(ge=0)] | None = None
     forward_text: Text = "+"
     backward_text: Text = "-"
     forward_key: str = ""
@@ -138,14 +144,26 @@ class PositionerSettings(StrictModel):
         allowed = {
             "linear": {"limits_um", "start_um", "start_region_um"},
             "rotary": {"limits_deg", "start_deg", "start_region_deg"},
-            "open-loop": {"start_um", "step_um"},
+            "open-loop": {"start_um", "step_um", *_COUNTED},
         }[self.kind]
         regions = "start_region_um", "start_region_deg"
-        for key in ("limits_um", "limits_deg", "start_um", "start_deg", "step_um", *regions):
+        for key in (
+            "limits_um",
+            "limits_deg",
+            "start_um",
+            "start_deg",
+            "step_um",
+            *_COUNTED,
+            *regions,
+        ):
             if getattr(self, key) is not None and key not in allowed:
                 raise ValueError(f"{self.name}: {key} does not fit, the axis is {self.kind}")
         if self.kind != "open-loop" and self.limits is None:
             raise ValueError(f"{self.name}: limits_{self.unit} is missing, the axis is {self.kind}")
+        if self.travel_um and not self.travel_um[0] < self.travel_um[1]:
+            raise ValueError(f"{self.name}: travel_um must be (low, high) with low < high")
+        if self.travel_um and not self.travel_um[0] <= (self.start_um or 0.0) <= self.travel_um[1]:
+            raise ValueError(f"{self.name}: start_um lies outside travel_um")
         if self.limits and not self.limits[0] < self.limits[1]:
             raise ValueError(f"{self.name}: limits must be (low, high) with low < high")
         if self.start_region and not self.start_region[0] <= self.start_region[1]:

@@ -1,5 +1,6 @@
 """What every card of a positioner is drawn on, and the small parts it is put together from."""
 
+import math
 from typing import Final
 
 from PySide6.QtCore import QEvent, QRectF, Qt
@@ -131,9 +132,11 @@ class ConfidenceMark(Chip):
         self.setFixedWidth(self.fontMetrics().horizontalAdvance("≈ estimated") + 3 * STEP_PX)
         self.set_confidence(Confidence.UNKNOWN)
 
-    def set_confidence(self, confidence: Confidence) -> None:
-        """Show `confidence`."""
+    def set_confidence(self, confidence: Confidence, std: float = math.inf) -> None:
+        """Show `confidence`, and of an estimate its standard deviation where that is known."""
         text, tone, tip = CONFIDENCE[confidence]
+        if confidence is Confidence.ESTIMATED and math.isfinite(std):
+            text, tip = f"≈ ± {std:.0f} {DISPLAY['um']}", f"{tip}, ± {std:.0f} {DISPLAY['um']}"
         if text == self.text():
             return
         self.setText(text)

@@ -170,7 +170,7 @@ class PositionerBaseGUI(Card):
             self.commands.note_motion()
         self._show_badge(STATES[state.status], state.error or self._activity_text(state))
         self._position.show_position(state.shown_position)
-        self._confidence.set_confidence(state.confidence)
+        self._confidence.set_confidence(state.confidence, state.std)
         self._show_usable(state)
         self._show_line(state)
 

@@ -29,6 +29,9 @@ class AxisSpan:
     heading : int or None
         Which way it goes on from `now` while it moves, 1 or -1; None: either, or nobody knows.
         What lies behind is part of the span, but is not gone to again.
+    spread : float or None
+        How far an estimated axis may be from where it is believed to be, in its unit; None: the
+        drive's uncertainty.
     """
 
     low: float
@@ -38,6 +41,7 @@ class AxisSpan:
     estimated: bool = False
     free: bool = False
     heading: int | None = None
+    spread: float | None = None
 
     @property
     def end(self) -> float | None:

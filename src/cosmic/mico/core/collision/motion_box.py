@@ -118,7 +118,8 @@ def _row(drive: Drive, joint: Joint, span: AxisSpan) -> _Row:
     if span.low == span.now == span.high and not (span.moving or span.estimated):
         rest = drive.offset + drive.factor * span.now
         return rest, rest, rest, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0
-    spread = drive.uncertainty if span.estimated else 0.0
+    believed = drive.uncertainty if span.spread is None else span.spread
+    spread = believed if span.estimated else 0.0
     over = drive.overshoot if span.moving else 0.0
     now = None if span.now is None else drive.offset + drive.factor * span.now
     asked = low, high = _interval(drive, joint, span, spread, now)
