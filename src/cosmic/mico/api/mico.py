@@ -14,7 +14,7 @@ from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.entry import Number
 from cosmic.mico.api.group import GroupMovement, waited_for
 from cosmic.mico.api.initialisation import Confirm
-from cosmic.mico.api.links import check_linkable
+from cosmic.mico.api.links import check_linkable, check_links_may_change
 from cosmic.mico.api.poses import Poses
 from cosmic.mico.api.task_wait import wait_or_cancel
 from cosmic.mico.api.trajectories import Trajectories
@@ -192,7 +192,7 @@ class Mico(AxesTogether):
         UnknownAxisError
             One of them does not exist.
         NotAvailable
-            They are linked already, have no sensor, or are not of one kind.
+            They are linked already, have no sensor, or are not of one kind, or one of them moves.
         """
         check_linkable(self._manager, first, second)
         return self._manager.links.add(first, second, float(ratio))
@@ -204,7 +204,10 @@ class Mico(AxesTogether):
         ------
         UnknownAxisError
             There is no such axis.
+        NotAvailable
+            One of the axes linked moves.
         """
+        check_links_may_change(self._manager, {self[axis].name})
         return self._manager.links.remove(self[axis].name)
 
     # Taking back

@@ -6,7 +6,7 @@ from cosmic.frame.network.remote import remote
 from cosmic.frame.network.station import Station
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.api.application import MicoApplication
-from cosmic.mico.api.links import check_linkable
+from cosmic.mico.api.links import check_linkable, check_links_may_change
 from cosmic.mico.api.station_checks import finite, one_line
 from cosmic.mico.api.station_orders import Key, OrderBook
 from cosmic.mico.api.station_tell import MicoTeller
@@ -68,6 +68,7 @@ class SettingsSide:
     @remote(moves=True)
     def unlink(self, axis: str) -> MicoStatus:
         """Take away every link of an axis."""
+        check_links_may_change(self._manager, {axis})
         self._log(f"{axis}: unlinked", "")
         self._manager.links.remove(axis)
         return self._teller.status()

@@ -22,11 +22,12 @@ class ChannelSpeed:
         self._context = context
         self._usual_hz = context.settings.defaults.closed_loop_frequency_hz
 
-    def set_usual(self, frequency_hz: int) -> None:
-        """Limit the closed-loop speed from now on."""
+    def set_usual(self, frequency_hz: int, *, now: bool = True) -> None:
+        """Limit the closed-loop speed, from `now` on or from the next movement."""
         self._usual_hz = frequency_hz
         self._positioner.frequency_hz = frequency_hz
-        self._limit(frequency_hz)
+        if now:
+            self._limit(frequency_hz)
 
     def limit(self, frequency_hz: int) -> None:
         """Limit the speed of one movement."""

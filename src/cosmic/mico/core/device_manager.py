@@ -1,7 +1,7 @@
 """`DeviceManager`: finds the devices, owns their threads, and stops them all (thesis 6.1)."""
 
 import logging
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Set
 from threading import RLock
 from typing import Final
 
@@ -19,7 +19,9 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.threads import urgent
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
+from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.collision.exemptions import Exemptions
+from cosmic.mico.core.collision.model import BodyPair
 from cosmic.mico.core.device import Device
 from cosmic.mico.core.device_inventory import DeviceMaker
 from cosmic.mico.core.device_table import DeviceTable
@@ -41,6 +43,9 @@ from cosmic.mico.hw.interface import Controller
 logger = logging.getLogger(__name__)
 
 CLOSED: Final = "MiCo is closed"
+WATCHED_AGAIN: Final = (
+    "stopped: it is checked for collisions again, and this movement began without; give it anew"
+)
 
 
 class DeviceManager(DeviceTable):
@@ -101,6 +106,8 @@ class DeviceManager(DeviceTable):
             on_lost=self._on_device_lost,
         )
         self._groups = self._make_groups()
+        if self.exemptions is not None:
+            self.exemptions.on_watched_again = self._on_watched_again
         self._arrange({})
 
     def _make_gate(self, checker: CollisionChecker) -> Gate:
@@ -289,6 +296,19 @@ class DeviceManager(DeviceTable):
         """Allow motion again."""
         self.latch.reset()
         logger.info("stop reset")
+
+    def _on_watched_again(self, axes: Set[str], pairs: Set[BodyPair]) -> None:
+        """Stop what moves only by leave of an exemption that has ended; any thread.
+
+        What is under way, or reserved, is judged without it.
+        """
+        checker = self.gate.checker
+        movers = checker.movers(pairs) if isinstance(checker, CollisionManager) and pairs else set()
+        affected = self.gate.held().keys() & {*axes, *movers}
+        if not affected or checker.check(self.gate.spans(), advice=False).allowed:
+            return
+        for name in sorted(self.gate.expire(affected)):
+            self.device(name).halt(self.address(name).channel, WATCHED_AGAIN)
 
     def _on_device_lost(self, lost: DeviceLost) -> None:
         self._note_missing(lost.reason)

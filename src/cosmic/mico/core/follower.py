@@ -51,8 +51,9 @@ class ChannelFollower:
         )
 
     def set_frequency(self, frequency_hz: int) -> None:
-        """Limit the closed-loop speed from now on."""
-        self.speed.set_usual(frequency_hz)
+        """Limit the closed-loop speed; a jog, or one that arrives with others, keeps its own."""
+        own = self.flight is not None and self.flight.has_own_speed
+        self.speed.set_usual(frequency_hz, now=not own)
 
     # Stopping
 

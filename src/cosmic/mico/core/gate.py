@@ -1,6 +1,6 @@
 """The one gate in front of the vendor library: every movement from anywhere is decided here."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import count
@@ -109,13 +109,20 @@ class Gate:
 
     def decide(self, requests: Sequence[Request]) -> tuple[MoveVerdict, dict[str, Grant]]:
         """Decide `requests` together; when allowed, hold their intervals and grant each axis."""
-        holder = self._lease.holder  # first, for it may tell listeners that it has lapsed
-        verdict, grants = self._decide(requests, holder)
-        if self._lease.holder.token == holder.token:
-            return verdict, grants
-        for grant in grants.values():
-            self.withdraw(grant)
-        return self.decide(requests)  # control passed meanwhile
+        for _ in range(MOST_JUDGED):
+            holder = self._lease.holder  # first, for it may tell listeners that it has lapsed
+            before = holder.token, self._revision
+            verdict, grants = self._decide(requests, holder)
+            # Looked at when the intervals are held: who changes it later finds them.
+            if before == (self._lease.holder.token, self._revision):
+                return verdict, grants
+            for grant in grants.values():
+                self.release(grant)
+        return words.changed(), {}
+
+    @property
+    def _revision(self) -> object:
+        return getattr(self._checker, "revision", None)
 
     def _decide(
         self, requests: Sequence[Request], holder: LeaseHolder
@@ -196,6 +203,13 @@ class Gate:
         if refused is None:
             self._sent[axis] = grant.number
         return refused
+
+    def expire(self, axes: Set[str]) -> frozenset[str]:
+        """End the unused reservations of `axes`; returns those that hold any. Takes no lock."""
+        for key, given in list(self._unused.items()):
+            if given.grant.axis in axes:
+                self._unused.pop(key, None)
+        return frozenset(axis for axis, holds in list(self._holds.items()) if holds) & axes
 
     def superseded(self, grant: Grant) -> bool:
         """Return True when a movement decided later was sent to the axis; takes no lock."""

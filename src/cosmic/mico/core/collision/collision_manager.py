@@ -94,6 +94,11 @@ class CollisionManager(Exemptions, CollisionChecker):
     def close(self) -> None:
         self._process.close()
 
+    def movers(self, pairs: Set[BodyPair]) -> frozenset[str]:
+        """Return the axes that move one of two bodies of `pairs`."""
+        bodies = {body for pair in pairs for body in pair}
+        return frozenset(axis for axis in self.model.axes if self.model.carried(axis) & bodies)
+
     # Questions
 
     @override
@@ -213,14 +218,19 @@ class CollisionManager(Exemptions, CollisionChecker):
         pair = pair_of(*bodies)
         if all(watched.bodies != pair for watched in self.model.pairs):
             raise NotAvailable(f"{pair[0]} and {pair[1]} are not watched in {self.model.name}")
+        before = self._callbacks.get(pair)
         if callback is None:
             self._callbacks.pop(pair, None)
         else:
             self._callbacks[pair] = callback
+        if before is not None and before is not callback:
+            self.watch_again(frozenset(), {pair})
 
     def set_default_callback(self, callback: CollisionCallbackBase) -> None:
         """Set the response of all pairs without their own."""
-        self._default_callback = callback
+        before, self._default_callback = self._default_callback, callback
+        if before is not callback and not isinstance(before, RefuseContact):
+            self.watch_again(frozenset(), {pair.bodies for pair in self.model.pairs})
 
 
 def _with_resting(pose: Mapping[str, float], spans: Spans) -> dict[str, float]:

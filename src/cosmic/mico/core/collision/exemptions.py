@@ -1,7 +1,7 @@
 """What the operator leaves out of collision detection for a while: axes and contacts."""
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Set
 from contextlib import contextmanager
 from threading import Lock
 
@@ -10,6 +10,10 @@ from cosmic.frame.listeners import tell
 from cosmic.mico.core.collision.model import BodyPair, Contact, pair_of
 
 logger = logging.getLogger(__name__)
+
+
+def _nobody(_axes: Set[str], _pairs: Set[BodyPair]) -> None:
+    """Nothing moves where nobody listens."""
 
 
 class Exemptions:
@@ -32,6 +36,16 @@ class Exemptions:
         self._uses: dict[str, list[object]] = {contact.name: [] for contact in contacts}
         self._ignored: frozenset[BodyPair] = frozenset()
         self._listeners: tuple[Callable[[], object], ...] = ()
+        self.on_watched_again: Callable[[Set[str], Set[BodyPair]], None] = _nobody
+        """Told which axes, and which pairs of bodies, are watched again, in that thread."""
+        self.revision = 0
+        """How often something was watched again."""
+
+    def watch_again(self, axes: Set[str], pairs: Set[BodyPair]) -> None:
+        """Count that something is watched again, then tell; what is decided meanwhile is void."""
+        with self._guard:
+            self.revision += 1
+        self.on_watched_again(axes, pairs)
 
     # Axes taken out (MiCoCL.13)
 
@@ -65,6 +79,7 @@ class Exemptions:
             The platform has no such axis.
         """
         if self._set_taken_out(axis, out=False):
+            self.watch_again({axis}, frozenset())
             logger.info("%s was taken into collision detection again by %s", axis, source)
             tell(self._listeners)
 
@@ -138,7 +153,11 @@ class Exemptions:
         with self._guard:
             uses = self._uses_of(name)
             uses[:] = [] if use is None else [each for each in uses if each != use]
+            before = self._ignored
             changed = self._renew_allowed()
+            watched = before - self._ignored
+        if watched:
+            self.watch_again(frozenset(), watched)
         if changed:
             logger.info("the contact %r was forbidden again by %s", name, source)
             tell(self._listeners)
