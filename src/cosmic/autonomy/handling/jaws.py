@@ -26,6 +26,7 @@ def zero_jaws(work: FibreWork) -> Steps:
     """
     full, count = work.settings.grasp.full_um, work.mico[work.gripper.gap_axis]
     close = -(1.0 + OVER) * full
+    _tell_gate(work, count.position_um or 0.0, None)  # what is counted is not trusted any more
     yield from move_jaws(work, close)
     yield from move_jaws(work, max(0.0, full - (count.position_um or 0.0)))
     # From closed again: nothing is between jaws that come down no wider than they should be.
@@ -37,11 +38,15 @@ def zero_jaws(work: FibreWork) -> Steps:
 def note_gap(work: FibreWork, gap_um: float, std_um: float) -> None:
     """Take the opening that is known by an end stop or by sight; the gate counts from it."""
     work.gap_um = gap_um
+    _tell_gate(work, gap_um, std_um)
+
+
+def _tell_gate(work: FibreWork, gap_um: float, std_um: float | None) -> None:
     axis = work.mico[work.gripper.gap_axis]
     try:
         axis.set_estimate(gap_um, std_um=std_um)
     except (MoveRefused, NotAvailable) as exc:
-        logger.warning("the opening seen is not taken: %s", exc)
+        logger.warning("the opening is not taken: %s", exc)
 
 
 def in_step(work: FibreWork) -> bool:

@@ -1,5 +1,6 @@
 """One axis of the scripted API: ``rig.mico["left.x"]``."""
 
+import math
 from typing import Literal, overload
 
 from typing_extensions import override
@@ -276,7 +277,7 @@ class Axis(AxisFacts):
     def _set_zero(self, zero: float) -> None:
         self._manager.device(self._name).set_zero(self._channel, zero)
 
-    def set_estimate(self, position: Number, *, std_um: Number = 5.0) -> None:
+    def set_estimate(self, position: Number, *, std_um: Number | None = 5.0) -> None:
         """Say where an axis without sensor stands, as seen or measured by hand; nothing moves.
 
         Parameters
@@ -284,7 +285,7 @@ class Axis(AxisFacts):
         position : float or str
             In um, from the user's zero; of a gripper the opening.
         std_um : float
-            How well that is known, a standard deviation.
+            How well that is known, a standard deviation; None: nobody knows.
 
         Raises
         ------
@@ -294,7 +295,7 @@ class Axis(AxisFacts):
             The numbers are none, or lie outside its travel.
         """
         where = self._number(position) + self.details.zero
-        std = as_number(std_um, "um", self._name)
+        std = math.inf if std_um is None else as_number(std_um, "um", self._name)
         self._manager.device(self._name).set_estimate(self._channel, where, std)
 
     def set_closed_loop_frequency(self, frequency_hz: Number) -> None:

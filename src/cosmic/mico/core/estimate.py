@@ -131,7 +131,7 @@ def check_estimate(
         raise NotAvailable(f"{state.name}: it has a sensor; its position is measured")
     if state.in_motion or not state.activity.at_rest:
         raise NotAvailable(f"{state.name}: it is moving; set the estimate when it stands")
-    if not (math.isfinite(position) and math.isfinite(std) and std >= 0.0):
+    if not (math.isfinite(position) and std >= 0.0):
         text = f"{state.name}: {position!r} ± {std!r} is no estimate"
         raise refusal(refuse(Reason.NOT_FINITE, text, axis=state.name))
     if not travel.low <= position <= travel.high:

@@ -39,7 +39,7 @@ class Gripper:
         self.widest_um = 0.0 if self.gap_um == 0.0 else max(self.widest_um, self.gap_um)
         return Moved()
 
-    def set_estimate(self, position: float, *, std_um: float) -> None:
+    def set_estimate(self, position: float, *, std_um: float | None) -> None:
         self.position_um = position
 
 
