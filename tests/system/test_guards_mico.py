@@ -4,7 +4,7 @@ The rows stand in docs/explanation/safety.md.
 """
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import FrozenInstanceError
 from threading import Thread
 
@@ -136,8 +136,10 @@ def test_a_contact_ends_with_its_operation_and_so_does_what_it_allowed(rig, how)
     rig.mico["left.z"].move_to(-1400.0)
     collision = rig.mico.collision
     if how == "block":
-        with collision.contact("grasp"), moving(rig, "left.z", LOW_UM) as movement:
-            pass
+        with ExitStack() as ends:
+            with collision.contact("grasp"):
+                movement = ends.enter_context(moving(rig, "left.z", LOW_UM))
+            assert "checked for collisions again" in str(movement.exception(5.0))
     else:
         model = application(rig).collision
         model.allow_contact("grasp")
