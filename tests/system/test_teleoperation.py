@@ -149,3 +149,29 @@ def test_the_hand_feels_the_fibre_that_the_probe_pushes_and_cannot_push_too_hard
         assert rig.stopped is None
         haptic.move_hand(y=0.5)
         wait_until(lambda: abs(rig.daqco.latest()["force"]) < 20.0, timeout_s=10.0)
+
+
+def test_the_force_channel_is_not_renamed_under_the_hand_and_its_lack_is_told():
+    with cosmic.connect(applications=("mico", "daqco")) as rig, VirtualGamepad() as pad:
+        teleoperation, daqco = rig.mico.teleoperation, rig.daqco
+        daqco.disarm_limit("force")
+        before = daqco.settings
+        renamed = before.model_copy(
+            update={
+                "limit": (),
+                "channel": tuple(
+                    each.model_copy(update={"name": "push"}) if each.name == "force" else each
+                    for each in before.channel
+                ),
+            }
+        )
+        teleoperation.start(pad.key, "left assembly")
+        with pytest.raises(cosmic.NotAvailable, match=r"channel force.*Stop steering first"):
+            daqco.apply(renamed)
+        teleoperation.stop()
+        daqco.apply(renamed)
+        with pytest.raises(cosmic.NotAvailable, match="force feedback needs the channel force"):
+            teleoperation.start(pad.key, "left assembly")
+        daqco.apply(before)
+        teleoperation.start(pad.key, "left assembly")
+        teleoperation.stop()

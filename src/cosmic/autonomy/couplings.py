@@ -14,7 +14,9 @@ from typing_extensions import override
 
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.core.chunk import DataChunk
+from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.frame.clock import WALL
+from cosmic.frame.errors import NotAvailable
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.core.teleoperation.coupling import ForceCoupling
 from cosmic.mico.core.teleoperation.mapping import Converter
@@ -191,5 +193,23 @@ def join_teleoperation(mico: MicoApplicationBase, daqco: DaqcoApplication) -> Te
         begin=begin,
         end=end,
         slowed=lambda: force.share,
+        problem=lambda: _missing(daqco.settings) if daqco.running else "",
     )
+
+    def _missing(settings: DaqcoSettings) -> str:
+        wanted = teleoperation.settings.force_channel
+        active = [each.name for each in settings.channel if each.active]
+        if not wanted or wanted in active:
+            return ""
+        return (
+            f"force feedback needs the channel {wanted}, and there is no active one of that name; "
+            f"there are {', '.join(active)}"
+        )
+
+    def keep_channel(settings: DaqcoSettings) -> None:
+        problem = _missing(settings)
+        if ends and problem:
+            raise NotAvailable(f"{problem}. Stop steering first")
+
+    daqco.before_change(keep_channel)
     return force

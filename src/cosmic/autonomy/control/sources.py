@@ -139,7 +139,9 @@ class ChannelSource(Source):
     def _on_chunk(self, chunk: DataChunk) -> None:
         """Take a chunk; acquisition thread."""
         if self._channel not in chunk.channels:
-            return  # the value gets stale
+            gone = f"there is no channel {self._channel} any more: renamed, or switched off"
+            self._tell(ConfigError(f"{gone}; begin the loop anew with one there is"))
+            return
         row = chunk.channels.index(self._channel)
         if chunk.scales[row].unit != self._unit:
             self._tell(ConfigError(f"{self._channel} is no longer measured in {self._unit}"))

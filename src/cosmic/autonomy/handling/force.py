@@ -72,6 +72,8 @@ class ForceWatch:
     @property
     def problem(self) -> str:
         """Why no samples come, as far as acquisition knows."""
+        if self._daqco.running and self._channel not in self._daqco.channels:
+            return f"there is no channel {self._channel} any more: renamed, or switched off"
         return self._daqco.problem or "acquisition says nothing about it"
 
     def open(self) -> None:
@@ -86,6 +88,8 @@ class ForceWatch:
             self._forget = None
 
     def _take(self, chunk: DataChunk) -> None:
+        if self._channel not in chunk.channels:
+            return  # `problem` says so to whoever waits
         values = chunk.values[chunk.channels.index(self._channel)]
         with self._changed:
             self._peak_un = max(self._peak_un, float(np.abs(values).max()))

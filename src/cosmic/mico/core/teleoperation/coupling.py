@@ -18,9 +18,12 @@ class ForceCoupling:
         Called when teleoperation begins and ends.
     slowed : callable
         Part of the speed that the force leaves now.
+    problem : callable
+        Returns why nobody could steer with it now; empty when all is well.
     """
 
     make_converter: Callable[[ProfileMapping], Converter]
     begin: Callable[[], None]
     end: Callable[[], None]
     slowed: Callable[[], float]
+    problem: Callable[[], str] = lambda: ""

@@ -192,6 +192,9 @@ class Teleoperation:
             raise NotAvailable("MiCo is not ready; wait, or rescan")
         if stop.latched:
             raise NotAvailable(f"motion is stopped ({stop.reason}); reset the stop first")
+        problem = self.coupling.problem() if self.coupling is not None else ""
+        if problem:
+            raise NotAvailable(problem)
 
     def _steering(self, device: InputDevice, profile: TeleoperationProfileSettings) -> Steering:
         mapping, commands = self._mapping(profile), RateMeter()
