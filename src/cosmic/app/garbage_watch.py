@@ -14,6 +14,7 @@ from cosmic.frame.threads import WorkerThread, running_threads
 from cosmic.mico.api.application_base import MicoApplicationBase
 
 PERIOD_S: Final = 0.5
+YOUNG_PERIOD_S: Final = 0.1
 
 
 class GarbageThread(WorkerThread):
@@ -51,22 +52,26 @@ class GarbageWatch:
         self._end: Callable[[], None] | None = None
         self._thread: GarbageThread | None = None
         self._timer: QTimer | None = None
+        self._ticks = 0
 
     def begin(self, *, window: bool = False) -> None:
         """Freeze what is loaded and begin; with a `window`, in its thread, which is this one."""
         if self._end is not None:
             return
-        self._end = GARBAGE.begin(self.moves)
+        self._end = GARBAGE.begin(self.moves, by_hand=window)
         if not window:
             self._thread = GarbageThread(self._policy)
             self._thread.start()
             return
-        self._timer = QTimer(interval=round(1000 * PERIOD_S))
+        self._timer = QTimer(interval=round(1000 * YOUNG_PERIOD_S))
         self._timer.timeout.connect(self._on_timer)
         self._timer.start()
 
     def _on_timer(self) -> None:
-        GARBAGE.tick()
+        self._ticks += 1
+        GARBAGE.tick_young()
+        if self._ticks % round(PERIOD_S / YOUNG_PERIOD_S) == 0:
+            GARBAGE.tick()
         self._stop_timer()
 
     def _stop_timer(self) -> None:

@@ -8,6 +8,11 @@ moves; where there is no such moment, before they are so many that it would take
 survives is frozen as well, so that the next time is as short; it is all looked through again at a
 longer rest, or when it has grown beyond bounds.
 
+In a program with a window Python collects nothing by itself: whatever thread makes objects would do
+it, and one that takes a Qt object apart holds Qt's lock and waits for the interpreter, while the
+window's thread may hold the interpreter and wait for that lock. There the window's thread collects
+young objects too.
+
 Knows no Qt, so that helper processes can use it.
 """
 
@@ -33,6 +38,10 @@ MOST: Final = 20_000
 """So many are looked through at once, whatever moves; it takes about 10 ms."""
 LONGEST_S: Final = 60.0
 """So often at least, for a few objects can hold many megabytes."""
+YOUNG: Final = 700
+"""So many young objects are worth a look of the window's thread."""
+PASSES: Final = 10
+"""After so many looks at the youngest those that survived one are looked through."""
 MANY_FROZEN: Final = 50_000
 MOST_FROZEN: Final = 250_000
 """So many that were frozen since the start are looked through at a long rest, or in any case."""
@@ -79,6 +88,7 @@ class Garbage:
         self._lock = RLock()  # a finalizer may end a platform
         self._users: dict[int, Callable[[], bool]] = {}
         self._count = 0
+        self._by_hand: set[int] = set()
         self._before = gc.get_threshold()
         self._frozen_before = 0
         self._loaded = 0
@@ -90,13 +100,15 @@ class Garbage:
         """True while a platform is open, and Python's own rules for old objects are not."""
         return bool(self._users)
 
-    def begin(self, moves: Callable[[], bool]) -> Callable[[], None]:
+    def begin(self, moves: Callable[[], bool], *, by_hand: bool = False) -> Callable[[], None]:
         """Freeze what is loaded, and collect as `moves` allows from now on.
 
         Parameters
         ----------
         moves : callable
             Tells whether anything moves that a pause could harm; called in `tick`.
+        by_hand : bool
+            There are widgets: nothing is collected except in `tick` and `tick_young`.
 
         Returns
         -------
@@ -111,6 +123,9 @@ class Garbage:
             self._count += 1
             number = self._count
             self._users[number] = moves
+            if by_hand and gc.isenabled():  # else a script has switched it off, for its reasons
+                self._by_hand.add(number)
+                gc.disable()
             gc.freeze()
             self._loaded = gc.get_freeze_count()
             self._moved_s = self._collected_s = self._now_s()
@@ -118,6 +133,9 @@ class Garbage:
 
     def _end(self, number: int) -> None:
         with self._lock:
+            if number in self._by_hand:
+                self._by_hand.discard(number)
+                gc.enable()
             if self._users.pop(number, None) is None or self._users:
                 return
             if gc.get_threshold() == (*self._before[:2], NEVER):  # else somebody else's wish
@@ -131,7 +149,7 @@ class Garbage:
         In a program with widgets the window's thread must call it: what is found may be one.
         """
         with self._lock:
-            if not self._users or not gc.isenabled():
+            if not self._users or not (gc.isenabled() or self._by_hand):
                 return None
             now_s = self._now_s()
             if any(moves() for moves in list(self._users.values())):
@@ -147,6 +165,17 @@ class Garbage:
             if grown >= (WORTHWHILE if at_rest else MOST) or (grown and long_ago):
                 return self._collect(at_rest=at_rest, whole=False)
             return None
+
+    def tick_young(self) -> None:
+        """Collect young objects where Python does not; the window's thread, ten times a second."""
+        with self._lock:
+            if not self._by_hand or gc.isenabled():
+                return
+            young, passes, _ = gc.get_count()
+            if passes >= PASSES:
+                gc.collect(1)
+            elif young >= YOUNG:
+                gc.collect(0)
 
     def _collect(self, *, at_rest: bool, whole: bool) -> Collection:
         before = gc.get_freeze_count()

@@ -1,4 +1,5 @@
 import gc
+import threading
 
 import pytest
 from PySide6.QtCore import QSettings, Qt
@@ -143,6 +144,32 @@ def test_no_collection_of_old_objects_stops_a_window_while_something_moves(
     assert not GARBAGE.in_force
     assert gc.get_freeze_count() == 0
     assert gc.get_threshold()[2] < 1000
+
+
+def test_only_the_thread_of_the_window_collects_garbage(make: Make, qtbot: QtBot) -> None:
+    window = make(hardware=False)
+    ready(window, qtbot)
+    where: list[threading.Thread] = []
+    made = threading.Event()
+
+    class Ring:
+        def __init__(self) -> None:
+            self.itself = self
+
+        def __del__(self) -> None:
+            where.append(threading.current_thread())
+
+    def make_garbage() -> None:
+        for _ in range(20_000):  # far beyond what Python lets gather by itself
+            Ring()
+        made.set()
+
+    threading.Thread(target=make_garbage).start()
+    assert made.wait(10.0)
+    qtbot.waitUntil(lambda: len(where) == 20_000)
+    assert set(where) == {threading.main_thread()}
+    window.close()
+    assert gc.isenabled()
 
 
 def test_closing_while_initialising_ends_in_time(make: Make, qtbot: QtBot) -> None:
