@@ -17,6 +17,7 @@ from benchmarks.figures import Figure, table
 from benchmarks.soak import resident_kb
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.api.recording import open_recording
+from cosmic.daqco.api.window_port import WindowPort
 from cosmic.daqco.gui.plotter import UDaqPlotter
 from cosmic.daqco.hw.sim_library import SimulatedLibrary
 from cosmic.frame.clock import WallClock
@@ -45,7 +46,7 @@ def soak(minutes: float) -> list[Figure]:
         tempfile.TemporaryDirectory() as folder,
         acquiring(SimulatedLibrary(WallClock()), wanted) as daqco,
     ):
-        plotter = UDaqPlotter(daqco)
+        plotter = UDaqPlotter(WindowPort(daqco.application))
         plotter.resize(1280, 800)
         plotter.show()
         for number in range(PIECES):
