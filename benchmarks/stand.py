@@ -40,7 +40,7 @@ from cosmic.twin.settings import DeviceWiring, StagePlace, TwinSettings
 R = TypeVar("R")
 
 REPAINT_MS = 33
-STEPS, STEP_HZ = 20_000, 1000
+STEPS, STEP_HZ = 380, 40  # of jaws, to and fro inside their end stops; nearly 10 s a way
 
 
 @dataclass
