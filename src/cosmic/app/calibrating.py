@@ -9,6 +9,7 @@ from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.places import PlatformPlaces
 from cosmic.autonomy.procedures.run import ProcedureRun
 from cosmic.autonomy.shipped.calibrate import build_calibrate
+from cosmic.frame.arguments import checked
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.vico.api.application import VicoApplication
 
@@ -25,6 +26,7 @@ def book_of(rig: "Rig") -> CalibrationBook:
     return places.book
 
 
+@checked
 def calibration_on(
     rig: "Rig", settings: HandlingSettings | None, anew: Sequence[str], *, zooms: bool
 ) -> ProcedureRun[FibreWork]:

@@ -11,15 +11,20 @@ from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.opening import Host, open_campaign, read_recipe
 from cosmic.autonomy.campaign.recipe import Recipe
 from cosmic.autonomy.campaign.records import TWIN
+from cosmic.frame.arguments import check_path, checked
 
 if TYPE_CHECKING:
     from cosmic.app.rig import Rig
 
 
+@checked
 def campaign_on(
     rig: "Rig", platform: Platform, recipe: Recipe | str | Path, folder: str | Path
 ) -> Campaign:
     """Return a campaign that is ready to start; see `Rig.campaign`."""
+    for name, value in (("recipe", recipe), ("folder", folder)):
+        if not isinstance(value, Recipe):
+            check_path(name, value)
     read = recipe if isinstance(recipe, Recipe) else read_recipe(Path(recipe))
     host = Host(
         rig=rig,

@@ -8,9 +8,11 @@ from cosmic.app.platform import Uses, build_platform
 from cosmic.app.platform_file import KNOWN_APPLICATIONS, check_applications
 from cosmic.app.rig import Rig
 from cosmic.app.serve_options import StationAddress
+from cosmic.frame.arguments import check_path, checked
 from cosmic.frame.errors import NotConnectedError
 
 
+@checked
 def connect(
     config: str | Path | None = None,
     applications: Sequence[str] = KNOWN_APPLICATIONS,
@@ -61,6 +63,12 @@ def connect(
     NotAvailable
         What stations need is not installed.
     """
+    for name, path in (("config", config), ("truth", truth), ("certificates", certificates)):
+        if path is not None:
+            check_path(name, path)
+    for station, endpoint in (stations or {}).items():
+        if not (isinstance(station, str) and isinstance(endpoint, str)):
+            raise TypeError(f"connect: stations must be texts by texts, not {endpoint!r}")
     if isinstance(applications, str):
         applications = (applications,)
     check_applications(applications, "applications")

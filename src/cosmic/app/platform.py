@@ -20,7 +20,7 @@ from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.remote_application import RemoteDaqcoApplication
 from cosmic.frame.application import CosmicApplicationBase, GuiFactory
 from cosmic.frame.clock import Clock, RatedClock
-from cosmic.frame.errors import ConfigError
+from cosmic.frame.errors import ArgumentError, ConfigError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.threads import share_interpreter
 from cosmic.mico.api.application_base import MicoApplicationBase
@@ -28,6 +28,7 @@ from cosmic.twin.scene import Scene
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.remote_application import RemoteVicoApplication
 
+LARGEST_SEED: Final = 2**63 - 1
 KNOWN_LIMIT_S: Final = 5.0
 """How long a station may take to say what it has."""
 
@@ -186,6 +187,8 @@ def build_platform(
     share_interpreter()
     file, path = load_platform(config)
     _check_simulation(file, path, rate=rate, only_simulated=cold or bool(sample or truth))
+    if not 0 <= seed <= LARGEST_SEED:
+        raise ArgumentError(f"seed must be a whole number from 0 to {LARGEST_SEED}, not {seed}")
     try:
         # Where anything is real, or runs in another process, time waits for nobody here.
         clock = RatedClock(rate, waits=file.all_simulated and not uses.stations)

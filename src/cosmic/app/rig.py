@@ -18,6 +18,7 @@ from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun
 from cosmic.daqco.api.daqco import Daqco
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import NotAvailable
 from cosmic.mico.api.mico import Mico
 from cosmic.vico.api.vico import Vico
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 W = TypeVar("W")
 
 
+@checked_class
 class Rig:
     """The whole platform, as scripts and the console see it; any thread.
 

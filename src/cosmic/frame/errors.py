@@ -48,6 +48,10 @@ class MoveCancelled(CosmicError):  # noqa: N818 - reads as what happened
     """A movement ended before its target: cancelled, or replaced by a newer command."""
 
 
+class ArgumentError(CosmicError, ValueError):
+    """An argument has a value that nothing can be done with; the text names it."""
+
+
 class RecordingError(CosmicError):
     """A recording cannot be written, read or exported; the text names the file and what to do."""
 

@@ -132,8 +132,12 @@ def check_directory(directory: Path) -> Path:
     RecordingError
         It does not exist, is none, or cannot be written to.
     """
-    whole = directory.expanduser().absolute()
-    if not whole.exists():
+    try:
+        whole = directory.expanduser().absolute()
+        there = whole.exists()
+    except (OSError, RuntimeError) as exc:  # too long a name, a home that nobody has
+        raise RecordingError(f"{directory}: can be no directory ({exc}); choose another") from exc
+    if not there:
         raise RecordingError(f"directory {whole} does not exist; create it or choose another")
     if not whole.is_dir():
         raise RecordingError(f"{whole} is a file; choose a directory")
@@ -191,9 +195,9 @@ def space_left(directory: Path, bytes_per_s: float) -> Space:
     """
     try:
         free = shutil.disk_usage(directory).free - RESERVE_BYTES
-    except OSError as exc:
+    except (OSError, ValueError) as exc:
         raise RecordingError(
-            f"{directory}: cannot be reached ({exc.strerror or exc}); is the disk still there?"
+            f"{directory}: cannot be reached ({exc}); is the disk still there?"
         ) from exc
     left_s = max(0.0, free / bytes_per_s) if bytes_per_s > 0.0 else float("inf")
     return Space(max(0, free), left_s)

@@ -11,6 +11,7 @@ from typing import Final
 from uuid import uuid4
 
 from cosmic.autonomy.calibrating.book_file import read_book, write_book
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.clock import Clock
 from cosmic.frame.listeners import tell
 
@@ -86,6 +87,7 @@ class CalibrationEntry:
         return self.name, self.tool
 
 
+@checked_class
 @dataclass(slots=True)
 class CalibrationBook:
     """All calibrations, the newest of each name and tool; any thread.

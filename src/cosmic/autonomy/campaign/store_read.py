@@ -25,8 +25,10 @@ from cosmic.autonomy.campaign.store_curves import read_curves
 from cosmic.autonomy.campaign.store_files import DATABASE
 from cosmic.autonomy.campaign.store_rows import Cell, Row, fibre_record, number, region_px
 from cosmic.autonomy.campaign.store_schema import SCHEMA_VERSION
+from cosmic.frame.arguments import checked_class
 
 
+@checked_class
 class CampaignReader:
     """What a campaign's folder holds; each call reads anew; any thread."""
 

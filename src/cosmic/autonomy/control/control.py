@@ -13,6 +13,7 @@ from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.autonomy.control.sink import AxisSink
 from cosmic.autonomy.control.sources import Source
 from cosmic.daqco.api.daqco import Daqco
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import (
     ConfigError,
     NotAvailable,
@@ -21,6 +22,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.api.mico import Mico
 
 
+@checked_class
 class Control:
     """Makes control loops and knows those that run; any thread.
 

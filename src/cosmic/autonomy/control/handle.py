@@ -16,6 +16,7 @@ from cosmic.autonomy.control.loop import (
     ControlStatistics,
 )
 from cosmic.autonomy.control.trace import ControlTrace
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import (
     ConfigError,
@@ -28,6 +29,7 @@ from cosmic.frame.threads import forbid_waiting_here
 from cosmic.frame.verdict import Reason, refuse
 
 
+@checked_class
 class ControlHandle:
     """A control loop that runs, as scripts and windows see it; any thread.
 

@@ -8,9 +8,11 @@ and keeps a value that is no number for ever.
 import math
 from dataclasses import dataclass
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import ConfigError
 
 
+@checked_class
 @dataclass(frozen=True, slots=True)
 class PidGains:
     """Gains; the output is in its own unit, which the names cannot know.

@@ -11,6 +11,7 @@ from cosmic.daqco.api.channel_flight import ChannelFlight, samples_of
 from cosmic.daqco.core.chunk import DataChunk, Values
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.plan_shape import (
@@ -63,6 +64,7 @@ class Acquisition(Protocol):
         """Call `listener()` when anything but samples changed."""
 
 
+@checked_class
 class ChannelHandle:
     """A channel: Readable, Configurable, Triggerable and Flyable, without bluesky; any thread.
 

@@ -17,6 +17,7 @@ from cosmic.daqco.core.plan import highest_rate_hz
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, LimitSettings
 from cosmic.daqco.hw.interface import BoardInfo
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.listeners import tell
 from cosmic.frame.task import Task
@@ -42,6 +43,7 @@ class DaqLimit:
     reason: str
 
 
+@checked_class
 class Daqco:
     """Channels, recordings and limits of the platform; any thread."""
 

@@ -14,12 +14,14 @@ from cosmic.daqco.core.curves import Slope, fit_slope
 from cosmic.daqco.core.recording_format import Overrun, RecordedEvent
 from cosmic.daqco.core.recording_source import Columns, RecordingSource
 from cosmic.daqco.core.scale import Scale
+from cosmic.frame.arguments import checked, checked_class
 from cosmic.frame.errors import RecordingError
 
 Values = npt.NDArray[np.float64]
 _CONFIDENCE: Final = {number: word for word, number in form.CONFIDENCES.items()}
 
 
+@checked
 def open_recording(path: "str | os.PathLike[str]") -> "Recording":
     """Open a recording, finished, running or left by a killed process; use it with ``with``.
 
@@ -31,6 +33,7 @@ def open_recording(path: "str | os.PathLike[str]") -> "Recording":
     return Recording(Path(path))
 
 
+@checked_class
 class Recording:
     """What was recorded. All times are seconds of the platform's clock. One thread.
 

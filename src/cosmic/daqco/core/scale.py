@@ -6,12 +6,14 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import ConfigError
 
 LARGEST_DEGREE = 9
 LARGEST_COEFFICIENT = 1e12
 
 
+@checked_class
 @dataclass(frozen=True, slots=True)
 class Scale:
     """A named polynomial, frozen; value = c0 + c1 V + c2 V**2 + ...

@@ -5,11 +5,13 @@ from threading import Lock
 
 from PySide6.QtCore import Qt
 
+from cosmic.frame.arguments import checked_class
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.core.device_commander import DeviceCommander
 from cosmic.mico.core.ports import DevicePort, ManagerPort
 
 
+@checked_class
 class Axes:
     """Each axis by its name; any thread.
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Literal, overload
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import MoveRefused
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.axes import Axes
@@ -12,6 +13,7 @@ from cosmic.mico.api.group import GroupMovement, waited_for
 from cosmic.mico.core.orders import Motion, MoveBy, MoveTo
 
 
+@checked_class
 class AxesTogether(Axes):
     """The axes, which can be moved and asked about together; any thread."""
 

@@ -5,6 +5,7 @@ from typing import Literal, overload
 
 from typing_extensions import override
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import NotAvailable, refusal
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.api.axis_facts import AxisFacts
@@ -21,6 +22,7 @@ from cosmic.mico.core.positioner import Confidence, class_for
 from cosmic.mico.hw.interface import Direction
 
 
+@checked_class
 class Axis(AxisFacts):
     """One positioner, as scripts and widgets command it; any thread.
 

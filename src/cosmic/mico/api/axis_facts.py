@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QObject, Qt
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.listeners import tell
 from cosmic.frame.units import AxisUnit
@@ -14,6 +15,7 @@ from cosmic.mico.core.positioner import Confidence, PositionerState, Status
 from cosmic.mico.hw.interface import Activity, PositionerKind
 
 
+@checked_class
 class AxisFacts(AxisShape):
     """The state of an axis, as scripts and widgets read and follow it; any thread."""
 

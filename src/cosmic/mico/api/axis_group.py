@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from typing_extensions import override
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import ConfigError, CosmicError, refusal
 from cosmic.frame.plan_shape import DataKeys, Readings, plain_name
 from cosmic.frame.verdict import MoveVerdict
@@ -16,6 +17,7 @@ Place = Mapping[str, Number] | Sequence[Number]
 """Targets by axis name, with or without the dot, or in the order of the group's axes."""
 
 
+@checked_class
 class AxisGroup:
     """Axes that the gate decides together and that start together, in the shape of bluesky.
 

@@ -6,6 +6,7 @@ from typing import Final
 
 from typing_extensions import override
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import CosmicError, MoveRefused, refusal
 from cosmic.frame.plan_shape import (
     DataKeys,
@@ -28,6 +29,7 @@ from cosmic.mico.core.positioner import PositionerState
 STANDS_AT: Final = {"um": 1.0, "deg": 0.1}
 
 
+@checked_class
 class AxisShape:
     """Movable, Readable, Configurable, Locatable, Stoppable and Checkable, without bluesky."""
 

@@ -2,6 +2,7 @@
 
 from contextlib import AbstractContextManager
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import NotAvailable
 from cosmic.mico.api.ports import CollisionPort
 from cosmic.mico.core.collision.answer import Approach
@@ -10,6 +11,7 @@ from cosmic.mico.core.collision.model import BodyPair, SceneModel, pair_of
 from cosmic.mico.core.ports import ManagerPort
 
 
+@checked_class
 class Collision:
     """What is watched, what may touch, and how close things are; any thread.
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from threading import Lock
 from typing import Protocol, Self, TypeVar
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, MoveCancelled
 from cosmic.frame.listeners import tell
@@ -16,6 +17,7 @@ from cosmic.mico.core.ports import ManagerPort
 T = TypeVar("T", covariant=True)
 
 
+@checked_class
 class GroupMovement:
     """A future for a synchronous movement: the failure of one axis stops the others.
 

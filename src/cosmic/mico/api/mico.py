@@ -5,6 +5,7 @@ from typing import Literal, overload
 
 from typing_extensions import override
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.task import Progress, Task
 from cosmic.frame.threads import forbid_waiting_here
@@ -26,6 +27,7 @@ from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 from cosmic.mico.core.undo import UndoEntry, undo_text
 
 
+@checked_class
 class Mico(AxesTogether):
     """The axes of the platform, by name; any thread.
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable, UnknownAxisError
 from cosmic.frame.task import Task
 from cosmic.mico.api.group import move_together
@@ -15,6 +16,7 @@ from cosmic.mico.core.positioner import Confidence
 WAY_BUDGET_S = 2.0
 
 
+@checked_class
 class Poses:
     """The named poses of the platform; any thread.
 

@@ -4,6 +4,7 @@ import logging
 import math
 from threading import RLock
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable, refusal
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.api.axis import Axis
@@ -13,6 +14,7 @@ from cosmic.mico.core.movement import Movement
 logger = logging.getLogger(__name__)
 
 
+@checked_class
 class StepwiseMove:
     """Moves an axis to a position in parts of at most `largest`, one after the other; any thread.
 

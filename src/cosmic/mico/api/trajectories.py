@@ -4,8 +4,9 @@ from collections.abc import Callable, Collection
 from datetime import datetime
 from pathlib import Path
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import NotAvailable, RecordingError
-from cosmic.mico.api.trajectory_player import TrajectoryPlayer
+from cosmic.mico.api.trajectory_player import SPEEDS, TrajectoryPlayer
 from cosmic.mico.api.trajectory_recording import TrajectoryRecording
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState, StartMode
@@ -18,6 +19,7 @@ from cosmic.mico.core.trajectory.writer import to_text
 from cosmic.mico.core.trajectory_recorder import TrajectoryRecorder
 
 
+@checked_class
 class Trajectories:
     """Records, reads, rehearses and runs trajectories; any thread.
 
@@ -146,8 +148,8 @@ class Trajectories:
         try:
             with Path(path).open("w" if overwrite else "x", encoding="utf-8") as file:
                 file.write(to_text(trajectory))
-        except OSError as exc:
-            raise RecordingError(f"{path} cannot be written: {exc.strerror or exc}") from exc
+        except (OSError, ValueError) as exc:  # a name with a zero in it is no OSError
+            raise RecordingError(f"{path} cannot be written: {exc}") from exc
 
     def mirror(self, trajectory: Trajectory) -> Trajectory:
         """Return a trajectory for the opposite assembly, as ``[mico.mirror]`` says.
@@ -184,8 +186,11 @@ class Trajectories:
         TrajectoryError
             It does not fit the platform.
         NotAvailable
-            One of its axes is linked to one that it does not move.
+            One of its axes is linked to one that it does not move, or `speed` is none.
         """
+        low, high = SPEEDS
+        if not low <= speed <= high:
+            raise NotAvailable(f"speed lies between {low:g} and {high:g}: {speed!r}")
         return self._site.rehearse(
             self._bound(trajectory),
             speed=speed,

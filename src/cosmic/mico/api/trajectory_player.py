@@ -5,6 +5,7 @@ from collections.abc import Callable
 from threading import RLock
 from typing import Final
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import CosmicError, DeviceTimeout, MoveCancelled, NotAvailable
 from cosmic.frame.listeners import tell
 from cosmic.frame.task import Task
@@ -29,6 +30,7 @@ SPEEDS: Final = (0.01, 10.0)
 _RESUMABLE: Final = (PlayState.READY, PlayState.PAUSED, PlayState.FAILED)
 
 
+@checked_class
 class TrajectoryPlayer:
     """Makes the movements of one trajectory; any thread, and every method returns at once.
 

@@ -7,11 +7,13 @@ from typing import Self
 
 from PySide6.QtCore import QObject, Qt
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import RecordingError
 from cosmic.frame.listeners import tell
 from cosmic.mico.core.trajectory_recorder import TrajectoryRecorder
 
 
+@checked_class
 class TrajectoryRecording:
     """Every movement goes into a file until it is stopped; any thread.
 

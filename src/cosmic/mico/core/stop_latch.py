@@ -45,7 +45,8 @@ class StopLatch:
         """Latch; the first reason stays until the reset."""
         with self._lock:
             before = self._state
-            self._state = StopState(reason=before.reason or reason, epoch=before.epoch + 1)
+            said = before.reason or str(reason or "stopped")  # no reason at all stops as well
+            self._state = StopState(reason=said, epoch=before.epoch + 1)
 
     def void_grants(self) -> None:
         """Let nothing that was granted or queued so far start any more, without latching."""

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from typing_extensions import override
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.file_names import space_left
@@ -25,6 +26,7 @@ from cosmic.vico.hw.interface import CameraCounters, CameraInfo, CameraRanges, C
 BACKGROUND_FRAMES = 8
 
 
+@checked_class
 class CameraHandle(CameraPlaces, CameraShape):
     """One camera: its pictures, settings, recordings and what machine vision finds; any thread.
 

@@ -3,12 +3,14 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.task import Task
 from cosmic.vico.api.places import CalibrationShown, Pixel, Places
 from cosmic.vico.core.picture import Picture
 
 
+@checked_class
 class CameraPlaces(ABC):
     """What pixels of a camera mean on the platform; any thread."""
 

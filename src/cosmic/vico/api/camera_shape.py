@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import ConfigError, NotAvailable, RecordingExistsError
 from cosmic.frame.file_names import check_directory
@@ -35,6 +36,7 @@ WAIT_S: Final = 5.0
 MEASURES: Final[Mapping[str, str]] = {"length_um": "um", "width_um": "um", "curl": ""}
 
 
+@checked_class
 class CameraShape:
     """Readable, Configurable and Triggerable, without bluesky; any thread."""
 

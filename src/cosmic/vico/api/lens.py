@@ -1,5 +1,6 @@
 """The lens and the light of ``rig.vico``; their panels use these as well."""
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.task import Task
 from cosmic.vico.api.application import VicoApplication
@@ -8,6 +9,7 @@ from cosmic.vico.core.zoom_scale import ZoomPoint, ZoomScale
 from cosmic.vico.hw.peripherals import LensAxis, LensState
 
 
+@checked_class
 class LensHandle:
     """The motorised lens; any thread, and everything returns at once."""
 
@@ -102,6 +104,7 @@ class LensHandle:
         return self._thread.reopen()
 
 
+@checked_class
 class LightHandle:
     """The lamp; any thread, and everything returns at once."""
 

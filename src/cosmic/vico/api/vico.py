@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.listeners import tell
 from cosmic.frame.task import Task
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from cosmic.vico.api.places import CalibrationShown, RotationShown
 
 
+@checked_class
 class Vico:
     """Cameras, lens and light of the platform; any thread."""
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from threading import RLock
 
+from cosmic.frame.arguments import checked_class
 from cosmic.frame.config import user_file
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
@@ -32,6 +33,7 @@ logger = logging.getLogger(__name__)
 SOURCE = "teleoperation"
 
 
+@checked_class
 class Teleoperation:
     """Starts and ends the steering by an input device; any thread.
 

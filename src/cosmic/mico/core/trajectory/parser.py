@@ -28,8 +28,8 @@ def load(path: Path, progress: Told | None = None, *, cut_off: bool = False) -> 
     try:
         with path.open("rb") as file:
             data = file.read(LARGEST_BYTES + 1)
-    except OSError as exc:
-        text = f"cannot be read: {exc.strerror or exc}"
+    except (OSError, ValueError) as exc:  # a name with a zero in it is no OSError
+        text = f"cannot be read: {exc}"
         raise TrajectoryError(str(path), [Problem(0, text)]) from exc
     return parse(data, name=str(path), path=path, progress=progress, cut_off=cut_off)
 
