@@ -92,6 +92,7 @@ class Garbage:
         self._before = gc.get_threshold()
         self._frozen_before = 0
         self._loaded = 0
+        self._frozen = 0  # counting them takes milliseconds, so it is done after a freeze only
         self._moved_s = 0.0
         self._collected_s = 0.0
 
@@ -127,7 +128,7 @@ class Garbage:
                 self._by_hand.add(number)
                 gc.disable()
             gc.freeze()
-            self._loaded = gc.get_freeze_count()
+            self._loaded = self._frozen = gc.get_freeze_count()
             self._moved_s = self._collected_s = self._now_s()
         return lambda: self._end(number)
 
@@ -155,7 +156,7 @@ class Garbage:
             if any(moves() for moves in list(self._users.values())):
                 self._moved_s = now_s
             rest_s = now_s - self._moved_s
-            frozen = gc.get_freeze_count() - self._loaded
+            frozen = self._frozen - self._loaded
             if frozen >= MOST_FROZEN or (frozen >= MANY_FROZEN and rest_s >= LONG_REST_S):
                 return self._collect(at_rest=rest_s >= LONG_REST_S, whole=True)
             passes = gc.get_count()[2]  # of young objects, since old ones were looked through
@@ -185,7 +186,7 @@ class Garbage:
         found = gc.collect()
         gc.freeze()
         self._collected_s = self._now_s()
-        left = gc.get_freeze_count()
+        self._frozen = left = gc.get_freeze_count()
         if whole:
             self._loaded = left
         objects = found + (left if whole else left - before)
