@@ -44,7 +44,7 @@ def in_parts(mico: Mico) -> Keep:
 
 
 def steps(mico: Mico) -> Keep:
-    mico["left.gripper"].steps(5000, wait=False)
+    mico["left.gripper"].steps(900, frequency_hz=100, wait=False)
     return nothing
 
 
@@ -208,7 +208,8 @@ def site(shared: Site) -> Iterator[Site]:
     mico.application.undo.forget_all()
     yield shared
     mico.application.manager.reset_stop()
-    mico.unlink("left.x")
+    wait_until(lambda: not any(axis.details.in_motion for axis in mico))
+    mico.unlink("left.x")  # links change at rest only
     running = mico.application.running_task
     wait_until(lambda: running is None or running.done)
 

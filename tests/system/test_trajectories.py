@@ -388,7 +388,7 @@ def test_of_steps_cut_short_the_rest_is_made(mico: Mico) -> None:
     asked: list[MovementBegun] = []
     device = mico.application.manager.device("left.gripper")
     device.movement_begun.connect(asked.append, Qt.ConnectionType.DirectConnection)
-    player = mico.trajectories.run(written("steps left.gripper 20000 100 V 2000 Hz\n"), wait=False)
+    player = mico.trajectories.run(written("steps left.gripper 900 100 V 50 Hz\n"), wait=False)
     wait_until(lambda: mico["left.gripper"].details.in_motion)
     WALL.sleep(0.1)
     mico["left.gripper"].halt()
@@ -396,8 +396,8 @@ def test_of_steps_cut_short_the_rest_is_made(mico: Mico) -> None:
         player.wait(5.0)
     player.resume()
     player.wait(10.0)
-    assert where(mico, "left.gripper") == pytest.approx([20030.0], abs=400.0)
-    assert 0 < asked[1].motion.steps < 20000  # type: ignore[union-attr]
+    assert where(mico, "left.gripper") == pytest.approx([930.0], abs=30.0)
+    assert 0 < asked[1].motion.steps < 900  # type: ignore[union-attr]
 
 
 def test_one_trajectory_runs_at_a_time(mico: Mico) -> None:
