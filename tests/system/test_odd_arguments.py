@@ -155,11 +155,11 @@ def test_a_file_that_lies_too_deep_is_refused(tmp_path: Path) -> None:
 @checked
 def taken(
     number: float = 0.0, count: int = 0, *, on: bool = False, text: str = "",
-    wait_s: float | None = 0.0,
+    timeout_s: float | None = 0.0,
     places: Sequence[float] = (), by: Mapping[str, float] | None = None, file: Path | str = "f",
 ) -> object:  # fmt: skip
     """Return what was taken."""
-    return number, count, on, text, wait_s, places, by, file
+    return number, count, on, text, timeout_s, places, by, file
 
 
 @pytest.mark.parametrize(
@@ -171,7 +171,7 @@ def taken(
         ("count", 1.0, "must be a whole number"),
         ("on", 1, "must be True or False"),
         ("text", b"t", "must be a text"),
-        ("wait_s", "1", "must be a number or None"),
+        ("timeout_s", "1", "must be a number or None"),
         ("places", [1.0, "x"], "each is a number"),
         ("places", "12", "must be a list"),
         ("by", [("a", 1.0)], "must be a mapping"),
@@ -188,8 +188,8 @@ def test_what_is_of_a_wrong_kind_is_refused_by_name(name: str, value: object, to
     ("name", "value"),
     [
         ("number", 10**400),
-        ("wait_s", math.inf),
-        ("wait_s", math.nan),
+        ("timeout_s", math.inf),
+        ("timeout_s", math.nan),
     ],
 )
 def test_what_nothing_can_be_done_with_is_refused_by_name(name: str, value: object) -> None:

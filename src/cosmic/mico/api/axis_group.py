@@ -1,6 +1,6 @@
 """Several axes that a plan moves as one: ``rig.mico.group("left.x", "left.y")``."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Sized
 
 from typing_extensions import override
 
@@ -126,7 +126,8 @@ class AxisGroup:
             if unknown or not value:
                 raise ConfigError(f"{self._name} has {list(self._of)}, not {unknown or 'nothing'}")
             return {known[plain_name(name)]: target for name, target in value.items()}
-        if isinstance(value, (str, float, int)) or len(value) != len(self._of):
-            text = f"{value!r} is not {len(self._of)} numbers, for {list(self._of)}"
+        sized = isinstance(value, Sized) and not isinstance(value, str | bytes)
+        if not sized or len(value) != len(self._of):
+            text = f"value {value!r} is not {len(self._of)} numbers, for {list(self._of)}"
             raise ConfigError(f"{self._name}: {text}")
         return dict(zip(self._of, value, strict=True))
