@@ -9,7 +9,7 @@ from typing_extensions import override
 from cosmic.autonomy.calibrating.book import CalibrationEntry
 from cosmic.autonomy.calibrating.calibrated import Calibrated
 from cosmic.autonomy.handling.force import ForceMean
-from cosmic.autonomy.handling.jaws import move_jaws
+from cosmic.autonomy.handling.jaws import CLOSED_STD_UM, distrust_gap, move_jaws, note_gap
 from cosmic.autonomy.handling.patience import PatientMove
 from cosmic.autonomy.handling.prepare import CONTACT, PROBE, retract_probe
 from cosmic.autonomy.handling.push import arm, limit_of, put_back
@@ -41,8 +41,9 @@ class TouchJaw(Calibrated):
             raise NotAvailable("see probe and gripper on one picture before they touch")
         if not work.daqco.running:
             work.daqco.start()
+        distrust_gap(work)
         yield from move_jaws(work, -(work.settings.grasp.full_um + settings.touch_closing_um))
-        work.gap_um = 0.0
+        note_gap(work, 0.0, CLOSED_STD_UM)
         before = limit_of(work)
         try:
             found = yield from self._touched(work)

@@ -26,13 +26,18 @@ def zero_jaws(work: FibreWork) -> Steps:
     """
     full, count = work.settings.grasp.full_um, work.mico[work.gripper.gap_axis]
     close = -(1.0 + OVER) * full
-    _tell_gate(work, count.position_um or 0.0, None)  # what is counted is not trusted any more
+    distrust_gap(work)
     yield from move_jaws(work, close)
     yield from move_jaws(work, max(0.0, full - (count.position_um or 0.0)))
     # From closed again: nothing is between jaws that come down no wider than they should be.
     yield from move_jaws(work, close)
     note_gap(work, 0.0, CLOSED_STD_UM)
     yield from move_jaws(work, work.settings.grasp.gap_um)
+
+
+def distrust_gap(work: FibreWork) -> None:
+    """Have the gate take the jaws to be anywhere: before they are run against their stop."""
+    _tell_gate(work, work.mico[work.gripper.gap_axis].position_um or 0.0, None)
 
 
 def note_gap(work: FibreWork, gap_um: float, std_um: float) -> None:

@@ -83,7 +83,7 @@ class CosmicServerGui(QMainWindow):
         self.setCorner(Qt.Corner.BottomRightCorner, Area.BottomDockWidgetArea)
         self._connect()
         self.set_theme(self._store.theme() or theme)
-        self.resize(170 * STEP_PX, 95 * STEP_PX)
+        self.resize(230 * STEP_PX, 125 * STEP_PX)  # less where the screen is smaller
 
     def _connect(self) -> None:
         self._bar.stop_requested.connect(self.stop_requested)
@@ -235,6 +235,7 @@ class CosmicServerGui(QMainWindow):
             app = QApplication.instance()
             if isinstance(app, QApplication):  # not before: making the panels makes many events
                 self._guards = (WheelGuard(app, self), DialogFitter(app, self))
+            fit_to_screen(self)
             self._size_panels()
             self._store.remember_default(self)
             self._store.restore(self)
