@@ -81,6 +81,7 @@ def test_a_campaign_that_ended_in_order_goes_on_without_it(rig: Rig, tmp_path: P
 @pytest.mark.slow
 def test_a_sensor_that_stays_at_its_end_lets_no_fibre_be_taken_and_is_told(tmp_path: Path) -> None:
     with cosmic.connect(rate=RATE, sample="three-dry", seed=2) as rig:
+        rig.daqco.disarm_limit("force")  # else it stops everything first, see below
         rig.faults.inject("sensor_saturated")
         campaign = rig.campaign(recipe(tmp_path, "bend test"), tmp_path / "out")
         campaign.run_here()
@@ -88,6 +89,18 @@ def test_a_sensor_that_stays_at_its_end_lets_no_fibre_be_taken_and_is_told(tmp_p
         assert "force sensor" in campaign.end_reason
         assert "cable" in campaign.end_reason, "it says what to look at"
         assert rig.stopped is None
+        assert CampaignReader(tmp_path / "out").fibres() == ()
+
+
+@pytest.mark.slow
+def test_a_sensor_beyond_the_limit_that_is_armed_stops_the_campaign(tmp_path: Path) -> None:
+    with cosmic.connect(rate=RATE, sample="three-dry", seed=2) as rig:
+        rig.faults.inject("sensor_saturated")
+        campaign = rig.campaign(recipe(tmp_path, "bend test"), tmp_path / "out")
+        campaign.run_here()
+        assert campaign.phase is CampaignPhase.STOPPED
+        assert "force reached 180 uN, its limit is 150" in campaign.end_reason
+        assert rig.stopped is not None
         assert CampaignReader(tmp_path / "out").fibres() == ()
 
 
