@@ -36,6 +36,9 @@ class Axis:
     def position_um(self) -> float:
         return self.bench.at_um[self.name]
 
+    def set_estimate(self, position: float, *, std_um: float | None) -> None:
+        self.bench.at_um[self.name] = position
+
     def steps(
         self, steps: int, *, frequency_hz: float, wait: bool, amplitude_v: float = 100.0
     ) -> Any:
