@@ -29,7 +29,6 @@ from cosmic.autonomy.interlocks import join_force_limits
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.api.recording import open_recording
-from cosmic.daqco.api.window_port import WindowPort
 from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, LimitSettings
 from cosmic.daqco.gui.plotter import UDaqPlotter
 from cosmic.daqco.hw.interface import BoardLibrary
@@ -82,7 +81,7 @@ def chain(
     app = QApplication.instance() or QApplication([])
     assert isinstance(app, QApplication)
     with tempfile.TemporaryDirectory() as folder, acquiring(library, wanted) as daqco:
-        plotter = UDaqPlotter(WindowPort(daqco.application)) if plot else None
+        plotter = UDaqPlotter(daqco) if plot else None
         if plotter is not None:
             plotter.resize(1280, 800)
             plotter.show()
@@ -155,7 +154,7 @@ def reactions(times: int) -> list[Figure]:
         )
         join_force_limits(application, bench.mico.application)
         application.initialize()
-        plotter = UDaqPlotter(WindowPort(application))
+        plotter = UDaqPlotter(Daqco(application))
         plotter.resize(1280, 800)
         plotter.show()
         try:

@@ -7,17 +7,15 @@ before is removed, so that the disk lasts. The first tenth is warm-up: plot and 
 import argparse
 import gc
 import tempfile
-import threading
 from pathlib import Path
 
 from PySide6.QtWidgets import QApplication
 
 from benchmarks.acquisition import acquiring, settings, wait_s
 from benchmarks.figures import Figure, table
-from benchmarks.soak import resident_kb
+from benchmarks.soak import resident_kb, thread_count
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.api.recording import open_recording
-from cosmic.daqco.api.window_port import WindowPort
 from cosmic.daqco.gui.plotter import UDaqPlotter
 from cosmic.daqco.hw.sim_library import SimulatedLibrary
 from cosmic.frame.clock import WallClock
@@ -46,14 +44,14 @@ def soak(minutes: float) -> list[Figure]:
         tempfile.TemporaryDirectory() as folder,
         acquiring(SimulatedLibrary(WallClock()), wanted) as daqco,
     ):
-        plotter = UDaqPlotter(WindowPort(daqco.application))
+        plotter = UDaqPlotter(daqco)
         plotter.resize(1280, 800)
         plotter.show()
         for number in range(PIECES):
             lost += one_file(app, daqco, Path(folder) / f"{number}.h5", 60.0 * minutes / PIECES)
             gc.collect()
             resident.append(resident_kb())
-            threads.append(threading.active_count())
+            threads.append(thread_count())
         problem = daqco.problem
         plotter.close()
         plotter.deleteLater()

@@ -10,6 +10,7 @@ left its soft limits. A run that is not harmless ends with exit code 1 and what 
 """
 
 import argparse
+import math
 import os
 import subprocess
 import sys
@@ -97,8 +98,11 @@ def served(rate: float, seed: int) -> Iterator[tuple[Platform, Rig, str, Scene]]
         rig.close()
 
 
-def attack(commands: int, *, rate: float, seed: int, client: bool = True) -> Result:
-    """Give so many commands, and return what was seen."""
+def attack(
+    commands: int, *, rate: float, seed: int, client: bool = True, minutes: float = math.inf
+) -> Result:
+    """Give so many commands, but not for longer than `minutes`, and return what was seen."""
+    end_s = time.monotonic() + 60.0 * minutes
     with (
         tempfile.TemporaryDirectory() as folder,
         served(rate, seed) as (platform, rig, endpoint, scene),
@@ -130,6 +134,8 @@ def attack(commands: int, *, rate: float, seed: int, client: bool = True) -> Res
         for thread in threads:
             thread.start()
         while sum(each.calls for each in attacks) + (remote.calls if remote else 0) < commands:
+            if time.monotonic() > end_s:
+                break
             time.sleep(0.05)
         ended.set()
         for thread in threads:
@@ -199,13 +205,18 @@ def main() -> int:
     """Read the command line and run."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--commands", type=int, default=20_000)
+    parser.add_argument("--minutes", type=float, default=math.inf, help="end after so many")
     parser.add_argument("--rate", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--no-station", action="store_true")
     options = parser.parse_args()
     began_s = time.perf_counter()
     result = attack(
-        options.commands, rate=options.rate, seed=options.seed, client=not options.no_station
+        options.commands,
+        rate=options.rate,
+        seed=options.seed,
+        client=not options.no_station,
+        minutes=options.minutes,
     )
     print(table(figures(result)))
     print(f"\n{time.perf_counter() - began_s:.0f} s; {result.by_way}; refused {result.refused}")

@@ -11,7 +11,7 @@ from cosmic.app.rig import Rig
 from cosmic.daqco.core.scale import Scale
 from cosmic.frame.errors import CosmicError
 from cosmic.mico.api.axis import Axis
-from cosmic.mico.core.orders import Calibrate, Grant, MoveBy, MoveTo, Order, Reference, Step
+from cosmic.mico.core.motion.orders import Calibrate, Grant, MoveBy, MoveTo, Order, Reference, Step
 
 NONSENSE: Final[Sequence[Any]] = (
     None, "abc", "5 kg", b"5", float("nan"), float("inf"), -float("inf"), 1e308, 2**70, -1, 0,

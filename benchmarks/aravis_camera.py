@@ -25,7 +25,7 @@ NET_RAW = 1 << 13
 CLIENT = """
 import json, pathlib, resource, sys, time
 from dataclasses import replace
-from cosmic.vico.hw.aravis_library import AravisLibrary
+from cosmic.vico.hw.aravis import AravisLibrary
 from cosmic.vico.hw.interface import FrameStatus, Roi
 
 key, seconds, rate_hz = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])

@@ -65,9 +65,9 @@ def watch_gate(bench: Stand) -> list[tuple[str, float, float]]:
     gate = bench.manager.gate
     decide = gate.decide
 
-    def timed(requests: Any) -> Any:
+    def timed(requests: Any, *more: Any) -> Any:
         began_s = time.perf_counter()
-        answer = decide(requests)
+        answer = decide(requests, *more)
         decisions.append((requests[0].axis, began_s, time.perf_counter()))
         return answer
 

@@ -16,7 +16,7 @@ from PySide6.QtCore import QObject
 
 from benchmarks.figures import Figure, main, percentile
 from benchmarks.stand import Stand, Traffic, stand, wait_until
-from cosmic.mico.core.messages import MovementEnded, PositionChanged
+from cosmic.mico.core.motion.messages import MovementEnded, PositionChanged
 from cosmic.mico.hw import scu3d_ctypes as sa
 
 NAME = "completion"

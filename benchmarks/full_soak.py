@@ -20,7 +20,7 @@ from pathlib import Path
 import cosmic
 from benchmarks.figures import Figure, table
 from benchmarks.full_platform import FullStand, full_platform
-from benchmarks.soak import command, resident_kb
+from benchmarks.soak import command, resident_kb, thread_count
 from cosmic.frame.errors import CosmicError
 
 NAME = "full_soak"
@@ -60,7 +60,7 @@ class Campaigns(threading.Thread):
                 with cosmic.connect(rate=RATE, sample="three-dry", seed=self.done) as rig:
                     campaign = rig.campaign(RECIPE, self._folder / str(self.done))
                     campaign.start()
-                    while not campaign.done and not self._end.wait(0.2):
+                    while not campaign.over and not self._end.wait(0.2):
                         pass
                     campaign.abort()
                     campaign.join()
@@ -108,7 +108,7 @@ def collect(bench: FullStand, seconds: float, tell: Callable[[Look], None]) -> l
                         (time.perf_counter() - began_s) / 60.0,
                         resident_kb() / 1024,
                         len(gc.get_objects()) + gc.get_freeze_count(),
-                        threading.active_count(),
+                        thread_count(),
                         len(list(FILES.iterdir())) if FILES.exists() else 0,
                         log_kb(folder),
                         moves,

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.kept_plate import KeptPlate
-from cosmic.autonomy.campaign.store_files import DATABASE, FIBRES
+from cosmic.autonomy.campaign.storage_format import DATABASE, FIBRES
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.frame.errors import CosmicError
 from cosmic.twin.truth import read_truth

@@ -16,8 +16,8 @@ from cosmic.autonomy.procedures.parts import (
     Steps,
     UnitOperation,
 )
+from cosmic.autonomy.procedures.procedure import Part
 from cosmic.autonomy.procedures.run import ProcedureRun
-from cosmic.autonomy.procedures.walk import Part
 from cosmic.frame.clock import RatedClock
 from cosmic.frame.failure import FailurePolicy
 

@@ -27,9 +27,9 @@ from cosmic.frame.threads import declare_gui_thread
 from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.mico import Mico
-from cosmic.mico.core.device_manager import DeviceManager
-from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.positioner import Status
+from cosmic.mico.core.motion.manager import DeviceManager
+from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.core.motion.positioner import Status
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.gui.mico_widget import make_mico_gui
 from cosmic.mico.hw.scu3d import Scu3dController

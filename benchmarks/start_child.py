@@ -16,7 +16,7 @@ from typing_extensions import override
 from cosmic.app import run_window
 from cosmic.app.cli import main
 from cosmic.app.operator_window import OperatorWindow
-from cosmic.mico.core.positioner import Status
+from cosmic.mico.core.motion.positioner import Status
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
 
 

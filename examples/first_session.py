@@ -6,7 +6,7 @@ Needs no window and no hardware.
 from threading import Event
 
 import cosmic
-from cosmic.frame.task import Progress
+from cosmic.frame.operation import Progress
 from cosmic.mico.api.mico import Mico
 
 

@@ -1,7 +1,7 @@
 """Initialise a platform that was just switched on: step by step, and once more without need."""
 
 import cosmic
-from cosmic.frame.task import Progress
+from cosmic.frame.operation import Progress
 
 
 def show(progress: Progress) -> None:

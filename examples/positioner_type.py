@@ -7,8 +7,8 @@ not know that movement, and the gate refuses it. See docs/how-to/add-a-positione
 from typing import ClassVar
 
 import cosmic
-from cosmic.mico.core.orders import Calibrate, Motion, MoveBy, MoveTo, Step
-from cosmic.mico.core.positioner import TYPE_CLASSES, RotaryPositioner
+from cosmic.mico.core.motion.orders import Calibrate, Motion, MoveBy, MoveTo, Step
+from cosmic.mico.core.motion.positioner import TYPE_CLASSES, RotaryPositioner
 
 
 class EndlessRotaryPositioner(RotaryPositioner):

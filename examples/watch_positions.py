@@ -10,7 +10,7 @@ from queue import Empty, SimpleQueue
 from PySide6.QtCore import Qt
 
 import cosmic
-from cosmic.mico.core.messages import PositionChanged
+from cosmic.mico.core.motion.messages import PositionChanged
 
 
 def main() -> None:

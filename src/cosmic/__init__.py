@@ -27,13 +27,13 @@ if TYPE_CHECKING:
         StoppedError,
         UnknownAxisError,
     )
-    from cosmic.frame.task import Progress, Task
+    from cosmic.frame.operation import Progress, Task
     from cosmic.frame.verdict import MoveVerdict, Reason
     from cosmic.mico.api.axis import Axis
     from cosmic.mico.api.group import GroupMovement
     from cosmic.mico.api.jogging import Jogging
     from cosmic.mico.api.mico import Mico
-    from cosmic.mico.core.movement import Movement
+    from cosmic.mico.core.motion.movement import Movement
 
 __version__ = "0.1.0"
 
@@ -59,13 +59,13 @@ _HOMES = {
         "StoppedError",
         "UnknownAxisError",
     ),
-    "cosmic.frame.task": ("Progress", "Task"),
+    "cosmic.frame.operation": ("Progress", "Task"),
     "cosmic.frame.verdict": ("MoveVerdict", "Reason"),
     "cosmic.mico.api.axis": ("Axis",),
     "cosmic.mico.api.group": ("GroupMovement",),
     "cosmic.mico.api.jogging": ("Jogging",),
     "cosmic.mico.api.mico": ("Mico",),
-    "cosmic.mico.core.movement": ("Movement",),
+    "cosmic.mico.core.motion.movement": ("Movement",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 

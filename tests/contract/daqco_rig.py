@@ -12,14 +12,13 @@ from typing_extensions import override
 from contract.station_rig import connected, free_port, listening
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco
-from cosmic.daqco.api.remote_application import RemoteDaqcoApplication
-from cosmic.daqco.api.station_side import DaqcoStationSide
 from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, ScaleSettings
 from cosmic.daqco.hw.sim_library import SimulatedLibrary
 from cosmic.daqco.hw.sim_signal import Source
 from cosmic.frame.clock import WallClock
 from cosmic.frame.failure import Failure, FailurePolicy
-from cosmic.frame.network.in_process import InProcessTransport
+from cosmic.frame.network.application import RemoteApplication
+from cosmic.frame.network.host import Host
 from cosmic.frame.network.line_settings import Line
 from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Transport
@@ -56,7 +55,7 @@ class DaqcoRig:
 
     home: Home
     daqco: Daqco
-    remote: RemoteDaqcoApplication | None = None
+    remote: RemoteApplication[Daqco] | None = None
     station: Station | None = None
 
 
@@ -96,22 +95,27 @@ def at_home(wanted: DaqcoSettings) -> Iterator[Home]:
 
 
 @contextmanager
-def hosted(home: Home, endpoint: str = "") -> Iterator[Station]:
-    """Offer it on a station, which listens at `endpoint` if one is given."""
-    station, side = Station("fibres", home.policy), DaqcoStationSide(home.application)
+def hosted(home: Home, endpoint: str) -> Iterator[Station]:
+    """Offer it on a station, which listens at `endpoint`."""
+    station, side = Station("fibres", home.policy), Host("daqco", Daqco(home.application))
     station.host("daqco", side)
     with ExitStack() as stack:
         stack.callback(side.close)
-        if endpoint:
-            line = Line(endpoint, listens=True, station="fibres")
-            stack.enter_context(listening(station, line))
+        line = Line(endpoint, listens=True, station="fibres")
+        stack.enter_context(listening(station, line))
         yield station
 
 
+def remote_daqco(transport: Transport, policy: FailurePolicy) -> RemoteApplication[Daqco]:
+    return RemoteApplication("DAQCo", Daqco, transport, policy, name="daqco")
+
+
 @contextmanager
-def elsewhere(transport: Transport, *, initialize: bool = True) -> Iterator[RemoteDaqcoApplication]:
+def elsewhere(
+    transport: Transport, *, initialize: bool = True
+) -> Iterator[RemoteApplication[Daqco]]:
     """Use it over a transport."""
-    remote = RemoteDaqcoApplication(transport, FailurePolicy())
+    remote = remote_daqco(transport, FailurePolicy())
     try:
         if initialize:
             remote.initialize()
@@ -122,22 +126,17 @@ def elsewhere(transport: Transport, *, initialize: bool = True) -> Iterator[Remo
 
 @contextmanager
 def daqco_rig(where: str, wanted: DaqcoSettings) -> Iterator[DaqcoRig]:
-    """Yield DAQCo; `where` is "home", "in-process" or "zenoh"."""
+    """Yield DAQCo; `where` is "home" or "station"."""
     with ExitStack() as stack:
         home = stack.enter_context(at_home(wanted))
         if where == "home":
             yield DaqcoRig(home, Daqco(home.application))
             return
-        endpoint = f"tcp/127.0.0.1:{free_port()}" if where == "zenoh" else ""
+        endpoint = f"tcp/127.0.0.1:{free_port()}"
         station = stack.enter_context(hosted(home, endpoint))
-        transport: Transport
-        if endpoint:
-            transport = stack.enter_context(connected(endpoint))
-        else:
-            transport = InProcessTransport(station, "vision")
-            stack.callback(transport.close)
+        transport = stack.enter_context(connected(endpoint))
         remote = stack.enter_context(elsewhere(transport))
-        yield DaqcoRig(home, Daqco(remote), remote, station)
+        yield DaqcoRig(home, remote.api, remote, station)
 
 
 def gather(daqco: Daqco) -> tuple[list[int], list[int], Callable[[], None]]:

@@ -86,6 +86,10 @@ class FakeNidaqmx:
         What the callbacks returned.
     fail_in : dict
         Error code by name of the call of a task that shall fail.
+    starts : int
+        How many tasks were started.
+    levels_v : dict of str to float
+        Level of an input, such as "Dev1/ai0", in place of K * 0.1 V.
     """
 
     def __init__(self, boards: int = 2) -> None:
@@ -93,6 +97,8 @@ class FakeNidaqmx:
         self.tasks: list[FakeTask] = []
         self.answers: list[int] = []
         self.fail_in: dict[str, int] = {}
+        self.levels_v: dict[str, float] = {}
+        self.starts = 0
         self.all_devices = [
             FakeDevice(self, name=f"Dev{number}", serial_num=0x1234567 + number)
             for number in range(1, boards + 1)
@@ -218,6 +224,7 @@ class FakeTask:
         assert not self.running
         self.taken = self.read = self.told = 0
         self.running = True
+        self.driver.starts += 1
 
     def stop(self) -> None:
         self.called("stop")
@@ -262,7 +269,10 @@ class FakeTask:
     def samples(self, count: int) -> npt.NDArray[np.float64]:
         """Return the next `count` samples, shape (channels, count)."""
         numbers = np.arange(self.read, self.read + count)
-        levels = [[0.1 * int(name.partition("/ai")[2])] for name, *_ in self.channels]
+        known = self.driver.levels_v
+        levels = [
+            [known.get(name, 0.1 * int(name.partition("/ai")[2]))] for name, *_ in self.channels
+        ]
         self.read += count
         return np.array(levels) + MICROVOLT * numbers
 

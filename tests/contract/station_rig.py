@@ -24,7 +24,7 @@ from cosmic.frame.network.server_listener import ServerListener
 from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Transport
 from cosmic.frame.network.zenoh_wire import ZenohWire
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.frame.verdict import MoveVerdict, Reason
 
 VERDICT = MoveVerdict(

@@ -226,7 +226,7 @@ def test_starting_and_stopping_a_hundred_times_leaves_nothing_behind(rig: BoardR
         board.start()
         rig.go_on(10)
         assert received(board, 1)[0].first_sample == 0
-    assert threading.active_count() == threads
+    assert threading.active_count() <= threads  # those of earlier tests may be forgotten meanwhile
 
 
 # --- what is refused --------------------------------------------------------------------------

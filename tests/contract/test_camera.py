@@ -202,6 +202,15 @@ def test_a_new_start_counts_anew(rig: CameraRig, camera: Camera) -> None:
     assert 1 <= counters.completed < 10
 
 
+def test_a_camera_that_takes_pictures_cannot_be_started(rig: CameraRig, camera: Camera) -> None:
+    camera.start()
+    number = taken(rig, camera, 2)[-1].frame_id
+    with pytest.raises(DeviceError) as caught:
+        camera.start()
+    assert caught.value.fault is DeviceFault.STATE
+    assert taken(rig, camera, 1)[0].frame_id > number  # and it goes on as it was
+
+
 def test_stopping_and_starting_again_and_again_leaves_nothing_behind(
     rig: CameraRig, camera: Camera
 ) -> None:
@@ -542,6 +551,8 @@ def test_a_camera_that_is_unplugged_says_so_and_can_be_opened_when_it_is_back(
             failure = _failure(camera)
             assert WALL.now_s() - gone_s < 2.0
             assert len(str(failure)) > 20
+            with pytest.raises(DeviceError):  # nothing more comes from it
+                camera.receive(0.0)
             camera.stop()
             camera.close()
             with pytest.raises(DeviceError):

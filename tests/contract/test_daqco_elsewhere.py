@@ -1,7 +1,8 @@
 """What a script does with ``rig.daqco`` it does the same at home and from another station."""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from threading import Event
 
@@ -10,13 +11,17 @@ import pytest
 from contract.daqco_rig import DaqcoRig, daqco_rig, settings
 from contract.station_rig import wait_until
 from cosmic.daqco.api.daqco import Daqco
+from cosmic.daqco.api.files import NamedFile
 from cosmic.daqco.api.recording import open_recording
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.limits import Crossing
 from cosmic.daqco.core.scale import Scale
+from cosmic.daqco.core.settings import LimitSettings
+from cosmic.frame.declaration import declaration_of
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable, RecordingError
+from cosmic.frame.file_names import NameOption
 
-EVERYWHERE = ["home", "in-process", "zenoh"]
+EVERYWHERE = ["home", "station"]
 
 
 @pytest.fixture(params=EVERYWHERE)
@@ -24,7 +29,7 @@ def rig(
     request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[DaqcoRig]:
     # A machine that is busy with other tests falls silent for a moment now and then.
-    monkeypatch.setattr("cosmic.daqco.api.remote_guard.SILENCE_LIMIT_S", 5.0)
+    monkeypatch.setattr("cosmic.daqco.api.limit_watch.SILENCE_LIMIT_S", 5.0)
     with daqco_rig(request.param, settings(tmp_path)) as made:
         yield made
 
@@ -110,6 +115,54 @@ def test_a_channel_averages_and_flies_for_a_plan(rig: DaqcoRig) -> None:
     assert sum(len(page["time"]) for page in channel.collect_pages()) > 0
 
 
+def _export_something(rig: DaqcoRig) -> None:
+    file = rig.daqco.directory / "exported.h5"
+    with rig.daqco.record(file):
+        assert wait_until(lambda: rig.home.application.recorder.state.duration_s > 0.1)
+    rig.daqco.export(file, file.with_suffix(".csv")).wait(10.0)
+
+
+FORCE_LIMIT = LimitSettings(channel="force", high=90.0, armed=True)
+GIVEN: dict[str, Callable[[DaqcoRig], object]] = {
+    "stop": lambda rig: rig.daqco.stop(),
+    "start": lambda rig: rig.daqco.start(),
+    "apply": lambda rig: rig.daqco.apply(
+        rig.daqco.settings.model_copy(update={"refresh_hz": 10.0})
+    ),
+    "set_scale": lambda rig: rig.daqco.set_scale("channel1", Scale("Lamp", "mW", (1.0, 2.0))),
+    "start_recording": lambda rig: rig.daqco.start_recording(rig.daqco.directory / "all.h5"),
+    "mark": lambda rig: rig.daqco.mark("here"),
+    "stop_recording": lambda rig: rig.daqco.stop_recording(),
+    "folder_problem": lambda rig: rig.daqco.folder_problem(str(rig.daqco.directory)),
+    "free_bytes": lambda rig: rig.daqco.free_bytes(rig.daqco.directory),
+    "name_recording": lambda rig: rig.daqco.name_recording(
+        "run", NameOption.NUMBER, rig.daqco.directory, datetime(2026, 11, 23, 12, 0, tzinfo=UTC)
+    ),
+    "recordings": lambda rig: rig.daqco.recordings(rig.daqco.directory),
+    "export": _export_something,
+    "set_limit": lambda rig: rig.daqco.set_limit(FORCE_LIMIT),
+    "reset_limit": lambda rig: rig.daqco.reset_limit("force"),
+    "disarm_limit": lambda rig: rig.daqco.disarm_limit("force"),
+    "remove_limit": lambda rig: rig.daqco.remove_limit("force"),
+}
+
+
+def test_every_command_that_is_declared_is_carried_out(rig: DaqcoRig) -> None:
+    assert set(GIVEN) == set(declaration_of(Daqco).commands)
+    found = {name: give(rig) for name, give in GIVEN.items()}
+    folder = rig.daqco.directory
+    assert found["folder_problem"] == ""
+    assert found["recordings"] == (folder / "all.h5",)
+    named = found["name_recording"]
+    assert isinstance(named, NamedFile)
+    assert named.path.parent == folder
+    with open_recording(folder / "all.h5") as recording:
+        assert [event.text for event in recording.events] == ["here"]
+    assert rig.daqco.settings.refresh_hz == 10.0
+    assert rig.daqco.limits == ()
+    assert not rig.home.failures
+
+
 # --- recordings -------------------------------------------------------------------------------
 
 
@@ -148,8 +201,8 @@ def test_a_limit_stops_where_the_board_is_and_is_heard_of_elsewhere(rig: DaqcoRi
     crossings: list[Crossing] = []
     rig.home.application.guard.trip = stopped_there.append
     if rig.remote is not None:
-        rig.remote.guard.trip = stopped_here.append
-    rig.daqco.application.on_crossing(crossings.append)
+        rig.daqco.guard.trip = stopped_here.append
+    rig.daqco.on_crossing(crossings.append)
     rig.daqco.arm_limit("force", high=30.0, hysteresis=2.0)
     assert [each.settings.armed for each in rig.daqco.limits] == [True]
     assert not rig.daqco.limits[0].crossed

@@ -18,40 +18,42 @@ from contract.daqco_rig import (
     elsewhere,
     gather,
     hosted,
+    remote_daqco,
     settings,
 )
-from contract.station_rig import connected, free_port, wait_until
+from contract.station_rig import connected, free_port, listening, wait_until
 from cosmic.daqco.api.daqco import Daqco
-from cosmic.daqco.api.remote_application import RemoteDaqcoApplication
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.limits import Crossing
-from cosmic.frame.errors import ConfigError, NotAvailable, RecordingError
+from cosmic.daqco.core.scale import Scale
+from cosmic.daqco.core.settings import LimitSettings
+from cosmic.frame.errors import ConfigError, NotAvailable, ProtocolError, RecordingError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.application import RemoteApplication
 from cosmic.frame.network.errors import CallRefused, StationAway
-from cosmic.frame.network.in_process import InProcessTransport
+from cosmic.frame.network.line_settings import Line as NetworkLine
 from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Rule
 
 
-@pytest.fixture(params=["in-process", "zenoh"])
-def rig(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[DaqcoRig]:
-    with daqco_rig(request.param, settings(tmp_path)) as made:
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[DaqcoRig]:
+    with daqco_rig("station", settings(tmp_path)) as made:
         yield made
 
 
 # --- samples ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("where", ["in-process", "zenoh"])
-def test_nothing_is_lost_of_32_channels_at_15_khz(where: str, tmp_path: Path) -> None:
+def test_nothing_is_lost_of_32_channels_at_15_khz(tmp_path: Path) -> None:
     wanted = settings(tmp_path, channels=32, rate_hz=15_000.0)
-    with daqco_rig(where, wanted) as rig:
+    with daqco_rig("station", wanted) as rig:
         firsts, lengths, end = gather(rig.daqco)
-        needed = (5.0 if where == "zenoh" else 1.0) * wanted.rate_hz
+        needed = 5.0 * wanted.rate_hz
         assert wait_until(lambda: sum(list(lengths)) >= needed, 30.0)
         end()
         assert rig.remote is not None
-        assert rig.remote.buffer.lost == rig.daqco.counters.lost == 0
+        assert rig.daqco.missed == rig.daqco.counters.lost == 0
         assert (
             firsts[1:]
             == [first + length for first, length in zip(firsts[:-1], lengths[:-1], strict=True)][
@@ -88,11 +90,11 @@ def test_acquisition_that_begins_anew_is_no_gap(rig: DaqcoRig) -> None:
 def test_an_old_report_that_comes_late_changes_nothing(rig: DaqcoRig) -> None:
     assert rig.remote is not None
     assert rig.station is not None
-    old = rig.remote.command("report")
+    old = rig.remote.transport.call("daqco", "state")
     rig.daqco.configure(rate_hz=2000.0)
     passed = Event()
-    rig.remote.transport.subscribe("daqco/reports", Rule.LATEST, lambda _: passed.set())
-    rig.station.publish("daqco/reports", old)
+    rig.remote.transport.subscribe("daqco/state", Rule.LATEST, lambda _: passed.set())
+    rig.station.publish("daqco/state", old)
     assert passed.wait(5.0)
     assert rig.daqco.rate_hz == 2000.0
 
@@ -117,7 +119,7 @@ def test_crossings_and_failures_are_published_one_by_one(rig: DaqcoRig) -> None:
 def test_all_samples_are_sent_only_while_somebody_wants_them(
     rig: DaqcoRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cosmic.daqco.api.remote_buffer.LINGER_S", 0.0)
+    monkeypatch.setattr("cosmic.frame.network.link.LINGER_S", 0.0)
     assert rig.station is not None
     bus = rig.station.bus
     firsts, _lengths, end = gather(rig.daqco)
@@ -175,26 +177,35 @@ def _cannot_be_moved(rig: DaqcoRig) -> None:
     with pytest.raises(ConfigError, match="platform file"):
         rig.daqco.apply(before.model_copy(update={"backend": "nidaqmx"}))
     assert rig.home.application.settings == before
-    with pytest.raises(NotAvailable, match="other stations may use"):
+    with pytest.raises(RecordingError, match="other stations may use"):
         rig.daqco.free_bytes(Path("/"))
     with pytest.raises(RecordingError):
-        rig.daqco.application.files.recordings(Path("/"))
-    assert rig.daqco.application.files.recordings(rig.daqco.directory) == (
-        rig.daqco.directory / "run.h5",
-    )
+        rig.daqco.recordings(Path("/"))
+    assert rig.daqco.recordings(rig.daqco.directory) == (rig.daqco.directory / "run.h5",)
+
+
+def forged_scale(name: str, coefficients: tuple[Any, ...]) -> Scale:
+    """Return a scale as only another program could send it."""
+    made = object.__new__(Scale)
+    for field_name, value in (("name", name), ("unit", "V"), ("coefficients", coefficients)):
+        object.__setattr__(made, field_name, value)
+    return made
 
 
 BAD_CALLS: list[tuple[str, dict[str, Any]]] = [
     ("apply", {"settings": {"rate_hz": 1000.0}}),
     ("apply", {"settings": {"channel": "all of them"}}),
     ("apply", {"settings": 5}),
-    ("set_limit", {"channel": "force", "low": 2.0, "high": 1.0, "hysteresis": 0.0, "armed": True}),
-    ("set_limit", {"channel": "x", "low": 0.0, "high": 1.0, "hysteresis": 0.0, "armed": True}),
-    ("set_limit", {"channel": "force", "low": 0.0, "high": 1.0, "hysteresis": 0.0, "armed": 1}),
-    ("set_scale", {"channel": "force", "name": "a", "unit": "V", "coefficients": []}),
-    ("set_scale", {"channel": "force", "name": "a", "unit": "V", "coefficients": ["1"]}),
-    ("set_scale", {"channel": "force", "name": "", "unit": "V", "coefficients": [1.0]}),
-    ("name_recording", {"base": "a/b", "append": "time", "directory": "."}),
+    ("set_limit", {"limit": {"channel": "force", "high": 1.0, "armed": True}}),
+    ("set_limit", {"limit": LimitSettings(channel="x", low=0.0, high=1.0, armed=True)}),
+    ("set_limit", {"limit": LimitSettings(channel="force", high=1.0), "armed": True}),
+    ("set_limit", {"limit": LimitSettings.model_construct(channel="force", low=2.0, high=1.0)}),
+    ("set_limit", {"limit": LimitSettings.model_construct(channel="force", high=1.0, armed=1)}),
+    ("set_scale", {"channel": "force", "scale": "a"}),
+    ("set_scale", {"channel": "force", "scale": forged_scale("a", ())}),
+    ("set_scale", {"channel": "force", "scale": forged_scale("a", ("1",))}),
+    ("set_scale", {"channel": "force", "scale": forged_scale("", (1.0,))}),
+    ("name_recording", {"base": "a/b", "option": "time", "directory": "."}),
     ("close", {}),
     ("on_hosted", {"station": None}),
 ]
@@ -204,8 +215,8 @@ def test_calls_that_make_no_sense_are_refused_and_change_nothing(rig: DaqcoRig) 
     before = rig.home.application.settings
     assert rig.remote is not None
     for function, arguments in BAD_CALLS:
-        with pytest.raises((CallRefused, ConfigError)):
-            rig.remote.command(function, arguments)
+        with pytest.raises((CallRefused, ConfigError, ProtocolError)):
+            rig.remote.transport.call("daqco", function, arguments)
     assert rig.home.application.settings == before
     assert not rig.home.application.guard.limits
     assert not rig.home.failures
@@ -221,7 +232,7 @@ class Line:
 
     home: Home
     endpoint: str
-    remote: RemoteDaqcoApplication
+    remote: RemoteApplication[Daqco]
     daqco: Daqco
     stops: list[str] = field(default_factory=list)
     crossings: list[Crossing] = field(default_factory=list)
@@ -243,9 +254,9 @@ def line(tmp_path: Path) -> Iterator[Line]:
         served.enter_context(hosted(home, endpoint))
         transport = stack.enter_context(connected(endpoint))
         remote = stack.enter_context(elsewhere(transport))
-        made = Line(home, endpoint, remote, Daqco(remote), served=served)
-        remote.guard.trip = made.stops.append
-        remote.on_crossing(made.crossings.append)
+        made = Line(home, endpoint, remote, remote.api, served=served)
+        remote.api.guard.trip = made.stops.append
+        remote.api.on_crossing(made.crossings.append)
         yield made
 
 
@@ -318,8 +329,8 @@ def test_whoever_comes_later_is_told_of_a_limit_that_still_is_crossed(
     assert wait_until(lambda: application.guard.limits["force"].beyond)
     stops: list[str] = []
     transport = rig.remote.transport
-    late = RemoteDaqcoApplication(transport, rig.home.policy)
-    late.guard.trip = stops.append
+    late = remote_daqco(transport, rig.home.policy)
+    late.api.guard.trip = stops.append
     try:
         late.initialize()
         assert wait_until(lambda: bool(stops))
@@ -328,11 +339,15 @@ def test_whoever_comes_later_is_told_of_a_limit_that_still_is_crossed(
 
 
 def test_a_station_without_daqco_is_told_as_the_reason() -> None:
-    transport = InProcessTransport(Station("empty", FailurePolicy()), "vision")
-    with elsewhere(transport, initialize=False) as remote:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    line = NetworkLine(endpoint, listens=True, station="fibres")
+    with (
+        listening(Station("fibres", FailurePolicy()), line),
+        connected(endpoint) as transport,
+        elsewhere(transport, initialize=False) as remote,
+    ):
         remote.initialize_later()
-        assert wait_until(lambda: "hosts no 'daqco'" in remote.away)
-        assert Daqco(remote).channels == ()
+        assert wait_until(lambda: "hosts no 'daqco'" in remote.api.away)
+        assert remote.api.channels == ()
         with pytest.raises(NotAvailable):
-            Daqco(remote).latest()
-    transport.close()
+            remote.api.latest()

@@ -14,7 +14,7 @@ from cosmic.frame.errors import (
     DeviceTimeout,
     NotAvailable,
 )
-from cosmic.vico.hw.peripheral_factory import make_lens
+from cosmic.vico.hw.factory import make_lens
 from cosmic.vico.hw.peripherals import Lens, LensAxis
 
 ZOOM, FOCUS = LensAxis.ZOOM, LensAxis.FOCUS

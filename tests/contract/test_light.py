@@ -9,7 +9,7 @@ import pytest
 
 from contract.peripheral_rig import PeripheralRig, terminal
 from cosmic.frame.errors import ConfigError, DeviceError, DeviceTimeout
-from cosmic.vico.hw.peripheral_factory import make_light
+from cosmic.vico.hw.factory import make_light
 from cosmic.vico.hw.peripherals import Light
 
 

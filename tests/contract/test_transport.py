@@ -29,7 +29,7 @@ from cosmic.frame.network.errors import (
 )
 from cosmic.frame.network.in_process import InProcessTransport
 from cosmic.frame.network.transport import Presence, Rule
-from cosmic.frame.task import Progress
+from cosmic.frame.operation import Progress
 from cosmic.frame.threads import declare_gui_thread
 from cosmic.frame.verdict import Reason
 

@@ -1,6 +1,5 @@
 """ViCo is used in the same way at home and from another station, over either transport."""
 
-import inspect
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from contract.station_rig import connected, free_port
+from contract.station_rig import connected, free_port, listening
 from contract.vico_rig import (
     LIMIT_S,
     VicoRig,
@@ -33,18 +32,15 @@ from cosmic.frame.errors import (
 )
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.errors import CallRefused
-from cosmic.frame.network.in_process import InProcessTransport
+from cosmic.frame.network.line_settings import Line
 from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Rule
 from cosmic.frame.threads import declare_gui_thread
 from cosmic.frame.verdict import Reason
-from cosmic.vico.api import remote_stream
+from cosmic.vico.api import camera_pictures
 from cosmic.vico.api.camera import CameraHandle
-from cosmic.vico.api.lens import LensHandle, LightHandle
-from cosmic.vico.api.remote_camera import RemoteCameraHandle
-from cosmic.vico.api.remote_lens import RemoteLensHandle, RemoteLightHandle
-from cosmic.vico.api.station_picture import SentPicture
-from cosmic.vico.api.station_state import STATE, pictures_topic, shown_topic
+from cosmic.vico.api.camera_pictures import PicturesElsewhere
+from cosmic.vico.api.sent_picture import SentPicture
 from cosmic.vico.api.vico import Vico
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.recording.reading import open_picture_recording
@@ -52,7 +48,16 @@ from cosmic.vico.hw.interface import Trigger
 from cosmic.vico.hw.peripherals import LensAxis
 from unit.vico.vision import drawn_fibres
 
-TRANSPORTS = ["in-process", "zenoh"]
+TRANSPORTS = ["station"]
+STATE = "vico/state"
+
+
+def pictures_topic(camera: str) -> str:
+    return f"vico/camera_handles/{camera}/pictures"
+
+
+def shown_topic(camera: str) -> str:
+    return f"vico/camera_handles/{camera}/shown"
 
 
 @pytest.fixture(params=["home", *TRANSPORTS])
@@ -191,7 +196,7 @@ def test_the_newest_picture_comes_with_all_that_is_known_of_it(rig: VicoRig) -> 
 def test_fibres_are_found_and_placed_on_the_platform(tmp_path: Path) -> None:
     lines = [drawn_fibres.arc((60.0, 120.0), 0.2, 300.0, 0.6)]
     image = drawn_fibres.picture(lines, [9.0], shape=(320, 480)).astype(np.uint8)
-    with vico_rig("zenoh", tmp_path, size_px=(480, 320)) as rig:
+    with vico_rig("station", tmp_path, size_px=(480, 320)) as rig:
         found, there = [
             while_waiting_for_fibres(rig, vico, image)
             for vico in (rig.vico, Vico(rig.home.application))
@@ -271,7 +276,7 @@ def test_every_frame_arrives_complete_and_in_order(away: VicoRig) -> None:
 def test_nothing_is_drawn_while_nobody_looks(
     away: VicoRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(remote_stream, "IDLE_S", 0.2)
+    monkeypatch.setattr(camera_pictures, "IDLE_S", 0.2)
     taken: list[Picture] = []
     away.home.application.unit("top").thread.subscribe(taken.append)
     away.home.camera.push(*[noise(n) for n in range(20)])
@@ -288,8 +293,8 @@ def test_nothing_is_drawn_while_nobody_looks(
 
 
 def is_live(camera: CameraHandle) -> bool:
-    assert isinstance(camera, RemoteCameraHandle)
-    return camera.live
+    assert isinstance(camera.pictures, PicturesElsewhere)
+    return camera.pictures.live
 
 
 def test_a_picture_that_the_line_dropped_is_asked_for(
@@ -333,13 +338,17 @@ def test_the_live_view_is_corrected_by_the_background(away: VicoRig) -> None:
 
 def test_a_state_that_was_overtaken_is_passed_over(away: VicoRig) -> None:
     assert away.remote is not None
-    known, told = away.remote.state, []
-    assert known is not None
+    assert away.client is not None
+    known: Any = away.client.call("vico", "state")
+    told: list[tuple[str, ...]] = []
     got = Event()
     forget = away.vico.on_change(lambda: told.append(tuple(away.vico.cameras)))
     assert away.client is not None
     fence = away.client.subscribe(STATE, Rule.LATEST, lambda _: got.set())
-    away.station.publish(STATE, replace(known, number=known.number - 1, cameras=()))
+    away.station.publish(
+        STATE,
+        replace(known, number=known.number - 1, values={**known.values, "camera_handles": {}}),
+    )
     assert got.wait(LIMIT_S)
     away.vico.camera().switch("focus", on=True)  # a newer one follows
     assert soon(lambda: told)
@@ -415,23 +424,26 @@ def test_a_path_without_a_root_begins_on_the_stations_disk(away: VicoRig, tmp_pa
 
 
 def test_who_may_only_look_sees_all_and_changes_nothing(tmp_path: Path) -> None:
-    with at_home(tmp_path, rate=1.0) as home, hosted(home) as station:
-        client = InProcessTransport(station, "guest", Access.VIEW)
-        with following(client, home.policy) as remote:
-            vico = Vico(remote)
-            rig = VicoRig(home, vico, station)
-            assert np.array_equal(
-                while_waiting(rig, lambda: vico.snap(timeout_s=LIMIT_S), 3), noise(3)
-            )
-            assert vico.camera().latest() is not None
-            with pytest.raises(CallRefused, match="may not call"):
-                vico.camera().stop()
-            assert vico.lens is not None
-            running = home.application.peripherals.home()
-            vico.lens.abort()
-            with pytest.raises(MoveCancelled):
-                running.wait(LIMIT_S)
-        client.close()
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    line = Line(endpoint, listens=True, station="fibres")
+    with (
+        at_home(tmp_path, rate=1.0) as home,
+        hosted(home) as station,
+        listening(station, line, lambda _: Access.VIEW),
+        connected(endpoint, "guest") as client,
+        following(client, home.policy) as remote,
+    ):
+        vico = remote.api
+        rig = VicoRig(home, vico, station)
+        assert np.array_equal(while_waiting(rig, lambda: vico.snap(timeout_s=LIMIT_S), 3), noise(3))
+        assert vico.camera().latest() is not None
+        with pytest.raises(CallRefused, match="may not call"):
+            vico.camera().stop()
+        assert vico.lens is not None
+        running = home.application.peripherals.home()
+        vico.lens.abort()
+        with pytest.raises(MoveCancelled):
+            running.wait(LIMIT_S)
 
 
 def test_pictures_and_time_lapses_are_written(rig: VicoRig, tmp_path: Path) -> None:
@@ -530,7 +542,7 @@ def test_the_lens_stops_when_who_moves_it_is_gone(tmp_path: Path) -> None:
         peripherals = home.application.peripherals
         with connected(endpoint) as client, following(client, home.policy) as remote:
             client.take_lease()
-            lens = Vico(remote).lens
+            lens = remote.api.lens
             assert lens is not None
             task = lens.home()
             assert soon(lambda: peripherals.state.moving)
@@ -567,10 +579,10 @@ def test_a_click_into_a_picture_that_has_changed_moves_nothing(away: VicoRig) ->
     away.home.camera.push(noise(1))
     assert soon(lambda: camera.latest() is not None)
     shown = camera.latest()
-    assert shown is not None and away.remote is not None and away.remote.places is not None
+    assert shown is not None and camera.pictures.places is not None
     places.shift_um = 130.0
     with pytest.raises(NotAvailable, match="has changed since"):
-        away.remote.places.move_to(shown, (10.0, 5.0), "left")
+        camera.pictures.places.move_to(shown, (10.0, 5.0), "left")
     assert places.moved == []
 
 
@@ -605,26 +617,17 @@ def test_a_window_never_waits_and_hears_of_refusals(away: VicoRig, tmp_path: Pat
     assert camera.refused == ""
 
 
-def test_a_handle_from_elsewhere_has_no_camera_of_its_own() -> None:
-    """Whatever looks at the camera, lens or lamp in this process is done anew."""
-    for here, there in (
-        (CameraHandle, RemoteCameraHandle),
-        (LensHandle, RemoteLensHandle),
-        (LightHandle, RemoteLightHandle),
-    ):
-        own = [name for name, member in vars(here).items() if looks_at_home(member)]
-        assert len(own) > 2
-        assert set(own) <= set(vars(there))
-
-
-def looks_at_home(member: object) -> bool:
-    function = member.fget if isinstance(member, property) else member
-    if not inspect.isfunction(function):
-        return False
-    return any(
-        f"self.{name}" in inspect.getsource(function)
-        for name in ("_unit", "_thread", "_application")
-    )
+def test_a_handle_from_elsewhere_has_no_camera_of_its_own(away: VicoRig) -> None:
+    """Whatever a script can read of it is known without one."""
+    lens, light = away.vico.lens, away.vico.light
+    assert lens is not None and light is not None
+    for handle in (away.vico, away.vico.camera(), lens, light):
+        names = [name for name in dir(handle) if not name.startswith("_")]
+        read = [name for name in names if isinstance(getattr(type(handle), name, None), property)]
+        assert len(read) > 5
+        for name in read:
+            if name != "application":
+                getattr(handle, name)
 
 
 # --- away and back ----------------------------------------------------------------------------
@@ -638,7 +641,7 @@ def test_a_station_that_goes_away_says_so_and_comes_back(tmp_path: Path) -> None
         first.enter_context(hosted(home, endpoint))
         client = stack.enter_context(connected(endpoint))
         remote = stack.enter_context(following(client, home.policy))
-        vico = Vico(remote)
+        vico = remote.api
         camera, lens = vico.camera(), vico.lens
         assert soon(lambda: camera.running)
         home.camera.push(noise(1))
@@ -665,13 +668,3 @@ def test_a_station_that_goes_away_says_so_and_comes_back(tmp_path: Path) -> None
             return found is not None and np.array_equal(found.data, noise(10))
 
         assert soon(newest)
-
-
-def test_the_stations_own_operator_needs_no_lease(tmp_path: Path) -> None:
-    with at_home(tmp_path) as home, hosted(home) as station:
-        own = InProcessTransport(station)
-        with following(own, home.policy) as remote:
-            lens = Vico(remote).lens
-            assert lens is not None
-            lens.seek_focus(3900).wait(LIMIT_S)
-        own.close()

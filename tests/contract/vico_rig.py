@@ -16,20 +16,19 @@ from contract.station_rig import connected, free_port, listening, wait_until
 from cosmic.frame.clock import Clock, RatedClock
 from cosmic.frame.errors import ConfigError, NotAvailable, NotConnectedError
 from cosmic.frame.failure import Failure, FailurePolicy
-from cosmic.frame.network.in_process import InProcessTransport
+from cosmic.frame.network.application import RemoteApplication
+from cosmic.frame.network.host import Host
 from cosmic.frame.network.line_settings import Line
 from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Transport
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.places import CalibrationShown, Pixel, Places, RotationShown
-from cosmic.vico.api.remote_application import RemoteVicoApplication
-from cosmic.vico.api.station_side import VicoStationSide
 from cosmic.vico.api.vico import Vico
 from cosmic.vico.core.peripheral_settings import LampSettings, MotorLensSettings, ZoomStepSettings
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.settings import CameraPlace, VicoSettings
-from cosmic.vico.hw.drawn_frame import DrawnFrame
+from cosmic.vico.hw.factory import make_lens, make_light
 from cosmic.vico.hw.interface import (
     Camera,
     CameraCounters,
@@ -44,7 +43,7 @@ from cosmic.vico.hw.interface import (
     Roi,
     Trigger,
 )
-from cosmic.vico.hw.peripheral_factory import make_lens, make_light
+from cosmic.vico.hw.sim_camera import DrawnFrame
 from cosmic.vico.hw.sim_peripherals import SimPeripherals
 
 LIMIT_S = 30.0
@@ -259,7 +258,7 @@ class VicoRig:
     home: Home
     vico: Vico
     station: Station
-    remote: RemoteVicoApplication | None = None
+    remote: RemoteApplication[Vico] | None = None
     client: Transport | None = None
 
 
@@ -308,7 +307,7 @@ def at_home(
 @contextmanager
 def hosted(home: Home, endpoint: str = "") -> Iterator[Station]:
     """Offer it on a station, which listens at `endpoint` if one is given."""
-    station, side = Station("fibres", home.policy), VicoStationSide(home.application)
+    station, side = Station("fibres", home.policy), Host("vico", Vico(home.application))
     station.host("vico", side)
     with ExitStack() as stack:
         stack.callback(side.close)
@@ -318,12 +317,12 @@ def hosted(home: Home, endpoint: str = "") -> Iterator[Station]:
 
 
 @contextmanager
-def following(transport: Transport, policy: FailurePolicy) -> Iterator[RemoteVicoApplication]:
+def following(transport: Transport, policy: FailurePolicy) -> Iterator[RemoteApplication[Vico]]:
     """Mirror the ViCo of a station."""
-    remote = RemoteVicoApplication(transport, policy)
+    remote = RemoteApplication("ViCo", Vico, transport, policy, name="vico")
     try:
         remote.initialize()
-        assert remote.wait_until_known(LIMIT_S), remote.problem
+        assert soon(lambda: remote.api.cameras), remote.api.away
         yield remote
     finally:
         remote.shut_down()
@@ -333,22 +332,17 @@ def following(transport: Transport, policy: FailurePolicy) -> Iterator[RemoteVic
 def vico_rig(
     where: str, folder: Path, size_px: tuple[int, int] = (64, 48), rate: float = 20.0
 ) -> Iterator[VicoRig]:
-    """Yield ViCo as it is used at "home", "in-process" or over "zenoh"."""
+    """Yield ViCo as it is used at "home" or over a "station"."""
     with ExitStack() as stack:
         home = stack.enter_context(at_home(folder, size_px, rate))
-        endpoint = f"tcp/127.0.0.1:{free_port()}" if where == "zenoh" else ""
+        endpoint = f"tcp/127.0.0.1:{free_port()}" if where != "home" else ""
         station = stack.enter_context(hosted(home, endpoint))
         if where == "home":
             yield VicoRig(home, Vico(home.application), station)
             return
-        client: Transport
-        if endpoint:
-            client = stack.enter_context(connected(endpoint))
-        else:
-            client = InProcessTransport(station, "vision")
-            stack.callback(client.close)
+        client = stack.enter_context(connected(endpoint))
         remote = stack.enter_context(following(client, home.policy))
-        yield VicoRig(home, Vico(remote), station, remote, client)
+        yield VicoRig(home, remote.api, station, remote, client)
 
 
 def with_exposure(now: CameraSettings | None, exposure_s: float) -> CameraSettings:

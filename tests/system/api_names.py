@@ -11,15 +11,14 @@ from cosmic.app.remote_station import StationControl
 from cosmic.autonomy.bending.plan import PlannedSpan
 from cosmic.autonomy.bending.result import BendingError, BendingResult, Quality, SpanFit
 from cosmic.autonomy.bending.span import Span
-from cosmic.autonomy.calibrating.book import (
-    CalibrationBook,
+from cosmic.autonomy.calibrating.registry import (
     CalibrationEntry,
+    CalibrationRegistry,
     CalibrationStanding,
 )
-from cosmic.autonomy.campaign.campaign import Campaign
+from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.records import CampaignError, FibreRecord, Outcome, Shape
 from cosmic.autonomy.campaign.statistics import CampaignProgress, MeanEi
-from cosmic.autonomy.campaign.steering import CampaignPhase
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.control.handle import ControlHandle
@@ -30,8 +29,7 @@ from cosmic.autonomy.control.pid import PidGains
 from cosmic.autonomy.control.trace import ControlTrace
 from cosmic.autonomy.procedures.failures import ProcedureAborted, ProcedureStopped, UndoFailed
 from cosmic.autonomy.procedures.operation import OperationFailed, UnitOperation
-from cosmic.autonomy.procedures.run import ProcedureRun
-from cosmic.autonomy.procedures.run_state import RunState
+from cosmic.autonomy.procedures.run import ProcedureRun, RunState
 from cosmic.autonomy.procedures.times import OperationStatistics, OperationTimes
 from cosmic.autonomy.procedures.tree import NodeEvent, NodeState, NodeView
 from cosmic.daqco.api.channel_shape import ChannelHandle
@@ -42,7 +40,13 @@ from cosmic.daqco.core.curves import Slope
 from cosmic.daqco.core.recording_format import AxisPosition, Overrun, RecordedEvent
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import LimitSettings
-from cosmic.frame.errors import DeviceFault, ExportCancelled, RecordingExistsError
+from cosmic.frame.declaration import Declared
+from cosmic.frame.errors import (
+    DeviceFault,
+    ExportCancelled,
+    OperationCancelled,
+    RecordingExistsError,
+)
 from cosmic.frame.network.errors import (
     Busy,
     CallRefused,
@@ -51,8 +55,8 @@ from cosmic.frame.network.errors import (
     StationAway,
     StationTimeout,
 )
+from cosmic.frame.operation import Operation, Progress, Task
 from cosmic.frame.plan_shape import PlanStatus
-from cosmic.frame.task import Progress, Task
 from cosmic.mico.api.axis import Axis, Jogging
 from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.axis_shape import AxisMovable
@@ -69,15 +73,15 @@ from cosmic.mico.api.trajectory_recording import TrajectoryRecording
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
-from cosmic.mico.core.links import Link
-from cosmic.mico.core.movement import Movement
+from cosmic.mico.core.motion.links import Link
+from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState, Status
+from cosmic.mico.core.motion.undo import UndoEntry
 from cosmic.mico.core.poses import Pose
-from cosmic.mico.core.positioner import Confidence, PositionerState, Status
 from cosmic.mico.core.teleoperation.state import TeleoperationPhase, TeleoperationState
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 from cosmic.mico.core.trajectory.model import Trajectory, TrajectoryError
 from cosmic.mico.core.trajectory.rehearsal import Rehearsal
-from cosmic.mico.core.undo import UndoEntry
 from cosmic.mico.hw.input_device import Feedback, InputInfo, InputKind, InputState
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
 from cosmic.vico.api.camera import CameraHandle, Seen
@@ -119,6 +123,7 @@ CLASSES: Final[dict[str, type]] = {
     "TeleoperationState": TeleoperationState,
     "InputInfo": InputInfo,
     "InputState": InputState,
+    "Operation": Operation,
     "Task": Task,
     "Progress": Progress,
     "PositionerState": PositionerState,
@@ -137,6 +142,7 @@ CLASSES: Final[dict[str, type]] = {
     "RecordedEvent": RecordedEvent,
     "Overrun": Overrun,
     "AxisPosition": AxisPosition,
+    "Declared": Declared,
     "Vico": Vico,
     "CameraHandle": CameraHandle,
     "LensHandle": LensHandle,
@@ -176,7 +182,7 @@ CLASSES: Final[dict[str, type]] = {
     "CampaignReader": CampaignReader,
     "FibreRecord": FibreRecord,
     "Shape": Shape,
-    "CalibrationBook": CalibrationBook,
+    "CalibrationRegistry": CalibrationRegistry,
     "CalibrationEntry": CalibrationEntry,
 }
 ENUMS: Final[dict[str, type[Enum]]] = {
@@ -202,6 +208,7 @@ ENUMS: Final[dict[str, type[Enum]]] = {
 }
 # Exceptions that a script may want to name and that `cosmic` does not export.
 FURTHER_EXCEPTIONS: Final = (
+    OperationCancelled,
     RecordingExistsError,
     ExportCancelled,
     TrajectoryError,
@@ -245,6 +252,16 @@ def names(title: str) -> dict[str, str]:
     if issubclass(cls, BaseModel):
         return {name: f"`{name}`" for name in cls.model_fields}
     found = {name: getattr(cls, name) for name in dir(cls) if not name.startswith("_")}
+    if cls is not Declared:  # what all that is declared have is listed once
+        found = {
+            name: each for name, each in found.items() if getattr(Declared, name, 0) is not each
+        }
+    if issubclass(cls, Operation) and cls is not Operation:  # what all have is listed once
+        found = {
+            name: value
+            for name, value in found.items()
+            if getattr(Operation, name, None) is not value
+        }
     found |= dict.fromkeys(MADE_LATER.get(title, ()))
     return {name: f"`{name}{signature(value)}`" for name, value in found.items()}
 

@@ -73,10 +73,10 @@ class Bench:
     def campaign(self, recipe: Path, folder: str, *, forget: tuple[str, ...] = ()) -> Campaign:
         """Return a campaign in a folder; `forget` names calibrations to be made anew."""
         campaign = self.rig.campaign(recipe, self.home / folder)
-        book = campaign.work.calibration.book
-        for entry in book.entries:
+        registry = campaign.work.calibration.registry
+        for entry in registry.entries:
             if entry.name in forget:
-                book.refuse(entry, "forgotten by the test")
+                registry.refuse(entry, "forgotten by the test")
         return campaign
 
     @property

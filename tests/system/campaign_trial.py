@@ -4,10 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from cosmic.autonomy.campaign.campaign import Campaign
+from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.records import FibreRecord, Outcome
-from cosmic.autonomy.campaign.steering import CampaignPhase
-from cosmic.autonomy.campaign.store_files import DATABASE
+from cosmic.autonomy.campaign.storage_format import DATABASE
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.frame.clock import WALL
 from system.campaign_bench import GRACE_WALL_S, Bench, Strike, wait_for

@@ -14,7 +14,7 @@ import pytest
 from contract.cameras.gige_process import GigeCamera, missing
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceError, NotConnectedError
-from cosmic.vico.hw.aravis_library import AravisLibrary
+from cosmic.vico.hw.aravis import AravisLibrary
 from cosmic.vico.hw.interface import (
     Camera,
     CameraSettings,
@@ -164,7 +164,7 @@ CLIENT = """
 import json, pathlib, sys
 from dataclasses import replace
 from cosmic.frame.clock import WALL
-from cosmic.vico.hw.aravis_library import AravisLibrary
+from cosmic.vico.hw.aravis import AravisLibrary
 from cosmic.vico.hw.interface import Roi
 
 library = AravisLibrary(packet_bytes=8000)

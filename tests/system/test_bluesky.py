@@ -17,7 +17,7 @@ from event_model import DocumentNames, schema_validators
 
 import cosmic
 from cosmic.mico.api.axis import Axis
-from cosmic.mico.core.positioner import Status
+from cosmic.mico.core.motion.positioner import Status
 from system.simulated_platform import wait_until
 
 Documents = list[tuple[str, dict[str, Any]]]

@@ -9,14 +9,14 @@ import pytest
 
 import cosmic
 from cosmic.app.rig import Rig
-from cosmic.autonomy.calibrating.book import CalibrationStanding
 from cosmic.autonomy.calibrating.drift import DRIFT
 from cosmic.autonomy.calibrating.heights import HEIGHTS
+from cosmic.autonomy.calibrating.registry import CalibrationStanding
 from cosmic.autonomy.calibrating.touching import TOUCH
 from cosmic.autonomy.calibrating.zooms import ZOOMS
+from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.prepare import HELD, PLATE, PROBE, TABLE
 from cosmic.autonomy.handling.settings import HandlingSettings, PushSettings
-from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.shipped.calibrate import build_calibrate
 from cosmic.frame.config import shipped_config_dir
 from cosmic.twin.truth import read_truth
@@ -55,14 +55,14 @@ def rig_on(home: Path, truth: Path | None = None) -> Iterator[Rig]:
 def test_everything_is_calibrated_and_agrees_with_the_truth(home: Path, tmp_path: Path) -> None:
     truth = tmp_path / "truth.jsonl"
     with rig_on(home, truth) as rig:
-        work = FibreWork.on(rig, SETTINGS)
+        work = HandlingContext.on(rig, SETTINGS)
         rig.procedure(build_calibrate(SETTINGS), work).run_here()
         work.close()
-        book = rig.calibrations
-        entries = {each.name: each for each in book.entries}
+        registry = rig.calibrations
+        entries = {each.name: each for each in registry.entries}
         assert set(entries) == {HEIGHTS, PLATE, HELD, PROBE, TOUCH, TABLE, ZOOMS}
         for each in entries.values():
-            assert book.standing(each) is CalibrationStanding.FRESH, each
+            assert registry.standing(each) is CalibrationStanding.FRESH, each
         zooms = {round(each.zoom_counts) for each in rig.vico.calibrated}
         assert len(zooms) == 5
     assert entries[HEIGHTS].values["up_um"] == pytest.approx(TOO_LOW_UM, abs=5.0)
@@ -81,17 +81,19 @@ def test_everything_is_calibrated_and_agrees_with_the_truth(home: Path, tmp_path
 @pytest.mark.timeout(600)
 def test_after_a_restart_what_holds_is_looked_at_and_used(home: Path) -> None:
     with rig_on(home) as rig:
-        book = rig.calibrations
-        before = {each.name: each for each in book.entries}
+        registry = rig.calibrations
+        before = {each.name: each for each in registry.entries}
         assert before, "kept by the test before"
-        assert {book.standing(each) for each in book.entries} == {CalibrationStanding.UNCHECKED}
-        work = FibreWork.on(rig, SETTINGS)
+        assert {registry.standing(each) for each in registry.entries} == {
+            CalibrationStanding.UNCHECKED
+        }
+        work = HandlingContext.on(rig, SETTINGS)
         run = rig.procedure(build_calibrate(SETTINGS, zooms=False), work)
         run.run_here()
         work.close()
-        now = {each.name: each for each in book.entries}
+        now = {each.name: each for each in registry.entries}
         for name in (HEIGHTS, PLATE, HELD, PROBE, TOUCH, TABLE):
-            assert book.standing(now[name]) is CalibrationStanding.FRESH, now[name]
+            assert registry.standing(now[name]) is CalibrationStanding.FRESH, now[name]
     # The others are measured anew where a tip is off, or is seen with a doubt.
     assert now[HEIGHTS].made == before[HEIGHTS].made
     assert now[HEIGHTS].checked is not None

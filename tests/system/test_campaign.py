@@ -9,10 +9,9 @@ import pytest
 
 from cosmic.app.campaign_output import write_output
 from cosmic.app.rig import Rig
-from cosmic.autonomy.campaign.campaign import Campaign
+from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.recipe import OutputSettings
 from cosmic.autonomy.campaign.records import CampaignError, Outcome
-from cosmic.autonomy.campaign.steering import CampaignPhase
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.frame.errors import ConfigError
 from cosmic.twin.truth import TruthRecord, read_truth

@@ -12,12 +12,12 @@ import pytest
 
 import cosmic
 from cosmic.app.rig import Rig
+from cosmic.autonomy.campaign.campaign import CampaignPhase
 from cosmic.autonomy.campaign.records import Outcome, Pose
-from cosmic.autonomy.campaign.steering import CampaignPhase
+from cosmic.autonomy.campaign.storage_format import DATABASE
 from cosmic.autonomy.campaign.store import CampaignStore
-from cosmic.autonomy.campaign.store_files import DATABASE
 from cosmic.autonomy.campaign.store_read import CampaignReader
-from cosmic.mico.core.positioner import Confidence
+from cosmic.mico.core.motion.positioner import Confidence
 from unit.autonomy.campaign.sample_records import INFO
 from unit.mico.rigs import wait_until
 

@@ -15,7 +15,7 @@ from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.handling.prepare import PLATE
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.operation import UnitOperation
-from cosmic.autonomy.procedures.walk import Part
+from cosmic.autonomy.procedures.procedure import Part
 from cosmic.autonomy.shipped.registry import PROCEDURES
 from system.campaign_bench import Bench, bench
 from system.campaign_trial import Provoke, Trial, Way
@@ -29,7 +29,7 @@ def fault(name: str, **where: object) -> Provoke:
 
 
 def distrust(_bench: Bench, campaign: Campaign) -> None:
-    campaign.work.distrusted = True
+    campaign.work.shared.needs_initialisation = True
 
 
 DARK: Final = fault("light_dimmed", amount=0.02)
@@ -56,8 +56,8 @@ def operations_of(part: Part) -> Iterator[UnitOperation]:
 def all_operations() -> dict[str, tuple[str, Way]]:
     """Return each operation with the first procedure that has it, and how it is come to."""
     found: dict[str, tuple[str, Way]] = {}
-    # What two hands do in turn is stopped in test_two_hands.py.
-    alone = {name: each for name, each in PROCEDURES.items() if each.hands == 1}
+    # What two arms do in turn is stopped in test_two_hands.py.
+    alone = {name: each for name, each in PROCEDURES.items() if each.arms == 1}
     for procedure, shipped in alone.items():
         for each in operations_of(shipped.build(HandlingSettings()).root):
             way = Way((each.key,)) if isinstance(each, Calibrated) else Way()

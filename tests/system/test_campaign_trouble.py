@@ -11,10 +11,9 @@ from types import SimpleNamespace
 import pytest
 
 import cosmic
-from cosmic.autonomy.campaign import steering
-from cosmic.autonomy.campaign.campaign import Campaign
+from cosmic.autonomy.campaign import campaign as campaign_module
+from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.records import CampaignError, FibreRecord, Outcome
-from cosmic.autonomy.campaign.steering import CampaignPhase
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.autonomy.handling import sight
@@ -110,9 +109,9 @@ def make(tmp_path: Path) -> Iterator[Make]:
 @pytest.mark.parametrize(
     ("sample", "told"),
     [
-        ("empty", "the plate is empty; put a sample there"),
-        ("crossings", r"none on the plate can be taken up \(.*\d+ crossing.*\); spread them"),
-        ("long", r"none on the plate can be taken up \(\d out of the field\); spread them"),
+        ("empty", "the plate is empty: put a sample there"),
+        ("crossings", r"none on the plate can be grasped \(.*\d+ crossing.*\): spread them"),
+        ("long", r"none on the plate can be grasped \(\d out of the field\): spread them"),
     ],
 )
 def test_where_nothing_can_be_taken_up_the_campaign_ends_and_says_why(
@@ -187,12 +186,14 @@ def room(monkeypatch: pytest.MonkeyPatch) -> Event:
 def test_a_fibre_that_the_full_disk_does_not_take_is_kept_when_there_is_room(
     make: Make, monkeypatch: pytest.MonkeyPatch, room: Event
 ) -> None:
-    monkeypatch.setattr(steering, "AGAIN_WALL_S", 0.05)
+    monkeypatch.setattr(campaign_module, "RETRY_INTERVAL_WALL_S", 0.05)
     bench = make()
     campaign = bench.campaign(procedure="transport")
     Strike(campaign, "release", room.clear)
     campaign.start()
-    wait_for(lambda: campaign.operation == steering.WAITING or campaign.over, "the full disk")
+    wait_for(
+        lambda: campaign.operation == campaign_module.WAITING or campaign.over, "the full disk"
+    )
     assert not campaign.over, campaign.end_reason
     assert bench.fibres[0].outcome is Outcome.RUNNING
     room.set()
@@ -205,13 +206,13 @@ def test_a_fibre_that_the_full_disk_does_not_take_is_kept_when_there_is_room(
 def test_where_no_room_is_made_it_says_what_is_not_kept_and_can_be_gone_on_with(
     make: Make, monkeypatch: pytest.MonkeyPatch, room: Event
 ) -> None:
-    monkeypatch.setattr(steering, "PATIENCE_WALL_S", 0.0)
+    monkeypatch.setattr(campaign_module, "RETRY_TIMEOUT_WALL_S", 0.0)
     bench = make()
     campaign = bench.campaign(procedure="transport")
     Strike(campaign, "release", room.clear)
     campaign.run_here()
     assert campaign.phase is CampaignPhase.FAILED
-    for word in ("the last fibre is not kept", "No space left", "make room", "same folder"):
+    for word in ("the last fibre is not saved", "No space left", "make room", "same folder"):
         assert word in campaign.end_reason
     bench.check_stands()
     room.set()
@@ -328,7 +329,7 @@ def soon(monkeypatch: pytest.MonkeyPatch) -> None:
             "left.z",
             "has no sensor",
         ),
-        ("camera unplugged", {}, "carry to the probe", "microscope", "no simulated camera"),
+        ("camera unplugged", {}, "carry to the probe", "microscope", "cannot open a camera"),
         ("board unplugged", {}, "push the spans", "force", "Dev1"),
         ("sensor_saturated", {}, "carry to the probe", "force", "180 uN"),
         ("sensor_dead", {}, "push the spans", "dead", "dead"),

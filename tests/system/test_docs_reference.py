@@ -11,7 +11,7 @@ from pydantic import BaseModel
 import cosmic
 from cosmic.app.platform_file import load_platform
 from cosmic.daqco.hw.sim_faults import NAMES as BOARD_FAULTS
-from cosmic.mico.core.positioner import Confidence
+from cosmic.mico.core.motion.positioner import Confidence
 from cosmic.mico.hw.sim_scu3d_faults import NAMES as FAULTS
 from system.api_names import CLASSES, ENUMS, exceptions, names, signature
 from system.config_tables import SECTIONS, WHOLE_FILES, rows

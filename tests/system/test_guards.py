@@ -10,7 +10,6 @@ import pytest
 from contract.daqco_rig import DaqcoRig, daqco_rig, settings
 from contract.station_rig import wait_until
 from cosmic.daqco.api.recording import open_recording
-from cosmic.daqco.api.window_port import WindowPort
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings, LimitSettings, ScaleSettings
 from cosmic.daqco.gui.draft import Draft
@@ -62,7 +61,7 @@ class Guarded:
         assert "force reached" in self.stops[0]
 
 
-@pytest.fixture(params=["home", "in-process"])
+@pytest.fixture(params=["home", "station"])
 def guarded(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Guarded]:
     wanted = settings(tmp_path, channels=3)
     wanted = wanted.model_copy(update={"silence_s": 0.5, "chunk_s": 0.01})
@@ -135,11 +134,11 @@ def test_an_armed_limit_keeps_its_scale(guarded: Guarded, name: str) -> None:
 
 
 def test_the_configure_dialog_is_refused_as_scripts_are(guarded: Guarded) -> None:
-    application = guarded.rig.remote or guarded.rig.home.application
-    draft = Draft(application.settings)
+    daqco = guarded.rig.daqco
+    draft = Draft(daqco.settings)
     draft.replace(0, draft.channels[0].model_copy(update={"name": "push"}))
     with pytest.raises(NotAvailable, match="isarm the limit first"):
-        WindowPort(application).apply(draft.settings())
+        daqco.apply(draft.settings())
     guarded.check_watched()
 
 

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 import cosmic
 from cosmic.frame.clock import WALL
+from cosmic.frame.network.lease import StationLease
 from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.core.collision.callback import CollisionCallbackBase, Response
 from unit.mico.rigs import wait_until
@@ -275,3 +276,29 @@ def test_a_rescan_between_orders_lets_nothing_through(own_rig: cosmic.Rig) -> No
     wait_until(lambda: not manager.gate.held())
     assert not any(axis.details.in_motion for axis in rig.mico)
     assert abs(rig.mico["left.x"].position_um) < 10.0 * (done + 40)
+
+
+def test_when_control_passes_local_jogs_end_and_movements_go_on_to_their_end(
+    own_rig: cosmic.Rig,
+) -> None:
+    station = StationLease()
+    application(own_rig).manager.lease.join(station)
+    left, right = own_rig.mico["left.x"], own_rig.mico["right.x"]
+    with moving(own_rig, to=300.0) as movement, right.jog(1, speed=100.0) as jog:
+        wait_until(lambda: right.details.in_motion)
+        station.take("vision", "t" * 32, in_process=True)
+
+        def ended() -> bool:
+            jog.renew()
+            return jog.done
+
+        wait_until(ended)
+        assert "vision controls the platform now" in str(jog.movement.exception(5.0))
+        wait_until(lambda: not right.details.in_motion)
+        assert not movement.done, "it goes on"
+        assert movement.exception(20.0) is None
+    assert left.position_um == pytest.approx(300.0, abs=1.0)
+    with pytest.raises(cosmic.MoveRefused, match="vision controls the platform now"):
+        left.move_to(0.0)
+    station.take_over()
+    left.move_to(0.0)

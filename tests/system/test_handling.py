@@ -8,16 +8,15 @@ from types import SimpleNamespace
 import pytest
 
 import cosmic
-from cosmic.autonomy.handling.in_hand import FibreInHand
+from cosmic.autonomy.handling.context import HandlingContext
+from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.settings import HandlingSettings, PushSettings
-from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.failures import ProcedureStopped
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun
 from cosmic.autonomy.procedures.tree import NodeEvent, NodeState
-from cosmic.autonomy.shipped.bend_test import build_bend_test
-from cosmic.autonomy.shipped.transport import build_transport
+from cosmic.autonomy.shipped.bend_test import build_bend_test, build_transport
 from cosmic.frame.failure import FailurePolicy
 from cosmic.twin.truth import TrueFibre, TruthRecord, read_truth
 
@@ -30,19 +29,19 @@ LIMIT_UN = 0.8 * 180.0
 @contextmanager
 def sample(name: str, truth: Path, seed: int = 0) -> Iterator[SimpleNamespace]:
     with cosmic.connect(sample=name, rate=RATE, seed=seed, truth=truth) as rig:
-        work = FibreWork.on(rig, SETTINGS)
+        work = HandlingContext.on(rig, SETTINGS)
         try:
             yield SimpleNamespace(rig=rig, work=work)
         finally:
             work.close()
 
 
-def carried_out(work: FibreWork, procedure: Procedure[FibreWork]) -> FibreInHand:
+def carried_out(work: HandlingContext, procedure: Procedure[HandlingContext]) -> HeldFibre:
     ProcedureRun(procedure, work, work.clock, FailurePolicy()).run_here()
-    return work.finished[-1]
+    return work.shared.finished[-1]
 
 
-def true_fibre(record: TruthRecord, fibre: FibreInHand) -> TrueFibre:
+def true_fibre(record: TruthRecord, fibre: HeldFibre) -> TrueFibre:
     """Return the one that was grasped while `fibre` was in hand."""
     grasped = [
         each.facts["fibre"]
@@ -53,7 +52,7 @@ def true_fibre(record: TruthRecord, fibre: FibreInHand) -> TrueFibre:
     return next(each for each in record.fibres if each.number == number)
 
 
-def check(record: TruthRecord, fibre: FibreInHand, *, fell: bool = False) -> None:
+def check(record: TruthRecord, fibre: HeldFibre, *, fell: bool = False) -> None:
     """See that what was measured is what is true."""
     true, found = true_fibre(record, fibre), fibre.bending
     assert found is not None
@@ -133,7 +132,7 @@ def test_a_fibre_that_was_lost_on_the_way_is_found_and_measured_all_the_same(
                 carried_out(bench.work, build_bend_test(SETTINGS))
             except OperationFailed as failure:
                 failures.append(failure.cause)
-        good = [each for each in bench.work.finished if each.failure is None]
+        good = [each for each in bench.work.shared.finished if each.failure is None]
     record = read_truth(truth)
     assert set(failures) <= {"dropped", "lost", "no fibre"}
     for fibre in good:
@@ -177,7 +176,7 @@ def test_after_a_stop_in_mid_air_the_next_run_puts_away_what_it_finds_in_the_jaw
         assert work.fibre is not None
         rig.reset_stop()
         fibre = carried_out(work, procedure)
-        left = work.finished[-2]
+        left = work.shared.finished[-2]
     record = read_truth(truth)
     assert left.failure is not None
     assert left.failure.cause == "interrupted"

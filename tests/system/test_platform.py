@@ -1,7 +1,9 @@
 """The shipped platform from the scripted API down to the stages of the twin."""
 
+import gc
 import math
 import random
+import weakref
 from contextlib import suppress
 
 import pytest
@@ -9,7 +11,7 @@ import pytest
 import cosmic
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceError, DeviceFault
-from cosmic.mico.core.positioner import Confidence, Status
+from cosmic.mico.core.motion.positioner import Confidence, Status
 from system.simulated_platform import platform, wait_until
 
 
@@ -161,6 +163,20 @@ def test_closing_releases_the_hold_and_leaves_nothing_moving():
         WALL.sleep(0.2)
         assert at < 4000.0
         assert scene.truth()["left.x"] == pytest.approx(at, abs=1.0)
+
+
+def test_a_closed_platform_leaves_nothing_in_memory():
+    kept = []
+    for _ in range(2):
+        with cosmic.connect() as rig:
+            rig.vico.camera().start().wait(20.0)
+            rig.daqco.start()
+            rig.vico.snap()
+            applications = (rig.mico.application, rig.daqco.application, rig.vico.application)
+            kept += [weakref.ref(each) for each in applications]
+        del rig, applications
+    gc.collect()
+    assert [each() for each in kept] == [None] * 6
 
 
 def test_random_commands_never_leave_the_limits_and_never_hang():

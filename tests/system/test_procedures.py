@@ -20,8 +20,8 @@ from cosmic.autonomy.procedures.parts import (
     Steps,
     UnitOperation,
 )
+from cosmic.autonomy.procedures.procedure import Part
 from cosmic.autonomy.procedures.run import ProcedureRun
-from cosmic.autonomy.procedures.walk import Part
 from cosmic.mico.api.axis import Axis
 
 LIMIT_S = 20.0

@@ -151,7 +151,7 @@ def test_the_hand_feels_the_fibre_that_the_probe_pushes_and_cannot_push_too_hard
         wait_until(lambda: abs(rig.daqco.latest()["force"]) < 20.0, timeout_s=10.0)
 
 
-def test_the_force_channel_is_not_renamed_under_the_hand_and_its_lack_is_told():
+def test_the_force_channel_is_not_renamed_under_the_hand_and_its_lack_is_told(caplog):
     with cosmic.connect(applications=("mico", "daqco")) as rig, VirtualGamepad() as pad:
         teleoperation, daqco = rig.mico.teleoperation, rig.daqco
         daqco.disarm_limit("force")
@@ -170,6 +170,8 @@ def test_the_force_channel_is_not_renamed_under_the_hand_and_its_lack_is_told():
             daqco.apply(renamed)
         teleoperation.stop()
         daqco.apply(renamed)
+        told = [each.getMessage() for each in caplog.records if each.levelname == "WARNING"]
+        assert any("force feedback needs the channel force" in each for each in told)
         with pytest.raises(cosmic.NotAvailable, match="force feedback needs the channel force"):
             teleoperation.start(pad.key, "left assembly")
         daqco.apply(before)

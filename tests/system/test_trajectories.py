@@ -31,7 +31,7 @@ from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.trajectory_places import AwayFromStartError
 from cosmic.mico.api.trajectory_recording import TrajectoryRecording
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
-from cosmic.mico.core.messages import MovementBegun
+from cosmic.mico.core.motion.messages import MovementBegun
 from cosmic.mico.core.trajectory.model import Trajectory, TrajectoryError
 from cosmic.mico.core.trajectory.parser import parse
 from cosmic.mico.core.trajectory_recorder import TrajectoryRecorder
@@ -408,7 +408,7 @@ def test_one_trajectory_runs_at_a_time(mico: Mico) -> None:
         mico.initialise()
     player.cancel()
     with pytest.raises(MoveCancelled):
-        player.wait(2.0)
+        player.wait(20.0)
     assert mico.trajectories.player is player
 
 

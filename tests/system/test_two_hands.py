@@ -1,4 +1,4 @@
-"""Campaigns of two hands on the twin: one fetches while the other's fibre is measured."""
+"""Campaigns of two arms on the twin: one fetches while the other's fibre is measured."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -7,9 +7,8 @@ from typing import Final
 
 import pytest
 
-from cosmic.autonomy.campaign.campaign import Campaign
+from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.records import FibreRecord, Outcome
-from cosmic.autonomy.campaign.steering import CampaignPhase
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.frame.clock import WALL
 from cosmic.twin.truth import TruthRecord
@@ -36,7 +35,7 @@ def records(plate: Bench, folder: str) -> list[FibreRecord]:
 
 
 def hand_of(plate: Bench, record: FibreRecord) -> tuple[str, int]:
-    """Return by which hand, and which fibre of the twin's, a record is of; by its positions."""
+    """Return by which arm, and which fibre of the twin's, a record is of; by its positions."""
     closes = [each for each in record.operations if each.name == "close the gripper"]
     grasped = [
         (str(each.facts["tool"]), int(each.facts["fibre"]))
@@ -100,7 +99,7 @@ def test_both_hands_measure_rightly_and_the_probe_is_one_hands_at_a_time(plate: 
     for record in found:
         noted = [each.operation for each in journal if each.fibre == record.number]
         done = [each.name for each in record.operations]
-        assert noted == done[-len(noted) :], "what is noted of a fibre is what its hand did"
+        assert noted == done[-len(noted) :], "what is noted of a fibre is what its arm did"
         assert noted[0] == "turn the table"
 
 
@@ -154,8 +153,8 @@ def test_an_abort_leaves_both_hands_safe(plate: Bench) -> None:
     assert trial.campaign.run is not None
     assert trial.campaign.run.not_safe == ""
     assert work.tip_now(work.probe)[1] >= work.settings.places.probe_away_y_um - 2.0
-    for hand in work.hands:
-        assert hand.height_now() >= hand.settings.places.travel_um - 2.0
+    for arm in work.arms:
+        assert arm.height_now() >= arm.settings.places.travel_um - 2.0
     trial.goes_on()
 
 

@@ -20,7 +20,7 @@ from cosmic.vico.core.camera_thread import CameraThread
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.recording.reading import open_picture_recording
 from cosmic.vico.hw.interface import CameraLibrary, Roi
-from cosmic.vico.hw.sim_camera_library import SimulatedCameraLibrary
+from cosmic.vico.hw.sim_camera import SimulatedCameraLibrary
 from unit.mico.rigs import wait_until
 
 Floats = npt.NDArray[np.float64]

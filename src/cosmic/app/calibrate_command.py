@@ -5,7 +5,11 @@ import sys
 from typing import Final
 
 from cosmic.app.connect import connect
-from cosmic.autonomy.calibrating.book import CalibrationBook, CalibrationEntry, CalibrationStanding
+from cosmic.autonomy.calibrating.registry import (
+    CalibrationEntry,
+    CalibrationRegistry,
+    CalibrationStanding,
+)
 from cosmic.autonomy.procedures.tree import OPERATION, NodeEvent, NodeState
 from cosmic.frame.errors import CosmicError
 
@@ -32,15 +36,15 @@ def run_calibrate(chosen: argparse.Namespace) -> int:
             sys.stderr.write(f"{exc}\n")
         for each in rig.calibrations.entries:
             sys.stdout.write(f"{line_of(rig.calibrations, each)}\n")
-        book = rig.calibrations
-        poor = any(book.standing(each) is CalibrationStanding.POOR for each in book.entries)
+        registry = rig.calibrations
+        poor = any(registry.standing(each) is CalibrationStanding.POOR for each in registry.entries)
         return 1 if poor or run.failure is not None else 0
 
 
-def line_of(book: CalibrationBook, entry: CalibrationEntry) -> str:
+def line_of(registry: CalibrationRegistry, entry: CalibrationEntry) -> str:
     """Return a calibration in one line."""
     quality = entry.problem or f"{entry.residual:.2g} {entry.unit}, at most {entry.largest:g}"
-    return f"{entry.name} ({entry.tool}): {book.standing(entry)}, {quality}"
+    return f"{entry.name} ({entry.tool}): {registry.standing(entry)}, {quality}"
 
 
 def _tell(event: NodeEvent) -> None:

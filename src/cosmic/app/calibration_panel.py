@@ -14,11 +14,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from cosmic.app.procedure_tree import ProcedureTreePanel
-from cosmic.app.procedure_tree_port import ProcedurePort
-from cosmic.app.procedure_tree_sign import SIGN_PX, state_pixmap
+from cosmic.app.procedure_tree_panel import ProcedurePort, ProcedureTreePanel
 from cosmic.app.rig import Rig
-from cosmic.autonomy.calibrating.book import CalibrationBook, CalibrationEntry, CalibrationStanding
+from cosmic.app.state_indicator import INDICATOR_PX, state_pixmap
+from cosmic.autonomy.calibrating.registry import (
+    CalibrationEntry,
+    CalibrationRegistry,
+    CalibrationStanding,
+)
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
@@ -31,7 +34,7 @@ CALIBRATIONS: Final = "Calibrations"
 HEADERS: Final = ("Calibration", "Tool", "Standing", "Residual", "At most", "Age", "How")
 NAME, TOOL, STANDING, RESIDUAL, LARGEST, AGE, HOW = range(len(HEADERS))
 PERIOD_MS: Final = 1000
-SIGNS: Final = {
+STANDING_STATES: Final = {
     CalibrationStanding.FRESH: State.OK,
     CalibrationStanding.STALE: State.REFUSED,
     CalibrationStanding.UNCHECKED: State.REFUSED,
@@ -49,30 +52,30 @@ class Calibrating(Protocol):
 
 
 class CalibrationPanel(QWidget):
-    """Lists the book, and carries out the procedure that calibrates; GUI thread.
+    """Lists the registry, and carries out the procedure that calibrates; GUI thread.
 
     Parameters
     ----------
-    book : callable
-        Returns the book.
+    registry : callable
+        Returns the registry.
     calibrate : callable
         Returns a run that is ready to begin.
     """
 
     def __init__(
         self,
-        book: Callable[[], CalibrationBook],
+        registry: Callable[[], CalibrationRegistry],
         calibrate: Calibrating,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self.setObjectName("CalibrationPanel")
-        self._book = book
+        self._registry = registry
         self.list = named(QTreeWidget(), "calibrationList")
         self.list.setHeaderLabels(list(HEADERS))
         self.list.setRootIsDecorated(False)
         self.list.setSelectionMode(QTreeWidget.SelectionMode.ExtendedSelection)
-        self.list.setIconSize(QSize(SIGN_PX, SIGN_PX))
+        self.list.setIconSize(QSize(INDICATOR_PX, INDICATOR_PX))
         self.list.itemSelectionChanged.connect(self._on_selection)
         self.anew = named(
             push_button("Measure anew", "What is selected is measured by the next run in any case"),
@@ -101,9 +104,9 @@ class CalibrationPanel(QWidget):
         self._on_selection()
 
     def refresh(self) -> None:
-        """Show the book as it is now."""
-        book = self._book()
-        entries = book.entries
+        """Show the registry as it is now."""
+        registry = self._registry()
+        entries = registry.entries
         keys = tuple(each.key for each in entries)
         self.none.setVisible(not keys)
         if keys != self._shown:
@@ -111,7 +114,7 @@ class CalibrationPanel(QWidget):
             self.list.addTopLevelItems([QTreeWidgetItem() for _ in keys])
             self._shown = keys
         for row, entry in enumerate(entries):
-            self._fill(self.list.topLevelItem(row), book, entry)
+            self._fill(self.list.topLevelItem(row), registry, entry)
         for column in range(HOW):
             self.list.resizeColumnToContents(column)
 
@@ -120,16 +123,16 @@ class CalibrationPanel(QWidget):
             self.refresh()
 
     def _fill(
-        self, item: QTreeWidgetItem | None, book: CalibrationBook, entry: CalibrationEntry
+        self, item: QTreeWidgetItem | None, registry: CalibrationRegistry, entry: CalibrationEntry
     ) -> None:
         if item is None:
             return
-        standing = book.standing(entry)
-        for column, text in enumerate(texts(book, entry)):
+        standing = registry.standing(entry)
+        for column, text in enumerate(texts(registry, entry)):
             if item.text(column) != text:
                 item.setText(column, text)
         if standing not in self._icons:
-            self._icons[standing] = QIcon(state_pixmap(SIGNS[standing]))
+            self._icons[standing] = QIcon(state_pixmap(STANDING_STATES[standing]))
         item.setIcon(STANDING, self._icons[standing])
         item.setData(NAME, _KEY, entry.key)
         tip = "\n".join(
@@ -142,10 +145,10 @@ class CalibrationPanel(QWidget):
         self.anew.setEnabled(bool(self.list.selectedItems()))
 
     def _on_anew(self) -> None:
-        book = self._book()
+        registry = self._registry()
         for item in self.list.selectedItems():
             name, tool = item.data(NAME, _KEY)
-            book.forget(name, tool)
+            registry.forget(name, tool)
         self.refresh()
 
     @override
@@ -165,16 +168,16 @@ class CalibrationPanel(QWidget):
         self.run.shut_down()
 
 
-def texts(book: CalibrationBook, entry: CalibrationEntry) -> Sequence[str]:
+def texts(registry: CalibrationRegistry, entry: CalibrationEntry) -> Sequence[str]:
     """Return what stands in the columns of the list."""
     refused = bool(entry.problem)
     return (
         entry.name,
         entry.tool,
-        str(book.standing(entry)),
+        str(registry.standing(entry)),
         "" if refused else f"{entry.residual:.2g} {entry.unit.replace('um', 'µm')}",
         "" if refused else f"{entry.largest:g}",
-        duration_text(book.age_s(entry)),
+        duration_text(registry.age_s(entry)),
         entry.problem or entry.how,
     )
 

@@ -1,22 +1,27 @@
 """``cosmic campaign``: a recipe without a window, with a bar that says how far it is."""
 
 import argparse
+import logging
 import math
 import signal
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import Final, TextIO
 
 from cosmic.app.campaign_output import gui_application, write_output
 from cosmic.app.connect import connect
-from cosmic.autonomy.campaign.campaign import Campaign
+from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.opening import read_recipe, recorded_seed
 from cosmic.autonomy.campaign.recipe import Recipe
 from cosmic.autonomy.campaign.records import TWIN
-from cosmic.autonomy.campaign.steering import CampaignPhase
 from cosmic.frame.clock import WALL
+from cosmic.frame.log import set_up_logging
 
+logger = logging.getLogger(__name__)
+
+LOG: Final = "cosmic.log"
 _EVERY_S: Final = 0.5
 _BAR: Final = 24
 _CODES: Final = {CampaignPhase.ENDED: 0, CampaignPhase.FAILED: 1, CampaignPhase.STOPPED: 3}
@@ -39,10 +44,14 @@ def run_campaign(chosen: argparse.Namespace) -> int:
         known = recorded_seed(chosen.out)
         seed = twin.seed if known is None else known
     sample = chosen.sample or recipe.file.sample.name or None
-    with connect(
-        chosen.config, rate=rate, cold=chosen.cold, seed=seed, sample=sample, truth=chosen.truth
-    ) as rig:
+    with (
+        ExitStack() as at_end,
+        connect(
+            chosen.config, rate=rate, cold=chosen.cold, seed=seed, sample=sample, truth=chosen.truth
+        ) as rig,
+    ):
         campaign = rig.campaign(recipe, chosen.out)
+        at_end.callback(_log_to(chosen.out / LOG))  # after this is known to be its own folder
         if rig.simulated:
             sys.stderr.write(f"{recipe.name}: {TWIN}, seed {seed}, {rate:g} times\n")
         with _ended_by_signals(campaign):
@@ -55,6 +64,15 @@ def run_campaign(chosen: argparse.Namespace) -> int:
     text = f"{recipe.name}: {campaign.end_reason}\n"
     (sys.stderr if code else sys.stdout).write(text)
     return code
+
+
+def _log_to(file: Path) -> Callable[[], None]:
+    """Keep the log in `file`; where that cannot be written the campaign goes on without."""
+    try:
+        return set_up_logging(file=file)
+    except OSError as exc:
+        logger.warning("%s: no log is kept: %s", file, exc)
+        return lambda: None
 
 
 class Bar:

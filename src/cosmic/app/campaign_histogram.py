@@ -10,9 +10,9 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QWidget
 
 from cosmic.app.curve_frame import CurveFrame
-from cosmic.autonomy.campaign.board import MeasuredEi
+from cosmic.autonomy.campaign.formatting import EI_LABEL, EI_UNIT
 from cosmic.autonomy.campaign.records import Floats
-from cosmic.autonomy.campaign.report_figures import EI_LABEL, EI_UNIT
+from cosmic.autonomy.campaign.snapshot import MeasuredEi
 from cosmic.autonomy.campaign.statistics import MeanEi
 from cosmic.frame.gui.palette import OKABE_ITO, Palette
 from cosmic.frame.gui.theme import STEP_PX

@@ -1,23 +1,157 @@
-"""What is made of a campaign besides its records: report and table."""
+"""What is made of a campaign besides its records: the report as page and PDF, and the table."""
 
 import os
 import sys
 from collections.abc import Callable
+from html import escape
 from pathlib import Path
 from typing import Final
 
-from PySide6.QtCore import QCoreApplication
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtCore import (
+    QBuffer,
+    QByteArray,
+    QCoreApplication,
+    QIODevice,
+    QMarginsF,
+    QRectF,
+    QSizeF,
+    Qt,
+    QUrl,
+)
+from PySide6.QtGui import (
+    QFont,
+    QGuiApplication,
+    QImage,
+    QPageLayout,
+    QPageSize,
+    QPainter,
+    QPdfWriter,
+    QTextDocument,
+)
+from PySide6.QtSvg import QSvgRenderer
 
-from cosmic.app.report_pdf import write_pdf
 from cosmic.autonomy.campaign.recipe import OutputSettings
-from cosmic.autonomy.campaign.report import write_report
+from cosmic.autonomy.campaign.records import CampaignError
+from cosmic.autonomy.campaign.report import report_body, report_data, write_report
 from cosmic.autonomy.campaign.report_table import write_table
+from cosmic.autonomy.campaign.store import CampaignStore, write_whole
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.overrides import override
 from cosmic.frame.threads import WorkerThread
+
+FINE: Final = 3
+"""Pixels of a drawn figure for one of the page."""
+
+FIGURE_PX: Final = 330
+"""Widest of two beside each other."""
+
+NUMBER_PX: Final = 10
+MARGINS_MM: Final = (15.0, 15.0, 15.0, 15.0)
+WIDTH_PX: Final = 680.0
+HEIGHT_PX: Final = 976.0
+"""Of the text on a page of A4, in the pixels that the report counts in."""
+
+STYLE: Final = """
+body { font-family: sans-serif; font-size: 11px; color: #202428; }
+h1 { font-size: 20px; } h2 { font-size: 15px; } h3 { font-size: 13px; margin-top: 14px; }
+h3.long { page-break-before: always; }
+th { background-color: #eef1f4; font-size: 11px; } td { font-size: 11px; }
+pre { background-color: #f3f5f7; font-size: 10px; } small { font-size: 9px; }
+"""
+
+
+class _Figures:
+    """Puts figures into a document under names of their own."""
+
+    def __init__(self, document: QTextDocument) -> None:
+        self._document = document
+        self._count = 0
+
+    def svg(self, svg: str, width_px: int) -> str:
+        drawing = QSvgRenderer(QByteArray(svg.encode()))
+        size = drawing.defaultSize()
+        width_px = width_px if width_px > FIGURE_PX + 100 else FIGURE_PX
+        height_px = round(width_px * size.height() / size.width())
+        image = QImage(FINE * width_px, FINE * height_px, QImage.Format.Format_RGB32)
+        image.fill(0xFFFFFFFF)
+        painter = QPainter(image)
+        drawing.render(painter)
+        painter.end()
+        return f"<p>{self._keep(image, width_px, height_px, 'figure')}</p>"
+
+    def png(self, data: bytes, width_px: int, words: str) -> str:
+        image = QImage.fromData(data)
+        width_px = min(width_px, FIGURE_PX)
+        height_px = round(width_px * image.height() / max(image.width(), 1))
+        return self._keep(image, width_px, height_px, words)
+
+    def _keep(self, image: QImage, width_px: int, height_px: int, words: str) -> str:
+        self._count += 1
+        name = f"cosmic:figure/{self._count}"
+        kind = QTextDocument.ResourceType.ImageResource
+        self._document.addResource(kind.value, QUrl(name), image)
+        return (
+            f'<img src="{name}" width="{width_px}" height="{height_px}" '
+            f'alt="{escape(words, quote=True)}">'
+        )
+
+
+def write_pdf(campaign: CampaignStore | CampaignReader, path: str | Path) -> None:
+    """Write the report of a campaign as PDF, A4.
+
+    There must be a `QGuiApplication`, of any Qt platform; it shows nothing.
+
+    Raises
+    ------
+    CampaignError
+        The campaign cannot be read, or the file not be written.
+    """
+    if QGuiApplication.instance() is None:
+        raise CampaignError("a report can only be printed by a program with a Qt application")
+    reader = campaign.reader if isinstance(campaign, CampaignStore) else campaign
+    data = report_data(reader)
+    document = QTextDocument()
+    figures = _Figures(document)
+    document.setDefaultStyleSheet(STYLE)
+    document.setHtml(f"<body>{report_body(data, svg=figures.svg, png=figures.png)}</body>")
+    held = QBuffer()
+    held.open(QIODevice.OpenModeFlag.WriteOnly)
+    writer = QPdfWriter(held)
+    writer.setPageSize(QPageSize(QPageSize.PageSizeId.A4))
+    writer.setPageMargins(QMarginsF(*MARGINS_MM), QPageLayout.Unit.Millimeter)
+    writer.setTitle(f"{data.info.name}: {data.info.procedure}")
+    writer.setCreator("CoSMic")
+    _print(document, writer)
+    write_whole(Path(path), bytes(held.data().data()))
+
+
+def _print(document: QTextDocument, writer: QPdfWriter) -> None:
+    """Print page by page, with their numbers."""
+    document.setDocumentMargin(0.0)
+    document.setPageSize(QSizeF(WIDTH_PX, HEIGHT_PX))
+    painter = QPainter(writer)
+    scale = writer.width() / WIDTH_PX
+    font = QFont(document.defaultFont())
+    font.setPixelSize(NUMBER_PX)  # a size in points would be scaled twice
+    painter.setFont(font)
+    count = document.pageCount()
+    for page in range(count):
+        if page:
+            writer.newPage()
+        painter.save()
+        painter.scale(scale, scale)
+        painter.drawText(
+            QRectF(0.0, HEIGHT_PX + 10.0, WIDTH_PX, 18.0),
+            Qt.AlignmentFlag.AlignRight,
+            f"{page + 1} / {count}",
+        )
+        painter.translate(0.0, -page * HEIGHT_PX)
+        document.drawContents(painter, QRectF(0.0, page * HEIGHT_PX, WIDTH_PX, HEIGHT_PX))
+        painter.restore()
+    painter.end()
+
 
 HTML: Final = "report.html"
 PDF: Final = "report.pdf"

@@ -6,42 +6,120 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import QComboBox, QFileDialog, QLineEdit, QTabWidget, QVBoxLayout, QWidget
 
 from cosmic.app.campaign_board import CampaignBoard
 from cosmic.app.campaign_output import OutputThread
-from cosmic.app.campaign_port import CampaignRun
 from cosmic.app.fibre_card import FibreCard
-from cosmic.app.procedure_tree import ProcedureTreePanel
-from cosmic.app.procedure_tree_port import ProcedurePort
-from cosmic.autonomy.campaign.board import board_of, card_of
-from cosmic.autonomy.campaign.campaign import Campaign
+from cosmic.app.procedure_tree_panel import ProcedurePort, ProcedureTreePanel
+from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.recipe import Recipe, shipped_recipes
 from cosmic.autonomy.campaign.records import FibreRecord
+from cosmic.autonomy.campaign.snapshot import card_of, snapshot_of
 from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.autonomy.procedures.combinators import outline_of
+from cosmic.autonomy.procedures.run import RunState
+from cosmic.autonomy.procedures.tree import NodeView, ProcedureTreeState
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.gui.ask_directory import ask_directory
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
+from cosmic.frame.overrides import override
 
 logger = logging.getLogger(__name__)
+
+_STATES: Final = {
+    CampaignPhase.READY: RunState.READY,
+    CampaignPhase.RUNNING: RunState.RUNNING,
+    CampaignPhase.PAUSING: RunState.PAUSING,
+    CampaignPhase.PAUSED: RunState.PAUSED,
+    CampaignPhase.ENDING: RunState.ABORTING,
+    CampaignPhase.ENDED: RunState.DONE,
+    CampaignPhase.STOPPED: RunState.ABORTED,
+    CampaignPhase.FAILED: RunState.FAILED,
+}
+
+
+class CampaignRun(ProcedurePort):
+    """The tree is that of the held fibre; start, pause, step and abort are of the whole."""
+
+    def __init__(self, campaign: Campaign) -> None:
+        self.campaign = campaign
+        root = campaign.procedure.root
+        self._waiting = ProcedureTreeState(outline_of(root), campaign.work.clock).snapshot()
+
+    @property
+    @override
+    def name(self) -> str:
+        done = self.campaign.progress.done
+        return f"{self.campaign.recipe.name}, fibre {done + 1}"
+
+    @property
+    @override
+    def state(self) -> RunState:
+        return _STATES[self.campaign.phase]
+
+    @property
+    @override
+    def failure(self) -> Exception | None:
+        campaign = self.campaign
+        return CosmicError(campaign.end_reason) if campaign.unfinished else None
+
+    @property
+    @override
+    def not_safe(self) -> str:
+        run = self.campaign.run
+        return run.not_safe if run is not None else ""
+
+    @property
+    @override
+    def tree(self) -> NodeView:
+        run = self.campaign.run
+        return run.tree if run is not None else self._waiting
+
+    @override
+    def on_change(self, listener: Callable[[], object]) -> Callable[[], None]:
+        return self.campaign.on_change(listener)
+
+    @override
+    def start(self) -> None:
+        self.campaign.start()
+
+    @override
+    def pause(self) -> None:
+        self.campaign.pause()
+
+    @override
+    def resume(self) -> None:
+        self.campaign.resume()
+
+    @override
+    def step(self) -> None:
+        if self.campaign.phase is CampaignPhase.READY:
+            self.campaign.start()
+            self.campaign.pause()
+        else:
+            self.campaign.step()
+
+    @override
+    def abort(self, reason: str = "aborted") -> None:
+        self.campaign.abort(reason)
+
+    @override
+    def join(self) -> None:
+        self.campaign.join()
+
 
 OTHER: Final = "another file…"
 PERIOD_MS: Final = 500
 _FIRST: Final = "quick"
 
 Open = Callable[[Recipe | Path, Path], Campaign]
-
-
-class _Relay(QObject):
-    """Brings what a campaign says to the window's thread; outlives the panel."""
-
-    changed = Signal()
-    written = Signal(str, bool)
 
 
 class CampaignPanel(QWidget):
@@ -79,7 +157,8 @@ class CampaignPanel(QWidget):
         self._writing: OutputThread | None = None
         self._campaign: Campaign | None = None
         self._card: FibreRecord | None = None
-        self._relay = _Relay()
+        self._tell_changed = Relay(self._on_changed)
+        self._tell_written = Relay(self._on_written)
         self._make_widgets()
         self._arrange()
         self._redraw = QTimer(self, interval=PERIOD_MS, singleShot=True)
@@ -88,14 +167,14 @@ class CampaignPanel(QWidget):
         self._suggest_folder()
 
     def _make_widgets(self) -> None:
-        self.recipe = named(tipped(QComboBox(), "What is done with the fibres"), "recipe")
+        self.recipe = named(tipped(QComboBox(), "Recipe: how each fibre is treated"), "recipe")
         self.recipe.addItems([*sorted(shipped_recipes()), OTHER])
         self.recipe.setCurrentText(_FIRST)
         self.folder = named(QLineEdit(), "campaignFolder")
-        self.folder.setToolTip("Records and report go there; a campaign in it is gone on with")
-        self.choose = named(push_button("Folder…", "Choose where records go"), "chooseFolder")
+        self.folder.setToolTip("Output folder. An existing campaign in it is resumed.")
+        self.choose = named(push_button("Folder…", "Choose the output folder"), "chooseFolder")
         self.report = named(
-            push_button("Report", "Write report and table of what there is by now"), "report"
+            push_button("Report", "Write the report and the table of the fibres so far"), "report"
         )
         self.told = named(ElidedLabel(), "campaignTold")
         self.procedure = ProcedureTreePanel(self._make_run, self._go_on)
@@ -127,8 +206,6 @@ class CampaignPanel(QWidget):
         self.report.clicked.connect(self.write_report)
         self.card.replay_requested.connect(self._on_replay)
         self.board.fibre_chosen.connect(self.show_fibre)
-        self._relay.changed.connect(self._on_changed)
-        self._relay.written.connect(self._on_written)
 
     @property
     def campaign(self) -> Campaign | None:
@@ -159,7 +236,7 @@ class CampaignPanel(QWidget):
         self.folder.setText(str(self._home / f"{name}-{datetime.now():%Y%m%d-%H%M%S}"))
 
     def _on_choose(self) -> None:
-        ask_directory(self, "Where records go", str(self._home), self.folder.setText)
+        ask_directory(self, "Output folder", str(self._home), self.folder.setText)
 
     # Running
 
@@ -171,15 +248,15 @@ class CampaignPanel(QWidget):
         """Return the campaign that ended early, ready to go on: its recipe, in its folder."""
         before = self._campaign
         if before is None:
-            raise CosmicError("there is no campaign to go on with; begin one")
+            raise CosmicError("there is no campaign to resume: start one")
         return self._opened(before.recipe, before.store.folder)
 
     def _opened(self, recipe: Recipe | Path, folder: Path) -> ProcedurePort:
         before = self._campaign
         if before is not None and not before.over:
-            raise CosmicError("a campaign is under way; end it first")
+            raise CosmicError("a campaign is running: end it first")
         campaign = self._open(recipe, folder)
-        campaign.on_change(self._relay.changed.emit)
+        campaign.on_change(self._tell_changed)
         self._campaign = campaign
         self.folder.setText(str(folder))
         self._say("")
@@ -200,7 +277,7 @@ class CampaignPanel(QWidget):
         if campaign is None:
             return
         self.board.set_state(
-            board_of(
+            snapshot_of(
                 campaign.recipe.name,
                 str(campaign.phase),
                 campaign.fibres,
@@ -240,7 +317,7 @@ class CampaignPanel(QWidget):
             return
         folder, wanted = campaign.store.folder, campaign.recipe.file.output
         self._say("writing the report", State.BUSY)
-        self._writing = OutputThread(folder, wanted, self._policy, self._relay.written.emit)
+        self._writing = OutputThread(folder, wanted, self._policy, self._tell_written)
         self._writing.start()
         self.refresh()
 

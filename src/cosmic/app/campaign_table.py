@@ -15,11 +15,9 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QIcon, QKeyEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
-from cosmic.app.procedure_tree_sign import SIGN_PX, state_pixmap
-from cosmic.autonomy.campaign.board import BoardRow
-from cosmic.autonomy.campaign.records import Outcome
-from cosmic.autonomy.campaign.report_figures import EI_LABEL
-from cosmic.autonomy.campaign.report_words import (
+from cosmic.app.state_indicator import INDICATOR_PX, state_pixmap
+from cosmic.autonomy.campaign.formatting import (
+    EI_LABEL,
     NONE,
     interval,
     number,
@@ -27,6 +25,8 @@ from cosmic.autonomy.campaign.report_words import (
     width_words,
     with_interval,
 )
+from cosmic.autonomy.campaign.records import Outcome
+from cosmic.autonomy.campaign.snapshot import FibreRow
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.theme import STEP_PX, State, number_font
 from cosmic.frame.overrides import override
@@ -41,9 +41,9 @@ _TIPS: Final = {
     INTERVAL: f"95 % interval of the bending stiffness, {EI_LABEL}",
     LENGTH: "Length, µm",
     WIDTH: "Width, µm",
-    CURL: "Length over the distance of the ends, less one",
+    CURL: "Length divided by the distance between the ends, minus one",
     TIME: "Time on the platform's clock",
-    CAUSE: "Why it failed, or why its result is not trusted",
+    CAUSE: "Cause of the failure, or why the result is not trusted",
 }
 _SAMPLES: Final = {
     NUMBER: "00000",
@@ -55,7 +55,7 @@ _SAMPLES: Final = {
     CURL: "0.00",
     TIME: "00 min 00 s",
 }
-SIGNS: Final = {
+OUTCOME_STATES: Final = {
     Outcome.RUNNING: State.BUSY,
     Outcome.GOOD: State.OK,
     Outcome.DOUBTFUL: State.REFUSED,
@@ -72,10 +72,10 @@ class FibreTableModel(QAbstractTableModel):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._rows: tuple[BoardRow, ...] = ()
+        self._rows: tuple[FibreRow, ...] = ()
         self._icons: dict[Outcome, QIcon] = {}
 
-    def set_rows(self, rows: Sequence[BoardRow]) -> None:
+    def set_rows(self, rows: Sequence[FibreRow]) -> None:
         """Show other rows; what is new comes on top, and a selection stays where it is."""
         old, new = self._rows, tuple(reversed(rows))
         if new == old:
@@ -132,7 +132,7 @@ class FibreTableModel(QAbstractTableModel):
 
     def _icon(self, outcome: Outcome) -> QIcon:
         if outcome not in self._icons:
-            self._icons[outcome] = QIcon(state_pixmap(SIGNS[outcome]))
+            self._icons[outcome] = QIcon(state_pixmap(OUTCOME_STATES[outcome]))
         return self._icons[outcome]
 
 
@@ -140,7 +140,7 @@ def _alignment(column: int) -> int:
     return _LEFT if column in (OUTCOME, CAUSE) else _RIGHT
 
 
-def _tip(row: BoardRow, column: int) -> str | None:
+def _tip(row: FibreRow, column: int) -> str | None:
     if column == WIDTH:
         return f"{width_words(row.shape)} µm (95 %)"
     if column == LENGTH:
@@ -148,7 +148,7 @@ def _tip(row: BoardRow, column: int) -> str | None:
     return row.cause if column == CAUSE and row.cause else None
 
 
-def _text(row: BoardRow, column: int) -> str:
+def _text(row: FibreRow, column: int) -> str:
     ei, shape = row.ei, row.shape
     texts = {
         NUMBER: str(row.number),
@@ -184,7 +184,7 @@ class FibreTable(QTableView):
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setShowGrid(False)
-        self.setIconSize(QSize(SIGN_PX, SIGN_PX))
+        self.setIconSize(QSize(INDICATOR_PX, INDICATOR_PX))
         self.setWordWrap(False)
         self.setTabKeyNavigation(False)
         rows = self.verticalHeader()

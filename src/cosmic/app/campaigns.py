@@ -8,7 +8,7 @@ import cosmic
 from cosmic.app.platform import Platform
 from cosmic.app.stop_watch import stopped_since
 from cosmic.autonomy.campaign.campaign import Campaign
-from cosmic.autonomy.campaign.opening import Host, open_campaign, read_recipe
+from cosmic.autonomy.campaign.opening import CampaignHost, open_campaign, read_recipe
 from cosmic.autonomy.campaign.recipe import Recipe
 from cosmic.autonomy.campaign.records import TWIN
 from cosmic.frame.arguments import check_path, checked
@@ -26,7 +26,7 @@ def campaign_on(
         if not isinstance(value, Recipe):
             check_path(name, value)
     read = recipe if isinstance(recipe, Recipe) else read_recipe(Path(recipe))
-    host = Host(
+    host = CampaignHost(
         rig=rig,
         policy=platform.policy,
         stopped=stopped_since(platform),

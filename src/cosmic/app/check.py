@@ -2,8 +2,14 @@
 
 from pathlib import Path
 
+from cosmic.app.names import kept_mistakes, misnamed, recipe_mistakes
 from cosmic.app.network_settings import serving
-from cosmic.app.platform_file import PlatformFile, load_platform, platform_path
+from cosmic.app.platform_file import (
+    KNOWN_APPLICATIONS,
+    PlatformFile,
+    load_platform,
+    platform_path,
+)
 from cosmic.app.scene_fit import misfits
 from cosmic.frame.config import load_model, read_toml
 from cosmic.frame.errors import ConfigError, NotAvailable
@@ -30,7 +36,9 @@ def find_mistakes(config: str | Path) -> list[str]:
             lines += str(exc).splitlines()
     if file is not None:
         lines += key_mistakes(file, path)
-        lines += _tool_mistakes(file, path)
+        lines += misnamed(file, path, KNOWN_APPLICATIONS)
+        lines += kept_mistakes(file, path)
+        lines += recipe_mistakes(file, path)
         lines += _network_mistakes(file, path)
     if file is not None and twin is not None:
         lines += _twin_mistakes(file, path, twin, twin_path)
@@ -92,16 +100,6 @@ def key_mistakes(file: PlatformFile, path: Path) -> list[str]:
     if not file.platform.stop_key:
         lines.append(f"{path}: platform.stop_key: a platform needs a stop key")
     return lines
-
-
-def _tool_mistakes(file: PlatformFile, path: Path) -> list[str]:
-    if file.vico is None:
-        return []
-    # Imported here: it loads OpenCV.
-    from cosmic.autonomy.places import tool_mistakes
-
-    axes = {each.name for each in file.mico.positioner}
-    return [f"{path}: {each}" for each in tool_mistakes(file.vico.tool, axes)]
 
 
 def _twin_mistakes(

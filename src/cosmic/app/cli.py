@@ -1,11 +1,13 @@
 """The command line: ``cosmic``, ``cosmic mico``, ``cosmic check``, ``cosmic init``."""
 
 import argparse
+import logging
 import os
 import re
 import shutil
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -20,11 +22,14 @@ from cosmic.app.cli_stations import (
 )
 from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.log import set_up_logging
 
 if TYPE_CHECKING:
     from cosmic.app.run_window import WindowOptions
 
 _WINDOW_SIZE: Final = (1600, 1000)
+_LOG_THEMSELVES: Final = (None, "mico", "daqco", "vico", "serve")
+"""Commands that run on, and say more of it."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -33,10 +38,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen, unknown = parser.parse_known_args(arguments)
     if unknown:
         parser.error(f"unrecognized arguments: {' '.join(unknown)}")
-    try:
-        return _carry_out(chosen, parser)
-    except CosmicError as exc:
-        return _fail(str(exc))
+    with ExitStack() as at_end:
+        if chosen.command not in _LOG_THEMSELVES:  # warnings alone: the rest is for their output
+            at_end.callback(set_up_logging(console=True, console_level=logging.WARNING))
+        try:
+            return _carry_out(chosen, parser)
+        except CosmicError as exc:
+            return _fail(str(exc))
 
 
 def _carry_out(chosen: argparse.Namespace, parser: argparse.ArgumentParser) -> int:

@@ -5,17 +5,27 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from cosmic.app.platform_file import KNOWN_APPLICATIONS
 from cosmic.app.remote_station import RemoteStation
 from cosmic.app.serve_options import StationAddress
+from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.application import GuiFactory
+from cosmic.frame.declaration import Declared
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.application import RemoteApplication
+from cosmic.vico.api.vico import Vico
 
 if TYPE_CHECKING:
     from cosmic.frame.network.line_settings import Certificates
+
+_DECLARED: Final[Mapping[str, tuple[str, type[Declared]]]] = {
+    "daqco": ("DAQCo", Daqco),
+    "vico": ("ViCo", Vico),
+}
+"""The applications of which a declaration suffices: what the operator reads, and the class."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +48,11 @@ class Elsewhere:
         station = self.host_of.get(name)
         if station is None:
             return None
+        if name in _DECLARED:
+            title, kind = _DECLARED[name]
+            return RemoteApplication(
+                title, kind, station.transport, policy, name=name, gui_factory=gui
+            )
         module = import_module(f"cosmic.{name}.api.remote_application")
         return getattr(module, f"Remote{name.capitalize()}Application")(
             station.transport, policy, gui_factory=gui

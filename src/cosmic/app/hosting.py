@@ -22,9 +22,8 @@ from cosmic.mico.hw.interface import Controller
 from cosmic.twin.scene import Scene
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.core.settings import Backend, VicoSettings
-from cosmic.vico.hw.factory import make_camera_library
+from cosmic.vico.hw.factory import make_camera_library, make_lens, make_light
 from cosmic.vico.hw.interface import CameraLibrary
-from cosmic.vico.hw.peripheral_factory import make_lens, make_light
 from cosmic.vico.hw.peripherals import Lens
 from cosmic.vico.hw.sim_peripherals import SimPeripherals
 

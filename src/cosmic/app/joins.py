@@ -12,8 +12,9 @@ from cosmic.autonomy.interlocks import (
 )
 from cosmic.autonomy.places import join_places
 from cosmic.daqco.api.application import DaqcoApplication
-from cosmic.daqco.api.remote_application import RemoteDaqcoApplication
+from cosmic.daqco.api.daqco import Daqco, daqco_of
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.application import RemoteApplication
 from cosmic.mico.api.application_base import MicoApplicationBase
 
 
@@ -34,7 +35,7 @@ def join_here(own: Hosted, site: Site) -> None:
 
 def join_stations(
     mico: MicoApplicationBase | None,
-    daqco: DaqcoApplication | RemoteDaqcoApplication | None,
+    daqco: DaqcoApplication | RemoteApplication[Daqco] | None,
     elsewhere: Elsewhere,
     policy: FailurePolicy,
 ) -> None:
@@ -46,8 +47,9 @@ def join_stations(
     there, boards_at = elsewhere.host_of.get("mico"), elsewhere.host_of.get("daqco")
     if mico is None or daqco is None or there is boards_at:
         return
+    guard = daqco_of(daqco).guard
     if there is None:
-        daqco.guard.trip = mico.manager.stop
+        guard.trip = mico.manager.stop
         return
 
     def trip(reason: str) -> None:
@@ -57,4 +59,4 @@ def join_stations(
             lambda exc: policy.report(exc, f"stop at {there.name} ({reason})"),
         )
 
-    daqco.guard.trip = trip
+    guard.trip = trip

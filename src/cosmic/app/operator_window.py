@@ -22,7 +22,7 @@ from cosmic.app.way_bar import Stage, WayBar
 from cosmic.app.way_guide import WayGuide
 from cosmic.app.window_bridge import WindowBridge
 from cosmic.app.window_stations import WindowStations
-from cosmic.daqco.api.window_port import WindowPort
+from cosmic.daqco.api.daqco import daqco_of
 from cosmic.daqco.gui.limit_indicator import LimitIndicator
 from cosmic.frame.failure import Failure
 from cosmic.frame.gui.console_panel import ConsolePanel
@@ -33,7 +33,7 @@ from cosmic.frame.gui.server_gui import LOG_TITLE, CosmicServerGui
 from cosmic.frame.gui.stop_key import StopKeyFilter
 from cosmic.frame.gui.theme import State
 from cosmic.frame.log import RingBufferHandler
-from cosmic.mico.core.stop_latch import StopState
+from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.mico.gui.mico_widget import MicoWidget
 
 logger = logging.getLogger(__name__)
@@ -154,7 +154,7 @@ class OperatorWindow(CosmicServerGui):
         scene = SCENE if self._scene is not None else ""
         self._instruments = instruments_of(self._platform)
         if self._platform.daqco is not None:
-            self.top_bar.add_indicator(LimitIndicator(WindowPort(self._platform.daqco)))
+            self.top_bar.add_indicator(LimitIndicator(daqco_of(self._platform.daqco)))
         return self._instruments.place(self, scene, MICO if scene else "")
 
     def _add_log(self, ring: RingBufferHandler, *, console: bool) -> None:

@@ -12,24 +12,25 @@ from cosmic.app.faults import SimulationFaults
 from cosmic.app.garbage_watch import GarbageWatch
 from cosmic.app.hosting import Site, build_applications
 from cosmic.app.joins import join_here, join_stations
+from cosmic.app.names import misnamed
 from cosmic.app.network_settings import own_certificates
 from cosmic.app.platform_file import KNOWN_APPLICATIONS, PlatformFile, load_platform
 from cosmic.app.serve_options import StationAddress
 from cosmic.app.simulation import make_scene
 from cosmic.daqco.api.application import DaqcoApplication
-from cosmic.daqco.api.remote_application import RemoteDaqcoApplication
+from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.application import CosmicApplicationBase, GuiFactory
 from cosmic.frame.clock import Clock, RatedClock
 from cosmic.frame.errors import ArgumentError, ConfigError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.application import RemoteApplication
 from cosmic.frame.threads import share_interpreter
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.twin.scene import Scene
 from cosmic.vico.api.application import VicoApplication
-from cosmic.vico.api.remote_application import RemoteVicoApplication
+from cosmic.vico.api.vico import Vico
 
 LARGEST_SEED: Final = 2**63 - 1
-KNOWN_LIMIT_S: Final = 5.0
 """How long a station may take to say what it has."""
 
 
@@ -52,8 +53,8 @@ class Platform:
     mico: MicoApplicationBase | None
     seed: int = 0
     faults: SimulationFaults | None = None
-    daqco: DaqcoApplication | RemoteDaqcoApplication | None = None
-    vico: VicoApplication | RemoteVicoApplication | None = None
+    daqco: DaqcoApplication | RemoteApplication[Daqco] | None = None
+    vico: VicoApplication | RemoteApplication[Vico] | None = None
     elsewhere: Elsewhere = field(default_factory=Elsewhere)
     end: Callable[[], None] | None = None
 
@@ -85,8 +86,6 @@ class Platform:
         for name, each in self._all.items():
             if name in self.elsewhere.host_of:
                 each.initialize()
-        if isinstance(self.vico, RemoteVicoApplication):
-            self.vico.wait_until_known(KNOWN_LIMIT_S)
         join_stations(self.mico, self.daqco, self.elsewhere, self.policy)
 
     @cached_property
@@ -204,6 +203,8 @@ def build_platform(
             for name in applications
             if name in file.platform.applications and name not in elsewhere.host_of
         ]
+        if mistakes := misnamed(file, path, hosted):
+            raise ConfigError("\n".join(mistakes))
         scene: Scene | None = None
         if file.mico.backend == "simulated" and hosted:
             scene = make_scene(file, path, clock, seed=seed, cold=cold, sample=sample, truth=truth)

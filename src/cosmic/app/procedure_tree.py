@@ -1,266 +1,177 @@
-"""The panel "Procedure": its tree, what it is at, and how to start, pause, step and end it."""
+"""The tree of a procedure: what each part is at, by shape, word and colour."""
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
-from PySide6.QtCore import QTimer
-from PySide6.QtGui import QCloseEvent, QHideEvent, QShowEvent
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtCore import QEvent, QSize, Qt
+from PySide6.QtGui import QBrush, QColor, QIcon
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QWidget,
+)
 
-from cosmic.app.procedure_tree_port import ChangeBridge, ProcedurePort
-from cosmic.app.procedure_tree_sign import StateSign
-from cosmic.app.procedure_tree_view import ProcedureTree
-from cosmic.autonomy.procedures.run_state import OVER, RunState
-from cosmic.frame.errors import CosmicError
-from cosmic.frame.gui.build import named, push_button
-from cosmic.frame.gui.chip import Chip
-from cosmic.frame.gui.elided_label import ElidedLabel
-from cosmic.frame.gui.flow_layout import FlowLayout
-from cosmic.frame.gui.theme import STEP_PX, State
+from cosmic.app.state_indicator import INDICATOR_PX, state_pixmap
+from cosmic.autonomy.procedures.tree import UNDER_WAY, NodeEvent, NodeState, NodeView, Path
+from cosmic.frame.gui.amounts import duration_text
+from cosmic.frame.gui.theme import State, current_palette, number_font, ui_font
 from cosmic.frame.overrides import override
 
-PERIOD_MS: Final = 50
-"""No more than so often is what changed drawn."""
-TICK_MS: Final = 200
-"""So often the times are drawn where nothing else changes."""
-_BEGUN: Final = (RunState.RUNNING, RunState.PAUSING, RunState.PAUSED, RunState.ABORTING)
-_LOOKS: Final[dict[RunState, State | None]] = {
-    RunState.READY: None,
-    RunState.RUNNING: State.BUSY,
-    RunState.PAUSING: State.BUSY,
-    RunState.PAUSED: State.REFUSED,
-    RunState.ABORTING: State.REFUSED,
-    RunState.DONE: State.OK,
-    RunState.FAILED: State.ERROR,
-    RunState.ABORTED: State.REFUSED,
+PART, STATE, TRY, TIME, CAUSE = range(5)
+_TITLES: Final = ("Part", "State", "Try", "Time", "Cause")
+_RIGHT: Final = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+_CENTRE: Final = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignVCenter
+_SHAPES: Final = {
+    NodeState.RUNNING: State.BUSY,
+    NodeState.QUEUED: State.BUSY,
+    NodeState.HOLDING: State.BUSY,
+    NodeState.VERIFYING: State.BUSY,
+    NodeState.UNDOING: State.BUSY,
+    NodeState.DONE: State.OK,
+    NodeState.FAILED: State.ERROR,
+    NodeState.NOT_UNDONE: State.ERROR,
+    NodeState.ENDED: State.REFUSED,
+}
+_KINDS: Final = {
+    "operation": "One operation",
+    "sequence": "One part after the other",
+    "retry": "Tried again when it fails",
+    "fallback": "The next part when one fails",
+    "guard": "Runs only while a condition holds",
+    "parallel": "Side by side",
+    "repeat": "Again and again",
+    "holding": "Needs something that one part at a time may use",
+    "role": "Done by one of several arms that do the same",
 }
 
 
-class ProcedureTreePanel(QWidget):
-    """Shows a run and lets the operator steer it; GUI thread.
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    event: NodeEvent
+    time: str
 
-    A run begun elsewhere can be shown as well. Closing the panel aborts the one begun here.
 
-    Parameters
-    ----------
-    make_run : callable or None
-        Returns a run that is ready to begin; called when Start is pressed and none is at hand.
-    go_on : callable or None
-        Returns a run that goes on where the one that is shown ended early; called when Resume is
-        pressed then.
-    """
+class ProcedureTree(QTreeWidget):
+    """Shows a `NodeView`; GUI thread."""
 
-    def __init__(
-        self,
-        make_run: Callable[[], ProcedurePort] | None = None,
-        go_on: Callable[[], ProcedurePort] | None = None,
-        parent: QWidget | None = None,
-    ) -> None:
+    def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setObjectName("ProcedureTreePanel")
-        self._make_run = make_run
-        self._go_on = go_on
-        self._run: ProcedurePort | None = None
-        self._mine: ProcedurePort | None = None
-        self._bridge = ChangeBridge(self)
-        self.sign = StateSign()
-        self.state = Chip("no procedure", tip="What the procedure is at")
-        self.title = named(ElidedLabel(), "procedureTitle")
-        self.reason = named(ElidedLabel(), "procedureReason")
-        self.tree = ProcedureTree()
-        self.start = named(push_button("Start", "Begin the procedure"), "procedureStart")
-        self.pause = named(
-            push_button("Pause", "Rest at the next place where nothing moves and nothing is lost"),
-            "procedurePause",
-        )
-        self.step = named(
-            push_button("Step", "Carry out one operation, then rest"), "procedureStep"
-        )
-        self.resume = named(
-            push_button("Resume", "Go on after a pause, or after an early end"), "procedureResume"
-        )
-        self.abort = named(
-            push_button(
-                "Abort", "End it at once: what moves is cancelled, then the tools are made safe"
-            ),
-            "procedureAbort",
-        )
-        self._build()
-        self._connect()
-        self._redraw = QTimer(self, interval=PERIOD_MS, singleShot=True)
-        self._redraw.timeout.connect(self.refresh)
-        self._tick = QTimer(self, interval=TICK_MS)
-        self._tick.timeout.connect(self.refresh)
-        self._bridge.changed.connect(self._on_changed)
-        self.refresh()
+        self.setObjectName("procedureTree")
+        self.setColumnCount(len(_TITLES))
+        self.setHeaderLabels(list(_TITLES))
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        self.headerItem().setTextAlignment(TIME, _RIGHT)
+        self.headerItem().setTextAlignment(TRY, _CENTRE)
+        self.setUniformRowHeights(True)
+        self.setAllColumnsShowFocus(True)
+        self.setIconSize(QSize(INDICATOR_PX, INDICATOR_PX))
+        header = self.header()
+        header.setStretchLastSection(True)
+        header.setSectionsMovable(False)
+        header.setSectionResizeMode(PART, QHeaderView.ResizeMode.Interactive)
+        self._items: dict[Path, QTreeWidgetItem] = {}
+        self._shown: dict[Path, _Shown] = {}
+        self._front: Path | None = None
+        self._icons: dict[NodeState, QIcon] = {}
 
-    def _build(self) -> None:
-        head = QHBoxLayout()
-        head.setSpacing(STEP_PX)
-        head.addWidget(self.sign)
-        head.addWidget(self.state)
-        head.addWidget(self.title, 1)
-        buttons = QWidget()
-        flow = FlowLayout(STEP_PX, buttons)
-        for button in (self.start, self.pause, self.step, self.resume, self.abort):
-            flow.addWidget(button)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
-        column.setSpacing(STEP_PX)
-        column.addLayout(head)
-        column.addWidget(self.reason)
-        column.addWidget(self.tree, 1)
-        column.addWidget(buttons)
+    def lay_out(self, view: NodeView) -> None:
+        """Show another tree, opened to its last part."""
+        self.clear()
+        self._items.clear()
+        self._shown.clear()
+        self._front = None
+        self._add(view, self.invisibleRootItem())
+        self.expandAll()
+        self._fit()
+        self.show_view(view)
 
-    def _connect(self) -> None:
-        self.start.clicked.connect(self._on_start)
-        self.pause.clicked.connect(self._on_pause)
-        self.step.clicked.connect(self._on_step)
-        self.resume.clicked.connect(self._on_resume)
-        self.abort.clicked.connect(self._on_abort)
+    def _add(self, view: NodeView, above: QTreeWidgetItem) -> None:
+        item = QTreeWidgetItem(above)
+        item.setText(PART, view.name)
+        item.setToolTip(PART, _KINDS.get(view.kind, view.kind))
+        item.setFont(TIME, number_font())
+        item.setTextAlignment(TIME, _RIGHT)
+        item.setTextAlignment(TRY, _CENTRE)
+        self._items[view.event.path] = item
+        for child in view.children:
+            self._add(child, item)
+
+    def _fit(self) -> None:
+        """Give each column the room of the longest text that can stand in it."""
+        metrics = self.fontMetrics()
+        words = max(metrics.horizontalAdvance(each.value) for each in NodeState)
+        self.resizeColumnToContents(PART)
+        self.setColumnWidth(PART, self.columnWidth(PART) + INDICATOR_PX)
+        self.setColumnWidth(STATE, words + 3 * INDICATOR_PX)
+        self.setColumnWidth(TRY, metrics.horizontalAdvance("round 000") + INDICATOR_PX)
+        self.setColumnWidth(TIME, metrics.horizontalAdvance("00 min 00 s") + INDICATOR_PX)
+
+    def show_view(self, view: NodeView) -> None:
+        """Show what the parts are at now; only what changed is written anew."""
+        front: Path | None = None
+        for each in view.walk():
+            path = each.event.path
+            time = duration_text(each.duration_s) if each.event.started_s is not None else ""
+            shown = _Shown(each.event, time)
+            if self._shown.get(path) != shown:
+                self._shown[path] = shown
+                self._write(self._items[path], each, time)
+            if each.state in UNDER_WAY:
+                front = path  # the last one stands lowest: the operation, not what is above it
+        if front != self._front:
+            self._front = front
+            if front is not None:
+                self.scrollToItem(self._items[front])
+
+    def _write(self, item: QTreeWidgetItem, view: NodeView, time: str) -> None:
+        event, palette = view.event, current_palette()
+        item.setIcon(STATE, self._icon(view.state))
+        item.setText(STATE, view.state.value)
+        item.setText(TRY, _count(view))
+        item.setText(TIME, time)
+        item.setText(CAUSE, event.cause or event.text)
+        item.setToolTip(CAUSE, f"{event.cause}: {event.text}" if event.cause else event.text)
+        running = view.state in UNDER_WAY
+        quiet = view.state is NodeState.WAITING
+        colour = QBrush(QColor(palette.dim if quiet else palette.text))
+        for column in range(len(_TITLES)):
+            item.setForeground(column, colour)
+        for column in (PART, STATE):
+            item.setFont(column, ui_font(bold=running))
+
+    def _icon(self, state: NodeState) -> QIcon:
+        if state not in self._icons:
+            self._icons[state] = _icon(state)
+        return self._icons[state]
 
     @property
-    def run(self) -> ProcedurePort | None:
-        """What is shown."""
-        return self._run
+    def front(self) -> str:
+        """Name of the operation that is under way, empty when none is."""
+        return self._items[self._front].text(PART) if self._front is not None else ""
 
-    def follow(self, run: ProcedurePort) -> None:
-        """Show `run`, begun or not."""
-        self._run = run
-        self._bridge.follow(run)
-        self.tree.lay_out(run.tree)
-        self.refresh()
-
-    # What the operator does
-
-    def _on_start(self) -> None:
-        def begin() -> None:
-            self._ready_run().start()
-
-        self._attempt(begin)
-
-    def _on_step(self) -> None:
-        def begin() -> None:
-            run = self._run
-            if run is None or run.state in OVER or run.state is RunState.READY:
-                run = self._ready_run()
-            run.step()
-
-        self._attempt(begin)
-
-    def _ready_run(self) -> ProcedurePort:
-        """Return a run that can be begun, and be answerable for it."""
-        run = self._run
-        if self._make_run is not None and (run is None or run.state in OVER):
-            run = self._make_run()
-            self.follow(run)
-        if run is None:
-            raise CosmicError("there is no procedure to begin; choose one")
-        self._mine = run
-        return run
-
-    def _on_pause(self) -> None:
-        if self._run is not None:
-            self._run.pause()
-        self.refresh()
-
-    def _on_resume(self) -> None:
-        def go_on() -> None:
-            if self._run is None:
-                return
-            if self._run.state not in OVER:
-                self._run.resume()
-            elif self._go_on is not None:
-                self._mine = self._go_on()
-                self.follow(self._mine)
-                self._mine.start()
-
-        self._attempt(go_on)
-
-    def _on_abort(self) -> None:
-        if self._run is not None:
-            self._run.abort("aborted by the operator")
-        self.refresh()
-
-    def _attempt(self, action: Callable[[], None]) -> None:
-        try:
-            action()
-        except CosmicError as exc:
-            self.sign.set_state(State.REFUSED)
-            self.state.setText("refused")
-            self.reason.set_text(str(exc))
-            return
-        self.refresh()
-
-    # Showing
-
-    def _on_changed(self) -> None:
-        if self.isVisible() and not self._redraw.isActive():
-            self._redraw.start()
-
-    def refresh(self) -> None:
-        """Show the run as it is now."""
-        self._bridge.take()
-        run = self._run
-        self._enable(None if run is None else run.state)
-        if run is None:
-            return
-        state = run.state
-        self.sign.set_state(_LOOKS[state])
-        self.state.setText(state.value)
-        self.tree.show_view(run.tree)
-        front = self.tree.front if state in _BEGUN else ""
-        self.title.set_text(f"{run.name}: {front}" if front else run.name)
-        self.reason.set_text(_reason(run))
-        ticking = state in _BEGUN and self.isVisible()
-        if ticking != self._tick.isActive():
-            if ticking:
-                self._tick.start()
-            else:
-                self._tick.stop()
-
-    def _enable(self, state: RunState | None) -> None:
-        fresh = state is RunState.READY or (
-            self._make_run is not None and (state is None or state in OVER)
-        )
-        self.start.setEnabled(fresh)
-        self.pause.setEnabled(state is RunState.RUNNING)
-        self.step.setEnabled(fresh or state is RunState.PAUSED)
-        early = self._go_on is not None and state in (RunState.ABORTED, RunState.FAILED)
-        self.resume.setEnabled(early or state in (RunState.PAUSED, RunState.PAUSING))
-        self.abort.setEnabled(state in _BEGUN)
+    def row(self, path: Path) -> tuple[str, ...]:
+        """Return the texts of a row."""
+        return tuple(self._items[path].text(column) for column in range(len(_TITLES)))
 
     @override
-    def showEvent(self, event: QShowEvent) -> None:
-        super().showEvent(event)
-        self.refresh()
-
-    @override
-    def hideEvent(self, event: QHideEvent) -> None:
-        super().hideEvent(event)
-        self._redraw.stop()
-        self._tick.stop()
-
-    @override
-    def closeEvent(self, event: QCloseEvent) -> None:
-        self.end_mine()
-        super().closeEvent(event)
-
-    def end_mine(self) -> None:
-        """Abort the run that was begun here; for whoever closes the window."""
-        if self._mine is not None:
-            self._mine.abort("the window was closed")
-
-    def shut_down(self) -> None:
-        """Abort the run that was begun here, and wait until its thread is gone."""
-        self.end_mine()
-        self._bridge.end()
-        if self._mine is not None:
-            self._mine.join()
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_icons"):
+            self._icons.clear()
+            self._shown.clear()  # all is written anew, in the new colours, when it is shown next
 
 
-def _reason(run: ProcedurePort) -> str:
-    text = "" if run.failure is None else str(run.failure)
-    if run.not_safe:
-        text = f"{text}; not made safe: {run.not_safe}" if text else run.not_safe
-    return text
+def _count(view: NodeView) -> str:
+    """Return which try or round it is, where it is not the only one."""
+    event = view.event
+    if event.attempt > 1:
+        return str(event.attempt)
+    return f"round {event.round}" if event.round and len(event.path) == 1 else ""
+
+
+def _icon(state: NodeState) -> QIcon:
+    return QIcon(state_pixmap(_SHAPES.get(state)))

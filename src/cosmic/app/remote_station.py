@@ -3,23 +3,20 @@
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
-from queue import SimpleQueue
 from threading import Lock
 from typing import TYPE_CHECKING, Final
-
-from typing_extensions import override
 
 from cosmic.app.network_settings import require_network
 from cosmic.app.serve_options import StationAddress
 from cosmic.app.station_facts import ITSELF, StationFacts
 from cosmic.frame.errors import ConfigError, CosmicError, ProtocolError
+from cosmic.frame.events import Event, Unsubscribe, notify
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.listeners import tell
+from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.network.errors import StationAway
 from cosmic.frame.network.lease import LeaseState
 from cosmic.frame.network.station import LEASE_TOPIC, checked_name
 from cosmic.frame.network.transport import Presence, Rule
-from cosmic.frame.threads import WorkerThread
 
 if TYPE_CHECKING:
     from cosmic.frame.network.client_side_connection import ClientSideConnection
@@ -30,7 +27,7 @@ logger = logging.getLogger(__name__)
 CONNECT_LIMIT_S: Final = 5.0
 """How long a station may take to answer at the start."""
 
-ControlListener = Callable[["StationControl"], None]
+ControlListener = Callable[["StationControl"], object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,12 +93,12 @@ class RemoteStation:
         self._connection = ClientSideConnection(
             address.name, client, lambda: ZenohWire(line), policy
         )
-        self._errands = _Errands(f"errands to {address.name}", policy)
+        self._errands = JobQueue(f"errands to {address.name}", policy)
         self._lock = Lock()
         self._facts: StationFacts | None = None
         self._lease: LeaseState | None = None
         self._away = "not connected yet"
-        self._listeners: tuple[ControlListener, ...] = ()
+        self._control_changed: Event[StationControl] = Event()
         self._undo: list[Callable[[], object]] = []
 
     @property
@@ -144,7 +141,6 @@ class RemoteStation:
         if not isinstance(facts, StationFacts):
             raise ProtocolError(f"{self.name} at {self.endpoint} is no station of CoSMic")
         self._facts = facts
-        self._errands.start()
         subscription = self._connection.subscribe(LEASE_TOPIC, Rule.ALL, self._on_lease)
         self._undo = [subscription.close, self._connection.presence(self._on_presence)]
 
@@ -161,17 +157,11 @@ class RemoteStation:
         offered = lease.offered and lease.local
         return StationControl(self.name, lease.holder, here=here, offered=offered)
 
-    def on_control(self, listener: ControlListener) -> Callable[[], None]:
+    def on_control(self, listener: ControlListener) -> Unsubscribe:
         """Call `listener` now and at each change; returns the function that ends it."""
-        with self._lock:
-            self._listeners = (*self._listeners, listener)
-        tell([listener], self.control)
-
-        def remove() -> None:
-            with self._lock:
-                self._listeners = tuple(each for each in self._listeners if each is not listener)
-
-        return remove
+        unsubscribe = self._control_changed.subscribe(listener)
+        notify(listener, self.control)
+        return unsubscribe
 
     def take_control(self) -> None:
         """Take the right to move things there, or keep it.
@@ -199,7 +189,7 @@ class RemoteStation:
 
     def later(self, what: Callable[[], object], failed: Callable[[CosmicError], object]) -> None:
         """Do `what` in a thread of the station's own, for windows, which must not wait."""
-        self._errands.put(what, failed)
+        self._errands.submit(what, f"an errand to {self.name}").when_failed(failed)
 
     def close(self) -> None:
         """Give control back and end the line; any state."""
@@ -230,35 +220,8 @@ class RemoteStation:
         self._on_lease(self._connection.call(ITSELF, "lease"))
 
     def _tell(self) -> None:
-        tell(self._listeners, self.control)
+        self._control_changed.emit(self.control)
 
 
 def _say_later(error: CosmicError) -> None:
     logger.info("it is not known who holds the controls: %s", error)
-
-
-class _Errands(WorkerThread):
-    """Does what may have to wait for an answer, one after the other."""
-
-    def __init__(self, name: str, policy: FailurePolicy) -> None:
-        super().__init__(name, policy)
-        self._jobs: SimpleQueue[Callable[[], None]] = SimpleQueue()
-
-    def put(self, what: Callable[[], object], failed: Callable[[CosmicError], object]) -> None:
-        def job() -> None:
-            try:
-                what()
-            except CosmicError as exc:
-                failed(exc)
-
-        self._jobs.put(job)
-
-    @override
-    def run_body(self) -> None:
-        while not self.end_requested:
-            self._jobs.get()()
-
-    @override
-    def request_end(self) -> None:
-        super().request_end()
-        self._jobs.put(lambda: None)

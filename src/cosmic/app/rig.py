@@ -17,18 +17,18 @@ from cosmic.app.stop_watch import stopped_since
 from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun
-from cosmic.daqco.api.daqco import Daqco
+from cosmic.daqco.api.daqco import Daqco, daqco_of
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import NotAvailable
 from cosmic.mico.api.mico import Mico
-from cosmic.vico.api.vico import Vico
+from cosmic.vico.api.vico import Vico, vico_of
 
 if TYPE_CHECKING:
-    from cosmic.autonomy.calibrating.book import CalibrationBook
+    from cosmic.autonomy.calibrating.registry import CalibrationRegistry
     from cosmic.autonomy.campaign.campaign import Campaign
     from cosmic.autonomy.campaign.recipe import Recipe
+    from cosmic.autonomy.handling.context import HandlingContext
     from cosmic.autonomy.handling.settings import HandlingSettings
-    from cosmic.autonomy.handling.work import FibreWork
 
 W = TypeVar("W")
 
@@ -44,8 +44,8 @@ class Rig:
     def __init__(self, platform: Platform, source: str = "script") -> None:
         self._platform = platform
         self._mico = Mico(platform.mico, source) if platform.mico is not None else None
-        self._daqco = Daqco(platform.daqco) if platform.daqco is not None else None
-        self._vico = Vico(platform.vico) if platform.vico is not None else None
+        self._daqco = daqco_of(platform.daqco) if platform.daqco is not None else None
+        self._vico = vico_of(platform.vico) if platform.vico is not None else None
         self._control: Control | None = None
         if self._mico is not None:
             self._control = Control(
@@ -125,7 +125,7 @@ class Rig:
         return campaign
 
     @property
-    def calibrations(self) -> "CalibrationBook":
+    def calibrations(self) -> "CalibrationRegistry":
         """All calibrations that were made, with residual, age, and whether they may be used.
 
         Raises
@@ -133,9 +133,9 @@ class Rig:
         NotAvailable
             Cameras and axes do not run in this program.
         """
-        from cosmic.app.calibrating import book_of
+        from cosmic.app.calibrating import registry_of
 
-        return book_of(self)
+        return registry_of(self)
 
     def calibrate(
         self,
@@ -143,7 +143,7 @@ class Rig:
         *,
         anew: Sequence[str] = (),
         zooms: bool = False,
-    ) -> "ProcedureRun[FibreWork]":
+    ) -> "ProcedureRun[HandlingContext]":
         """Return a run that calibrates what is not fresh; begin it by `run_here` or `start`.
 
         Parameters

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from cosmic.mico.core.collision.model import SceneModel, pair_of
-from cosmic.mico.core.positioner import PositionerState
+from cosmic.mico.core.motion.positioner import PositionerState
 
 _STILL: Final = 1e-3
 """Share of its travel by which the position of an axis at rest may differ."""

@@ -18,8 +18,8 @@ from cosmic.frame.overrides import override
 from cosmic.frame.verdict import MoveVerdict, Reason
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.model import SceneModel
-from cosmic.mico.core.device_commander import DeviceCommander
-from cosmic.mico.core.positioner import Confidence, PositionerState
+from cosmic.mico.core.motion.device_commander import DeviceCommander
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.mico.gui.state_feed import StateFeed
 

@@ -38,7 +38,14 @@ def make_scene(
     told = NO_TRUTH if truth is None else TruthFile(Path(truth))
     try:
         return Scene.from_settings(
-            twin, clock, seed, cold=cold, folder=path.parent, sample=sample or "", truth=told
+            twin,
+            clock,
+            seed,
+            cold=cold,
+            folder=path.parent,
+            sample=sample or "",
+            truth=told,
+            apart=True,
         )
     except BaseException:
         told.close()

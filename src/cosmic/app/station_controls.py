@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QWidget
 from cosmic.app.remote_station import RemoteStation, StationControl
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.controls_sign import ControlAction, ControlsSign
-from cosmic.frame.gui.relay import Unsubscribe
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.network.lease import LeaseState, StationLease
 
 HERE: Final = "this window"
@@ -40,8 +40,6 @@ class StationControls(QObject):
 
     control_changed = Signal(object)
     failed = Signal(str)
-    _told = Signal(object)
-    _own_told = Signal(object)
 
     def __init__(
         self,
@@ -58,19 +56,18 @@ class StationControls(QObject):
         self._known = {name: StationControl(name) for name in self._stations}
         self._own = own
         self._own_state: LeaseState | None = None
-        self._told.connect(self._on_told)
-        self._own_told.connect(self._on_own_told)
         sign.action_requested.connect(self._on_action)
-        self._ends: list[Unsubscribe] = [
-            each.on_control(self._told.emit) for each in self._stations.values()
-        ]
+        self._say_later = Relay(self._say)
+        self._relay, self._own_relay = Relay(self._on_told), Relay(self._on_own_told)
+        for each in self._stations.values():
+            self._relay.follow(each.on_control)
         if own is not None:
-            self._ends.append(own.subscribe(self._own_told.emit))
+            self._own_relay.follow(own.subscribe)
 
     def end(self) -> None:
         """Listen no more; harmless the second time."""
-        while self._ends:
-            self._ends.pop()()
+        self._relay.end()
+        self._own_relay.end()
 
     # What is told
 
@@ -110,7 +107,8 @@ class StationControls(QObject):
         elif station in self._stations:
             there = self._stations[station]
             # Aside, for a window must not wait for a line.
-            there.later(there.take_control if what == "take" else there.release_control, self._say)
+            what_to_do = there.take_control if what == "take" else there.release_control
+            there.later(what_to_do, self._say_later)
 
     def _say(self, error: CosmicError) -> None:
         self.failed.emit(str(error))

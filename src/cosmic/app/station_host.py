@@ -9,12 +9,15 @@ from cosmic.app.network_settings import Serving
 from cosmic.app.platform import Platform
 from cosmic.app.station_facts import ITSELF, StationFacts, StationSide
 from cosmic.daqco.api.application import DaqcoApplication
+from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.network.errors import StationAway
+from cosmic.frame.network.host import Host
 from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.station import Station
 from cosmic.mico.api.application import MicoApplication
 from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.api.vico import Vico
 
 if TYPE_CHECKING:
     from cosmic.frame.network.wire import Wire
@@ -101,18 +104,16 @@ def _opened(how: Serving) -> "Wire":
 def _sides(platform: Platform) -> dict[str, object]:
     """Return what answers for each application that runs in this process."""
     # Imported here: whoever serves nothing loads none of it.
-    from cosmic.daqco.api.station_side import DaqcoStationSide
     from cosmic.mico.api.station_side import MicoStationSide
-    from cosmic.vico.api.station_side import VicoStationSide
 
     sides: dict[str, object] = {}
     for name, application in platform.own.items():
         if isinstance(application, MicoApplication):
             sides[name] = MicoStationSide(application)
         elif isinstance(application, DaqcoApplication):
-            sides[name] = DaqcoStationSide(application)
+            sides[name] = Host(name, Daqco(application))
         elif isinstance(application, VicoApplication):
-            sides[name] = VicoStationSide(application)
+            sides[name] = Host(name, Vico(application))
     return sides
 
 

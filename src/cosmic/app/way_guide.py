@@ -2,6 +2,7 @@
 
 import logging
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 from PySide6.QtCore import QObject, Qt, Signal
@@ -9,7 +10,8 @@ from PySide6.QtCore import QObject, Qt, Signal
 from cosmic.app.scene_panel import ScenePanel
 from cosmic.app.way_bar import Stage, WayBar
 from cosmic.frame.errors import NotAvailable
-from cosmic.frame.task import Progress, Task
+from cosmic.frame.gui.relay import Relay
+from cosmic.frame.operation import Progress, Task
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.ways import Way
 from cosmic.mico.gui.mico_widget import MicoWidget
@@ -19,15 +21,6 @@ logger = logging.getLogger(__name__)
 
 _THERE: Final = 1.0
 """How far, um or deg, an axis may stand from where a way begins, or ends."""
-
-
-class _TaskRelay(QObject):
-    """Brings the progress of tasks to the window's thread; outlives the guide."""
-
-    progressed = Signal(object, object)
-
-    def follow(self, task: Task) -> None:
-        task.subscribe(lambda progress: self.progressed.emit(task, progress))
 
 
 class WayGuide(QObject):
@@ -64,10 +57,9 @@ class WayGuide(QObject):
         self._task: Task | None = None
         self._answer: Way | MoveVerdict | None = None
         self._way: Way | None = None
-        self._relay = _TaskRelay()
         # Queued even from this thread: the answer was sent before, and comes before its end.
         queued = Qt.ConnectionType.QueuedConnection
-        self._relay.progressed.connect(self._on_progressed, queued)
+        self._relay = Relay(self._on_progressed, queued=True)
         self._application.way_found.connect(self._on_answer, queued)
         self._application.way_missing.connect(self._on_answer, queued)
         panel.way_wanted.connect(self.seek)
@@ -97,7 +89,7 @@ class WayGuide(QObject):
         request.note("the straight way is blocked; looking for a way round")
         self._bar.show_search(_what(request), str(request.verdict))
         self.offered.emit()
-        self._relay.follow(task)
+        task.subscribe(partial(self._relay, task))
 
     def _refuse(self, request: WayRequest, why: str) -> None:
         """Let the refusal of the straight way stand."""
@@ -166,7 +158,7 @@ class WayGuide(QObject):
         self._task = task
         request.note("going round")
         self._bar.show_going(_what(request))
-        self._relay.follow(task)
+        task.subscribe(partial(self._relay, task))
 
     def _left_start(self, way: Way) -> bool:
         for name, start in way.start.items():

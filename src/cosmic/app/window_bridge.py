@@ -3,7 +3,7 @@
 from PySide6.QtCore import QObject, Signal
 
 from cosmic.frame.failure import Failure
-from cosmic.mico.core.stop_latch import StopState
+from cosmic.mico.core.motion.stop_latch import StopState
 
 
 class WindowBridge(QObject):

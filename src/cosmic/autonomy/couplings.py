@@ -5,6 +5,7 @@ nothing else takes part at run time: `TestAppMiCoConverter` in the input thread,
 `TestAppDAQCoConverter` in the acquisition thread.
 """
 
+import logging
 import math
 from collections.abc import Callable, Mapping
 from threading import Lock
@@ -22,6 +23,8 @@ from cosmic.mico.core.teleoperation.coupling import ForceCoupling
 from cosmic.mico.core.teleoperation.mapping import Converter
 from cosmic.mico.core.teleoperation.settings import TeleoperationSettings
 from cosmic.mico.hw.input_device import InputState
+
+logger = logging.getLogger(__name__)
 
 STALE_S: Final = 0.1
 """Age from which a force no longer counts as an answer, on the wall clock."""
@@ -210,6 +213,8 @@ def join_teleoperation(mico: MicoApplicationBase, daqco: DaqcoApplication) -> Te
         problem = _missing(settings)
         if ends and problem:
             raise NotAvailable(f"{problem}. Stop steering first")
+        if problem and not _missing(daqco.settings):
+            logger.warning("%s; steering is refused until then", problem)
 
     daqco.before_change(keep_channel)
     return force

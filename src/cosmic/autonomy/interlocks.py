@@ -1,19 +1,26 @@
 """Interlocks between subsystems: what one sees stops the other (D7, thesis 5.2)."""
 
+import math
+from collections import deque
 from collections.abc import Iterator
 from typing import Final
 
+import numpy as np
+
 from cosmic.daqco.api.application import DaqcoApplication
-from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.api.recorder import Recorder
+from cosmic.daqco.core.chunk import DataChunk, Values
 from cosmic.daqco.core.recording_format import AxisPosition
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errors import CosmicError
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.vico.api.application import VicoApplication
 
 _UN: Final = {"nN": 1e-3, "uN": 1.0, "µN": 1.0, "mN": 1e3, "N": 1e6}
 """How many micronewtons a unit of force is."""
+TOUCH_S: Final = 0.02
+"""Over so long a force is averaged, so that noise is no touch."""
+TOUCH_AGAIN_S: Final = 0.1
+"""How often a touch that lasts is told, for movements that begin in it."""
 
 
 def join_force_limits(daqco: DaqcoApplication, mico: MicoApplicationBase) -> None:
@@ -28,24 +35,71 @@ def join_force_limits(daqco: DaqcoApplication, mico: MicoApplicationBase) -> Non
 def join_force_cautions(daqco: DaqcoApplication, mico: MicoApplicationBase) -> None:
     """Have undo and initialisation ask where a force is felt beyond ``[mico.undo] felt_un``.
 
-    Only channels whose unit is one of force count.
+    A touch that is over when a movement ends is told to undo as well. Only channels whose unit is
+    one of force count, and of those the mean over `TOUCH_S`.
     """
-    board = Daqco(daqco)
+    watch = TouchWatch(mico)
 
     def doubt() -> str:
-        least_un = mico.manager.settings.undo.felt_un
-        try:
-            values, units = board.latest(), board.units
-        except CosmicError:
-            return ""
-        felt = {
-            name: f"{value:.1f} {units[name]}"
-            for name, value in values.items()
-            if not abs(value) * _UN.get(units.get(name, ""), 0.0) <= least_un
-        }
-        return "; ".join(f"{name} feels {text}" for name, text in sorted(felt.items()))
+        return watch.doubt() if daqco.buffer.latest_chunk is not None else ""
 
     mico.cautions.add(doubt)
+    daqco.buffer.subscribe(watch.take)
+
+
+class TouchWatch:
+    """Tells the cautions of MiCo of touches that last `TOUCH_S`; acquisition thread."""
+
+    def __init__(self, mico: MicoApplicationBase) -> None:
+        self._mico = mico
+        self._told_s: dict[str, float] = {}
+        self._recent: deque[tuple[Values, int]] = deque()
+        self._last: DataChunk | None = None
+        self._means: Values = np.empty(0)
+        self._felt = ""
+
+    def doubt(self) -> str:
+        """Return which forces are felt now, on the mean of the last samples; any thread."""
+        return self._felt
+
+    def take(self, chunk: DataChunk) -> None:
+        """Look at the mean force of the last samples; one that lasts is told again and again."""
+        samples = self._average(chunk)
+        least_un = self._mico.manager.settings.undo.felt_un
+        felt: list[str] = []
+        for name, scale, mean in zip(chunk.channels, chunk.scales, self._means, strict=True):
+            force_un = abs(mean) * _UN.get(scale.unit, 0.0)
+            if force_un <= least_un:
+                continue
+            felt.append(f"{name} feels {mean:.1f} {scale.unit}")
+            # Not a number is no touch: the doubt tells it for as long as it lasts.
+            if samples < TOUCH_S * chunk.rate_hz or np.isnan(force_un):
+                continue
+            if chunk.time_s >= self._told_s.get(name, -math.inf) + TOUCH_AGAIN_S:
+                self._told_s[name] = chunk.time_s
+                self._mico.cautions.touched(f"{name} felt more than {least_un:g} uN")
+        self._felt = "; ".join(sorted(felt))
+
+    def _average(self, chunk: DataChunk) -> int:
+        """Take the mean of the last samples, and return of how many: fewer right after a start."""
+        last, self._last = self._last, chunk
+        if last is None or not _continues(chunk, last):
+            self._recent.clear()
+        self._recent.append((chunk.values.sum(axis=1), chunk.samples))
+        samples = sum(each for _, each in self._recent)
+        while samples - self._recent[0][1] >= TOUCH_S * chunk.rate_hz:
+            samples -= self._recent.popleft()[1]
+        self._means = np.sum([each for each, _ in self._recent], axis=0) / samples
+        return samples
+
+
+def _continues(chunk: DataChunk, last: DataChunk) -> bool:
+    """Return False where another acquisition, or another meaning of its volts, begins."""
+    return (
+        chunk.first_sample >= last.first_sample
+        and chunk.channels == last.channels
+        and chunk.scales == last.scales
+    )
 
 
 def join_positions(recorder: Recorder, mico: MicoApplicationBase, clock: Clock) -> None:

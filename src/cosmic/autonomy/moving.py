@@ -5,10 +5,10 @@ from collections.abc import Mapping
 
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import CosmicError, MoveCancelled, StoppedError
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.api.group import move_together
-from cosmic.mico.core.orders import MoveTo
+from cosmic.mico.core.motion.orders import MoveTo
 from cosmic.mico.core.ports import ManagerPort
 
 logger = logging.getLogger(__name__)

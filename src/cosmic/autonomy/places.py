@@ -1,26 +1,26 @@
 """Pixels and places on the platform: what is calibrated, and moving a tool to a pixel."""
 
 import logging
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
 from typing_extensions import override
 
-from cosmic.autonomy.calibrating.book import CalibrationBook
+from cosmic.autonomy.calibrating.registry import CalibrationRegistry
 from cosmic.autonomy.calibrations import Calibrations
 from cosmic.autonomy.rotation_procedure import RotationProcedure
 from cosmic.autonomy.stage_procedure import StageProcedure
 from cosmic.autonomy.tools import axis_targets, expected, tip_um
 from cosmic.frame.errors import ConfigError, NotAvailable
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.mico.api.application_base import MicoApplicationBase
-from cosmic.mico.core.orders import MoveTo
+from cosmic.mico.core.motion.orders import MoveTo
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.places import CalibrationShown, Pixel, Places, RotationShown
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.pixel_map import PixelMap
-from cosmic.vico.core.tool_settings import ToolSettings
+from cosmic.vico.core.tool_settings import ToolSettings, tool_mistakes
 from cosmic.vico.core.vision.algorithms import FindTips, FindTools
 from cosmic.vico.core.vision.tool_types import ExpectedTool
 
@@ -38,13 +38,13 @@ class PlatformPlaces(Places):
     folder : Path or None
         Where calibrations are kept; None: until the end of the program.
     version : str
-        Of the program, for the book of calibrations.
+        Of the program, for the calibration registry.
 
     Attributes
     ----------
     calibrations : Calibrations
         Maps from platform to picture, and the rotation centre.
-    book : CalibrationBook
+    registry : CalibrationRegistry
         All that procedures measure, those maps among it.
 
     Raises
@@ -67,7 +67,7 @@ class PlatformPlaces(Places):
         if mistakes := tool_mistakes(vico.settings.tool, axes):
             raise ConfigError("\n".join(mistakes))
         self.calibrations = Calibrations(vico.units, self._tools, folder)
-        self.book = CalibrationBook(folder, clock=vico.clock, version=version)
+        self.registry = CalibrationRegistry(folder, clock=vico.clock, version=version)
 
     # Pixels to places
 
@@ -137,7 +137,7 @@ class PlatformPlaces(Places):
             raise NotAvailable(f"{running.title} is under way; click to move when it has ended")
         tip = tip_um(tool, self.positions())
         if tip is None:
-            raise NotAvailable(f"{what}: where it stands is not known; initialise the platform")
+            raise NotAvailable(f"{what}: its position is unknown; initialise the platform")
         x_um, y_um = self.map_of(picture, tip[2], what).to_um(place_px).tolist()
         motions = {
             axis: MoveTo(target, "um") for axis, target in axis_targets(tool, x_um, y_um).items()
@@ -231,16 +231,6 @@ class PlatformPlaces(Places):
 
 def _inside(place_px: Pixel, width: int, height: int) -> bool:
     return 0.0 <= place_px[0] <= width - 1.0 and 0.0 <= place_px[1] <= height - 1.0
-
-
-def tool_mistakes(tools: Sequence[ToolSettings], axes: Collection[str]) -> list[str]:
-    """Return a line for every axis that a tool names and that is not there."""
-    return [
-        f"vico.tool[{index}]: {tool.name}: there is no positioner {axis!r}"
-        for index, tool in enumerate(tools)
-        for axis in tool.axes
-        if axis not in axes
-    ]
 
 
 def join_places(

@@ -9,7 +9,7 @@ import numpy as np
 from cosmic.autonomy.calibrations import Calibrations
 from cosmic.autonomy.moving import Mover
 from cosmic.frame.errors import CosmicError, NotAvailable
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.mico.core.ports import ManagerPort
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.core.calibration import RotationCentre
@@ -53,7 +53,7 @@ class RotationProcedure:
         """Measure, keep, and turn back."""
         try:
             if self._axis not in self._mover.positions():
-                raise NotAvailable(f"{self._axis}: its angle is not known; initialise the platform")
+                raise NotAvailable(f"{self._axis}: its angle is unknown: initialise the platform")
             begun = self._mover.remember()[self._axis]
             try:
                 fit = self._measure(task, begun)
@@ -88,7 +88,7 @@ class RotationProcedure:
                 # One with a doubt will do: what does not turn along shows in the residual.
                 if track.fibre is None:
                     raise CalibrationRefused(
-                        f"rotation centre: the fibre was not followed to {away_deg:+g} degrees: "
+                        f"rotation centre: the fibre was lost at {away_deg:+g} degrees: "
                         f"{track.reason}; choose a place with one clear fibre near the middle"
                     )
                 fibre = track.fibre

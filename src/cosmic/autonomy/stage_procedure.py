@@ -7,14 +7,15 @@ from datetime import UTC, datetime
 from itertools import pairwise
 from typing import Final
 
+import cv2
 import numpy as np
+import numpy.typing as npt
 
 from cosmic.autonomy.calibrations import Calibrations
 from cosmic.autonomy.moving import Mover
-from cosmic.autonomy.tip_search import Floats, middle, uncovered
 from cosmic.autonomy.tools import axis_targets, tip_um
 from cosmic.frame.errors import CosmicError, NotAvailable
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.mico.core.ports import ManagerPort
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.core.calibration import Plane
@@ -24,7 +25,42 @@ from cosmic.vico.core.tool_settings import ToolSettings
 from cosmic.vico.core.vision.algorithms import grey
 from cosmic.vico.core.vision.tips import find_gripper, find_probe
 from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen
-from cosmic.vico.hw.interface import CameraSettings
+from cosmic.vico.hw.interface import CameraSettings, Pixels
+
+Floats = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.uint8]
+
+LEAST_CHANGE: Final = 15.0
+"""Grey levels of 255 that count as a change at least."""
+CHANGE_SHARE: Final = 0.5
+"""Of the largest change."""
+BROAD: Final = 0.6
+"""Narrower than this part of the tool's width is no tool: fibres, edges, noise."""
+
+
+def uncovered(before: Pixels, after: Pixels, width_px: float) -> Mask:
+    """Return where a dark tool stood before and does not afterwards, without what is narrow."""
+    scale = 1.0 if before.dtype == np.uint8 else 255.0 / max(1.0, float(before.max()))
+    change = cv2.blur(scale * (after.astype(np.float32) - before.astype(np.float32)), (3, 3))
+    level = max(LEAST_CHANGE, CHANGE_SHARE * float(np.percentile(change, 99.99)))
+    size = max(3, round(BROAD * width_px))
+    mask = (change > level).astype(np.uint8)
+    opened = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((size, size), np.uint8))
+    return np.asarray(opened, dtype=np.uint8)
+
+
+def middle(mask: Mask) -> Floats | None:
+    """Return the middle of what is marked, x and y; None where nothing is.
+
+    Of a gripper the jaws' ends are marked, each as a patch: what lies between their middles counts.
+    """
+    count, _, stats, centres = cv2.connectedComponentsWithStats(mask)
+    areas = stats[1:count, cv2.CC_STAT_AREA]
+    if not areas.size:
+        return None
+    large = centres[1:count][areas > 0.5 * areas.max()]
+    return np.asarray(large.mean(axis=0), dtype=np.float64)
+
 
 PICTURE_S: Final = 5.0
 SEARCH_PART: Final = 0.8
@@ -110,7 +146,7 @@ class StageProcedure:
         tip = tip_um(self._tool, self._mover.positions())
         if tip is None:
             raise NotAvailable(
-                f"{self._tool.name}: where it stands is not known; initialise the platform"
+                f"{self._tool.name}: its position is unknown; initialise the platform"
             )
         return np.array(tip)
 

@@ -1,6 +1,7 @@
 """Strict configuration: TOML read once at start into frozen models, every error named."""
 
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TypeVar
 
@@ -38,6 +39,11 @@ def user_file(name: str, folder: Path | None) -> Path | None:
     return folder / name
 
 
+def not_there(what: str, name: str, known: Iterable[str]) -> str:
+    """Return what is said of a name that nothing has, with those that there are."""
+    return f"there is no {what} {name!r}; there are {', '.join(known) or 'none'}"
+
+
 def read_toml(path: Path) -> dict[str, object]:
     """Read a TOML file.
 
@@ -55,6 +61,8 @@ def read_toml(path: Path) -> dict[str, object]:
         raise ConfigError(f"{path}: not UTF-8 text ({exc.reason} at byte {exc.start})") from exc
     except tomllib.TOMLDecodeError as exc:
         raise ConfigError(f"{path}: not valid TOML: {exc}") from exc
+    except ValueError as exc:  # more digits than Python makes a number of
+        raise ConfigError(f"{path}: not read: {str(exc).partition(';')[0]}") from None
     except RecursionError:
         raise ConfigError(f"{path}: not read: its arrays or tables lie too deep") from None
     except OSError as exc:

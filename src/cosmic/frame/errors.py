@@ -44,6 +44,10 @@ class WrongThreadError(CosmicError):
     """A blocking call was made in the GUI thread, which must never wait."""
 
 
+class OperationCancelled(CosmicError):  # noqa: N818 - reads as what happened
+    """An operation was cancelled before its end, most often before it began."""
+
+
 class MoveCancelled(CosmicError):  # noqa: N818 - reads as what happened
     """A movement ended before its target: cancelled, or replaced by a newer command."""
 

@@ -6,16 +6,16 @@ See docs/explanation/errors.md for the policy that this module enforces.
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
-from threading import Lock, local
-from typing import Generic, ParamSpec, TypeVar
+from threading import local
+from typing import ParamSpec, TypeVar
 
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.events import Event, Unsubscribe
 
 logger = logging.getLogger(__name__)
 
 P = ParamSpec("P")
 R = TypeVar("R")
-C = TypeVar("C", bound=Callable[..., object])
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,24 +37,6 @@ class Failure:
     defect: bool
 
 
-class _Subscribers(Generic[C]):
-    """A list of callables that may be changed while it is being called."""
-
-    def __init__(self) -> None:
-        self._lock = Lock()
-        self.all: tuple[C, ...] = ()
-
-    def add(self, callable_: C) -> Callable[[], None]:
-        with self._lock:
-            self.all = (*self.all, callable_)
-
-        def remove() -> None:
-            with self._lock:
-                self.all = tuple(each for each in self.all if each != callable_)
-
-        return remove
-
-
 class _Entered(local):
     """What this thread is doing now, so that a failure of it does not start it again."""
 
@@ -70,17 +52,17 @@ class FailurePolicy:
     """
 
     def __init__(self) -> None:
-        self._safe_stops: _Subscribers[Callable[[str], None]] = _Subscribers()
-        self._listeners: _Subscribers[Callable[[Failure], None]] = _Subscribers()
+        self._safe_stop: Event[str] = Event("a safe stop")
+        self._failed: Event[Failure] = Event("a failure listener")
         self._entered = _Entered()
 
-    def on_safe_stop(self, stop: Callable[[str], None]) -> Callable[[], None]:
+    def on_safe_stop(self, stop: Callable[[str], object]) -> Unsubscribe:
         """Call `stop(reason)` when motion must end; returns the function that undoes it."""
-        return self._safe_stops.add(stop)
+        return self._safe_stop.subscribe(stop)
 
-    def subscribe(self, listener: Callable[[Failure], None]) -> Callable[[], None]:
+    def subscribe(self, listener: Callable[[Failure], object]) -> Unsubscribe:
         """Call `listener` with each failure, in the thread where it happened."""
-        return self._listeners.add(listener)
+        return self._failed.subscribe(listener)
 
     def report(self, error: BaseException, where: str, *, thread_died: bool = False) -> Failure:
         """Log `error` with its traceback, stop what must stop, and tell the operator."""
@@ -99,22 +81,14 @@ class FailurePolicy:
         if self._entered.stopping:
             return
         self._entered.stopping = True
-        for stop in self._safe_stops.all:
-            try:
-                stop(reason)
-            except Exception:
-                logger.exception("a safe stop failed")
+        self._safe_stop.emit(reason)
         self._entered.stopping = False
 
     def _tell(self, failure: Failure) -> None:
         if self._entered.telling:
             return
         self._entered.telling = True
-        for listener in self._listeners.all:
-            try:
-                listener(failure)
-            except Exception:
-                logger.exception("a failure listener failed")
+        self._failed.emit(failure)
         self._entered.telling = False
 
     def guarded(self, where: str, function: Callable[P, R], fallback: R) -> Callable[P, R]:

@@ -75,9 +75,10 @@ def set_up_logging(
     *,
     file: Path | None = None,
     console: bool = False,
+    console_level: int = logging.INFO,
     clock: Clock = WALL,
 ) -> Callable[[], None]:
-    """Send the records of ``cosmic`` to `ring`, a rotating file and the terminal.
+    """Send the records of ``cosmic`` to `ring`, a rotating file and, from a level on, the terminal.
 
     Floods are folded on the way (`FoldingHandler`), by `clock`. The file and its three predecessors
     hold 20 MB at most. Returns the function that undoes it.
@@ -93,7 +94,9 @@ def set_up_logging(
             )
         )
     if console:
-        handlers.append(logging.StreamHandler())
+        terminal = logging.StreamHandler()
+        terminal.setLevel(console_level)
+        handlers.append(terminal)
     for handler in handlers:
         handler.setFormatter(formatter)
     folding = FoldingHandler(handlers, clock)

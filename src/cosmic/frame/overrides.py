@@ -3,6 +3,8 @@
 On Python 3.11 PySide6 crashes (seen with 6.9 to 6.11) when an overridden method raises while Qt
 calls it on behalf of Python, as `resizeEvent` within `resize()`, and the exception came from the
 interpreter, such as a KeyError of a dict. An exception that was caught once passes unharmed.
+From 3.12 on this is the `override` of all, which hands the method back as it is; here a call costs
+0.09 us more (2026-11, CPython 3.11.7, PySide6 6.11.3).
 """
 
 import sys

@@ -5,17 +5,13 @@ CoSMic are bluesky's.
 """
 
 import logging
-from collections.abc import Callable
 from datetime import UTC, datetime
-from threading import Condition
 from typing import Any, NotRequired, TypedDict
 
 from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errors import DeviceTimeout
-from cosmic.frame.listeners import tell
-from cosmic.frame.threads import forbid_waiting_here
+from cosmic.frame.operation import Operation
 
 logger = logging.getLogger(__name__)
 
@@ -85,77 +81,16 @@ def unix_of_platform_s(clock: Clock, platform_s: float) -> float:
     return unix_now_s() - (clock.now_s() - platform_s) / (clock.rate or 1.0)
 
 
-class PlanStatus:
-    """Something under way that a plan waits for; ends exactly once, from any thread."""
-
-    def __init__(self, what: str) -> None:
-        self._what = what
-        self._changed = Condition()
-        self._done = False
-        self._error: Exception | None = None
-        self._callbacks: list[Callable[[PlanStatus], None]] = []
+class PlanStatus(Operation[None]):
+    """Something under way that a plan waits for; why it fails is logged."""
 
     @override
-    def __repr__(self) -> str:
-        if not self._done:
-            return f"<{self._what}: under way>"
-        return f"<{self._what}: {self._error or 'done'}>"
+    def finish(self, result: None = None) -> bool:
+        return super().finish(result)
 
-    @property
-    def done(self) -> bool:
-        """True when it has ended, well or not."""
-        return self._done
-
-    @property
-    def success(self) -> bool:
-        """True when it has ended well."""
-        return self._done and self._error is None
-
-    def exception(self, timeout: float | None = 0.0) -> Exception | None:
-        """Return why it failed, or None; waits up to `timeout` seconds (None: for ever).
-
-        Raises
-        ------
-        DeviceTimeout
-            It had not ended by then.
-        """
-        if not self._done and timeout != 0.0:
-            forbid_waiting_here(f"waiting for {self._what}")
-        with self._changed:
-            if not self._changed.wait_for(lambda: self._done, timeout):
-                raise DeviceTimeout(f"{self._what} had not ended after {timeout:g} s")
-        return self._error
-
-    def wait(self, timeout_s: float | None = None) -> None:
-        """Wait for the end; raises what it failed with, and `DeviceTimeout`."""
-        error = self.exception(timeout_s)
-        if error is not None:
-            raise error
-
-    def add_callback(self, callback: "Callable[[PlanStatus], None]") -> None:
-        """Call `callback(status)` at the end, in the thread that ends it, or now."""
-        with self._changed:
-            if not self._done:
-                self._callbacks.append(callback)
-                return
-        tell([callback], self)
-
-    def finish(self) -> bool:
-        """End it well; False where it had ended before. For whoever carries it out."""
-        return self._end(None)
-
+    @override
     def fail(self, error: Exception) -> bool:
-        """End it badly; False where it had ended before. For whoever carries it out."""
-        return self._end(error)
-
-    def _end(self, error: Exception | None) -> bool:
-        with self._changed:
-            if self._done:
-                return False
-            self._error, self._done = error, True
-            callbacks, self._callbacks = self._callbacks, []
-            self._changed.notify_all()
-        if error is not None:
-            logger.warning("%s ended: %s", self._what, error)
-        tell(callbacks, self)
-        return True
+        ended = super().fail(error)
+        if ended:
+            logger.warning("%s ended: %s", self.title, error)
+        return ended

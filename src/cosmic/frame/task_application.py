@@ -2,9 +2,6 @@
 
 import logging
 from collections.abc import Callable
-from contextvars import copy_context
-from queue import SimpleQueue
-from threading import Lock
 
 from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
@@ -12,7 +9,8 @@ from typing_extensions import override
 from cosmic.frame.application import CosmicApplicationBase, GuiFactory
 from cosmic.frame.errors import MoveCancelled, MoveRefused, NotAvailable
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.task import Task
+from cosmic.frame.job_queue import Jobs
+from cosmic.frame.operation import Task
 
 logger = logging.getLogger(__name__)
 
@@ -38,10 +36,8 @@ class TaskApplication(CosmicApplicationBase):
         parent: QObject | None = None,
     ) -> None:
         super().__init__(title, policy, gui_factory, parent)
-        self._jobs: SimpleQueue[tuple[Task, Job] | None] = SimpleQueue()
+        self._jobs = Jobs(title)
         self._running_task: Task | None = None
-        self._taking = Lock()
-        self._over = False
 
     @property
     def running_task(self) -> Task | None:
@@ -63,55 +59,42 @@ class TaskApplication(CosmicApplicationBase):
             raise NotAvailable(f"{self.title} is closed")
         task = Task(title)
         self._running_task = task
-        with self._taking:
-            if self._over:
-                raise NotAvailable(f"{self.title} is closed")
-            # It is carried out as whoever began it, who may be another process.
-            context = copy_context()
-            self._jobs.put((task, lambda task: context.run(job, task)))
+        if not self._jobs.put(lambda: _carry_out(job, task), task):
+            raise NotAvailable(f"{self.title} is closed")
         self.task_started.emit(task)
         return task
 
     @override
     def custom_event_loop(self) -> bool:
         try:
-            self._work()
+            self._jobs.carry_out(_end_by)
         finally:
-            self._give_up_jobs()
+            self._jobs.close()
         return True
-
-    def _give_up_jobs(self) -> None:
-        """Leave nobody waiting for a task that will not be begun."""
-        with self._taking:
-            self._over = True
-        while not self._jobs.empty():
-            item = self._jobs.get_nowait()
-            if item is not None:
-                item[0].fail(NotAvailable(f"{self.title} is closed"))
-
-    def _work(self) -> None:
-        while not self.end_requested:
-            item = self._jobs.get()
-            if item is None:
-                continue
-            task, job = item
-            logger.info("%s started", task.title)
-            try:
-                job(task)
-            except Exception as exc:
-                task.fail(exc)  # whoever waits for it must not wait for ever
-                raise
-            failure = task.failure
-            if isinstance(failure, (MoveRefused, MoveCancelled)):
-                logger.warning("%s ended: %s", task.title, failure)
-            elif failure is not None:
-                logger.error("%s ended: %s", task.title, failure)
-            else:
-                logger.info("%s finished", task.title)
 
     @override
     def request_end(self) -> None:
         super().request_end()
-        if self._running_task is not None:
-            self._running_task.cancel()
-        self._jobs.put(None)
+        self._jobs.close()
+
+
+def _carry_out(job: Job, task: Task) -> None:
+    logger.info("%s started", task.title)
+    try:
+        job(task)
+    except Exception as exc:
+        task.fail(exc)
+        raise
+    finally:
+        failure = task.failure
+        if isinstance(failure, (MoveRefused, MoveCancelled)):
+            logger.warning("%s ended: %s", task.title, failure)
+        elif failure is not None:
+            logger.error("%s ended: %s", task.title, failure)
+        else:
+            logger.info("%s finished", task.title)
+
+
+def _end_by(error: Exception, _where: str) -> None:
+    """Let a defect end the application's thread, which the policy then hears of."""
+    raise error

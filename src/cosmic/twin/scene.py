@@ -120,6 +120,7 @@ class Scene:
         folder: Path | None = None,
         sample: str = "",
         truth: Truth = NO_TRUTH,
+        apart: bool = False,
     ) -> Self:
         """Make the platform that `settings` describes.
 
@@ -135,6 +136,8 @@ class Scene:
             Name of what lies on the plate, for the truth.
         truth : Truth
             Told what happens; `close` ends it.
+        apart : bool
+            Images are drawn in a process of their own.
 
         Raises
         ------
@@ -172,7 +175,7 @@ class Scene:
             force_side=force_side,
             lens=lens,
             light=light,
-            optics=Optics(settings, files, stages, force_side, lens, light, seed),
+            optics=Optics(settings, files, stages, force_side, lens, light, seed, apart=apart),
             faults=faults,
             truth=truth,
         )

@@ -6,7 +6,7 @@ from typing_extensions import override
 
 from contract.cameras import CameraRig, Can
 from contract.cameras.gige_process import GigeCamera, missing
-from cosmic.vico.hw.aravis_library import AravisLibrary
+from cosmic.vico.hw.aravis import AravisLibrary
 from cosmic.vico.hw.interface import Roi
 
 

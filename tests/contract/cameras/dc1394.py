@@ -12,7 +12,7 @@ from typing import Self
 from typing_extensions import override
 
 from contract.cameras import CameraRig, Can
-from cosmic.vico.hw.dc1394_library import Dc1394Library
+from cosmic.vico.hw.dc1394 import Dc1394Library
 from cosmic.vico.hw.interface import Roi
 
 SCALABLE, FIXED = "0800460200000001", "0800460200000002"

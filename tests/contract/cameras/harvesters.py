@@ -7,7 +7,7 @@ from typing import Self
 from typing_extensions import override
 
 from contract.cameras import CameraRig, Can
-from cosmic.vico.hw.harvesters_library import HarvestersLibrary
+from cosmic.vico.hw.harvesters import HarvestersLibrary
 from cosmic.vico.hw.interface import Roi
 
 

@@ -8,7 +8,7 @@ from contract.cameras import CameraRig, Can
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import shipped_settings
 from cosmic.vico.hw.interface import Roi
-from cosmic.vico.hw.sim_camera_library import SimulatedCameraLibrary
+from cosmic.vico.hw.sim_camera import SimulatedCameraLibrary
 
 
 class SimulatedRig(CameraRig):

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from cosmic.app.calibration_panel import AGE, HOW, RESIDUAL, STANDING, CalibrationPanel
-from cosmic.autonomy.calibrating.book import CalibrationBook, CalibrationEntry
+from cosmic.autonomy.calibrating.registry import CalibrationEntry, CalibrationRegistry
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import NotAvailable
 
@@ -20,23 +20,23 @@ def clock() -> ManualClock:
 
 
 @pytest.fixture
-def book(clock: ManualClock) -> CalibrationBook:
-    book = CalibrationBook(clock=clock, now=lambda: NOON)
+def registry(clock: ManualClock) -> CalibrationRegistry:
+    registry = CalibrationRegistry(clock=clock, now=lambda: NOON)
     for name, residual in (("height", 2.34), ("map", 0.1)):
-        book.put(
+        registry.put(
             CalibrationEntry(
-                name, "left", {"up_um": 38.5}, residual, "um", 12.0, NOON, 0.0, book.session
+                name, "left", {"up_um": 38.5}, residual, "um", 12.0, NOON, 0.0, registry.session
             )
         )
-    return book
+    return registry
 
 
 @pytest.fixture
-def panel(qtbot: Any, book: CalibrationBook) -> Iterator[CalibrationPanel]:
+def panel(qtbot: Any, registry: CalibrationRegistry) -> Iterator[CalibrationPanel]:
     def calibrate(*, zooms: bool) -> Any:
         raise NotAvailable(f"every zoom: {zooms}; initialise the platform first")
 
-    panel = CalibrationPanel(lambda: book, calibrate)
+    panel = CalibrationPanel(lambda: registry, calibrate)
     qtbot.addWidget(panel)
     panel.show()
     yield panel
@@ -57,22 +57,24 @@ def test_each_is_listed_with_residual_and_age(panel: CalibrationPanel, clock: Ma
 
 
 def test_a_poor_one_says_why_and_shows_no_residual(
-    panel: CalibrationPanel, book: CalibrationBook
+    panel: CalibrationPanel, registry: CalibrationRegistry
 ) -> None:
-    book.refuse(book.entries[1], "residual 0.8 px, at most 0.5 is allowed")
+    registry.refuse(registry.entries[1], "residual 0.8 px, at most 0.5 is allowed")
     panel.refresh()
     shown = row(panel, 1)
     assert (shown[STANDING], shown[RESIDUAL]) == ("poor", "")
     assert "0.8 px" in shown[HOW]
 
 
-def test_what_is_selected_is_measured_anew(panel: CalibrationPanel, book: CalibrationBook) -> None:
+def test_what_is_selected_is_measured_anew(
+    panel: CalibrationPanel, registry: CalibrationRegistry
+) -> None:
     assert not panel.anew.isEnabled()
     item = panel.list.topLevelItem(0)
     assert item is not None
     item.setSelected(True)
     panel.anew.click()
-    assert [each.name for each in book.entries] == ["map"]
+    assert [each.name for each in registry.entries] == ["map"]
     assert panel.list.topLevelItemCount() == 1
 
 

@@ -13,10 +13,9 @@ from pytestqt.qtbot import QtBot
 
 from cosmic.app.campaign_board import CampaignBoard
 from cosmic.app.campaign_table import CAUSE, EI, INTERVAL, NUMBER, OUTCOME, TIME
-from cosmic.app.fibre_card import FibreCard
-from cosmic.app.fibre_picture import round_below
-from cosmic.autonomy.campaign.board import BoardRow, BoardState, board_of, card_of
+from cosmic.app.fibre_card import FibreCard, round_below
 from cosmic.autonomy.campaign.records import FibreRecord, Outcome, Picture, Shape
+from cosmic.autonomy.campaign.snapshot import CampaignSnapshot, FibreRow, card_of, snapshot_of
 from cosmic.autonomy.campaign.statistics import progress
 from cosmic.frame.gui.palette import LIGHT
 from cosmic.frame.gui.theme import State, apply_theme
@@ -26,8 +25,8 @@ LEFT = Qt.MouseButton.LeftButton
 FIBRES = [good(1), failed(2), good(3, ei_n_m2=2e-11, seed=1), failed(4, "slipped"), failed(5)]
 
 
-def state(fibres: list[FibreRecord], word: str = "running", **more: object) -> BoardState:
-    return board_of("quick", word, fibres, progress(fibres, 200.0), left_s=90.0, **more)  # type: ignore[arg-type]
+def state(fibres: list[FibreRecord], word: str = "running", **more: object) -> CampaignSnapshot:
+    return snapshot_of("quick", word, fibres, progress(fibres, 200.0), left_s=90.0, **more)  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +47,7 @@ def only_card(qapp: QApplication) -> Iterator[FibreCard]:
 
 @pytest.fixture
 def board(only_board: CampaignBoard, qtbot: QtBot) -> CampaignBoard:
-    only_board.set_state(BoardState())
+    only_board.set_state(CampaignSnapshot())
     only_board.resize(900, 700)
     only_board.show()
     qtbot.waitExposed(only_board)
@@ -72,7 +71,7 @@ def cell(board: CampaignBoard, row: int, column: int) -> str:
 def test_the_board_tells_how_a_campaign_stands(board: CampaignBoard) -> None:
     board.set_state(state(FIBRES, operation="lift"))
     assert board.state.text() == "running"
-    assert board.sign.state is State.BUSY
+    assert board.indicator.state is State.BUSY
     assert board.title.text() == "quick: lift"
     assert board.fibres.value.text() == "2 good, 3 failed"
     assert board.success.value.text() == "40 %"
@@ -83,7 +82,7 @@ def test_the_board_tells_how_a_campaign_stands(board: CampaignBoard) -> None:
     assert not board.reason.isVisible()
     board.set_state(state(FIBRES, "ended", reason="2 good fibres"))
     assert board.reason.text() == "2 good fibres"
-    assert board.sign.state is State.OK
+    assert board.indicator.state is State.OK
 
 
 def test_the_table_has_the_newest_fibre_on_top(board: CampaignBoard) -> None:
@@ -129,7 +128,7 @@ def test_a_double_click_or_enter_chooses_a_fibre(board: CampaignBoard, qtbot: Qt
 
 def test_the_histogram_counts_every_fibre_that_was_measured(board: CampaignBoard) -> None:
     rows = [
-        BoardRow(n, Outcome.GOOD, "", _measured(n, 1e-11 * 1.3**n), Shape(), 30.0, 1)
+        FibreRow(n, Outcome.GOOD, "", _measured(n, 1e-11 * 1.3**n), Shape(), 30.0, 1)
         for n in range(12)
     ]
     measured = tuple(row.ei for row in rows if row.ei is not None)
@@ -146,7 +145,7 @@ def test_the_histogram_counts_every_fibre_that_was_measured(board: CampaignBoard
 
 
 def _measured(number: int, ei_n_m2: float) -> object:
-    from cosmic.autonomy.campaign.board import MeasuredEi
+    from cosmic.autonomy.campaign.snapshot import MeasuredEi
 
     return MeasuredEi(number, ei_n_m2, 0.95 * ei_n_m2, 1.05 * ei_n_m2, trusted=True)
 
@@ -174,7 +173,7 @@ def test_a_card_shows_picture_curves_and_numbers(card: FibreCard, qtbot: QtBot) 
     record = replace(record, pictures=(picture(3), replace(picture(4, (60, 80)), name="held")))
     card.set_card(card_of(record))
     assert card.title.text() == "Fibre 12"
-    assert card.sign.state is State.OK
+    assert card.indicator.state is State.OK
     assert (card.picture.shown.width(), card.picture.shown.height()) == (320, 240)
     card.pictures.setCurrentText("held")
     assert (card.picture.shown.width(), card.picture.shown.height()) == (80, 60)
@@ -201,7 +200,7 @@ def _texts(card: FibreCard) -> list[str]:
 def test_a_card_of_a_failed_fibre_says_why(card: FibreCard) -> None:
     card.set_card(card_of(good(1)))
     card.set_card(card_of(failed(13)))
-    assert card.sign.state is State.ERROR
+    assert card.indicator.state is State.ERROR
     assert card.outcome.text() == "failed: missed grasp"
     assert "did not follow" in card.text.text()
     assert card.failures.text() == "Failed on the way: close: missed grasp, close: missed grasp"

@@ -10,12 +10,12 @@ from PySide6.QtCore import Qt
 from cosmic.app.campaign_panel import CampaignPanel
 from cosmic.app.control_mode import ACM, blocked_modes
 from cosmic.app.scene_replay import poses_of
+from cosmic.autonomy.campaign.campaign import CampaignPhase
 from cosmic.autonomy.campaign.recipe import load_recipe
 from cosmic.autonomy.campaign.records import CampaignInfo, FibreRecord, Series
 from cosmic.autonomy.campaign.statistics import progress
-from cosmic.autonomy.campaign.steering import CampaignPhase
+from cosmic.autonomy.campaign.storage_format import DATABASE
 from cosmic.autonomy.campaign.store import CampaignStore
-from cosmic.autonomy.campaign.store_files import DATABASE
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.shipped.bend_test import build_bend_test
 from cosmic.frame.clock import ManualClock
@@ -132,7 +132,7 @@ def test_one_that_was_stopped_is_shown_as_stopped_and_resume_goes_on_in_its_fold
     first.abort("a hand on the button")
     panel.refresh()
     panel.procedure.refresh()
-    for sign in (panel.board.sign, panel.procedure.sign):
+    for sign in (panel.board.indicator, panel.procedure.indicator):
         assert sign.state is State.REFUSED
     assert panel.board.state.text() == "stopped"
     assert "a hand on the button" in panel.procedure.reason.text()

@@ -34,7 +34,7 @@ def refuse_left_z(window: OperatorWindow, qtbot: QtBot) -> SceneWidget:
     enter(qtbot, field(card, "target"), "-5000")
     click(qtbot, card, "MiCoCL_9")
     shown = scene(window, qtbot)
-    qtbot.waitUntil(lambda: bool(shown.refused_text))
+    qtbot.waitUntil(lambda: bool(shown.refused_text), timeout=20_000)
     return shown
 
 
@@ -159,8 +159,7 @@ def test_the_next_move_of_the_axis_takes_the_ghost_away(
     card = mico(window).cards["left.z"]
     enter(qtbot, field(card, "target"), "100")
     click(qtbot, card, "MiCoCL_9")
-    qtbot.waitUntil(lambda: not shown.refused_text)
-    assert not shown.content.ghosts
+    qtbot.waitUntil(lambda: not shown.refused_text and not shown.content.ghosts, timeout=20_000)
 
 
 def test_a_click_on_its_words_takes_the_ghost_away(window: OperatorWindow, qtbot: QtBot) -> None:

@@ -4,13 +4,14 @@ from collections.abc import Callable
 
 import pytest
 from PySide6.QtCore import QPoint, QRect, QSettings, Qt
-from PySide6.QtWidgets import QApplication, QDialog, QDockWidget, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QDockWidget, QScrollArea, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from cosmic.frame.gui import screen_fit
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.frame.gui.stop_button import StopButton
-from gui.app.windows import Make
+from gui.app.windows import Make, mico
+from gui.mico.panels import part
 
 SMALL = QRect(0, 0, 1024, 600)
 Screen = Callable[[QRect], None]
@@ -59,6 +60,22 @@ def test_a_stand_alone_window_fits_a_small_screen(
     window = make(applications=(application,), hardware=False, size=(2040, 1137))
     qtbot.waitUntil(lambda: on(SMALL, window), timeout=5000)
     assert stop_is_seen(window, SMALL)
+
+
+def test_on_a_small_screen_every_card_shows_the_button_that_halts_its_axis(
+    make: Make, qtbot: QtBot, screen: Screen
+) -> None:
+    screen(SMALL)
+    window = make(hardware=False, size=(2040, 1137))
+    qtbot.waitUntil(lambda: on(SMALL, window), timeout=5000)
+    dock = window.dock("MiCo")
+    areas = [each for each in dock.findChildren(QScrollArea) if each.isVisible()]
+    qtbot.waitUntil(lambda: not any(each.horizontalScrollBar().maximum() for each in areas))
+    for card in mico(window).cards.values():
+        halt = part(card, "stopAxis", QToolButton)
+        for area in areas:
+            left_px = halt.mapTo(area.viewport(), QPoint(0, 0)).x()
+            assert 0 <= left_px <= area.viewport().width() - halt.width(), card.objectName()
 
 
 def test_a_kept_layout_of_a_larger_screen_is_fitted_with_what_floats(

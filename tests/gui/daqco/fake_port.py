@@ -18,7 +18,7 @@ from cosmic.daqco.core.settings import (
 from cosmic.daqco.hw.interface import BoardInfo
 from cosmic.frame.errors import ConfigError, CosmicError
 from cosmic.frame.file_names import directory_problem
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 
 FORCE = ScaleSettings(name="Probe", unit="uN", coefficients=(0.0, 20.0))
 INPUTS = tuple(f"ai{number}" for number in range(32))

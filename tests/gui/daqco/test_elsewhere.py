@@ -37,7 +37,7 @@ class Seen:
 @pytest.fixture
 def seen(qtbot, tmp_path, monkeypatch):
     # A machine that is busy with other tests falls silent for a moment now and then.
-    monkeypatch.setattr("cosmic.daqco.api.remote_guard.SILENCE_LIMIT_S", 5.0)
+    monkeypatch.setattr("cosmic.daqco.api.limit_watch.SILENCE_LIMIT_S", 5.0)
     with ExitStack() as stack:
         home = stack.enter_context(at_home(settings(tmp_path)))
         endpoint = f"tcp/127.0.0.1:{free_port()}"

@@ -6,6 +6,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QMenu, QWidget
 from pytestqt.qtbot import QtBot
 
+from cosmic.frame.gui.application_events import ApplicationEvents
 from cosmic.frame.gui.key_hold import GRACE_MS, HoldKeys
 
 LEFT, UP = Qt.Key.Key_Left, Qt.Key.Key_Up
@@ -16,7 +17,7 @@ NONE, SHIFT = Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier
 def keys(qapp: QApplication) -> Iterator[HoldKeys]:
     keys = HoldKeys(qapp, ["Left", "Up", "Shift+A"])
     yield keys
-    qapp.removeEventFilter(keys)
+    ApplicationEvents.of(qapp).remove(keys)
     keys.deleteLater()
 
 

@@ -1,4 +1,4 @@
-"""What an application tells reaches a widget in the GUI thread, while there is one."""
+"""What happens in any thread reaches a QObject in the GUI thread, while there is one."""
 
 import threading
 
@@ -6,63 +6,93 @@ import pytest
 from PySide6.QtCore import QCoreApplication, QEvent
 from PySide6.QtWidgets import QWidget
 
-from cosmic.frame.gui.relay import PortRelay
+from cosmic.frame.events import Event
+from cosmic.frame.gui.relay import Relay
 
 GOES = QEvent.Type.DeferredDelete.value
-
-
-class Port:
-    """Tells of changes."""
-
-    def __init__(self):
-        self.listeners = []
-
-    def on_change(self, listener):
-        self.listeners.append(listener)
-        return lambda: self.listeners.remove(listener)
-
-    def change(self):
-        for each in self.listeners:
-            each()
 
 
 class Shown(QWidget):
     def __init__(self):
         super().__init__()
-        self.threads = []
+        self.heard = []
 
-    def refresh(self):
-        self.threads.append(threading.current_thread())
+    def hear(self, *values):
+        self.heard.append((values, threading.current_thread()))
 
 
 @pytest.fixture
-def port():
-    return Port()
+def event():
+    return Event()
 
 
-def test_a_change_in_a_thread_is_told_in_the_gui_thread(qtbot, port):
-    widget = Shown()
-    qtbot.addWidget(widget)
-    PortRelay(port, widget).changed.connect(widget.refresh)
-    teller = threading.Thread(target=port.change)
-    teller.start()
-    teller.join()
-    qtbot.waitUntil(lambda: bool(widget.threads))
-    assert widget.threads == [threading.main_thread()]
-
-
-def test_it_stops_listening_when_the_widget_goes_and_when_it_is_told_to(qapp, port):
-    kept = []
-    widget = Shown()
-    relay = PortRelay(port, widget)
-    relay.keep(lambda: kept.append("ended"))
+def goes(widget):
     widget.deleteLater()
     QCoreApplication.sendPostedEvents(widget, GOES)
-    assert (port.listeners, kept) == ([], ["ended"])
+
+
+def in_a_thread(function, *args):
+    thread = threading.Thread(target=function, args=args)
+    thread.start()
+    thread.join()
+
+
+def test_what_happens_in_a_thread_is_heard_in_the_gui_thread(qtbot, event):
+    widget = Shown()
+    qtbot.addWidget(widget)
+    relay = Relay(widget.hear).follow(event.subscribe)
+    in_a_thread(event.emit, 1, "left.x")
+    qtbot.waitUntil(lambda: bool(widget.heard))
+    assert widget.heard == [((1, "left.x"), threading.main_thread())]
+    relay.end()
+
+
+def test_in_the_gui_thread_it_is_heard_at_once_unless_it_is_queued(qtbot):
+    widget = Shown()
+    qtbot.addWidget(widget)
+    Relay(widget.hear)("now")
+    assert [values for values, _ in widget.heard] == [("now",)]
+    later = Relay(widget.hear, queued=True)
+    later("later")
+    assert len(widget.heard) == 1
+    qtbot.waitUntil(lambda: len(widget.heard) == 2)
+
+
+def test_it_stops_listening_when_the_widget_goes_and_when_it_is_told_to(qapp, event):
+    kept = []
+    widget = Shown()
+    relay = Relay(widget.hear).follow(event.subscribe)
+    relay.keep(lambda: kept.append("ended"))
+    goes(widget)
+    assert (len(event), kept) == (0, ["ended"])
     other = Shown()
-    relay = PortRelay(port, other)
+    relay = Relay(other.hear).follow(event.subscribe)
     relay.end()
     relay.end()
-    assert port.listeners == []
-    other.deleteLater()
-    QCoreApplication.sendPostedEvents(other, GOES)
+    assert len(event) == 0
+    goes(other)
+
+
+def test_what_was_on_its_way_to_a_widget_that_is_gone_harms_nobody(qapp):
+    widget = Shown()
+    heard, relay = widget.heard, Relay(widget.hear)
+    in_a_thread(relay, 1)
+    goes(widget)
+    QCoreApplication.processEvents()
+    relay(2)
+    assert heard == []
+
+
+def test_a_relay_keeps_no_widget_alive(qapp):
+    widget = Shown()
+    gone = []
+    widget.destroyed.connect(lambda: gone.append(True))
+    relay = Relay(widget.hear)
+    del widget
+    assert gone == [True]
+    relay(1)
+
+
+def test_what_belongs_to_no_qobject_cannot_be_called_through_a_relay(qapp):
+    with pytest.raises(TypeError, match="a method of a QObject"):
+        Relay(print)

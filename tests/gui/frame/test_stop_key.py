@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from cosmic.frame.gui.application_events import ApplicationEvents
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.stop_key import StopKeyFilter
 
@@ -33,7 +34,7 @@ def key(qapp: QApplication, moves: list[bool]) -> Iterator[StopKeyFilter]:
     """The stop key of a platform that moves."""
     key = StopKeyFilter(qapp, "F12", moving=lambda: bool(moves))
     yield key
-    qapp.removeEventFilter(key)
+    ApplicationEvents.of(qapp).remove(key)
     key.deleteLater()
 
 

@@ -5,7 +5,7 @@ from PySide6.QtCore import QEvent, Qt
 
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.gui.task_bar import TaskBar
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 
 LEFT = Qt.MouseButton.LeftButton
 

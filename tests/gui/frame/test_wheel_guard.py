@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from cosmic.frame.gui.application_events import ApplicationEvents
 from cosmic.frame.gui.wheel_guard import WheelGuard
 from gui.frame.wheel import turn
 
@@ -51,7 +52,7 @@ def area(qtbot: QtBot, qapp: QApplication) -> Iterator[QScrollArea]:
         area.activateWindow()
     area.setFocus()
     yield area
-    qapp.removeEventFilter(guard)
+    ApplicationEvents.of(qapp).remove(guard)
     guard.deleteLater()
 
 

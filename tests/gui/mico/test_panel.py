@@ -10,7 +10,7 @@ from pytestqt.qtbot import QtBot
 from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import State
-from cosmic.mico.core.positioner import PositionerState
+from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.gui import registry
 from cosmic.mico.gui.card import ConfidenceMark
 from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI

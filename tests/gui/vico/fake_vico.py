@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cosmic.frame.errors import ConfigError, CosmicError
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.vico.api.places import CalibrationShown
 from cosmic.vico.core.picture import Circumstances, Picture
 from cosmic.vico.hw.interface import (
@@ -126,7 +126,7 @@ class Recorded:
 
 
 class FakeCamera:
-    """Follows `CameraPort`; tests push pictures with `push` and set what it is to answer."""
+    """Has what a `CameraHandle` has; tests push pictures and set what it is to answer."""
 
     def __init__(self, port: "FakeVico", name: str, directory: Path) -> None:
         self._port, self.name, self.directory = port, name, directory
@@ -169,6 +169,10 @@ class FakeCamera:
         now_s = self._next_id / 30.0
         shot = Frame(data, self._next_id, now_s, now_s, status=status, pixel_format=pixel_format)
         self._next_id += 1
+        return self.show_frame(shot)
+
+    def show_frame(self, shot: Frame) -> Picture:
+        """Have a frame as the newest."""
         self._latest = Picture(self.name, shot, Circumstances(scale_um_px=self.scale_um_px))
         self.counters = replace(self.counters, completed=self.counters.completed + 1)
         return self._latest

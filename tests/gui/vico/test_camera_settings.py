@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 
 from cosmic.frame.errors import ConfigError
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.vico.hw.interface import PixelFormat, Roi, Trigger
 from gui.vico.fake_vico import INFO, RANGES, SETTINGS
 

@@ -1,5 +1,6 @@
 """The live picture: what is shown, which part of it, and what is never shown."""
 
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from cosmic.frame.gui.theme import State
 from cosmic.vico.gui.camera_view import CameraView
 from cosmic.vico.gui.levels import OVER_RGB, UNDER_RGB
 from cosmic.vico.hw.interface import FrameStatus, PixelFormat, Trigger
+from cosmic.vico.hw.sim_camera import DrawnFrame
 from gui.vico.fake_vico import HEIGHT, SETTINGS, WIDTH, Found, Seen, SeenTip
 
 
@@ -41,6 +43,27 @@ def test_only_the_newest_picture_is_shown(qtbot, shown, camera):
     qtbot.waitUntil(lambda: shown.view.picture is newest)
     QApplication.processEvents()
     assert shown.view.paints <= paints + 2
+
+
+def test_the_window_waits_for_no_picture_that_is_still_drawn(qtbot, shown, camera):
+    before = shown.view.picture
+    asked, drawn = [], threading.Event()
+
+    class Slow:
+        ready = property(lambda _: drawn.is_set())
+
+        def pixels(self):
+            assert drawn.is_set(), "the window waited"
+            return half(90)
+
+    frame = DrawnFrame(lambda: asked.append(1) or Slow(), 99, 5.0, 5.0)
+    coming = camera.show_frame(frame)
+    qtbot.waitUntil(lambda: bool(asked))
+    shown.look()
+    assert shown.view.picture is before
+    drawn.set()
+    qtbot.waitUntil(lambda: shown.view.picture is coming)
+    assert asked == [1]
 
 
 def test_an_incomplete_picture_is_not_shown_as_good(qtbot, shown, camera):

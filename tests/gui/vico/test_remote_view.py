@@ -12,14 +12,15 @@ from contract.station_rig import connected, free_port
 from contract.vico_rig import VicoRig, at_home, following, hosted, vico_rig
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.gui.theme import State
+from cosmic.frame.network.application import RemoteApplication
 from cosmic.frame.threads import declare_gui_thread
-from cosmic.vico.api.remote_application import RemoteVicoApplication
+from cosmic.vico.api.vico import Vico
 from cosmic.vico.gui.vico_gui import VicoGui, make_vico_gui
 
 SIZE_PX = (320, 240)
 
 
-@pytest.fixture(params=["in-process", "zenoh"])
+@pytest.fixture(params=["station"])
 def rig(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[VicoRig]:
     with vico_rig(request.param, tmp_path, SIZE_PX) as made:
         yield made
@@ -44,7 +45,7 @@ def ramp() -> np.ndarray:
     return np.tile(across, (SIZE_PX[1], 1))
 
 
-def made_gui(remote: RemoteVicoApplication | None, own: Callable[[QWidget], None]) -> VicoGui:
+def made_gui(remote: RemoteApplication[Vico] | None, own: Callable[[QWidget], None]) -> VicoGui:
     assert remote is not None
     gui = make_vico_gui(remote)
     for widget in (*gui.cameras.values(), gui.lens):

@@ -1,5 +1,6 @@
 """``cosmic campaign``: its exit code says if it did what was asked, its seed is the one given."""
 
+import logging
 import math
 import re
 from collections.abc import Iterator
@@ -10,13 +11,17 @@ from typing import Any
 
 import pytest
 
-from cosmic.app import campaign_command
+from cosmic.app import calibrate_command, campaign_command, left_open
 from cosmic.app.cli import main
+from cosmic.autonomy.campaign.campaign import CampaignPhase
 from cosmic.autonomy.campaign.records import CampaignInfo
 from cosmic.autonomy.campaign.statistics import progress
-from cosmic.autonomy.campaign.steering import CampaignPhase
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.frame.errors import RecordingError
+from cosmic.frame.log_folding import FoldingHandler
+
+logger = logging.getLogger("cosmic.test")
 
 RECIPE = """
 procedure = "transport"
@@ -30,6 +35,10 @@ table = false
 """
 
 
+# A command makes a Qt application where there is none; of the wrong kind for the tests after it.
+pytestmark = pytest.mark.usefixtures("qapp")
+
+
 @pytest.fixture
 def recipe(tmp_path: Path) -> Path:
     path = tmp_path / "short.toml"
@@ -40,14 +49,14 @@ def recipe(tmp_path: Path) -> Path:
 @pytest.fixture
 def platforms(monkeypatch: pytest.MonkeyPatch, qapp: object) -> SimpleNamespace:
     """Stands for the platform: what it was begun with, and how the campaign on it ends."""
-    made = SimpleNamespace(seeds=[], phase=CampaignPhase.ENDED)
+    made = SimpleNamespace(seeds=[], phase=CampaignPhase.ENDED, start=lambda: None)
 
     @contextmanager
     def connect(*_: object, seed: int, **__: object) -> Iterator[Any]:
         made.seeds.append(seed)
         campaign = SimpleNamespace(
             phase=made.phase, over=True, end_reason="so it was", operation="", left_s=math.nan,
-            progress=progress((), 3.0), start=lambda: None, join=lambda: None,
+            progress=progress((), 3.0), start=lambda: made.start(), join=lambda: None,
         )  # fmt: skip
         yield SimpleNamespace(campaign=lambda *_: campaign, simulated=True)
 
@@ -104,3 +113,60 @@ def test_another_seed_than_that_of_the_campaign_is_refused(
     CampaignStore.create(out, info).close()
     assert main(["campaign", str(recipe), "--out", str(out), "--seed", "8"]) == 1
     assert re.search("twin with seed 7, and this one has seed 8", capsys.readouterr().err)
+
+
+def test_the_log_of_a_campaign_is_kept_in_its_folder_and_warnings_are_told_at_once(
+    recipe: Path,
+    tmp_path: Path,
+    platforms: SimpleNamespace,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def start() -> None:
+        logger.info("the plate is looked at")
+        for number in range(1000):
+            logger.warning("sample %d is late", number)
+
+    platforms.start = start
+    out = tmp_path / "out"
+    assert main(["campaign", str(recipe), "--out", str(out)]) == 0
+    for text in ((out / "cosmic.log").read_text(encoding="utf-8"), capsys.readouterr().err):
+        assert 1 <= text.count("is late") < 100
+        assert "repeated 950 times" in text
+    assert "the plate is looked at" in (out / "cosmic.log").read_text(encoding="utf-8")
+    assert "the plate is looked at" not in text, "the terminal is for the bar"
+    handlers = logging.getLogger("cosmic").handlers
+    assert not [each for each in handlers if isinstance(each, FoldingHandler)]
+
+
+def test_a_campaign_that_is_refused_writes_no_log_into_the_folder_of_another(
+    recipe: Path, tmp_path: Path, qapp: object, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    CampaignStore.create(
+        out, CampaignInfo(name="short", procedure="transport", recipe_text="another", seed=1,
+                          hardware="digital twin", sample="", started="2026-01-01T00:00:00+00:00"),
+    ).close()  # fmt: skip
+    assert main(["campaign", str(recipe), "--out", str(out)]) == 1
+    assert "another recipe" in capsys.readouterr().err
+    assert not (out / "cosmic.log").exists()
+
+
+@pytest.mark.parametrize("command", ["calibrate", "repair"])
+def test_a_flood_of_warnings_is_folded_by_every_command_without_a_window(
+    command: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def flood(*_: object, **__: object) -> None:
+        for number in range(1000):
+            logger.warning("sample %d is late", number)
+        raise RecordingError("and that was all")
+
+    monkeypatch.setattr(calibrate_command, "connect", flood)
+    monkeypatch.setattr(left_open, "close_one", flood)
+    assert main([command, *([str(tmp_path / "push.h5")] if command == "repair" else [])]) == 1
+    told = capsys.readouterr().err
+    assert 1 <= told.count("is late") < 100
+    assert "repeated 950 times" in told
+    assert "and that was all" in told

@@ -6,7 +6,7 @@ from typing import Any, cast
 import pytest
 
 from cosmic.app.stop_watch import RESET_SINCE, stopped_since
-from cosmic.mico.core.stop_latch import StopLatch
+from cosmic.mico.core.motion.stop_latch import StopLatch
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cosmic.autonomy.calibrations import NEAR_UM, Calibrations
-from cosmic.autonomy.tip_search import middle, uncovered
+from cosmic.autonomy.stage_procedure import middle, uncovered
 from cosmic.autonomy.tools import axis_targets, expected, tip_um
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.vico.core.calibration import Plane, RotationCentre

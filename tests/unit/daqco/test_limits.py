@@ -64,6 +64,30 @@ def test_both_sides_and_what_is_no_number_count_as_crossed(volts: float) -> None
     assert len(rig.stops) == 1
 
 
+@pytest.mark.parametrize("volts", [3.5, 1.5])
+def test_a_force_exactly_at_its_limit_as_of_a_saturated_input_counts_as_crossed(
+    volts: float,
+) -> None:
+    rig = Rig()
+    rig.arm()
+    rig.guard.look(chunk([2.5, volts, volts]))
+    (crossing,) = rig.crossings
+    assert abs(crossing.value) == 100.0
+    assert crossing.sample == 1
+    assert len(rig.stops) == 1
+
+
+def test_missing_samples_trip_limits_that_are_armed_and_not_crossed_already() -> None:
+    rig = Rig()
+    rig.guard.set_limit(Limit("force", low=-100.0, high=100.0))
+    rig.guard.trip_all("samples were lost")
+    assert not rig.stops
+    rig.arm()
+    rig.guard.trip_all("samples were lost")
+    rig.guard.trip_all("samples were lost")
+    assert rig.stops == ["samples were lost while the limit of force is armed"]
+
+
 def test_after_a_crossing_it_trips_again_only_when_the_value_has_come_well_back() -> None:
     rig = Rig()
     rig.arm()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.lib.recfunctions import repack_fields
 
 from cosmic.daqco.api.recording import open_recording
 from cosmic.daqco.core.recording_file import RecordingFile, block_samples
@@ -139,7 +140,9 @@ def test_missing_samples_are_counted_and_leave_a_gap_in_time(tmp_path):
     late = chunks(head, volts, 50, first_sample=137)
     path = record(tmp_path / "run.h5", head, [*chunks(head, volts), *late])
     with open_recording(path) as found:
-        assert found.overruns == (Overrun(sample=137, lost=37, time_s=pytest.approx(100.1)),)
+        assert found.overruns == (
+            Overrun(sample=137, lost=37, time_s=pytest.approx(100.1), column=100),
+        )
         assert found.samples == 200
         assert found.time_s[99] == pytest.approx(100.099)
         assert found.time_s[100] == pytest.approx(100.137)
@@ -152,8 +155,26 @@ def test_an_acquisition_that_began_again_is_placed_by_the_clock(tmp_path):
     again = [replace(each, time_s=each.time_s + 2.0) for each in chunks(head, volts)]
     path = record(tmp_path / "run.h5", head, [*chunks(head, volts), *again])
     with open_recording(path) as found:
-        assert found.overruns == (Overrun(sample=0, lost=1900, time_s=pytest.approx(100.1)),)
-        assert found.time_s[100] == pytest.approx(102.0)
+        (gap,) = found.overruns
+        assert gap == Overrun(sample=0, lost=1900, time_s=pytest.approx(100.1), column=100)
+        assert found.time_s[gap.column] == pytest.approx(102.0)
+
+
+def test_gaps_of_a_file_that_does_not_say_where_they_are_are_placed_by_the_clock(tmp_path):
+    head = header()
+    volts = volts_of(2, 100)
+    parts = [
+        replace(each, time_s=each.time_s + after_s)
+        for after_s in (0.0, 2.0, 5.0)
+        for each in chunks(head, volts)
+    ]
+    path = record(tmp_path / "run.h5", head, parts)
+    with h5py.File(path, "r+") as file:
+        rows = file["overruns"][:][["sample", "lost", "time_s"]]
+        del file["overruns"]
+        file["overruns"] = repack_fields(rows)
+    with open_recording(path) as found:
+        assert [gap.column for gap in found.overruns] == [100, 200]
 
 
 def test_the_last_sample_number_may_exceed_32_bit(tmp_path):

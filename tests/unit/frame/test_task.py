@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from cosmic.frame.errors import DeviceError, DeviceTimeout, WrongThreadError
-from cosmic.frame.task import Progress, Task
+from cosmic.frame.operation import Progress, Task
 from cosmic.frame.threads import declare_gui_thread
 
 

@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 
-from cosmic.mico.core.collision.helper_wire import encode
+from cosmic.frame.helper_process import encode
 from cosmic.mico.core.collision.sweep import Sweep
 
 HANDLERS = {

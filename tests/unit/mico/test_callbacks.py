@@ -4,7 +4,7 @@ import pytest
 
 import cosmic
 from cosmic.frame.errors import DeviceError, DeviceFault, WrongThreadError
-from cosmic.mico.core.positioner import Confidence, Status
+from cosmic.mico.core.motion.positioner import Confidence, Status
 from cosmic.mico.hw.interface import Channel
 from unit.mico.rigs import mico, wait_until
 

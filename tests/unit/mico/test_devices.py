@@ -3,9 +3,9 @@ import pytest
 import cosmic
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceError, DeviceFault
-from cosmic.mico.core.device_commander import CommanderType, DeviceCommander
 from cosmic.mico.core.mode import Mode
-from cosmic.mico.core.positioner import Status
+from cosmic.mico.core.motion.device_commander import CommanderType, DeviceCommander
+from cosmic.mico.core.motion.positioner import Status
 from cosmic.mico.hw.interface import PositionerKind
 from unit.mico.rigs import listen, mico, wait_until
 

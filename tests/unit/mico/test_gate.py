@@ -9,13 +9,12 @@ from hypothesis import strategies as st
 from cosmic.frame.verdict import ALLOWED, Reason, refuse
 from cosmic.mico.core.collision.answer import AxisSpan
 from cosmic.mico.core.collision.checker import NoCollisionModel
-from cosmic.mico.core.gate import Gate
-from cosmic.mico.core.judgement import Picture, Request, judge
-from cosmic.mico.core.lease import Lease
-from cosmic.mico.core.orders import Calibrate, Interval, MoveBy, MoveTo, Reference, Step
-from cosmic.mico.core.positioner import Confidence, PositionerState
-from cosmic.mico.core.rules import Limits
-from cosmic.mico.core.stop_latch import StopLatch
+from cosmic.mico.core.motion.checks import Limits, PlatformSnapshot, Request, judge
+from cosmic.mico.core.motion.gate import Gate
+from cosmic.mico.core.motion.lease import Lease
+from cosmic.mico.core.motion.orders import Calibrate, Interval, MoveBy, MoveTo, Reference, Step
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState
+from cosmic.mico.core.motion.stop_latch import StopLatch
 from cosmic.mico.hw.interface import (
     Activity,
     Channel,
@@ -52,7 +51,7 @@ def picture(*states, **changes):
         "now_wall_s": 100.0,
         "rules": RULES,
     }
-    return Picture(**(fields | changes))
+    return PlatformSnapshot(**(fields | changes))
 
 
 def ask(motion, *states, token="t", consent=False, checker=None, **changes):

@@ -187,7 +187,7 @@ def test_a_file_in_the_working_directory_is_not_taken_for_a_module(
     (tmp_path / "numpy.py").write_text("raise ImportError('the wrong one')")
     monkeypatch.chdir(tmp_path)
     with running() as gate:
-        assert gate.alive
+        wait_until(lambda: answers(gate), LOADING_S)  # with the wrong one it never does
 
 
 # --- faults -----------------------------------------------------------------------------------

@@ -1,18 +1,25 @@
 """A collision check that is long in coming: what may happen until it answers."""
 
 from contextlib import contextmanager
-from threading import Event
+from threading import Event, Thread
+
+import pytest
 
 import cosmic
 from cosmic.frame.clock import WALL
+from cosmic.frame.errors import DeviceError, DeviceFault
+from cosmic.frame.network.lease import StationLease
 from cosmic.frame.verdict import ALLOWED, Reason
-from cosmic.mico.core import gate as gate_module
 from cosmic.mico.core.collision.answer import AxisSpan, SweepAnswer
 from cosmic.mico.core.collision.checker import CollisionChecker
 from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.collision.helper_link import LateAnswerError
+from cosmic.mico.core.motion import gate as gate_module
+from cosmic.mico.core.motion.checks import Request
+from cosmic.mico.core.motion.gate import Question
+from cosmic.mico.core.motion.orders import MoveTo
 from cosmic.mico.hw.interface import Channel
-from unit.mico.rigs import mico, wait_until
+from unit.mico.rigs import listen, mico, wait_until
 from unit.mico.small_scenes import two_arms
 
 X, Y = Channel(0, 0), Channel(1, 1)
@@ -75,6 +82,20 @@ def test_a_stop_waits_for_no_answer_and_nothing_moves_when_it_comes(monkeypatch)
         assert not controller.of("move_to")
 
 
+def test_a_movement_that_is_being_judged_is_judged_again_for_a_new_holder(monkeypatch):
+    with waiting(monkeypatch) as (rig, controller, checker, movement):
+        station = StationLease()
+        rig.application.manager.lease.join(station)
+        station.take("vision", "t" * 32, in_process=True)
+        checker.go.set()
+        error = movement.exception(5.0)
+        assert error.verdict.reason is Reason.NO_LEASE
+        assert "vision controls the platform now" in str(error)
+        assert not controller.of("move_to")
+        station.take_over()
+        assert rig["d0.c0"].move_to(50.0) == 50.0
+
+
 def test_where_something_was_moved_meanwhile_the_answer_counts_for_nothing(monkeypatch):
     with waiting(monkeypatch) as (rig, controller, checker, movement):
         controller.position[Y] = 7.0  # by the hand control unit
@@ -131,3 +152,137 @@ def test_what_is_watched_again_meanwhile_is_judged_again():
     spans = {"left.x": AxisSpan(0.0, 9.0, 0.0, moving=True)}
     assert manager.check(spans).allowed
     assert [each[0]["left.x"].free for each in asked] == [True, False]
+
+
+# What goes on meanwhile, on the axes of the same device
+
+
+@contextmanager
+def going(**changes):
+    """A platform whose axis d0.c1 moves, and whose check answers until the test says no more."""
+    with mico(("LLN",), instant=False, **changes) as (rig, controller):
+        checker = Slow()
+        rig.application.manager.gate._checker = checker
+        try:
+            yield rig, controller, checker
+        finally:
+            checker.go.set()
+
+
+def test_positions_are_published_while_a_judgement_is_awaited():
+    with going() as (rig, controller, checker):
+        rig["d0.c1"].move_to(50.0, wait=False)
+        wait_until(lambda: len(controller.of("move_to")) == 1)
+        checker.go.clear()
+        rig["d0.c0"].move_to(20.0, wait=False)
+        wait_until(lambda: len(checker.asked) == 2)
+        heard = listen(rig.application.manager.devices[0].position_changed)
+        for number in range(1, 4):
+            controller.position[Channel(0, 1)] = 10.0 * number
+            wait_until(lambda at=10.0 * number: ("d0.c1", at) in told(heard), timeout_s=2.0)
+        assert len(controller.of("move_to")) == 1
+
+
+def told(heard):
+    return [(each.name, each.position) for each in heard]
+
+
+def test_a_movement_lands_while_a_judgement_is_awaited():
+    with going() as (rig, controller, checker):
+        first = rig["d0.c1"].move_to(50.0, wait=False)
+        wait_until(lambda: len(controller.of("move_to")) == 1)
+        checker.go.clear()
+        second = rig["d0.c0"].move_to(20.0, wait=False)
+        wait_until(lambda: len(checker.asked) == 2)
+        controller.end(Channel(0, 1), 50.0)
+        assert first.wait(2.0) == 50.0
+        assert not second.done
+
+
+@pytest.mark.parametrize("awaited", ["its own next packet", "the move of another axis"])
+def test_a_dead_man_s_movement_ends_while_a_judgement_is_awaited(awaited):
+    with going() as (rig, controller, checker):
+        jog = rig["d0.c1"].jog(1, speed=100.0)
+        wait_until(lambda: len(controller.of("move_to")) == 1)
+        checker.go.clear()
+        if awaited != "its own next packet":
+            rig["d0.c0"].move_to(20.0, wait=False)
+        wait_until(lambda: ("stop", Channel(0, 1)) in controller.calls, timeout_s=2.0)
+        controller.end(Channel(0, 1), 5.0)
+        jog.movement.wait(2.0)
+        checker.go.set()
+        wait_until(lambda: "d0.c1" not in rig.application.manager.gate.held())
+        assert len([call for call in controller.of("move_to") if call[1] == Channel(0, 1)]) == 1
+
+
+def test_a_jog_that_is_held_goes_on_after_a_judgement_that_took_long():
+    with going() as (rig, controller, checker):
+        jog = rig["d0.c1"].jog(1, speed=100.0)
+        wait_until(lambda: len(controller.of("move_to")) == 1)
+        checker.go.clear()
+        until_s = WALL.now_s() + 0.6
+        while WALL.now_s() < until_s:
+            jog.renew()
+            WALL.sleep(0.02)
+        sent = len(controller.of("move_to"))
+        checker.go.set()
+        while len(controller.of("move_to")) <= sent:
+            assert WALL.now_s() < until_s + 5.0
+            jog.renew()
+            WALL.sleep(0.02)
+        assert not jog.done
+
+
+@pytest.mark.parametrize("how", ["cancelled", "halted", "closed"])
+def test_what_is_ended_before_it_was_judged_ends_at_once_and_never_begins(how):
+    with going() as (rig, controller, checker):
+        checker.go.clear()
+        movement = rig["d0.c0"].move_to(20.0, wait=False)
+        wait_until(lambda: bool(checker.asked))
+        manager = rig.application.manager
+        if how == "cancelled":
+            movement.cancel()
+        elif how == "halted":
+            rig["d0.c0"].stop()
+        else:
+            manager.devices[0].request_end()
+        assert isinstance(movement.exception(2.0), cosmic.MoveCancelled)
+        checker.go.set()
+        wait_until(lambda: "d0.c0" not in manager.gate.held())
+        assert not controller.of("move_to")
+
+
+@pytest.mark.parametrize("when", ["while it is judged", "when it was granted"])
+def test_a_question_that_is_taken_back_holds_nothing(when):
+    with going() as (rig, _, checker):
+        manager = rig.application.manager
+        gate, question = manager.gate, Question()
+        request = Request("d0.c0", MoveTo(20.0, "um"), manager.lease.local_token)
+        checker.go.clear()
+        answers = []
+        asking = Thread(target=lambda: answers.append(gate.decide([request], question)))
+        asking.start()
+        wait_until(lambda: bool(checker.asked))
+        if when == "while it is judged":
+            gate.take_back(question)
+        checker.go.set()
+        asking.join(5.0)
+        if when == "when it was granted":
+            assert gate.held()
+            gate.take_back(question)
+        assert not gate.held()
+        assert not gate.targets()
+        assert answers[0][0].allowed
+
+
+def test_a_device_that_is_lost_while_a_judgement_is_awaited_stops_everything():
+    with going() as (rig, controller, checker):
+        lost = listen(rig.application.manager.device_lost)
+        checker.go.clear()
+        movement = rig["d0.c0"].move_to(20.0, wait=False)
+        wait_until(lambda: len(checker.asked) == 1)
+        controller.broken = DeviceError("the cable is out", fault=DeviceFault.COMMUNICATION)
+        wait_until(lambda: len(lost) == 1)
+        assert isinstance(movement.exception(2.0), cosmic.CosmicError)
+        assert rig.application.manager.latch.state.latched
+        assert lost[0].in_motion

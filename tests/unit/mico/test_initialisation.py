@@ -5,7 +5,7 @@ from pydantic import ValidationError
 
 import cosmic
 from cosmic.frame.errors import DeviceError, DeviceFault
-from cosmic.mico.core.orders import Calibrate, MoveTo, Reference, Step, ToEndStop
+from cosmic.mico.core.motion.orders import Calibrate, MoveTo, Reference, Step, ToEndStop
 from cosmic.mico.core.sequence.plan import plan_sequence
 from cosmic.mico.core.sequence.report import StepState
 from cosmic.mico.core.sequence.settings import StepKind

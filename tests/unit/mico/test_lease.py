@@ -9,13 +9,12 @@ from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.station import Station
 from cosmic.frame.verdict import Reason
 from cosmic.mico.core.collision.checker import NoCollisionModel
-from cosmic.mico.core.gate import Gate
-from cosmic.mico.core.judgement import Request
-from cosmic.mico.core.lease import Guard, Lease
-from cosmic.mico.core.orders import MoveTo
-from cosmic.mico.core.positioner import Confidence, PositionerState
-from cosmic.mico.core.rules import Limits
-from cosmic.mico.core.stop_latch import StopLatch
+from cosmic.mico.core.motion.checks import Limits, Request
+from cosmic.mico.core.motion.gate import Gate
+from cosmic.mico.core.motion.lease import Guard, Lease
+from cosmic.mico.core.motion.orders import MoveTo
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState
+from cosmic.mico.core.motion.stop_latch import StopLatch
 from cosmic.mico.hw.interface import Channel, PositionerKind
 
 

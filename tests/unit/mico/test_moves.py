@@ -7,7 +7,7 @@ import pytest
 
 import cosmic
 from cosmic.frame.errors import DeviceError, DeviceFault, UnknownAxisError
-from cosmic.mico.core.positioner import Confidence, Status
+from cosmic.mico.core.motion.positioner import Confidence, Status
 from cosmic.mico.hw.interface import Activity, Channel, PositionerKind
 from unit.mico.rigs import mico, wait_until
 

@@ -8,8 +8,8 @@ import pytest
 
 import cosmic
 from cosmic.frame.verdict import Reason
-from cosmic.mico.core.judgement import Request
-from cosmic.mico.core.orders import Grant, Jog, MoveBy, MoveTo, Order
+from cosmic.mico.core.motion.checks import Request
+from cosmic.mico.core.motion.orders import Grant, Jog, MoveBy, MoveTo, Order
 from cosmic.mico.hw.interface import Channel
 from unit.mico.rigs import listen, mico, wait_until
 
@@ -162,7 +162,7 @@ def test_an_axis_that_was_elsewhere_meanwhile_is_judged_again():
         away[NAME].movement.wait(2)
         judged = []
         real = gate.decide
-        gate.decide = lambda requests: judged.append(requests) or real(requests)
+        gate.decide = lambda requests, *more: judged.append(requests) or real(requests, *more)
         assert submit(manager, motion, late).wait(2) == 10.0
         assert len(judged) == 1, "the way from 1000 um was never looked at"
 

@@ -7,8 +7,8 @@ import pytest
 import cosmic
 from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.frame.threads import running_threads
-from cosmic.mico.core.device_commander import DeviceCommander
-from cosmic.mico.core.positioner import Status
+from cosmic.mico.core.motion.device_commander import DeviceCommander
+from cosmic.mico.core.motion.positioner import Status
 from cosmic.mico.hw.interface import Activity, Channel
 from unit.mico.rigs import mico, wait_until
 

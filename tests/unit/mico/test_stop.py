@@ -96,6 +96,20 @@ def test_a_stop_between_grant_and_start_still_counts():
         assert not orders
 
 
+def test_a_stop_that_comes_while_a_movement_is_sent_ends_it_though_nobody_repeats_the_stop():
+    with mico(instant=False) as (rig, controller):
+        manager, real = rig.application.manager, controller.move_to
+
+        def stopped_meanwhile(channel, target, unit, *, hold_s):
+            manager.latch.set("in between")
+            real(channel, target, unit, hold_s=hold_s)
+
+        controller.move_to = stopped_meanwhile
+        movement = rig["d0.c0"].move_to(100.0, wait=False)
+        assert isinstance(movement.exception(5), cosmic.StoppedError)
+        assert ("stop", X) in controller.calls
+
+
 def test_stop_from_many_threads_while_all_axes_are_commanded():
     with mico(("LLL", "LLL")) as (rig, controller):
         manager = rig.application.manager

@@ -1,5 +1,6 @@
 """Axes that move together: linked, started back to back, arriving at the same time."""
 
+import sys
 import threading
 
 import pytest
@@ -11,10 +12,10 @@ from pydantic import ValidationError
 import cosmic
 from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.mico.api.stepwise import StepwiseMove
-from cosmic.mico.core.group_start import GroupStart
-from cosmic.mico.core.links import LinkTable
-from cosmic.mico.core.matching import Leg, matched_frequencies
-from cosmic.mico.core.orders import MoveBy, MoveTo
+from cosmic.mico.core.motion.group import Leg, matched_frequencies
+from cosmic.mico.core.motion.group_start import GroupStart
+from cosmic.mico.core.motion.links import LinkTable
+from cosmic.mico.core.motion.orders import MoveBy, MoveTo
 from cosmic.mico.hw.interface import Channel
 from unit.mico.rigs import listen, mico, settings, wait_until
 
@@ -262,6 +263,66 @@ def test_an_axis_that_is_stopped_while_it_waits_never_starts_nor_do_the_others(h
         assert len(controller.of("move_to")) == 1
 
 
+def test_axes_moved_together_by_distances_go_on_from_where_they_stand():
+    with mico(TWO) as (rig, controller):
+        rig.move({LEFT: 10.0, RIGHT: 20.0})
+        rig.move_by({LEFT: 1.0, RIGHT: -1.0})
+        assert sorted(call[2] for call in controller.of("move_to")) == [10.0, 11.0, 19.0, 20.0]
+
+
+def test_the_failure_of_an_axis_that_waits_ends_the_others_before_they_are_ready():
+    with mico(TWO, instant=False) as (rig, controller):
+        manager = rig.application.manager
+        controller.block.clear()
+        rig["d1.c1"].move_to(3.0, wait=False)  # its device hangs in this call
+        wait_until(lambda: len(controller.of("move_to")) == 1)
+        motions = {LEFT: MoveTo(1.0, "um"), RIGHT: MoveTo(1.0, "um")}
+        orders = manager.order_together(motions, source="test")
+        wait_until(lambda: rig[LEFT].details.in_motion)
+        manager.device(LEFT).halt(manager.address(LEFT).channel, "halted")
+        wait_until(lambda: orders[LEFT].movement.done)
+        controller.block.set()
+        assert isinstance(orders[RIGHT].movement.exception(5), cosmic.MoveCancelled)
+        assert len(controller.of("move_to")) == 1
+
+
+def test_an_axis_started_for_another_thread_stops_at_once_when_a_stop_overtook_its_call():
+    with mico(TWO, instant=False) as (rig, controller):
+        manager, sends = rig.application.manager, controller.move_to
+        asks, ready, hangs, free = controller.ask_position, *(threading.Event() for _ in range(3))
+
+        def send(channel, target, unit, *, hold_s):
+            if channel == Channel(1, 1):
+                ready.wait(10)
+            elif channel == Channel(0, 0):
+                manager.stop("overtakes the call")
+                controller.calls.clear()
+            sends(channel, target, unit, hold_s=hold_s)
+
+        def ask(channel, unit):
+            if hangs.is_set() and channel.device == 0:
+                controller.calls.append(("hangs",))
+                free.wait(10)
+            asks(channel, unit)
+
+        controller.move_to, controller.ask_position = send, ask
+        rig["d1.c1"].move_to(3.0, wait=False)
+        motions = {LEFT: MoveTo(1.0, "um"), RIGHT: MoveTo(1.0, "um")}
+        orders = manager.order_together(motions, source="test")
+        wait_until(lambda: rig[LEFT].details.in_motion)
+        hangs.set()
+        wait_until(lambda: ("hangs",) in controller.calls)
+        ready.set()
+        sent = ("move_to", Channel(0, 0), 1.0)
+        wait_until(lambda: any(call[:3] == sent for call in controller.calls))
+        try:
+            wait_until(lambda: ("stop", Channel(0, 0)) in controller.calls, 5)
+        finally:
+            free.set()
+        for order in orders.values():
+            assert isinstance(order.movement.exception(10), cosmic.StoppedError)
+
+
 def test_an_axis_that_is_wanted_elsewhere_while_it_waits_goes_there_only():
     with mico(TWO, instant=False) as (rig, controller):
         real, free = controller.move_to, threading.Event()
@@ -322,6 +383,22 @@ def test_whoever_comes_last_starts_all_and_tells_afterwards():
         thread.join()
     assert log == [(what, name) for what in ("go", "tell") for name in "abc"]
     assert heard[0].names == ("a", "b", "c")
+
+
+def test_nothing_lets_other_threads_in_more_often_between_the_calls_of_a_start():
+    usual_s = sys.getswitchinterval()
+
+    class Watching(_Axis):
+        def go(self):
+            self._log.append(sys.getswitchinterval())
+            return super().go()
+
+    log = []
+    start = GroupStart(2, lambda _started: None)
+    for name in ("a", "b"):
+        start.arrive(Watching(name, log))
+    intervals_s = [each for each in log if isinstance(each, float)]
+    assert intervals_s == [usual_s, usual_s]
 
 
 def test_a_start_of_which_all_was_withdrawn_is_none():

@@ -163,6 +163,70 @@ def test_undo_is_refused_where_a_force_was_felt_since_until_it_is_confirmed():
         assert rig.undo(confirm=True) == {"d0.c0": 0.0}
 
 
+def test_a_touch_that_is_over_when_the_movement_ends_is_remembered_by_undo():
+    with mico(TWO, instant=False, **GROUPS) as (rig, controller):
+        movement = rig["d0.c0"].move_to(100.0, wait=False)
+        wait_until(lambda: controller.of("move_to"))
+        rig.application.cautions.touched("force felt more than 15 uN")
+        controller.end(Channel(0, 0), 100.0)
+        movement.wait(3)
+        wait_until(lambda: len(rig.undo_entries) == 1)
+        with pytest.raises(cosmic.NotAvailable, match="force felt more than 15 uN"):
+            rig.undo()
+        assert len(controller.of("move_to")) == 1
+        back = rig.undo(wait=False, confirm=True)
+        wait_until(lambda: len(controller.of("move_to")) == 2)
+        controller.end(Channel(0, 0), 0.0)
+        back.wait(3)
+
+
+def test_a_touch_between_two_movements_counts_for_all_that_lead_back_over_it():
+    with mico(TWO, **GROUPS) as (rig, _):
+        rig["d1.c0"].move_to(7.0)
+        rig["d0.c0"].move_to(100.0)
+        wait_until(lambda: len(rig.undo_entries) == 2)
+        rig.application.cautions.touched("force felt more than 15 uN")
+        rig["d0.c0"].move_to(80.0)
+        wait_until(lambda: len(rig.undo_entries) == 3)
+        assert rig.undo() == {"d0.c0": 100.0}  # nothing was touched after that
+        wait_until(lambda: len(rig.undo_entries) == 2)
+        for group in (None, "Right"):
+            with pytest.raises(cosmic.NotAvailable, match="force felt more than 15 uN"):
+                rig.undo(group)
+        assert where(rig, "d0.c0", "d1.c0") == [100.0, 7.0]
+
+
+def test_a_touch_on_the_way_back_is_remembered_with_what_was_before():
+    with mico(TWO, instant=False, **GROUPS) as (rig, controller):
+        for number, target in enumerate((100.0, 200.0), start=1):
+            movement = rig["d0.c0"].move_to(target, wait=False)
+            wait_until(lambda n=number: len(controller.of("move_to")) == n)
+            controller.end(Channel(0, 0), target)
+            movement.wait(3)
+            wait_until(lambda n=number: len(rig.undo_entries) == n)
+        back = rig.undo(wait=False)
+        wait_until(lambda: len(controller.of("move_to")) == 3)
+        rig.application.cautions.touched("force felt more than 15 uN")
+        controller.end(Channel(0, 0), 100.0)
+        back.wait(3)
+        wait_until(lambda: len(rig.undo_entries) == 1)
+        with pytest.raises(cosmic.NotAvailable, match="force felt more than 15 uN"):
+            rig.undo()
+
+
+def test_a_movement_that_came_back_by_itself_leaves_its_touch_to_the_one_before():
+    with mico(TWO, instant=False, **GROUPS) as (rig, controller):
+        for number, target in enumerate((100.0, 130.0), start=1):
+            movement = rig["d0.c0"].move_to(target, wait=False)
+            wait_until(lambda n=number: len(controller.of("move_to")) == n)
+            if number == 2:
+                rig.application.cautions.touched("force felt more than 15 uN")
+            controller.end(Channel(0, 0), 100.0)
+            movement.exception(3)
+        with pytest.raises(cosmic.NotAvailable, match="force felt more than 15 uN"):
+            rig.undo()
+
+
 def test_initialising_is_refused_where_something_may_be_held_until_it_is_said():
     with mico(TWO, **GROUPS) as (rig, controller):
         rig.application.cautions.add(lambda: "left.gripper was closed and may hold something")

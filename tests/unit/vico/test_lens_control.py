@@ -20,9 +20,9 @@ from cosmic.frame.errors import (
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.caller import Call, Caller, carrying_out
 from cosmic.frame.network.dead_man import DeadMan, Pulse
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.vico.core.lens_control import PeripheralThread
-from cosmic.vico.hw.peripheral_factory import make_lens, make_light
+from cosmic.vico.hw.factory import make_lens, make_light
 from cosmic.vico.hw.peripherals import LensAxis
 from cosmic.vico.hw.sim_peripherals import SimPeripherals
 from system.simulated_platform import wait_until
@@ -98,7 +98,8 @@ def test_a_seek_ends_when_the_motor_is_there_and_tells_how_far_it_is(make: Make)
     assert bench.true_counts(ZOOM) == pytest.approx(12000, abs=1)
     zoom = bench.thread.state.zoom
     assert zoom is not None and zoom.position_counts == 12000 and not zoom.moving
-    assert fractions == sorted(fractions) and fractions[-1] == 1.0
+    wait_until(lambda: fractions[-1] == 1.0)
+    assert fractions == sorted(fractions)
 
 
 def test_movement_is_told_at_most_twenty_times_a_second(make: Make) -> None:

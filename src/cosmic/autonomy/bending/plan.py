@@ -8,10 +8,9 @@ from typing import Final
 from pydantic import Field
 
 from cosmic.autonomy.bending.fit import fit_bending
-from cosmic.autonomy.bending.result import BendingError
+from cosmic.autonomy.bending.result import UN_UM2_PER_N_M2, BendingError
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
-from cosmic.autonomy.bending.units import UN_UM2_PER_N_M2
 from cosmic.frame.config import StrictModel
 
 DRY_EI_N_M2: Final = 5e-11

@@ -11,22 +11,20 @@ from cosmic.autonomy.bending.branch import (
     CLEAR_SIGMAS,
     Mask,
     Points,
+    back_and_forth_percent,
     free_force_un,
+    lost_while_pushing,
     points_of,
+    rises,
     rough,
+    saturated,
+    touched,
 )
 from cosmic.autonomy.bending.branch import stuck as clings
 from cosmic.autonomy.bending.elastica import force_un
 from cosmic.autonomy.bending.result import Floats, Quality, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
-from cosmic.autonomy.bending.symptoms import (
-    back_and_forth_percent,
-    lost_while_pushing,
-    rises,
-    saturated,
-    touched,
-)
 
 ROUNDS: Final = 2
 LEAST_OF_A_WAY: Final = 3

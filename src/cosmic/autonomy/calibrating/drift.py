@@ -7,13 +7,11 @@ from typing import Final
 
 from typing_extensions import override
 
-from cosmic.autonomy.calibrating.book import CalibrationEntry
-from cosmic.autonomy.handling.in_hand import Measured
-from cosmic.autonomy.handling.operation import FibreOperation
+from cosmic.autonomy.calibrating.registry import CalibrationEntry
+from cosmic.autonomy.handling.context import FibreOperation, HandlingContext, Measured
 from cosmic.autonomy.handling.prepare import HELD, PLATE, PROBE, see_both, zoom_to
 from cosmic.autonomy.handling.tips import TIMES_STD, Off, TipOff, shift_maps
-from cosmic.autonomy.handling.work import FibreWork
-from cosmic.autonomy.procedures.operation import SAFE_POINT, Steps, Wish
+from cosmic.autonomy.procedures.operation import SAFE_POINT, Steps, Yielded
 from cosmic.frame.errors import NotAvailable
 
 DRIFT: Final = "drift of the tips"
@@ -29,12 +27,12 @@ class CheckDrift(FibreOperation):
     name = "check the drift"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
+    def steps(self, work: HandlingContext) -> Steps:
         known, settings = work.calibration, work.settings.calibration
-        due = len(work.finished) - known.drift_looked_at >= settings.drift_fibres
+        due = len(work.shared.finished) - known.drift_looked_at >= settings.drift_fibres
         if not settings.drift_fibres or not due or PROBE not in known.made:
             return
-        known.drift_looked_at = len(work.finished)
+        known.drift_looked_at = len(work.shared.finished)
         try:
             gripper, probe = yield from look_at_both(work)
         except NotAvailable:
@@ -45,18 +43,18 @@ class CheckDrift(FibreOperation):
         yield SAFE_POINT
 
 
-def look_at_both(work: FibreWork) -> Generator[Wish, object, tuple[TipOff, TipOff]]:
+def look_at_both(work: HandlingContext) -> Generator[Yielded, object, tuple[TipOff, TipOff]]:
     """Hold both tips where fibres are pushed, and look at them; raises `NotAvailable`."""
     try:
         yield from zoom_to(work, work.settings.calibration.compare_zoom)
         seen = yield from see_both(work)
     finally:
-        work.zoomed = None
+        work.shared.zoomed = None
     yield from zoom_to(work, work.settings.zoom)
     return seen
 
 
-def follow(work: FibreWork, gripper: TipOff, probe: TipOff) -> None:
+def follow(work: HandlingContext, gripper: TipOff, probe: TipOff) -> None:
     """Put right what has moved, and note it."""
     known, settings = work.calibration, work.settings.calibration
     off = probe.off_um[0] - gripper.off_um[0], probe.off_um[1] - gripper.off_um[1]
@@ -76,25 +74,25 @@ def follow(work: FibreWork, gripper: TipOff, probe: TipOff) -> None:
     _note(work, gripper, moved, limit_um)
 
 
-def distrust(work: FibreWork) -> None:
+def distrust(work: HandlingContext) -> None:
     """Have everything that rests on where the tips are measured anew."""
     for key in (PLATE, HELD, PROBE):
         work.calibration.made.pop(key, None)
-        work.calibration.book.forget(key, work.gripper.name)
+        work.calibration.registry.forget(key, work.gripper.name)
 
 
-def _note(work: FibreWork, gripper: TipOff, moved: Off, limit_um: float) -> None:
-    book, now_s = work.calibration.book, work.clock.now_s()
+def _note(work: HandlingContext, gripper: TipOff, moved: Off, limit_um: float) -> None:
+    registry, now_s = work.calibration.registry, work.clock.now_s()
     for key in (PLATE, HELD, PROBE):
-        entry = book.get(key, work.gripper.name)
+        entry = registry.get(key, work.gripper.name)
         if entry is not None:
             values = dict(entry.values)
             if key == PROBE:
                 values["off_x_um"], values["off_y_um"] = work.calibration.probe_off_um
                 values["seen_x_um"], values["seen_y_um"] = work.calibration.seen_off_um
-            book.confirm(replace(entry, values=values), now_s)
+            registry.confirm(replace(entry, values=values), now_s)
     work.calibration.made[DRIFT] = Measured(now_s, gripper.std_um, "um")
-    book.put(
+    registry.put(
         CalibrationEntry(
             DRIFT,
             work.gripper.name,
@@ -108,9 +106,9 @@ def _note(work: FibreWork, gripper: TipOff, moved: Off, limit_um: float) -> None
             gripper.std_um,
             "um",
             work.settings.calibration.drift_far_um,
-            book.now(),
+            registry.now(),
             now_s,
-            book.session,
+            registry.session,
             zoom=work.settings.calibration.compare_zoom,
             how="one picture of both tips",
         )

@@ -4,8 +4,8 @@ from collections.abc import Generator
 
 import numpy as np
 
-from cosmic.autonomy.handling.work import FibreWork
-from cosmic.autonomy.procedures.operation import Wish
+from cosmic.autonomy.handling.context import HandlingContext
+from cosmic.autonomy.procedures.operation import Yielded
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.api.lens import LensHandle
 from cosmic.vico.core.calibration_fit import CalibrationRefused
@@ -17,27 +17,29 @@ SWEEPS = 3
 PLAY_COUNTS = 100
 """More than the play of the focus: each sweep begins so far below, and only goes upwards."""
 
-Found = Generator[Wish, object, tuple[float, float]]
+Found = Generator[Yielded, object, tuple[float, float]]
 """Where the focus is, and the standard deviation of that; counts."""
 
 
-def lens_of(work: FibreWork) -> LensHandle:
+def lens_of(work: HandlingContext) -> LensHandle:
     """Return the lens; raises `NotAvailable` where its focus cannot be moved."""
     lens = work.vico.lens
     if lens is None:
-        raise NotAvailable("the lens has no motor: nothing can be focused on")
+        raise NotAvailable("the lens has no motor: it cannot focus")
     return lens
 
 
-def focus_now(work: FibreWork) -> float:
+def focus_now(work: HandlingContext) -> float:
     """Return where the focus stands, counts."""
     state = lens_of(work).state(LensAxis.FOCUS)
     if state is None or not state.homed:
-        raise NotAvailable("the focus is not known; home the lens, then try again")
+        raise NotAvailable("the focus is unknown: home the lens, then try again")
     return float(state.position_counts)
 
 
-def find_focus_near(work: FibreWork, about_counts: float, reach_counts: float, what: str) -> Found:
+def find_focus_near(
+    work: HandlingContext, about_counts: float, reach_counts: float, what: str
+) -> Found:
     """Sweep through a focus that is about known; where it lies at an end, sweep again there.
 
     Raises
@@ -57,7 +59,7 @@ def find_focus_near(work: FibreWork, about_counts: float, reach_counts: float, w
     raise CalibrationRefused(f"{what}: {why}")
 
 
-def seek_from_below(work: FibreWork, counts: float) -> Generator[Wish, object, None]:
+def seek_from_below(work: HandlingContext, counts: float) -> Generator[Yielded, object, None]:
     """Focus somewhere with the play taken up as in a sweep."""
     lens = lens_of(work)
     yield lens.seek_focus(max(0, round(counts) - PLAY_COUNTS))
@@ -65,15 +67,15 @@ def seek_from_below(work: FibreWork, counts: float) -> Generator[Wish, object, N
 
 
 def _sweep(
-    work: FibreWork, about_counts: float, reach_counts: float
-) -> Generator[Wish, object, FocusAnswer]:
+    work: HandlingContext, about_counts: float, reach_counts: float
+) -> Generator[Yielded, object, FocusAnswer]:
     lens, frames = lens_of(work), work.settings.calibration.focus_frames
     state = lens.state(LensAxis.FOCUS)
     limit = state.limit_counts if state is not None else 0
     low = max(0.0, about_counts - reach_counts)
     high = min(float(limit), about_counts + reach_counts)
     if not high - low > reach_counts:
-        raise CalibrationRefused("the focus lies beyond the travel of the lens")
+        raise CalibrationRefused("the focus lies outside the travel of the lens")
     curve: list[tuple[float, float]] = []
     yield lens.seek_focus(max(0, round(low) - PLAY_COUNTS))
     for place in np.linspace(low, high, frames).round().tolist():

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from typing_extensions import override
 
-from cosmic.autonomy.calibrating.book import CalibrationEntry
 from cosmic.autonomy.calibrating.calibrated import Calibrated, Holds
 from cosmic.autonomy.calibrating.focusing import (
     Found,
@@ -14,10 +13,10 @@ from cosmic.autonomy.calibrating.focusing import (
     focus_now,
     seek_from_below,
 )
-from cosmic.autonomy.handling.operation import FibreOperation
+from cosmic.autonomy.calibrating.registry import CalibrationEntry
+from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.prepare import clear_picture, retract_probe, zoom_to
-from cosmic.autonomy.handling.work import FibreWork
-from cosmic.autonomy.procedures.operation import Steps, Wish
+from cosmic.autonomy.procedures.operation import Steps, Yielded
 from cosmic.autonomy.tools import tip_um
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.core.calibration_fit import CalibrationRefused
@@ -51,7 +50,7 @@ class HeightsAsFiled(FibreOperation):
     name = "take heights from the file"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
+    def steps(self, work: HandlingContext) -> Steps:
         work.calibration.up_um.clear()
         yield from zoom_to(work, work.settings.zoom)
 
@@ -67,7 +66,7 @@ class HeightByFocus(Calibrated):
     key = HEIGHTS
 
     @override
-    def measure(self, work: FibreWork) -> Steps:
+    def measure(self, work: HandlingContext) -> Steps:
         settings = work.settings.calibration
         begun = focus_now(work)
         try:
@@ -76,7 +75,7 @@ class HeightByFocus(Calibrated):
             # Nothing with edges may lie in so small a field: a wider one, and less sure.
             yield from self._at(work, settings.focus_wide_zoom, begun)
 
-    def _at(self, work: FibreWork, zoom: float, begun_counts: float) -> Steps:
+    def _at(self, work: HandlingContext, zoom: float, begun_counts: float) -> Steps:
         try:
             yield from clear_picture(work)
             yield from zoom_to(work, zoom)
@@ -89,14 +88,14 @@ class HeightByFocus(Calibrated):
             probe = yield from _probe(work, zoom, plate[0])
             yield from retract_probe(work)
         finally:
-            work.zoomed = None
+            work.shared.zoomed = None
         yield from seek_from_below(work, begun_counts)
         self._keep(work, zoom, plate, (tips[0], tips[1]), probe)
         yield from zoom_to(work, work.settings.zoom)
 
     def _keep(
         self,
-        work: FibreWork,
+        work: HandlingContext,
         zoom: float,
         plate: tuple[float, float],
         tips: tuple[Seen, Seen],
@@ -109,7 +108,7 @@ class HeightByFocus(Calibrated):
         if not 0.7 * usual <= counts_um <= 1.4 * usual:
             raise CalibrationRefused(
                 f"the focus goes {counts_um:.2f} counts for each um of the tip, not about "
-                f"{usual:.2f}: something else was in focus"
+                f"{usual:.2f}: another object was in focus"
             )
         over = over_um(low, plate[0], counts_um, settings.lying_um)
         up = over - low.stage_um
@@ -133,19 +132,19 @@ class HeightByFocus(Calibrated):
         self.kept(work, std_um, "um", settings.height_um, values=values, how=how)
 
     @override
-    def restore(self, work: FibreWork, entry: CalibrationEntry) -> None:
+    def restore(self, work: HandlingContext, entry: CalibrationEntry) -> None:
         work.calibration.up_um |= {
             work.gripper.name: entry.values["up_um"],
             work.probe.name: entry.values["probe_up_um"],
         }
 
     @override
-    def made_with(self, work: FibreWork) -> str:
+    def made_with(self, work: HandlingContext) -> str:
         tip = ", ".join(f"{each:g}" for each in work.probe.tip_um)
         return f"{super().made_with(work)}, {work.probe.name} at {tip}"
 
     @override
-    def check(self, work: FibreWork, entry: CalibrationEntry) -> Holds:
+    def check(self, work: HandlingContext, entry: CalibrationEntry) -> Holds:
         """Focus on the plate and on the tip once, and see that they are as far apart as before."""
         zoom, begun = entry.values["zoom"], focus_now(work)
         try:
@@ -155,7 +154,7 @@ class HeightByFocus(Calibrated):
             tip = yield from _gripper(work, zoom, plate[0], LOW_PART * work.hold_tip_um)
             yield from clear_picture(work)
         finally:
-            work.zoomed = None
+            work.shared.zoomed = None
         yield from seek_from_below(work, begun)
         yield from zoom_to(work, work.settings.zoom)
         settings = work.settings.calibration
@@ -169,20 +168,20 @@ def over_um(tip: Seen, plate_counts: float, counts_um: float, lying_um: float) -
     return (tip.counts - plate_counts) / counts_um + lying_um
 
 
-def _reach_counts(work: FibreWork, zoom: float) -> float:
+def _reach_counts(work: HandlingContext, zoom: float) -> float:
     settings = work.settings.calibration
     wider = math.pow(settings.focus_zoom / zoom, FIELD_POWER)
     return settings.focus_reach_um * wider / settings.focus_um_count
 
 
-def _plate(work: FibreWork, zoom: float, about: float) -> Found:
+def _plate(work: HandlingContext, zoom: float, about: float) -> Found:
     reach = _reach_counts(work, zoom)
     return (yield from find_focus_near(work, about, reach, "the plate and what lies on it"))
 
 
 def _gripper(
-    work: FibreWork, zoom: float, plate_counts: float, height_um: float
-) -> Generator[Wish, object, Seen]:
+    work: HandlingContext, zoom: float, plate_counts: float, height_um: float
+) -> Generator[Yielded, object, Seen]:
     settings = work.settings.calibration
     tool = work.gripper
     yield work.go_up(max(height_um, work.height_now()))
@@ -191,19 +190,21 @@ def _gripper(
     return (yield from _seen(work, tool, zoom, plate_counts))
 
 
-def _probe(work: FibreWork, zoom: float, plate_counts: float) -> Generator[Wish, object, Seen]:
+def _probe(
+    work: HandlingContext, zoom: float, plate_counts: float
+) -> Generator[Yielded, object, Seen]:
     settings = work.settings.calibration
     yield work.go(work.at(work.probe, settings.focus_x_um, settings.focus_y_um))
     return (yield from _seen(work, work.probe, zoom, plate_counts))
 
 
 def _seen(
-    work: FibreWork, tool: ToolSettings, zoom: float, plate_counts: float
-) -> Generator[Wish, object, Seen]:
+    work: HandlingContext, tool: ToolSettings, zoom: float, plate_counts: float
+) -> Generator[Yielded, object, Seen]:
     positions = {name: work.mico[name].position_um or 0.0 for name in tool.axes}
     tip = tip_um(tool, positions)
     if tip is None:
-        raise NotAvailable(f"{tool.name}: where it stands is not known")
+        raise NotAvailable(f"{tool.name}: its position is unknown")
     about = plate_counts + tip[2] / work.settings.calibration.focus_um_count
     reach = _reach_counts(work, zoom)
     found, std = yield from find_focus_near(work, about, reach, f"the tip of {tool.shown}")

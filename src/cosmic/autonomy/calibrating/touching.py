@@ -6,15 +6,15 @@ from typing import Final
 import numpy as np
 from typing_extensions import override
 
-from cosmic.autonomy.calibrating.book import CalibrationEntry
 from cosmic.autonomy.calibrating.calibrated import Calibrated
+from cosmic.autonomy.calibrating.registry import CalibrationEntry
+from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
 from cosmic.autonomy.handling.jaws import CLOSED_STD_UM, distrust_gap, move_jaws, note_gap
-from cosmic.autonomy.handling.patience import PatientMove
 from cosmic.autonomy.handling.prepare import CONTACT, PROBE, retract_probe
-from cosmic.autonomy.handling.push import arm, limit_of, put_back
-from cosmic.autonomy.handling.work import FibreWork
-from cosmic.autonomy.procedures.operation import Steps, Wish
+from cosmic.autonomy.handling.push import arm_force_limit, limit_of, put_back
+from cosmic.autonomy.handling.retrying_move import RetryingMove
+from cosmic.autonomy.procedures.operation import Steps, Yielded
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.core.calibration_fit import CalibrationRefused
 
@@ -35,7 +35,7 @@ class TouchJaw(Calibrated):
     key = TOUCH
 
     @override
-    def measure(self, work: FibreWork) -> Steps:
+    def measure(self, work: HandlingContext) -> Steps:
         settings = work.settings.calibration
         if PROBE not in work.calibration.made:
             raise NotAvailable("see probe and gripper on one picture before they touch")
@@ -52,7 +52,7 @@ class TouchJaw(Calibrated):
         yield from move_jaws(work, work.settings.grasp.gap_um)
         self._keep(work, found)
 
-    def _touched(self, work: FibreWork) -> Generator[Wish, object, list[float]]:
+    def _touched(self, work: HandlingContext) -> Generator[Yielded, object, list[float]]:
         """Return by how much the probe's tip is elsewhere than its stage says, touch by touch."""
         settings, places = work.settings.calibration, work.settings.places
         side = -1.0 if work.probe.forward[1] > 0.0 else 1.0
@@ -68,15 +68,15 @@ class TouchJaw(Calibrated):
         work.calibration.touching = True
         with work.mico.collision.contact(CONTACT):
             yield work.go({work.probe.x_axis: x - work.probe.tip_um[0]})
-            arm(work)
+            arm_force_limit(work)
             near = face - off_y + side * settings.touch_stand_off_um
             yield self._to(work, near + side * FAR_UM)
             base = yield from _mean_un(work, 0.1)
             yield self._to(work, near)
             if abs((yield from _mean_un(work, 0.02)) - base) > settings.touch_un:
                 raise CalibrationRefused(
-                    "something is felt before the jaw, as the picture shows it, is near; look "
-                    "whether a tip is bent, and calibrate the picture anew"
+                    "contact force before the expected jaw position: check for a bent tip, "
+                    "and calibrate the camera again"
                 )
             found = []
             for _ in range(settings.touches):
@@ -88,20 +88,22 @@ class TouchJaw(Calibrated):
         return found
 
     @override
-    def undo(self, work: FibreWork) -> Steps:
+    def undo(self, work: HandlingContext) -> Steps:
         yield from retract_probe(work)
 
     @staticmethod
-    def _to(work: FibreWork, y_um: float) -> PatientMove:
+    def _to(work: HandlingContext, y_um: float) -> RetryingMove:
         return work.go({work.probe.y_axis: y_um - work.probe.tip_um[1]})
 
-    def _feel(self, work: FibreWork, side: float, base_un: float) -> Generator[Wish, object, float]:
+    def _feel(
+        self, work: HandlingContext, side: float, base_un: float
+    ) -> Generator[Yielded, object, float]:
         """Make small steps until something is felt, and return the place of the tip then."""
         settings, axis = work.settings.calibration, work.mico[work.probe.y_axis]
         _, begun = work.tip_now(work.probe)
         before = begun
         while abs(before - begun) < settings.touch_stand_off_um + 2.0 * settings.touch_off_um:
-            yield PatientMove(
+            yield RetryingMove(
                 lambda: axis.steps(
                     -round(side), amplitude_v=settings.touch_step_v, frequency_hz=100, wait=False
                 )
@@ -118,10 +120,10 @@ class TouchJaw(Calibrated):
             before = here
         raise CalibrationRefused(
             f"nothing was felt within {abs(before - begun):.0f} um of where the picture shows the "
-            "jaw; look whether the sensor works, and the jaws are closed"
+            "jaw; check the sensor, and that the jaws are closed"
         )
 
-    def _keep(self, work: FibreWork, found: list[float]) -> None:
+    def _keep(self, work: HandlingContext, found: list[float]) -> None:
         settings = work.settings.calibration
         off_x, seen_y = work.calibration.probe_off_um
         felt_y = float(np.mean(found))
@@ -139,17 +141,17 @@ class TouchJaw(Calibrated):
         self.kept(work, float(std_um), "um", settings.touch_std_um, values=values, how=how)
 
     @override
-    def restore(self, work: FibreWork, entry: CalibrationEntry) -> None:
+    def restore(self, work: HandlingContext, entry: CalibrationEntry) -> None:
         off_x, _ = work.calibration.probe_off_um
         work.calibration.probe_off_um = off_x, entry.values["off_y_um"]
 
     @override
-    def made_with(self, work: FibreWork) -> str:
+    def made_with(self, work: HandlingContext) -> str:
         tip = ", ".join(f"{each:g}" for each in work.probe.tip_um)
         return f"{work.gripper.name} against {work.probe.name} at {tip}"
 
 
-def _mean_un(work: FibreWork, seconds: float) -> Generator[Wish, object, float]:
+def _mean_un(work: HandlingContext, seconds: float) -> Generator[Yielded, object, float]:
     mean = yield work.forces.wanted(seconds)
     assert isinstance(mean, ForceMean)
     return mean.mean_un

@@ -11,9 +11,9 @@ from cosmic.autonomy.calibrating.focusing import (
     lens_of,
     seek_from_below,
 )
+from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.jaws import in_step, move_jaws, zero_jaws
 from cosmic.autonomy.handling.prepare import clear_picture, zoom_to
-from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import Steps
 from cosmic.autonomy.stage_procedure import LARGEST_PART
 from cosmic.vico.core.calibration_fit import CalibrationRefused
@@ -33,11 +33,11 @@ class CalibrateZooms(Calibrated):
     key = ZOOMS
 
     @override
-    def measure(self, work: FibreWork) -> Steps:
+    def measure(self, work: HandlingContext) -> Steps:
         settings, begun = work.settings.calibration, focus_now(work)
         steps = lens_of(work).steps
         if not steps:
-            raise CalibrationRefused("the lens has no steps: name some in the platform file")
+            raise CalibrationRefused("the lens has no zoom steps: list them in the platform file")
         yield from clear_picture(work)
         if not in_step(work):
             yield from zero_jaws(work)
@@ -60,7 +60,7 @@ class CalibrateZooms(Calibrated):
                 values[f"residual_{step.zoom:g}x_px"] = residual
                 worst = max(worst, residual)
         finally:
-            work.zoomed = None
+            work.shared.zoomed = None
         yield from seek_from_below(work, begun)
         yield from move_jaws(work, work.settings.grasp.gap_um - (work.gap_um or 0.0))
         yield from zoom_to(work, work.settings.zoom)
@@ -68,7 +68,7 @@ class CalibrateZooms(Calibrated):
         self.kept(work, worst, "px", settings.residual_px, values=values, how=how)
 
     @staticmethod
-    def _focus(work: FibreWork, plate_counts: float, height_um: float) -> Steps:
+    def _focus(work: HandlingContext, plate_counts: float, height_um: float) -> Steps:
         settings = work.settings.calibration
         about = plate_counts + height_um / settings.focus_um_count
         reach = settings.focus_reach_um / settings.focus_um_count
@@ -76,7 +76,7 @@ class CalibrateZooms(Calibrated):
         yield from seek_from_below(work, found)
 
 
-def _middle_x_um(work: FibreWork, scale_um_px: float) -> float:
+def _middle_x_um(work: HandlingContext, scale_um_px: float) -> float:
     """Return where the tip stands so that it reaches the places on both sides of it."""
     settings, camera = work.settings.calibration, work.vico.camera(work.settings.camera)
     width_px = camera.settings.roi.width_px if camera.settings is not None else 0

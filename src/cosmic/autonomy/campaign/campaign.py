@@ -1,38 +1,69 @@
-"""`Campaign`: fibre after fibre by one recipe, kept so that it can be gone on with."""
+"""`Campaign`: fibre after fibre by one recipe, recorded so that it can be resumed."""
 
 import logging
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from functools import partial
+from threading import Condition
 from typing import Final
 
-from cosmic.autonomy.campaign.keeper import Keeper, skip_known
-from cosmic.autonomy.campaign.keeping import CampaignKeeping
 from cosmic.autonomy.campaign.recipe import Recipe
+from cosmic.autonomy.campaign.recorder import FibreRecorder, skip_known
+from cosmic.autonomy.campaign.records import FibreRecord
 from cosmic.autonomy.campaign.resume import ResumePlan
-from cosmic.autonomy.campaign.steering import OVER, CampaignPhase
+from cosmic.autonomy.campaign.statistics import CampaignProgress
 from cosmic.autonomy.campaign.stop_rule import StopRule
-from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.campaign.store import CampaignStore, NotWrittenError
+from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.push import armed_while_pushing
 from cosmic.autonomy.handling.survey import NONE_LEFT
-from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.failures import STOPPED, ProcedureAborted
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.autonomy.procedures.procedure import Procedure
-from cosmic.autonomy.procedures.run import ProcedureRun
-from cosmic.autonomy.procedures.run_thread import RunThread
+from cosmic.autonomy.procedures.run import ProcedureRun, RunState, RunThread
+from cosmic.autonomy.procedures.times import OperationTimes
 from cosmic.autonomy.procedures.tree import OPERATION, NodeEvent, NodeState
+from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.frame.events import Event, Unsubscribe
 from cosmic.frame.failure import FailurePolicy
 
 logger = logging.getLogger(__name__)
 
 MOST_STUCK: Final = 3
 """Fibres in a row that cannot be put away before a person is asked for."""
+_POLL_S: Final = 0.2
+RETRY_INTERVAL_WALL_S: Final = 2.0
+"""How often it is tried to write what could not be written."""
+RETRY_TIMEOUT_WALL_S: Final = 600.0
+"""How long that is tried."""
+WAITING: Final = "waiting for disk space"
+
+
+class CampaignPhase(StrEnum):
+    """What a campaign is at; the value is the word.
+
+    `ENDED`: what the recipe asks for is done. `STOPPED`: it ended before that, in order: by
+    somebody's wish, by a stop, or because no fibre could be taken. `FAILED`: by a fault.
+    """
+
+    READY = "ready"
+    RUNNING = "running"
+    PAUSING = "pausing"
+    PAUSED = "paused"
+    ENDING = "ending"
+    ENDED = "ended"
+    STOPPED = "stopped"
+    FAILED = "failed"
+
+
+OVER: Final = frozenset({CampaignPhase.ENDED, CampaignPhase.STOPPED, CampaignPhase.FAILED})
 
 
 @dataclass(frozen=True, slots=True)
-class Doing:
+class Treatment:
     """What a campaign does with each fibre.
 
     Attributes
@@ -43,18 +74,18 @@ class Doing:
         A fibre without a result is no good one.
     """
 
-    procedure: Procedure[FibreWork]
+    procedure: Procedure[HandlingContext]
     measures: bool = True
 
 
-class Campaign(CampaignKeeping):
+class Campaign:
     """Runs a procedure again and again on one platform, and keeps what comes of it; any thread.
 
     Parameters
     ----------
-    work : FibreWork
+    work : HandlingContext
         The platform with the settings of the recipe; the campaign closes it.
-    doing : Doing
+    treatment : Treatment
         What is done with a fibre.
     recipe : Recipe
         When to end, and what to keep.
@@ -70,8 +101,8 @@ class Campaign(CampaignKeeping):
 
     def __init__(
         self,
-        work: FibreWork,
-        doing: Doing,
+        work: HandlingContext,
+        treatment: Treatment,
         recipe: Recipe,
         store: CampaignStore,
         *,
@@ -79,25 +110,62 @@ class Campaign(CampaignKeeping):
         stopped: Callable[[], str | None],
         known: ResumePlan | None = None,
     ) -> None:
-        keeper = Keeper(work, store, measures=doing.measures, pictures=recipe.file.output.pictures)
-        super().__init__(work, keeper, StopRule(recipe.file.stop))
         self.recipe = recipe
         self.store = store
-        self._doing = doing
+        self.work = work
+        self._treatment = treatment
+        self._recorder = FibreRecorder(
+            work, store, measures=treatment.measures, pictures=recipe.file.output.pictures
+        )
+        self._rule = StopRule(recipe.file.stop)
         self._policy = policy
         self._stopped = stopped
         self._known = known
+        self._changed = Condition()
+        self._phase = CampaignPhase.READY
+        self._run: ProcedureRun[HandlingContext] | None = None
+        self._thread: RunThread | None = None
+        self._published: Event[[]] = Event()
+        self._operation = ""
+        self._abort: str | None = None
         self._broken: CosmicError | None = None
         self._end_reason = ""
         self._reached = False
-        self._thread: RunThread | None = None
+        self._recorded = 0
+        self._unwritten = False
+        self._stuck = 0
+        work.shared.enough = self._enough
 
-    # What is known of it
+    # State
 
     @property
-    def procedure(self) -> Procedure[FibreWork]:
+    def phase(self) -> CampaignPhase:
+        """What it is at."""
+        return self._phase
+
+    @property
+    def operation(self) -> str:
+        """The operation under way, in words."""
+        return self._operation
+
+    @property
+    def over(self) -> bool:
+        """True when it has ended, well or not."""
+        return self._phase in OVER
+
+    @property
+    def run(self) -> ProcedureRun[HandlingContext] | None:
+        """The run of the procedure on the held fibre, for drawing; None before the first."""
+        return self._run
+
+    def on_change(self, listener: Callable[[], object]) -> Unsubscribe:
+        """Call `listener()` when anything changed, in any thread; returns what ends it."""
+        return self._published.subscribe(listener)
+
+    @property
+    def procedure(self) -> Procedure[HandlingContext]:
         """What is done with each fibre."""
-        return self._doing.procedure
+        return self._treatment.procedure
 
     @property
     def end_reason(self) -> str:
@@ -116,7 +184,22 @@ class Campaign(CampaignKeeping):
             return 0.0 if self._phase is CampaignPhase.ENDED else math.nan
         return self._rule.left_s(self.progress)
 
-    # What can be asked of it
+    @property
+    def fibres(self) -> tuple[FibreRecord, ...]:
+        """All fibres so far without curves and pictures, those of earlier runs included."""
+        return self._recorder.fibres
+
+    @property
+    def times(self) -> OperationTimes:
+        """How long operations took, and what they failed with."""
+        return self._recorder.times
+
+    @property
+    def progress(self) -> CampaignProgress:
+        """How it stands."""
+        return self._recorder.progress()
+
+    # Commands
 
     def start(self) -> None:
         """Begin, in a thread of its own; returns at once.
@@ -141,6 +224,38 @@ class Campaign(CampaignKeeping):
         self._begin()
         self._carry_out()
 
+    def pause(self) -> None:
+        """Rest at the next place where that is safe; harmless when it does not run."""
+        with self._changed:
+            if self._phase is not CampaignPhase.RUNNING:
+                return
+            self._phase = CampaignPhase.PAUSING
+            run = self._run
+        if run is not None:
+            run.pause()
+        self._publish()
+
+    def resume(self) -> None:
+        """Go on after a pause; harmless when it does not pause."""
+        with self._changed:
+            if self._phase not in (CampaignPhase.PAUSING, CampaignPhase.PAUSED):
+                return
+            self._phase = CampaignPhase.RUNNING
+            self._changed.notify_all()
+            run = self._run
+        if run is not None:
+            run.resume()
+        self._publish()
+
+    def step(self) -> None:
+        """Carry out one operation, then rest; harmless when it is over."""
+        with self._changed:
+            if self._phase in OVER or self._run is None or self._run.over:
+                return
+            self._phase = CampaignPhase.PAUSING
+            run = self._run
+        run.step()
+
     def abort(self, reason: str = "ended by the operator") -> None:
         """End it at once: what moves is cancelled, then it is made safe; returns at once."""
         with self._changed:
@@ -156,7 +271,7 @@ class Campaign(CampaignKeeping):
         if not begun:
             self._end_reason = reason
             self._leave(failed=False)
-        self._tell()
+        self._publish()
 
     def join(self) -> None:
         """Wait until its thread is gone; for whoever closes the platform, after `abort`."""
@@ -168,9 +283,9 @@ class Campaign(CampaignKeeping):
     def _begin(self) -> None:
         with self._changed:
             if self._phase is not CampaignPhase.READY:
-                raise NotAvailable(f"campaign {self.recipe.name} was begun already")
+                raise NotAvailable(f"campaign {self.recipe.name} has already started")
             self._phase = CampaignPhase.RUNNING
-        self._tell()
+        self._publish()
 
     def _carry_out(self) -> None:
         failed = False
@@ -182,7 +297,7 @@ class Campaign(CampaignKeeping):
             failed, self._end_reason = True, str(exc)
         except Exception as exc:  # noqa: BLE001 - it must be said, and the store closed in order
             self._policy.report(exc, f"campaign {self.recipe.name!r}")
-            failed, self._end_reason = True, f"a mistake in the program: {exc}"
+            failed, self._end_reason = True, f"program error: {exc}"
         finally:
             self._leave(failed=failed)
             leading.close()
@@ -190,7 +305,7 @@ class Campaign(CampaignKeeping):
     def _leave(self, *, failed: bool) -> None:
         self.work.close()
         try:
-            self._keeper.close(self._end_reason)
+            self._recorder.close(self._end_reason)
         except CosmicError as exc:
             failed, self._end_reason = True, f"{self._end_reason}; {exc}"
         finally:
@@ -199,8 +314,8 @@ class Campaign(CampaignKeeping):
         told = logger.error if failed else logger.info if self._reached else logger.warning
         told("campaign %s: %s", self.recipe.name, self._end_reason)
         self._operation = ""
-        self._move_on(CampaignPhase.FAILED if failed else end)
-        self._tell()
+        self._enter(CampaignPhase.FAILED if failed else end)
+        self._publish()
 
     def _treat_all(self) -> str:
         if self._known is not None:
@@ -218,15 +333,15 @@ class Campaign(CampaignKeeping):
     def _treat_one(self) -> str:
         """Treat one fibre; returns why the campaign ends, or nothing."""
         run = ProcedureRun(
-            self._doing.procedure,
+            self._treatment.procedure,
             self.work,
             self.work.clock,
             self._policy,
             stopped=self._stopped,
         )
         run.subscribe(self._on_event)
-        self._keeper.begin_run()
-        taken = len(self.work.finished)
+        self._recorder.begin_run()
+        taken = len(self.work.shared.finished)
         if reason := self._follow(run):
             return reason
         try:
@@ -234,43 +349,151 @@ class Campaign(CampaignKeeping):
         except ProcedureAborted as exc:
             if self._broken is not None:
                 raise self._broken from exc
-            self._keep_cut_off(str(exc))
+            self._record_cut_off(str(exc))
             return self._abort or str(exc)
         except OperationFailed as exc:
             return self._after_failure(exc, taken)
-        self._keep_finished()
+        self._record_finished()
         return ""
 
     def _after_failure(self, failure: OperationFailed, taken: int) -> str:
         if failure.cause == STOPPED:
-            self._keep_cut_off(str(failure))
+            self._record_cut_off(str(failure))
             return str(failure)
-        self._keep_finished()
+        self._record_finished()
         if failure.cause == NONE_LEFT:
             return str(failure)
-        if len(self.work.finished) > taken:
+        if len(self.work.shared.finished) > taken:
             return ""
-        held = [each for each in self.work.hands if each.fibre is not None]
+        held = [each for each in self.work.arms if each.fibre is not None]
         if not held:
             raise failure
-        for hand in held:
-            self._keep_held(hand, failure)
-        self.work.surveyed = False
+        for arm in held:
+            self._record_held(arm, failure)
+        self.work.shared.surveyed = False
         self._stuck += 1
         if self._stuck >= MOST_STUCK:
-            return f"{self._stuck} fibres in a row could not be put away, the last: {failure}"
+            return f"{self._stuck} fibres in a row were not released; the last: {failure}"
         return ""
 
-    # What happens meanwhile
+    def _enter(self, phase: CampaignPhase) -> CampaignPhase:
+        """Enter another phase; returns the one before."""
+        with self._changed:
+            before, self._phase = self._phase, phase
+            self._changed.notify_all()
+        return before
+
+    def _follow(self, run: ProcedureRun[HandlingContext]) -> str | None:
+        """Have this run steered from now on; returns why it must not begin, or None."""
+        run.on_change(self._on_run_changed)
+        with self._changed:
+            self._run = run
+            return self._abort
+
+    def _rest(self) -> None:
+        """Wait between two fibres while a pause is wanted."""
+        with self._changed:
+            if self._phase is CampaignPhase.PAUSING:
+                self._phase = CampaignPhase.PAUSED
+            resting = self._phase is CampaignPhase.PAUSED
+        if not resting:
+            return
+        self._publish()
+        with self._changed:
+            while self._phase is CampaignPhase.PAUSED and self._abort is None:
+                self._changed.wait(_POLL_S)
+
+    def _insist(self, write: Callable[[], None]) -> None:
+        """Write what must not be lost; where that fails, again and again while it may yet succeed.
+
+        Raises
+        ------
+        NotWrittenError
+            It was not written in `RETRY_TIMEOUT_WALL_S`, or before the end was wanted.
+        """
+        until_s = WALL.now_s() + RETRY_TIMEOUT_WALL_S
+        before = self._operation
+        while True:
+            try:
+                write()
+                break
+            except NotWrittenError as exc:
+                if self._abort is not None or WALL.now_s() >= until_s:
+                    raise NotWrittenError(f"the last fibre is not saved: {exc}") from exc
+                if self._operation != WAITING:
+                    self._operation = WAITING
+                    logger.error("%s; retried every %g s", exc, RETRY_INTERVAL_WALL_S)
+                    self._publish()
+            with self._changed:
+                self._changed.wait(RETRY_INTERVAL_WALL_S)
+        self._operation = before
+
+    def _on_run_changed(self) -> None:
+        run = self._run
+        with self._changed:
+            pausing = run is not None and self._phase is CampaignPhase.PAUSING
+            if pausing and run is not None and run.state is RunState.PAUSED:
+                self._phase = CampaignPhase.PAUSED
+        if pausing and run is not None and run.state is RunState.RUNNING:
+            run.pause()  # it was wanted while the run had not begun
+        self._publish()
+
+    # Recording
+
+    def _record_held(self, arm: HandlingContext, failure: OperationFailed) -> None:
+        """Keep a fibre that could not be put away."""
+        fibre, arm.fibre = arm.fibre, None
+        if fibre is not None:
+            fibre.failure = fibre.failure or failure
+            self._insist(lambda: self._recorder.record(fibre))
+
+    def _record_cut_off(self, reason: str) -> None:
+        """Keep the fibres of a run that was cut off: one that was done with by then is no less."""
+        self._record_finished()
+        for fibre in self._recorder.in_work:
+            self._insist(partial(self._recorder.record, fibre, interrupted=reason))
+
+    def _record_finished(self) -> None:
+        """Keep the fibres that were done with and are not kept yet."""
+        while self._recorded < len(self.work.shared.finished):
+            fibre = self.work.shared.finished[self._recorded]
+            with self.work.clock.at_work():
+                self._insist(partial(self._recorder.record, fibre))
+            self._recorded += 1
+            self._stuck = 0
+            self._publish()
+        self._unwritten = False
+
+    def _enough(self) -> bool:
+        """Tell whether no further fibre is to be begun, if those in work become good ones."""
+        now, more = self.progress, len(self._recorder.in_work)
+        then = replace(now, done=now.done + more, good=now.good + more)
+        return self._unwritten or self._abort is not None or bool(self._rule.reason(then))
+
+    def _record_meanwhile(self) -> None:
+        """Keep what one arm is done with, while the other goes on."""
+        while self._recorded < len(self.work.shared.finished):
+            try:
+                self._recorder.record(self.work.shared.finished[self._recorded])
+            except NotWrittenError as exc:
+                # Once both arms are done with theirs, it is tried again.
+                logger.error("%s; no further fibre is started", exc)
+                self._unwritten = True
+                return
+            self._recorded += 1
+            self._publish()
 
     def _on_event(self, event: NodeEvent) -> None:
         if event.kind == OPERATION and event.state is NodeState.RUNNING:
             self._operation = f"{event.role}: {event.name}" if event.role else event.name
         try:
-            self._keeper.note(event)
+            self._recorder.note(event)
             if event.role and not self._unwritten:
-                self._keep_meanwhile()
+                self._record_meanwhile()
         except CosmicError as exc:  # what cannot be written down must not be done
             self._broken = exc
             if self._run is not None:
                 self._run.abort(str(exc))
+
+    def _publish(self) -> None:
+        self._published.emit()

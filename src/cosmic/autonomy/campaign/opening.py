@@ -1,31 +1,32 @@
 """Beginning a campaign in a folder, or going on with the one that is there."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
-from cosmic.autonomy.campaign.campaign import Campaign, Doing
+from cosmic.autonomy.campaign.campaign import Campaign, Treatment
 from cosmic.autonomy.campaign.recipe import Recipe, load_recipe
 from cosmic.autonomy.campaign.records import TWIN, CampaignError, CampaignInfo
 from cosmic.autonomy.campaign.resume import ResumePlan, resume
+from cosmic.autonomy.campaign.storage_format import DATABASE
 from cosmic.autonomy.campaign.store import CampaignStore
-from cosmic.autonomy.campaign.store_files import DATABASE
 from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.autonomy.handling.context import Applications, HandlingContext, vision_of
 from cosmic.autonomy.handling.settings import HandlingSettings
-from cosmic.autonomy.handling.work import FibreWork, Handles
 from cosmic.autonomy.shipped.registry import PARAMETERS, PROCEDURES
+from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy
 
 
 @dataclass(frozen=True)
-class Host:
+class CampaignHost:
     """The platform that a campaign runs on.
 
     Attributes
     ----------
-    rig : Handles
+    rig : Applications
         Its applications.
     policy : FailurePolicy
         Told of defects.
@@ -37,7 +38,7 @@ class Host:
         Of everything random in the twin that runs: what is recorded, whatever the recipe says.
     """
 
-    rig: Handles
+    rig: Applications
     policy: FailurePolicy
     stopped: Callable[[], str | None]
     hardware: str
@@ -57,7 +58,22 @@ def read_recipe(path: Path) -> Recipe:
     return load_recipe(path, procedures=PARAMETERS)
 
 
-def open_campaign(recipe: Recipe, folder: Path, host: Host) -> Campaign:
+def recipe_misfits(
+    recipe: Recipe,
+    *,
+    tools: Collection[str],
+    cameras: Collection[str],
+    channels: Collection[str],
+) -> list[str]:
+    """Return a line for each name in a recipe that a platform has not: file, key, name."""
+    settings = recipe.parameters
+    if not isinstance(settings, HandlingSettings):
+        return []
+    wrong = settings.misfits(tools=tools, cameras=cameras, channels=channels)
+    return [f"{recipe.path}: parameters.{each}" for each in wrong]
+
+
+def open_campaign(recipe: Recipe, folder: Path, host: CampaignHost) -> Campaign:
     """Return a campaign that is ready to start; close its store at the end.
 
     In a folder that holds a campaign by the same recipe it goes on with that one: what is finished
@@ -75,14 +91,21 @@ def open_campaign(recipe: Recipe, folder: Path, host: Host) -> Campaign:
     parameters = recipe.parameters
     settings = parameters if isinstance(parameters, HandlingSettings) else HandlingSettings()
     shipped = PROCEDURES[recipe.file.procedure]
+    if wrong := recipe_misfits(
+        recipe,
+        tools=[each.name for each in vision_of(host.rig.vico).settings.tool],
+        cameras=host.rig.vico.cameras,
+        channels=host.rig.daqco.channels,
+    ):
+        raise ConfigError("\n".join(wrong))
     with ExitStack() as undo:
-        work = FibreWork.on(host.rig, settings)
+        work = HandlingContext.on(host.rig, settings)
         undo.callback(work.close)
         store, known = _store(recipe, folder, host, work.clock.now_s())
         undo.callback(store.close)
         campaign = Campaign(
             work,
-            Doing(shipped.build(settings), measures=shipped.measures),
+            Treatment(shipped.build(settings), measures=shipped.measures),
             recipe,
             store,
             policy=host.policy,
@@ -94,7 +117,7 @@ def open_campaign(recipe: Recipe, folder: Path, host: Host) -> Campaign:
 
 
 def _store(
-    recipe: Recipe, folder: Path, host: Host, now_s: float
+    recipe: Recipe, folder: Path, host: CampaignHost, now_s: float
 ) -> tuple[CampaignStore, ResumePlan | None]:
     if not (folder / DATABASE).exists():
         return CampaignStore.create(folder, _info(recipe, host), time_s=now_s), None
@@ -108,7 +131,7 @@ def _store(
         raise
 
 
-def _check_same(info: CampaignInfo, recipe: Recipe, folder: Path, host: Host) -> None:
+def _check_same(info: CampaignInfo, recipe: Recipe, folder: Path, host: CampaignHost) -> None:
     if info.recipe_text != recipe.text:
         raise CampaignError(
             f"{folder} holds a campaign by another recipe than {recipe.path}: "
@@ -133,7 +156,7 @@ def recorded_seed(folder: Path) -> int | None:
     return CampaignReader(folder).info().seed if (folder / DATABASE).exists() else None
 
 
-def _info(recipe: Recipe, host: Host) -> CampaignInfo:
+def _info(recipe: Recipe, host: CampaignHost) -> CampaignInfo:
     file = recipe.file
     return CampaignInfo(
         name=recipe.name,

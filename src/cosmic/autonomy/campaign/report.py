@@ -1,27 +1,101 @@
-"""The report of a campaign: one HTML file that holds everything it shows."""
+"""The report of a campaign: one HTML file that holds everything it shows.
 
-from html import escape
-from pathlib import Path
-from typing import Final
-
-from cosmic.autonomy.campaign.report_data import report_data
-from cosmic.autonomy.campaign.report_html import body
-from cosmic.autonomy.campaign.store import CampaignStore
-from cosmic.autonomy.campaign.store_files import write_whole
-from cosmic.autonomy.campaign.store_read import CampaignReader
-
-STYLE: Final = """
-body { font-family: "Segoe UI", "Noto Sans", sans-serif; color: #202428; background: #ffffff;
-  max-width: 62rem; margin: 2rem auto; padding: 0 1rem; line-height: 1.45; }
-h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2rem; }
-h3 { font-size: 1rem; margin-top: 2rem; border-top: 1px solid #d9dde1; padding-top: 0.8rem; }
-table { border-collapse: collapse; font-size: 0.88rem; font-variant-numeric: tabular-nums; }
-table:not(.plain) tr { border-bottom: 1px solid #d9dde1; }
-.scroll { overflow-x: auto; } .figure { margin: 0.4rem 0; } .figure svg { max-width: 100%; }
-img { max-width: 100%; height: auto; } pre { background: #f3f5f7; padding: 0.8rem;
-  overflow-x: auto; } small { color: #596068; }
-@media print { h3 { break-before: auto; } table, .figure { break-inside: avoid; } }
+What it tells stands in `templates/report_body.html`; here are the data and the figures.
 """
+
+import base64
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup, escape
+
+from cosmic.autonomy.bending.result import BendingResult
+from cosmic.autonomy.campaign.formatting import (
+    EI_LABEL,
+    EI_UNIT,
+    NONE,
+    duration,
+    interval,
+    mean_words,
+    number,
+    outcome_words,
+    stiffness,
+    when,
+    width_words,
+    with_interval,
+)
+from cosmic.autonomy.campaign.records import (
+    TWIN,
+    CalibrationNote,
+    CampaignError,
+    CampaignInfo,
+    FibreRecord,
+    Outcome,
+    Picture,
+)
+from cosmic.autonomy.campaign.snapshot import SpanCurve, span_curves
+from cosmic.autonomy.campaign.statistics import CampaignProgress, MeanEi, progress
+from cosmic.autonomy.campaign.store import CampaignStore, write_whole
+from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.autonomy.campaign.svg_plot import BLUE, GREY, INK, ORANGE, Axis, Plot, around, bars
+
+ShowSvg = Callable[[str, int], str]
+"""Returns the element that shows an SVG, so many pixels wide."""
+
+ShowPng = Callable[[bytes, int, str], str]
+"""Returns the element that shows a PNG, so many pixels wide, with words for who cannot see it."""
+
+TEMPLATES: Final = Path(__file__).parent / "templates"
+PICTURE_PX: Final = 360
+ASPECT: Final = 4.0 / 3.0
+ROOM: Final = 1.5
+"""How much more of the picture is shown than what it is about."""
+PALE: Final = "#9dbfdc"
+FEW: Final = 8
+"""Fewer fibres are drawn one by one."""
+SHORTEST_S: Final = 0.05
+"""Of an operation that is drawn."""
+
+
+@dataclass(frozen=True, slots=True)
+class OperationTime:
+    """How long an operation takes, over all its tries."""
+
+    name: str
+    tries: int
+    failed: int
+    median_s: float
+    p95_s: float
+    total_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class ReportData:
+    """Everything of a report.
+
+    Attributes
+    ----------
+    finished : tuple of FibreRecord
+        Without curves and pictures.
+    whole : callable
+        Returns a fibre with them, by its number: they are not all held at once.
+    """
+
+    info: CampaignInfo
+    ended: tuple[str, str]
+    progress: CampaignProgress
+    finished: tuple[FibreRecord, ...]
+    calibrations: tuple[CalibrationNote, ...]
+    operations: tuple[OperationTime, ...]
+    whole: Callable[[int], FibreRecord]
 
 
 def write_report(campaign: CampaignStore | CampaignReader, path: str | Path) -> None:
@@ -35,12 +109,391 @@ def write_report(campaign: CampaignStore | CampaignReader, path: str | Path) -> 
         The campaign cannot be read, or the file not be written.
     """
     reader = campaign.reader if isinstance(campaign, CampaignStore) else campaign
-    data = report_data(reader)
-    title = f"{data.info.name}: {data.info.procedure}"
-    page = (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{STYLE}</style></head>\n"
-        f"<body>\n{body(data)}\n</body></html>\n"
-    )
+    page = _render("report.html", report_data(reader), svg=_inline_svg, png=_inline_png)
     write_whole(Path(path), page.encode())
+
+
+def report_body(data: ReportData, *, svg: ShowSvg, png: ShowPng) -> str:
+    """Return the whole report between <body> and </body>, in HTML that QTextDocument reads."""
+    return _render("report_body.html", data, svg=svg, png=png)
+
+
+def report_data(reader: CampaignReader) -> ReportData:
+    """Return what a report tells.
+
+    Raises
+    ------
+    CampaignError
+        The campaign cannot be read.
+    """
+    reader.check()
+    fibres, finished = reader.fibres(), reader.finished()
+    return ReportData(
+        info=reader.info(),
+        ended=reader.ended(),
+        progress=progress(fibres, reader.elapsed_s()),
+        finished=finished,
+        calibrations=reader.calibrations(),
+        operations=operation_times(finished),
+        whole=lambda number: _whole(reader, number, finished),
+    )
+
+
+def _whole(reader: CampaignReader, number: int, finished: Sequence[FibreRecord]) -> FibreRecord:
+    """Return a fibre with what can be read of it: a lost file costs no report."""
+    try:
+        return reader.fibre(number)
+    except CampaignError as exc:
+        record = next(each for each in finished if each.number == number)
+        return replace(record, text=f"{record.text} {exc}".strip())
+
+
+def operation_times(fibres: Sequence[FibreRecord]) -> tuple[OperationTime, ...]:
+    """Return the time of each operation, in the order of their first appearance."""
+    took: dict[str, list[float]] = {}
+    failed: dict[str, int] = {}
+    for fibre in fibres:
+        for each in fibre.operations:
+            took.setdefault(each.name, []).append(each.ended_s - each.began_s)
+            failed[each.name] = failed.get(each.name, 0) + each.failed
+    return tuple(
+        OperationTime(
+            name=name,
+            tries=len(times),
+            failed=failed[name],
+            median_s=float(np.median(times)),
+            p95_s=float(np.quantile(times, 0.95)),
+            total_s=float(np.sum(times)),
+        )
+        for name, times in took.items()
+    )
+
+
+@cache
+def _templates() -> Environment:
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.globals |= {
+        "TWIN": TWIN,
+        "EI_LABEL": EI_LABEL,
+        "interval": interval,
+        "outcome_words": outcome_words,
+        "stiffness": stiffness,
+        "width_words": width_words,
+        "with_interval": with_interval,
+    }
+    environment.tests["finite"] = math.isfinite
+    return environment
+
+
+def _render(template: str, data: ReportData, *, svg: ShowSvg, png: ShowPng) -> str:
+    def drawn(figure: str, width_px: int) -> Markup:
+        return Markup(svg(figure, width_px) if figure else "")
+
+    causes = [(cause, float(count), str(count)) for cause, count in data.progress.causes.items()]
+    good = _good_results(data)
+    return (
+        _templates()
+        .get_template(template)
+        .render(
+            data=data,
+            summary=_summary(data),
+            distribution=drawn(distribution_figure(good, data.progress.mean) if good else "", 640),
+            few=len(good) < FEW,
+            fibre_rows=[_fibre_row(each) for each in data.finished],
+            failures=drawn(bars("Failures by cause", causes) if causes else "", 430),
+            operation_bars=drawn(_operation_bars(data), 560),
+            operation_rows=[_operation_row(each) for each in data.operations],
+            calibration_rows=[_calibration_row(each) for each in data.calibrations],
+            cards=_cards(data, svg, png),
+            versions=sorted(data.info.versions.items()),
+        )
+    )
+
+
+def _inline_svg(svg: str, _width_px: int) -> str:
+    return f'<div class="figure">{svg}</div>'
+
+
+def _inline_png(data: bytes, width_px: int, words: str) -> str:
+    content = base64.b64encode(data).decode()
+    return f'<img width="{width_px}" alt="{escape(words)}" src="data:image/png;base64,{content}">'
+
+
+# ---------------------------------------------------------------- rows
+
+
+def _summary(data: ReportData) -> list[tuple[str, str]]:
+    info, now = data.info, data.progress
+    ended, reason = data.ended
+    rows = [
+        ("Sample", info.sample or NONE),
+        ("Platform", info.hardware),
+        ("Operator", info.operator or NONE),
+        ("Started", when(info.started)),
+        ("Ended", f"{when(ended)}, {reason}" if ended else "not ended"),
+        ("Time on the platform's clock", duration(now.elapsed_s)),
+        (
+            "Fibres done",
+            f"{now.done}: {now.good} good, {now.doubtful} measured but not trusted, "
+            f"{now.failed} failed",
+        ),
+        ("Cut off by an end of the program", str(now.interrupted)),
+        ("Good fibres an hour", number(now.good_per_hour)),
+        ("Success", f"{number(now.success_percent)} %"),
+        ("Median time of a fibre", duration(now.cycle_s)),
+        (f"Geometric mean of EI, {EI_LABEL} (95 %)", mean_words(now.mean)),
+        ("Spread between fibres", _spread(now.mean.spread_ln)),
+        ("Mean length, width, curl", _shape(data.finished)),
+    ]
+    if info.hardware == TWIN:
+        rows.insert(3, ("Seed and rate of the twin", f"{info.seed}; {info.rate:g} times"))
+    return rows
+
+
+def _spread(spread_ln: float) -> str:
+    return f"factor {math.exp(spread_ln):.2f}" if math.isfinite(spread_ln) else NONE
+
+
+def _shape(fibres: Sequence[FibreRecord]) -> str:
+    told = []
+    for values, digits, unit in (
+        ([each.shape.length_um for each in fibres], 0, " µm"),
+        ([each.shape.width_um for each in fibres], 0, " µm"),
+        ([each.shape.curl for each in fibres], 3, ""),
+    ):
+        known = [each for each in values if math.isfinite(each)]
+        told.append(f"{np.mean(known):.{digits}f}{unit}" if known else NONE)
+    return ", ".join(told)
+
+
+def _fibre_row(each: FibreRecord) -> tuple[str, ...]:
+    result = each.bending
+    return (
+        str(each.number),
+        outcome_words(each),
+        NONE if result is None else stiffness(result.ei_n_m2),
+        NONE if result is None else interval(result.ei_low_n_m2, result.ei_high_n_m2),
+        with_interval(each.shape.length_um, each.shape.length_std_um),
+        width_words(each.shape),
+        with_interval(each.shape.curl, each.shape.curl_std, 3),
+        number(each.peak_force_un, 1),
+        number(each.duration_s),
+    )
+
+
+def _good_results(data: ReportData) -> list[BendingResult]:
+    return [
+        each.bending
+        for each in data.finished
+        if each.outcome is Outcome.GOOD and each.bending is not None and each.bending.ei_n_m2 > 0.0
+    ]
+
+
+def _operation_row(each: OperationTime) -> tuple[str, ...]:
+    return (
+        each.name,
+        str(each.tries),
+        str(each.failed),
+        f"{each.median_s:.2f}",
+        f"{each.p95_s:.2f}",
+        f"{each.total_s:.0f}",
+    )
+
+
+def _calibration_row(each: CalibrationNote) -> tuple[str, ...]:
+    residual = f"{each.residual:.3g} {each.unit.replace('um', 'µm')}"
+    return each.name, residual, when(each.made)
+
+
+def _span_rows(result: BendingResult) -> list[tuple[str, ...]]:
+    return [
+        (
+            f"{fit.place_um:.1f}",
+            f"{number(fit.k_un_um, 3)} ± {number(1.96 * fit.k_std_un_um, 3)}",
+            number(fit.k_loading_un_um, 3),
+            number(fit.k_unloading_un_um, 3),
+            number(fit.hysteresis_percent, 1),
+            number(fit.drift_un_s, 3),
+            number(fit.peak_un, 1),
+            f"{fit.chi2:.0f} / {fit.freedom}",
+            ", ".join(sorted(fit.flags)) or ("" if place in result.used else "not used"),
+        )
+        for place, fit in enumerate(result.spans)
+    ]
+
+
+# ---------------------------------------------------------------- each fibre
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Card:
+    """One fibre as the template shows it."""
+
+    record: FibreRecord
+    figures: list[Markup]
+    span_rows: list[tuple[str, ...]]
+
+
+def _cards(data: ReportData, svg: ShowSvg, png: ShowPng) -> Iterator[_Card]:
+    for each in data.finished:
+        record = data.whole(each.number)
+        figures = [_shown(picture, png) for picture in record.pictures[:2]]
+        drawn = force_figure(record), stiffness_figure(record)
+        figures += [Markup(svg(figure, 430)) for figure in drawn if figure]
+        rows = [] if record.bending is None else _span_rows(record.bending)
+        yield _Card(record, figures, rows)
+
+
+def _shown(picture: Picture, png: ShowPng) -> Markup:
+    pixels = _cut(picture)
+    if pixels.dtype == np.uint16:
+        pixels = (pixels >> 8).astype(np.uint8)
+    height, width = pixels.shape[:2]
+    if width > PICTURE_PX:
+        size = PICTURE_PX, max(1, round(height * PICTURE_PX / width))
+        pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    _, data = cv2.imencode(".png", pixels)
+    scale = f", {picture.scale_um_px * width:.0f} µm wide" if picture.scale_um_px > 0.0 else ""
+    words = f"{picture.name}{scale}"
+    shown_px = PICTURE_PX if picture.region_px is not None else pixels.shape[1]
+    shown = Markup(png(data.tobytes(), shown_px, words))
+    return Markup("{}<br><small>{}</small>").format(shown, words)
+
+
+def _cut(picture: Picture) -> npt.NDArray[Any]:
+    """Return what a picture is about, with room around it, as wide as high times 4 / 3."""
+    pixels: npt.NDArray[Any] = picture.pixels
+    if picture.region_px is None:
+        return pixels
+    left, top, width, height = picture.region_px
+    wide = max(width, height * ASPECT) * ROOM
+    high = wide / ASPECT
+    x, y = left + width / 2.0 - wide / 2.0, top + height / 2.0 - high / 2.0
+    rows = slice(max(0, round(y)), max(1, round(y + high)))
+    columns = slice(max(0, round(x)), max(1, round(x + wide)))
+    part = pixels[rows, columns]
+    return part if part.size else pixels
+
+
+# ---------------------------------------------------------------- figures
+
+
+def force_figure(record: FibreRecord) -> str:
+    """Return force over push of all spans of a fibre: measured out and back, and fitted."""
+    curves = span_curves(record)
+    if not curves:
+        return ""
+    ways = np.concatenate([each.way_um for each in curves])
+    forces = np.concatenate([each.force_un for each in curves])
+    x = Axis("push beyond the first contact, µm", *around(float(ways.min()), float(ways.max())))
+    y = Axis("force, µN", *around(float(forces.min()), float(forces.max())))
+    plot = Plot(x, y, f"Force over push of fibre {record.number}")
+    for curve in curves:
+        _draw(plot, curve)
+    return plot.svg()
+
+
+def _operation_bars(data: ReportData) -> str:
+    done = max(data.progress.done, 1)
+    rows = [
+        (each.name, each.total_s / done, f"{each.total_s / done:.1f} s")
+        for each in data.operations
+        if each.total_s / done >= SHORTEST_S
+    ]
+    return (
+        bars("Time of each operation, for one fibre", rows, width=560.0) if data.operations else ""
+    )
+
+
+def _draw(plot: Plot, curve: SpanCurve) -> None:
+    way, force, fitted = curve.way_um, curve.force_un, curve.fitted_un
+    for branch in (curve.loading, ~curve.loading):
+        shown = branch & np.isfinite(fitted)
+        order = np.argsort(way[shown])
+        if shown.any():
+            plot.line(way[shown][order].tolist(), fitted[shown][order].tolist(), GREY)
+    back = ~curve.loading
+    plot.points(way[back].tolist(), force[back].tolist(), ORANGE, hollow=True)
+    plot.points(way[curve.loading].tolist(), force[curve.loading].tolist(), BLUE)
+    last = int(np.argmax(way))
+    plot.note(float(way[last]), float(force[last]), f"{curve.place_um:.0f} µm", end=True)
+
+
+def stiffness_figure(record: FibreRecord) -> str:
+    """Return k^(-1/3) over the place, with the line whose slope is the bending stiffness."""
+    result = record.bending
+    if result is None:
+        return ""
+    fits = [each for each in result.spans if each.k_un_um > 0.0]
+    if not fits or not result.ei_n_m2 > 0.0:
+        return ""
+    places = [each.place_um for each in fits]
+    roots = [each.k_un_um ** (-1.0 / 3.0) for each in fits]
+    slope = (3.0 * result.ei_n_m2 * 1e18) ** (-1.0 / 3.0)
+    begin, end = -result.clamp_offset_um, max(places) * 1.05
+    x = Axis("place of the probe from the tip of the jaws, µm", *around(min(begin, 0.0), end))
+    y = Axis("k^(-1/3), (µN/µm)^(-1/3)", 0.0, 1.1 * max(*roots, slope * (end - begin)))
+    plot = Plot(x, y, f"Stiffness of the spans of fibre {record.number}")
+    plot.line([begin, end], [0.0, slope * (end - begin)], GREY)
+    for index, (place, root) in enumerate(zip(places, roots, strict=True)):
+        plot.points([place], [root], BLUE, hollow=index not in result.used)
+    plot.note(begin + 0.16 * (end - begin), 0.06 * y.high, "clamp, where the line begins")
+    return plot.svg()
+
+
+def distribution_figure(results: Sequence[BendingResult], mean: MeanEi) -> str:
+    """Return the distribution of stiffnesses on a logarithmic axis; of few, each with its interval.
+
+    Across the top the 95 % interval of their mean.
+    """
+    values = np.array([each.ei_n_m2 for each in results]) / EI_UNIT
+    logs = np.log(values)
+    few = len(values) < FEW
+    bins = max(4, min(16, round(1.5 * math.sqrt(len(values)))))
+    room = max(0.12, 0.5 * float(np.ptp(logs)) / bins)
+    low, high = float(logs.min()) - room, float(logs.max()) + room
+    if few and mean.count >= 2:
+        # The mean of few is known badly: its interval is shown as far as it does not hide them.
+        low = min(low, max(math.log(mean.ei_low_n_m2 / EI_UNIT) - room, low - 1.0))
+        high = max(high, min(math.log(mean.ei_high_n_m2 / EI_UNIT) + room, high + 1.0))
+    edges = np.linspace(low, high, bins + 1)
+    counts, _ = np.histogram(logs, edges)
+    top = len(values) + 0.8 if few else 1.15 * float(counts.max())
+    x = Axis(f"bending stiffness, {EI_LABEL}", math.exp(edges[0]), math.exp(edges[-1]), log=True)
+    y = Axis("good fibres in order" if few else "fibres", 0.0, top, whole=True)
+    plot = Plot(x, y, "Distribution of bending stiffness", width=640.0, height=280.0)
+    if few:
+        for place, each in enumerate(results, 1):
+            ends = _inside(x, each.ei_low_n_m2, each.ei_high_n_m2)
+            plot.line(ends, [float(place)] * 2, BLUE)
+            plot.points([each.ei_n_m2 / EI_UNIT], [float(place)], BLUE)
+    else:
+        for count, first, last in zip(counts, edges[:-1], edges[1:], strict=True):
+            if count:
+                plot.box(math.exp(first + 0.01), math.exp(last - 0.01), 0.0, float(count), PALE)
+        _bell(plot, mean, len(values) * (edges[1] - edges[0]))
+        plot.points(values.tolist(), [0.02 * top] * len(values), BLUE)
+    if mean.count >= 2:
+        plot.line(_inside(x, mean.ei_low_n_m2, mean.ei_high_n_m2), [0.96 * top] * 2, ORANGE)
+    return plot.svg()
+
+
+def _inside(axis: Axis, low_n_m2: float, high_n_m2: float) -> list[float]:
+    return [max(low_n_m2 / EI_UNIT, axis.low), min(high_n_m2 / EI_UNIT, axis.high)]
+
+
+def _bell(plot: Plot, mean: MeanEi, area: float) -> None:
+    """Draw the lognormal distribution with a mean and spread."""
+    if not mean.spread_ln > 0.0:
+        return
+    at = np.linspace(math.log(plot.x.low), math.log(plot.x.high), 120)
+    away = (at - math.log(mean.ei_n_m2 / EI_UNIT)) / mean.spread_ln
+    high = np.exp(-0.5 * away**2) * area / (mean.spread_ln * math.sqrt(2.0 * math.pi))
+    plot.line(np.exp(at).tolist(), np.minimum(high, plot.y.high).tolist(), INK)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from cosmic.autonomy.campaign.records import FibreRecord, Value
-from cosmic.autonomy.campaign.store_files import write_whole
+from cosmic.autonomy.campaign.store import write_whole
 from cosmic.autonomy.campaign.store_read import CampaignReader
 
 COLUMNS: Final = (

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from cosmic.autonomy.campaign.journal import FELL
 from cosmic.autonomy.campaign.records import FINISHED, FibreRecord, JournalEntry, Outcome, Pose
 from cosmic.autonomy.campaign.store import CampaignStore
 
+FELL: Final = "fell"
+"""Phase of a line about a measured fibre that lies on the plate again, nobody knows where."""
 JOURNAL_LINES: Final = 20
 LOOKS: Final = ("length_um", "width_um", "curl")
 SAME_PLACE_UM: Final = 150.0
@@ -18,7 +19,7 @@ MOST_INTERRUPTIONS: Final = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class KnownFibre:
     """A fibre that need not be looked at again, where it was seen last."""
 
     number: int
@@ -27,7 +28,7 @@ class Known:
 
 
 @dataclass(frozen=True, slots=True)
-class Fallen:
+class DroppedFibre:
     """A fibre that was measured and fell where nobody saw it: known by what it looks like only."""
 
     number: int
@@ -49,11 +50,11 @@ class ResumePlan:
         Fibres that have their end.
     interrupted : tuple of int
         Fibres that were in treatment: one of them may hang in the jaws.
-    known : tuple of Known
+    known : tuple of KnownFibre
         Fibres to be skipped where they are found again.
     last : tuple of JournalEntry
         What was about to be done, oldest first.
-    fallen : tuple of Fallen
+    fallen : tuple of DroppedFibre
         Finished fibres that lie on the plate again; one like each of them is skipped.
     cut_off : bool
         The run before ended without a word, as when the program is killed.
@@ -61,9 +62,9 @@ class ResumePlan:
 
     finished: int
     interrupted: tuple[int, ...]
-    known: tuple[Known, ...]
+    known: tuple[KnownFibre, ...]
     last: tuple[JournalEntry, ...]
-    fallen: tuple[Fallen, ...] = ()
+    fallen: tuple[DroppedFibre, ...] = ()
     cut_off: bool = False
 
     def is_done(self, pose: Pose, length_um: float) -> bool:
@@ -91,24 +92,26 @@ def resume(store: CampaignStore) -> ResumePlan:
     )
 
 
-def _fallen(fibres: Sequence[FibreRecord], lines: Sequence[JournalEntry]) -> tuple[Fallen, ...]:
+def _fallen(
+    fibres: Sequence[FibreRecord], lines: Sequence[JournalEntry]
+) -> tuple[DroppedFibre, ...]:
     """Return the finished ones: what was written before a record that never was counts nothing."""
     finished = {each.number for each in fibres if each.outcome in FINISHED}
     return tuple(
-        Fallen(each.fibre, **{name: float(str(each.payload[name])) for name in LOOKS})
+        DroppedFibre(each.fibre, **{name: float(str(each.payload[name])) for name in LOOKS})
         for each in lines
         if each.fibre is not None and each.fibre in finished
     )
 
 
-def _known(fibres: Sequence[FibreRecord]) -> tuple[Known, ...]:
+def _known(fibres: Sequence[FibreRecord]) -> tuple[KnownFibre, ...]:
     interrupted = [each for each in fibres if each.outcome is Outcome.INTERRUPTED]
     known = []
     for fibre in fibres:
         tried = fibre.outcome in FINISHED or _tries(fibre, interrupted) >= MOST_INTERRUPTIONS
         pose = fibre.left or fibre.found
         if tried and pose is not None:
-            known.append(Known(fibre.number, pose, fibre.shape.length_um))
+            known.append(KnownFibre(fibre.number, pose, fibre.shape.length_um))
     return tuple(known)
 
 
@@ -116,14 +119,14 @@ def _tries(fibre: FibreRecord, interrupted: Sequence[FibreRecord]) -> int:
     """Return how often the treatment of the fibre that lies there was interrupted."""
     if fibre.outcome is not Outcome.INTERRUPTED or fibre.found is None:
         return 0
-    known = Known(fibre.number, fibre.found, fibre.shape.length_um)
+    known = KnownFibre(fibre.number, fibre.found, fibre.shape.length_um)
     return sum(
         each.found is not None and _same(known, each.found, each.shape.length_um)
         for each in interrupted
     )
 
 
-def _same(known: Known, pose: Pose, length_um: float) -> bool:
+def _same(known: KnownFibre, pose: Pose, length_um: float) -> bool:
     away = known.pose.x_plate_um - pose.x_plate_um, known.pose.y_plate_um - pose.y_plate_um
     near = away[0] ** 2 + away[1] ** 2 <= SAME_PLACE_UM**2
     turned = (known.pose.angle_deg - pose.angle_deg + 90.0) % 180.0 - 90.0

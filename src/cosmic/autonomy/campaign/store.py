@@ -3,12 +3,15 @@
 import hashlib
 import json
 import math
+import os
 import sqlite3
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path, PurePosixPath
+from threading import RLock
 from types import TracebackType
-from typing import Self
+from typing import Final, Self
 
 import cv2
 
@@ -23,19 +26,14 @@ from cosmic.autonomy.campaign.records import (
     Pose,
     Value,
 )
-from cosmic.autonomy.campaign.store_curves import curves_file
-from cosmic.autonomy.campaign.store_files import (
+from cosmic.autonomy.campaign.storage_format import (
     DATABASE,
     FIBRES,
-    remove_parts,
-    write_through,
-    write_whole,
-)
-from cosmic.autonomy.campaign.store_line import WriteLine, last_number
-from cosmic.autonomy.campaign.store_read import CampaignReader
-from cosmic.autonomy.campaign.store_rows import (
+    SCHEMA_VERSION,
+    TABLES,
     Row,
     cell,
+    curves_file,
     fibre_row,
     insert,
     operation_row,
@@ -43,6 +41,216 @@ from cosmic.autonomy.campaign.store_rows import (
     span_row,
     update,
 )
+from cosmic.autonomy.campaign.store_read import CampaignReader
+
+LOCK: Final = "campaign.lock"
+PART: Final = ".part"
+
+
+class NotWrittenError(CampaignError):
+    """The disk did not take it: there may be room later."""
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file under another name, see that it is on the disk, and give it its name.
+
+    Raises
+    ------
+    NotWrittenError
+        It cannot be written; nothing of it is left.
+    """
+    part = path.with_name(path.name + PART)
+    try:
+        with part.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as exc:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise NotWrittenError(
+            f"{path} cannot be written: {exc.strerror or exc}. Completed fibres are saved: "
+            "make room, and start the campaign again in the same folder"
+        ) from exc
+
+
+def write_through(folder: Path) -> None:
+    """See that the names in a folder are on the disk too, where a folder can be opened.
+
+    Raises
+    ------
+    NotWrittenError
+        They cannot be written.
+    """
+    if os.name != "posix":
+        return
+    try:
+        opened = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(opened)
+        finally:
+            os.close(opened)
+    except OSError as exc:
+        raise NotWrittenError(f"{folder} cannot be written: {exc.strerror or exc}") from exc
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove what an end without warning left half written."""
+    for part in folder.glob(f"*{PART}"):
+        with suppress(OSError):
+            part.unlink()
+
+
+class FolderLock:
+    """Keeps a folder to one writer; the system lets go of it when the process ends, however.
+
+    Raises
+    ------
+    CampaignError
+        Another process, or another store of this one, has it.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._connection = sqlite3.connect(
+            folder / LOCK, timeout=0.0, isolation_level=None, check_same_thread=False
+        )
+        try:
+            self._connection.execute("PRAGMA journal_mode = MEMORY")
+            self._connection.execute("BEGIN EXCLUSIVE")
+        except sqlite3.Error as exc:
+            self._connection.close()
+            raise CampaignError(
+                f"{folder}: a campaign is already being written there ({exc}): "
+                "wait for its end, or name another folder"
+            ) from exc
+
+    def release(self) -> None:
+        """Let others write."""
+        self._connection.close()
+
+
+BUSY_S: Final = 10.0
+
+
+class WriteConnection:
+    """Transactions on the database; any thread, one at a time.
+
+    Attributes
+    ----------
+    guard : RLock
+        Held during a transaction, and by who needs several to be one.
+
+    Parameters
+    ----------
+    info : CampaignInfo, optional
+        What is begun; None: it is there already.
+    """
+
+    def __init__(self, folder: Path, info: CampaignInfo | None = None) -> None:
+        self.guard = RLock()
+        self._file = folder / DATABASE
+        self._lock = FolderLock(folder)
+        self._closed = False
+        try:
+            if info is not None:
+                _lay_out(self._file, info)
+            self._connection = _opened(self._file)
+        except BaseException:
+            self._lock.release()
+            raise
+
+    @contextmanager
+    def transaction(self, *, durable: bool = True) -> Generator[sqlite3.Connection]:
+        """Do all of it or nothing; durable: it is on the disk before going on.
+
+        Raises
+        ------
+        CampaignError
+            The connection is closed, or it cannot be written.
+        """
+        with self.guard:
+            if self._closed:
+                raise CampaignError(f"{self._file.parent}: this campaign is closed")
+            try:
+                self._connection.execute(f"PRAGMA synchronous = {'FULL' if durable else 'NORMAL'}")
+                self._connection.execute("BEGIN IMMEDIATE")
+                try:
+                    yield self._connection
+                    self._connection.execute("COMMIT")
+                finally:
+                    if self._connection.in_transaction:
+                        self._connection.execute("ROLLBACK")
+            except sqlite3.Error as exc:
+                raise _failure(self._file, exc) from exc
+
+    def close(self) -> None:
+        """Let go of the folder; without effect after the first time."""
+        with self.guard:
+            if not self._closed:
+                self._closed = True
+                self._connection.close()
+                self._lock.release()
+
+
+def _opened(file: Path) -> sqlite3.Connection:
+    try:
+        connection = sqlite3.connect(
+            file, timeout=BUSY_S, isolation_level=None, check_same_thread=False
+        )
+        connection.execute("PRAGMA foreign_keys = ON")
+        connection.execute("PRAGMA journal_mode = WAL")
+    except sqlite3.Error as exc:
+        raise _failure(file, exc) from exc
+    return connection
+
+
+def _lay_out(file: Path, info: CampaignInfo) -> None:
+    """Make the tables under another name, so that there is a whole database or none."""
+    part = file.with_name(file.name + PART)
+    part.unlink(missing_ok=True)
+    row: Row = {
+        "one": 1,
+        "name": info.name,
+        "procedure": info.procedure,
+        "sample": info.sample,
+        "recipe_text": info.recipe_text,
+        "recipe_sha256": hashlib.sha256(info.recipe_text.encode()).hexdigest(),
+        "started": info.started,
+        "description": info.description,
+        "operator": info.operator,
+        "hardware": info.hardware,
+        "seed": info.seed,
+        "rate": info.rate,
+        "versions_json": json.dumps(dict(info.versions)),
+    }
+    connection = sqlite3.connect(part, isolation_level=None)
+    try:
+        connection.execute("BEGIN")
+        for statement in TABLES.split(";"):
+            if statement.strip():
+                connection.execute(statement)
+        insert(connection, "campaign", row)
+        connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+        connection.execute("COMMIT")
+    except sqlite3.Error as exc:
+        raise _failure(file, exc) from exc
+    finally:
+        connection.close()
+    part.replace(file)
+
+
+def _failure(file: Path, error: sqlite3.Error) -> NotWrittenError:
+    return NotWrittenError(
+        f"{file} cannot be written: {error}. Completed fibres are saved: make room, and "
+        "start the campaign again in the same folder"
+    )
+
+
+def last_number(connection: sqlite3.Connection) -> int:
+    """Return the number that the last row got."""
+    return int(connection.execute("SELECT last_insert_rowid()").fetchone()[0])
+
 
 Now = Callable[[], datetime]
 
@@ -62,7 +270,7 @@ class CampaignStore:
         self.folder = folder
         self.reader = CampaignReader(folder)
         self._now = now
-        self._line = WriteLine(folder, info)
+        self._connection = WriteConnection(folder, info)
         self._run = 0
 
     # ------------------------------------------------------------------ opening and closing
@@ -81,7 +289,7 @@ class CampaignStore:
         folder = Path(folder)
         if CampaignReader(folder).version() != 0:
             raise CampaignError(
-                f"{folder} holds a campaign already: go on with it, or name another folder"
+                f"{folder} already holds a campaign: resume it, or name another folder"
             )
         store = cls._opened(folder, now, info)
         try:
@@ -136,13 +344,13 @@ class CampaignStore:
             "versions_json": json.dumps(dict(versions)),
             "begin_s": time_s,
         }
-        with self._line.transaction() as line:
-            insert(line, "run", row)
-            self._run = last_number(line)
+        with self._connection.transaction() as connection:
+            insert(connection, "run", row)
+            self._run = last_number(connection)
 
     def close(self) -> None:
         """Let go of the folder; without effect after the first time."""
-        self._line.close()
+        self._connection.close()
 
     def __enter__(self) -> Self:
         return self
@@ -174,9 +382,9 @@ class CampaignStore:
             row["found_x_plate_um"] = found.x_plate_um
             row["found_y_plate_um"] = found.y_plate_um
             row["found_angle_deg"] = found.angle_deg
-        with self._line.transaction() as line:
-            insert(line, "fibre", row)
-            return last_number(line)
+        with self._connection.transaction() as connection:
+            insert(connection, "fibre", row)
+            return last_number(connection)
 
     def note(
         self,
@@ -199,8 +407,8 @@ class CampaignStore:
             "phase": phase,
             "payload_json": json.dumps(dict(payload or {})),
         }
-        with self._line.transaction(durable=False) as line:
-            insert(line, "journal", row)
+        with self._connection.transaction(durable=False) as connection:
+            insert(connection, "journal", row)
 
     def finish_fibre(self, record: FibreRecord) -> None:
         """Write all of a fibre, once.
@@ -212,10 +420,10 @@ class CampaignStore:
             and this may be called again.
         """
         if record.outcome not in FINISHED and record.outcome is not Outcome.INTERRUPTED:
-            raise CampaignError(f"fibre {record.number} is {record.outcome}, which is no end")
-        with self._line.guard:
-            with self._line.transaction() as line:
-                self._refuse_unless_running(line, record.number)
+            raise CampaignError(f"fibre {record.number} is {record.outcome}, which is not final")
+        with self._connection.guard:
+            with self._connection.transaction() as connection:
+                self._refuse_unless_running(connection, record.number)
             name = f"{record.number:05d}"
             curves = PurePosixPath(FIBRES, f"{name}.h5")
             write_whole(self.folder / curves, curves_file(record))
@@ -224,30 +432,30 @@ class CampaignStore:
                 for order, picture in enumerate(record.pictures)
             ]
             write_through(self.folder / FIBRES)
-            with self._line.transaction() as line:
-                self._refuse_unless_running(line, record.number)
-                update(line, "fibre", fibre_row(record, str(curves)), key=record.number)
+            with self._connection.transaction() as connection:
+                self._refuse_unless_running(connection, record.number)
+                update(connection, "fibre", fibre_row(record, str(curves)), key=record.number)
                 fits = record.bending.spans if record.bending is not None else ()
-                _insert_all(line, "span", record.number, [span_row(fit) for fit in fits])
-                _insert_all(line, "picture", record.number, pictures)
+                _insert_all(connection, "span", record.number, [span_row(fit) for fit in fits])
+                _insert_all(connection, "picture", record.number, pictures)
                 steps = [operation_row(each) for each in record.operations]
-                _insert_all(line, "operation", record.number, steps)
+                _insert_all(connection, "operation", record.number, steps)
 
     def interrupt_running(self, text: str = "the campaign ended without warning") -> list[int]:
         """Mark fibres that were in treatment when the campaign ended, and return their numbers."""
-        with self._line.transaction() as line:
-            rows = line.execute(
+        with self._connection.transaction() as connection:
+            rows = connection.execute(
                 "SELECT number FROM fibre WHERE outcome = ? ORDER BY number", (Outcome.RUNNING,)
             ).fetchall()
             numbers = [int(row[0]) for row in rows]
             for each in numbers:
                 row: Row = {"outcome": Outcome.INTERRUPTED.value, "text": text}
-                update(line, "fibre", row, key=each)
+                update(connection, "fibre", row, key=each)
         return numbers
 
     def keep_calibrations(self, notes: Sequence[CalibrationNote]) -> None:
         """Note the calibrations in force in this run."""
-        with self._line.transaction() as line:
+        with self._connection.transaction() as connection:
             for each in notes:
                 row: Row = {
                     "name": each.name,
@@ -256,24 +464,24 @@ class CampaignStore:
                     "made": each.made,
                     "run": self._run,
                 }
-                insert(line, "calibration", row)
+                insert(connection, "calibration", row)
 
     def end(self, reason: str, *, time_s: float) -> None:
         """Note why the campaign ended; it may be gone on with all the same."""
-        with self._line.transaction() as line:
-            line.execute(
+        with self._connection.transaction() as connection:
+            connection.execute(
                 "UPDATE campaign SET ended = ?, end_reason = ?", (self._now().isoformat(), reason)
             )
-            update(line, "run", {"end_s": time_s}, key=self._run)
+            update(connection, "run", {"end_s": time_s}, key=self._run)
 
     # ------------------------------------------------------------------ inside
 
-    def _refuse_unless_running(self, line: sqlite3.Connection, fibre: int) -> None:
-        row = line.execute("SELECT outcome FROM fibre WHERE number = ?", (fibre,)).fetchone()
+    def _refuse_unless_running(self, connection: sqlite3.Connection, fibre: int) -> None:
+        row = connection.execute("SELECT outcome FROM fibre WHERE number = ?", (fibre,)).fetchone()
         if row is None:
-            raise CampaignError(f"fibre {fibre} was not begun in {self.folder}")
+            raise CampaignError(f"fibre {fibre} was not started in {self.folder}")
         if row[0] != Outcome.RUNNING:
-            raise CampaignError(f"fibre {fibre} in {self.folder} has its end already: {row[0]}")
+            raise CampaignError(f"fibre {fibre} in {self.folder} is already completed: {row[0]}")
 
     def _write_picture(self, picture: Picture, file: PurePosixPath) -> Row:
         done, data = cv2.imencode(".png", picture.pixels)
@@ -287,6 +495,8 @@ class CampaignStore:
         return picture_row(picture, file, hashlib.sha256(content).hexdigest())
 
 
-def _insert_all(line: sqlite3.Connection, table: str, fibre: int, rows: Sequence[Row]) -> None:
+def _insert_all(
+    connection: sqlite3.Connection, table: str, fibre: int, rows: Sequence[Row]
+) -> None:
     for order, row in enumerate(rows):
-        insert(line, table, {"fibre": fibre, "number": order, **row})
+        insert(connection, table, {"fibre": fibre, "number": order, **row})

@@ -21,10 +21,16 @@ from cosmic.autonomy.campaign.records import (
     JournalEntry,
     Picture,
 )
-from cosmic.autonomy.campaign.store_curves import read_curves
-from cosmic.autonomy.campaign.store_files import DATABASE
-from cosmic.autonomy.campaign.store_rows import Cell, Row, fibre_record, number, region_px
-from cosmic.autonomy.campaign.store_schema import SCHEMA_VERSION
+from cosmic.autonomy.campaign.storage_format import (
+    DATABASE,
+    SCHEMA_VERSION,
+    Cell,
+    Row,
+    fibre_record,
+    number,
+    read_curves,
+    region_px,
+)
 from cosmic.frame.arguments import checked_class
 
 
@@ -45,7 +51,7 @@ class CampaignReader:
         """
         version = self.version()
         if version == 0:
-            raise CampaignError(f"{self.folder} holds no campaign: its begin was cut off")
+            raise CampaignError(f"{self.folder} holds no campaign: its creation was interrupted")
         if version != SCHEMA_VERSION:
             raise CampaignError(
                 f"{self.folder / DATABASE} is of version {version}, and this program reads "
@@ -56,8 +62,8 @@ class CampaignReader:
         """Return the version of the tables; 0 where there is no campaign."""
         if not (self.folder / DATABASE).exists():
             return 0
-        with self._line() as line:
-            return int(line.execute("PRAGMA user_version").fetchone()[0])
+        with self._connection() as connection:
+            return int(connection.execute("PRAGMA user_version").fetchone()[0])
 
     def info(self) -> CampaignInfo:
         """Return what the campaign is."""
@@ -177,23 +183,23 @@ class CampaignReader:
     # ------------------------------------------------------------------ inside
 
     @contextmanager
-    def _line(self) -> Generator[sqlite3.Connection]:
+    def _connection(self) -> Generator[sqlite3.Connection]:
         file = self.folder / DATABASE
         if not file.exists():
             raise CampaignError(f"{self.folder} holds no campaign: there is no {DATABASE} in it")
         try:
-            line = sqlite3.connect(_address(file), uri=True, timeout=10.0)
+            connection = sqlite3.connect(_address(file), uri=True, timeout=10.0)
             try:
-                line.row_factory = sqlite3.Row
-                yield line
+                connection.row_factory = sqlite3.Row
+                yield connection
             finally:
-                line.close()
+                connection.close()
         except sqlite3.Error as exc:
             raise CampaignError(f"{file} cannot be read: {exc}") from exc
 
     def _rows(self, query: str, *values: Cell) -> list[Row]:
-        with self._line() as line:
-            return [dict(row) for row in line.execute(query, values).fetchall()]
+        with self._connection() as connection:
+            return [dict(row) for row in connection.execute(query, values).fetchall()]
 
     def _by_fibre(self, query: str) -> dict[Cell, list[Row]]:
         found: dict[Cell, list[Row]] = {}
@@ -226,7 +232,7 @@ def _pixels(file: Path) -> Image:
         raise CampaignError(f"{file} cannot be read: {exc.strerror or exc}") from exc
     pixels = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
     if pixels is None:
-        raise CampaignError(f"{file} is no picture any more")
+        raise CampaignError(f"{file} is not a readable image")
     if pixels.dtype == np.uint16:
         return np.asarray(pixels, dtype=np.uint16)
     return np.asarray(pixels, dtype=np.uint8)

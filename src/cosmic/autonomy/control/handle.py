@@ -2,7 +2,7 @@
 
 import math
 from types import TracebackType
-from typing import Self
+from typing import Final, Self
 
 import numpy as np
 from typing_extensions import override
@@ -27,6 +27,9 @@ from cosmic.frame.errors import (
 )
 from cosmic.frame.threads import forbid_waiting_here
 from cosmic.frame.verdict import Reason, refuse
+
+LOOK_WALL_S: Final = 0.02
+"""How often `wait_settled` looks."""
 
 
 @checked_class
@@ -153,10 +156,7 @@ class ControlHandle:
 
     def wait(self, timeout_s: float | None = None) -> ControlEnding:
         """Wait for its end and return why; raises `DeviceTimeout` after `timeout_s`."""
-        forbid_waiting_here("waiting for a control loop")
-        if not self._loop.over.wait(timeout_s):
-            raise DeviceTimeout(f"{self.source}: the loop had not ended after {timeout_s:g} s")
-        return self._loop.ending or ControlEnding.ASKED
+        return self._loop.over.wait(timeout_s)
 
     def wait_settled(self, tolerance: float | None = None, timeout_s: float = 30.0) -> float:
         """Wait until the value is held, and return its mean.
@@ -187,8 +187,9 @@ class ControlHandle:
             held = self._held(within)
             if held is not None:
                 return held
-            if self._loop.over.wait(0.02):
+            if self._loop.over.done:
                 raise self.error or NotAvailable(f"{self.source}: the loop was ended")
+            WALL.sleep(LOOK_WALL_S)
         reading = self.reading
         raise DeviceTimeout(
             f"{self.source} was not held after {timeout_s:g} s: {reading.measured:.4g} "

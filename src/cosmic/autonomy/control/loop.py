@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from threading import Event, Lock
+from threading import Lock
 
 from typing_extensions import override
 
@@ -25,6 +25,7 @@ from cosmic.frame.errors import (
     StoppedError,
 )
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.operation import Operation
 from cosmic.frame.threads import WorkerThread
 
 logger = logging.getLogger(__name__)
@@ -123,7 +124,7 @@ class ControlLoop(WorkerThread):
         self._lock = Lock()
         self._ending: ControlEnding | None = None
         self._error: CosmicError | None = None
-        self._over = Event()
+        self._over = Operation[ControlEnding](f"the loop of {source.name}")
         self._real_time = "it has not begun"
         self._begun_wall_s = 0.0
         self._zero = 0.0
@@ -141,8 +142,8 @@ class ControlLoop(WorkerThread):
         return self._error
 
     @property
-    def over(self) -> Event:
-        """Set once it has ended."""
+    def over(self) -> Operation[ControlEnding]:
+        """Ends when its thread has done all there was to do, with why it ended."""
         return self._over
 
     def statistics(self) -> ControlStatistics:
@@ -212,7 +213,7 @@ class ControlLoop(WorkerThread):
         finally:
             self.finish()
             self.source.end()
-            self._over.set()
+            self._over.finish(self._ending or ControlEnding.ASKED)
             if self._on_end is not None:
                 self._on_end(self)
 

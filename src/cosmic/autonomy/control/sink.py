@@ -15,9 +15,9 @@ from cosmic.frame.errors import (
 from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.api.mico import Mico
-from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import MoveTo
-from cosmic.mico.core.positioner import class_for
+from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.core.motion.orders import MoveTo
+from cosmic.mico.core.motion.positioner import class_for
 
 PACKET_S: Final = 0.1
 """No packet is a longer way than that much time at the highest speed."""

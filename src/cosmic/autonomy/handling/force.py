@@ -13,6 +13,7 @@ from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import ConfigError, DeviceTimeout, NotAvailable
+from cosmic.frame.events import Event, Unsubscribe
 
 KEPT_S: Final = 5.0
 LIMIT_WALL_S: Final = 15.0
@@ -60,7 +61,7 @@ class ForceWatch:
         self.clock = clock
         self._chunks: deque[DataChunk] = deque()
         self._changed = Condition()
-        self._waiting: tuple[Callable[[], None], ...] = ()
+        self._taken: Event[[]] = Event()
         self._peak_un = 0.0
         self._forget: Callable[[], None] | None = None
 
@@ -74,7 +75,7 @@ class ForceWatch:
         """Why no samples come, as far as acquisition knows."""
         if self._daqco.running and self._channel not in self._daqco.channels:
             return f"there is no channel {self._channel} any more: renamed, or switched off"
-        return self._daqco.problem or "acquisition says nothing about it"
+        return self._daqco.problem or "acquisition gives no reason"
 
     def open(self) -> None:
         """Begin to keep samples; harmless the second time."""
@@ -97,9 +98,7 @@ class ForceWatch:
             while self._chunks and chunk.end_time_s - self._chunks[0].end_time_s > KEPT_S:
                 self._chunks.popleft()
             self._changed.notify_all()
-            waiting = self._waiting
-        for each in waiting:
-            each()
+        self._taken.emit()
 
     def take_peak_un(self) -> float:
         """Return the largest reading, either sign, since this was called last."""
@@ -107,16 +106,9 @@ class ForceWatch:
             peak, self._peak_un = self._peak_un, 0.0
         return peak
 
-    def subscribe(self, listener: Callable[[], None]) -> Callable[[], None]:
+    def subscribe(self, listener: Callable[[], object]) -> Unsubscribe:
         """Call `listener()` after each chunk; returns the function that ends it."""
-        with self._changed:
-            self._waiting = (*self._waiting, listener)
-
-        def forget() -> None:
-            with self._changed:
-                self._waiting = tuple(each for each in self._waiting if each is not listener)
-
-        return forget
+        return self._taken.subscribe(listener)
 
     def between(self, since_s: float, until_s: float) -> ForceMean | None:
         """Return the mean over a time; None while not all of it was sampled."""
@@ -197,13 +189,13 @@ class ForceWanted:
         NotAvailable
             No samples come.
         DeviceTimeout
-            It had not ended after `timeout_s` of wall time.
+            It did not end within `timeout_s` of wall time.
         """
         until_wall_s = math.inf if timeout_s is None else WALL.now_s() + timeout_s
         while not self.done:
             left_s = until_wall_s - WALL.now_s()
             if left_s <= 0.0:
-                raise DeviceTimeout(f"the force had not been averaged after {timeout_s:g} s")
+                raise DeviceTimeout(f"no mean force after {timeout_s:g} s")
             self._watch.wait_for_chunk(min(left_s, 0.05))
         if self._mean is None:
             raise NotAvailable(

@@ -1,20 +1,91 @@
-"""Operations that take a fibre up and carry it to the probe."""
+"""Taking a fibre up, and what is known of its shape in the jaws."""
 
+import math
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from typing_extensions import override
 
-from cosmic.autonomy.handling.in_hand import FibreInHand
-from cosmic.autonomy.handling.operation import FibreOperation
-from cosmic.autonomy.handling.plate import along
+from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
+from cosmic.autonomy.handling.held_fibre import HeldFibre
+from cosmic.autonomy.handling.plate import along, ways
 from cosmic.autonomy.handling.reach import LOST, line_of
-from cosmic.autonomy.handling.shape import HeldShape, held_shape
 from cosmic.autonomy.handling.sight import trace_along
-from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.pixel_map import Floats
+
+TANGENT_UM: Final = 120.0
+"""Length to both sides of the jaws' tip from which the direction there is taken."""
+STEP_UM: Final = 5.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldShape:
+    """The free part of a fibre, which leaves the jaws straight ahead.
+
+    Attributes
+    ----------
+    ahead_um, aside_um, way_um : ndarray, shape (n,), float64
+        Of places along it, from the jaws' tip: along the jaws, in y, and along the fibre. Ends
+        where the fibre turns back.
+    """
+
+    ahead_um: Floats
+    aside_um: Floats
+    way_um: Floats
+
+    @property
+    def reach_um(self) -> float:
+        """How far ahead of the jaws it reaches."""
+        return float(self.ahead_um[-1])
+
+    def bow_um(self, ahead_um: float) -> float:
+        """Return how far in y the fibre is from straight ahead, so far from the jaws."""
+        return float(np.interp(ahead_um, self.ahead_um, self.aside_um))
+
+    def lever_um(self, ahead_um: float) -> float:
+        """Return the length of a straight cantilever that gives way as much to a push there.
+
+        The push is across the jaws' axis: each piece of the fibre bends with its arm along the
+        axis, and a bowed fibre has more pieces than a straight one.
+        """
+        count = int(np.searchsorted(self.ahead_um, ahead_um))
+        u = np.append(self.ahead_um[:count], ahead_um)
+        s = np.append(self.way_um[:count], np.interp(ahead_um, self.ahead_um, self.way_um))
+        arm = ahead_um - u
+        parts = (arm[:-1] ** 2 + arm[:-1] * arm[1:] + arm[1:] ** 2) / 3.0 * np.diff(s)
+        return float(np.cbrt(3.0 * parts.sum()))
+
+
+def held_shape(line_um: Floats, inside_um: float, forward: float) -> HeldShape:
+    """Return the shape that a fibre has in the jaws.
+
+    Parameters
+    ----------
+    line_um : ndarray, shape (n, 2)
+        Its centre line as it lay, from the end that is grasped.
+    inside_um : float
+        Length between the jaws.
+    forward : float
+        1 or -1: which way along x the jaws point.
+    """
+    whole = float(ways(line_um)[-1])
+    near = np.linspace(max(0.0, inside_um - TANGENT_UM), min(whole, inside_um + TANGENT_UM), 25)
+    points = np.array([along(line_um, float(way)) for way in near])
+    slope = np.array([np.polyfit(near - inside_um, points[:, i], 2)[1] for i in (0, 1)])
+    angle = (0.0 if forward > 0.0 else math.pi) - math.atan2(slope[1], slope[0])
+    cos, sin = math.cos(angle), math.sin(angle)
+    count = max(8, int((whole - inside_um) / STEP_UM))
+    at = np.linspace(inside_um, whole, count)
+    free = np.array([along(line_um, float(way)) for way in at]) - along(line_um, inside_um)
+    ahead = forward * (cos * free[:, 0] - sin * free[:, 1])
+    aside = sin * free[:, 0] + cos * free[:, 1]
+    rises = np.diff(ahead) > 0.0
+    last = len(ahead) if rises.all() else max(int(rises.argmin()) + 1, 2)
+    return HeldShape(ahead[:last], aside[:last], at[:last] - inside_um)
+
 
 MISSED: Final = "missed grasp"
 DROPPED: Final = "dropped"
@@ -32,8 +103,8 @@ class TestGrasp(FibreOperation):
     name = "lift and see that it follows"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
-        fibre, places = work.in_hand(), work.settings.places
+    def steps(self, work: HandlingContext) -> Steps:
+        fibre, places = work.held_fibre(), work.settings.places
         before = ahead_of_jaws(fibre)
         x, y = work.tip_now(work.gripper)
         with work.mico.collision.contact("grasp"):
@@ -50,23 +121,23 @@ class TestGrasp(FibreOperation):
             raise OperationFailed(
                 MISSED, f"fibre {fibre.number} lies where it was: the jaws closed beside it"
             )
-        work.surveyed = False
-        raise OperationFailed(LOST, f"fibre {fibre.number} is neither in the jaws nor on its place")
+        work.shared.surveyed = False
+        raise OperationFailed(LOST, f"fibre {fibre.number} is neither in the jaws nor where it lay")
 
 
-def ahead_of_jaws(fibre: FibreInHand) -> Floats:
+def ahead_of_jaws(fibre: HeldFibre) -> Floats:
     """Return the begin of the free part of a fibre that still lies, on the platform."""
     last = min(BEGIN_UM + LENGTH_UM, fibre.free_um)
     at = np.linspace(fibre.inside_um + BEGIN_UM, fibre.inside_um + last, 40)
     return np.array([along(line_of(fibre), float(way)) for way in at])
 
 
-def shape_of(work: FibreWork, fibre: FibreInHand) -> HeldShape:
+def shape_of(work: HandlingContext, fibre: HeldFibre) -> HeldShape:
     """Return the shape that the fibre should have in the jaws."""
     return held_shape(line_of(fibre), fibre.inside_um, work.jaws.forward)
 
 
-def in_jaws(work: FibreWork, fibre: FibreInHand) -> Floats:
+def in_jaws(work: HandlingContext, fibre: HeldFibre) -> Floats:
     """Return where the begin of its free part should be while the jaws hold it."""
     x, y = work.tip_now(work.gripper)
     shape = shape_of(work, fibre)
@@ -76,7 +147,7 @@ def in_jaws(work: FibreWork, fibre: FibreInHand) -> Floats:
 
 
 def seen_at(
-    work: FibreWork, fibre: FibreInHand, picture: Picture, line_um: Floats, height_um: float
+    work: HandlingContext, fibre: HeldFibre, picture: Picture, line_um: Floats, height_um: float
 ) -> bool:
     """Return whether something as dark as the fibre lies along a line, or next to it."""
     mapped = work.mapped_near(picture, height_um)
@@ -91,8 +162,8 @@ class Carry(FibreOperation):
     name = "carry to the probe"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
-        fibre, places = work.in_hand(), work.settings.places
+    def steps(self, work: HandlingContext) -> Steps:
+        fibre, places = work.held_fibre(), work.settings.places
         yield work.go_up(work.hold_tip_um)
         x = places.hold_x_um * work.jaws.forward
         yield work.go(work.at(work.gripper, x, places.hold_y_um, work.hold_tip_um))
@@ -100,5 +171,5 @@ class Carry(FibreOperation):
         assert isinstance(picture, Picture)
         fibre.pictures["held"] = picture
         if not seen_at(work, fibre, picture, in_jaws(work, fibre), work.hold_tip_um):
-            fibre.held, work.surveyed = False, False
+            fibre.held, work.shared.surveyed = False, False
             raise OperationFailed(DROPPED, f"fibre {fibre.number} is no longer in the jaws")

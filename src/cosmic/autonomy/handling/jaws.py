@@ -3,8 +3,8 @@
 import logging
 from typing import Final
 
-from cosmic.autonomy.handling.patience import PatientMove
-from cosmic.autonomy.handling.work import FibreWork
+from cosmic.autonomy.handling.context import HandlingContext
+from cosmic.autonomy.handling.retrying_move import RetryingMove
 from cosmic.autonomy.procedures.operation import Steps
 from cosmic.frame.errors import MoveRefused, NotAvailable
 
@@ -18,7 +18,7 @@ COUNT_UM: Final = 130.0
 """How wrong the opening counted may be for a calibration; pictures show the jaws all the same."""
 
 
-def zero_jaws(work: FibreWork) -> Steps:
+def zero_jaws(work: HandlingContext) -> Steps:
     """Bring the opening counted in step with the true one, and open the jaws as for a grasp.
 
     Steps against a stop are counted and move nothing: closed to one stop, then opened against the
@@ -35,18 +35,18 @@ def zero_jaws(work: FibreWork) -> Steps:
     yield from move_jaws(work, work.settings.grasp.gap_um)
 
 
-def distrust_gap(work: FibreWork) -> None:
+def distrust_gap(work: HandlingContext) -> None:
     """Have the gate take the jaws to be anywhere: before they are run against their stop."""
     _tell_gate(work, work.mico[work.gripper.gap_axis].position_um or 0.0, None)
 
 
-def note_gap(work: FibreWork, gap_um: float, std_um: float) -> None:
+def note_gap(work: HandlingContext, gap_um: float, std_um: float) -> None:
     """Take the opening that is known by an end stop or by sight; the gate counts from it."""
     work.gap_um = gap_um
     _tell_gate(work, gap_um, std_um)
 
 
-def _tell_gate(work: FibreWork, gap_um: float, std_um: float | None) -> None:
+def _tell_gate(work: HandlingContext, gap_um: float, std_um: float | None) -> None:
     axis = work.mico[work.gripper.gap_axis]
     try:
         axis.set_estimate(gap_um, std_um=std_um)
@@ -54,14 +54,14 @@ def _tell_gate(work: FibreWork, gap_um: float, std_um: float | None) -> None:
         logger.warning("the opening is not taken: %s", exc)
 
 
-def in_step(work: FibreWork) -> bool:
+def in_step(work: HandlingContext) -> bool:
     """Return whether the opening counted is about the true one."""
     counted = work.mico[work.gripper.gap_axis].position_um
     known = work.gap_um is not None and counted is not None
     return known and abs((counted or 0.0) - (work.gap_um or 0.0)) < COUNT_UM
 
 
-def move_jaws(work: FibreWork, by_um: float) -> Steps:
+def move_jaws(work: HandlingContext, by_um: float) -> Steps:
     """Open the jaws, or close them: open loop, a step at full voltage is what the file says."""
     axis = work.mico[work.gripper.gap_axis]
     step_um = next(
@@ -77,6 +77,6 @@ def move_jaws(work: FibreWork, by_um: float) -> Steps:
         # They may be at the plate; the gate knows of no smaller movement than their whole travel.
         with work.mico.collision.contact("grasp"):
             frequency_hz = work.settings.grasp.gripper_hz
-            yield PatientMove(lambda: axis.steps(steps, frequency_hz=frequency_hz, wait=False))
+            yield RetryingMove(lambda: axis.steps(steps, frequency_hz=frequency_hz, wait=False))
     if work.gap_um is not None:
         work.gap_um = max(0.0, work.gap_um + steps * step_um)

@@ -1,21 +1,100 @@
-"""Operations before the first fibre: out of the way, and calibrated as far as is not fresh."""
+"""Before fibres are handled, and after: initialise, calibrate, make ready, leave safe."""
 
+import logging
 import math
 from collections.abc import Generator
 from dataclasses import replace
+from typing import Final
 
 from typing_extensions import override
 
-from cosmic.autonomy.calibrating.book import CalibrationEntry
 from cosmic.autonomy.calibrating.calibrated import Calibrated, Holds
+from cosmic.autonomy.calibrating.registry import CalibrationEntry
+from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.jaws import in_step, zero_jaws
-from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.tips import TIMES_STD, TipOff, shift_maps, tip_off
-from cosmic.autonomy.handling.work import FibreWork
-from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Wish
-from cosmic.mico.core.positioner import Confidence
+from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Yielded
+from cosmic.frame.errors import DeviceError, MoveRefused, NotAvailable
+from cosmic.frame.verdict import Reason
+from cosmic.mico.core.motion.positioner import Confidence
+from cosmic.vico.api.lens import LensHandle
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.tool_settings import ToolSettings
+from cosmic.vico.hw.peripherals import LensAxis
+
+logger = logging.getLogger(__name__)
+
+TRIES: Final = 4
+APART_S: Final = 8.0
+
+
+class InitialiseAgain(FibreOperation):
+    """The sequence of the platform file, and meanwhile the lens is homed.
+
+    Only where the run before ended without warning. Whoever goes on with a campaign has consented
+    to it.
+    """
+
+    name = "initialise again"
+
+    @override
+    def steps(self, work: HandlingContext) -> Steps:
+        if not work.shared.needs_initialisation:
+            return
+        lens = work.vico.lens
+        homing = None if lens is None or lens.problem else _Homing(lens)
+        try:
+            yield from _initialise(work)
+            if homing is not None:
+                yield from homing.steps(work)
+        finally:
+            if homing is not None:
+                homing.end()
+        work.shared.needs_initialisation, work.shared.zoomed = False, None
+        yield SAFE_POINT
+
+
+class _Homing:
+    """The lens runs to where counting begins, and then focuses as before, or on what lies there."""
+
+    def __init__(self, lens: LensHandle) -> None:
+        focus = lens.state(LensAxis.FOCUS)
+        self._lens = lens
+        self._before = focus.position_counts if focus is not None and focus.homed else None
+        self._task = lens.home()
+
+    def steps(self, work: HandlingContext) -> Steps:
+        lens = self._lens
+        yield self._task
+        if self._before is not None:
+            yield lens.seek_focus(self._before)
+            return
+        focus = lens.state(LensAxis.FOCUS)
+        yield lens.zoom_to(work.settings.zoom)
+        if focus is None:
+            return
+        yield lens.seek_focus(focus.limit_counts // 2)
+        try:
+            yield lens.autofocus(work.settings.camera)
+        except (NotAvailable, DeviceError) as exc:
+            logger.warning("the middle of its travel is taken for the focus: %s", exc)
+
+    def end(self) -> None:
+        if not self._task.done:
+            self._lens.abort()
+
+
+def _initialise(work: HandlingContext) -> Steps:
+    for left in reversed(range(TRIES)):
+        try:
+            yield work.mico.initialise(wait=False, may_hold=True)
+        except MoveRefused as refusal:
+            if refusal.verdict.reason is not Reason.NO_ANSWER or not left:
+                raise
+            yield APART_S  # the gate is being restarted, or the machine is busy
+        else:
+            return
+
 
 OTHER_UP_UM = 5000.0
 OTHER_BACK_UM = 4000.0
@@ -34,7 +113,7 @@ class MakeReady(FibreOperation):
     name = "make ready"
 
     @override
-    def precondition(self, work: FibreWork) -> None:
+    def precondition(self, work: HandlingContext) -> None:
         for tool in self._tools(work):
             for name in (tool.x_axis, tool.y_axis, *filter(None, [tool.z_axis])):
                 details = work.mico[name].details
@@ -46,7 +125,7 @@ class MakeReady(FibreOperation):
                     raise OperationFailed("zero set", f"{name}: clear its zero, then begin again")
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
+    def steps(self, work: HandlingContext) -> Steps:
         if work.ready:
             return
         settings, places = work.settings, work.settings.places
@@ -72,17 +151,17 @@ class MakeReady(FibreOperation):
         yield SAFE_POINT
 
     @staticmethod
-    def _high(work: FibreWork) -> float:
+    def _high(work: HandlingContext) -> float:
         tool, travel = work.gripper, work.settings.places.travel_um
         return max(travel - tool.tip_um[2], work.mico[tool.z_axis].position_um or 0.0)
 
     @staticmethod
-    def _tools(work: FibreWork) -> list[ToolSettings]:
+    def _tools(work: HandlingContext) -> list[ToolSettings]:
         names = [work.settings.gripper, work.settings.probe, work.settings.other]
         return [work.tool(name) for name in names if name]
 
 
-def retract_probe(work: FibreWork) -> Steps:
+def retract_probe(work: HandlingContext) -> Steps:
     """Take the probe away from where fibres are held and lie."""
     x, y = work.tip_now(work.probe)
     away = work.settings.places.probe_away_y_um
@@ -104,13 +183,13 @@ class CalibratePlate(Calibrated):
     key = PLATE
 
     @override
-    def measure(self, work: FibreWork) -> Steps:
+    def measure(self, work: HandlingContext) -> Steps:
         place = work.settings.calibration
         residual = yield from calibrate_at(work, place.place_x_um, place.place_y_um, place.place_um)
         self.kept(work, residual, "px", place.residual_px)
 
     @override
-    def check(self, work: FibreWork, entry: CalibrationEntry) -> Holds:
+    def check(self, work: HandlingContext, entry: CalibrationEntry) -> Holds:
         place = work.settings.calibration
         return entry if (yield from still_at(work, place.place_um, follow=True)) else None
 
@@ -122,7 +201,7 @@ class CalibrateHeld(Calibrated):
     key = HELD
 
     @override
-    def measure(self, work: FibreWork) -> Steps:
+    def measure(self, work: HandlingContext) -> Steps:
         place = work.settings.calibration
         residual = yield from calibrate_at(
             work, place.place_x_um, place.place_y_um, work.hold_tip_um
@@ -130,11 +209,13 @@ class CalibrateHeld(Calibrated):
         self.kept(work, residual, "px", place.residual_px)
 
     @override
-    def check(self, work: FibreWork, entry: CalibrationEntry) -> Holds:
+    def check(self, work: HandlingContext, entry: CalibrationEntry) -> Holds:
         return entry if (yield from still_at(work, work.hold_tip_um, follow=False)) else None
 
 
-def still_at(work: FibreWork, z_um: float, *, follow: bool) -> Generator[Wish, object, bool]:
+def still_at(
+    work: HandlingContext, z_um: float, *, follow: bool
+) -> Generator[Yielded, object, bool]:
     """Look whether the tip is where the map has it; one that is near is followed, if wanted."""
     settings = work.settings.calibration
     yield from to_place(work, settings.place_x_um, settings.place_y_um)
@@ -157,7 +238,7 @@ def still_at(work: FibreWork, z_um: float, *, follow: bool) -> Generator[Wish, o
     return True
 
 
-def to_place(work: FibreWork, x_um: float, y_um: float) -> Steps:
+def to_place(work: HandlingContext, x_um: float, y_um: float) -> Steps:
     """Take the gripper over a place, its jaws as far open as is counted."""
     yield work.go_up(max(work.settings.places.travel_um, work.height_now()))
     yield work.go(work.at(work.gripper, x_um * work.jaws.forward, y_um))
@@ -166,8 +247,8 @@ def to_place(work: FibreWork, x_um: float, y_um: float) -> Steps:
 
 
 def calibrate_at(
-    work: FibreWork, x_um: float, y_um: float, z_um: float
-) -> Generator[Wish, object, float]:
+    work: HandlingContext, x_um: float, y_um: float, z_um: float
+) -> Generator[Yielded, object, float]:
     """Take the gripper there, have the camera calibrated by it, and take it up again.
 
     Returns the residual, px.
@@ -183,7 +264,7 @@ def calibrate_at(
     return max((each.residual_px for each in new), default=0.0)
 
 
-def clear_picture(work: FibreWork) -> Steps:
+def clear_picture(work: HandlingContext) -> Steps:
     """Take gripper and probe out of the picture."""
     places = work.settings.places
     yield work.go_up(max(places.travel_um, work.height_now()))
@@ -201,16 +282,16 @@ class ComparePlaces(Calibrated):
     key = PROBE
 
     @override
-    def measure(self, work: FibreWork) -> Steps:
+    def measure(self, work: HandlingContext) -> Steps:
         zoom = work.settings.calibration.compare_zoom
         yield from zoom_to(work, zoom)
         try:
             yield from self._compare(work)
         finally:
-            work.zoomed = None
+            work.shared.zoomed = None
         yield from zoom_to(work, work.settings.zoom)
 
-    def _compare(self, work: FibreWork) -> Steps:
+    def _compare(self, work: HandlingContext) -> Steps:
         hold_y, settings = work.settings.places.hold_y_um, work.settings.calibration
         residual = yield from calibrate_at(work, settings.compare_x_um, hold_y, work.hold_tip_um)
         gripper, probe = yield from see_both(work)
@@ -219,14 +300,14 @@ class ComparePlaces(Calibrated):
         self.kept(work, residual, "px", settings.residual_px, values=_both(off), how="one picture")
 
     @override
-    def check(self, work: FibreWork, entry: CalibrationEntry) -> Holds:
+    def check(self, work: HandlingContext, entry: CalibrationEntry) -> Holds:
         """See both tips anew by the map that there is, where that still holds."""
         settings = work.settings.calibration
         yield from zoom_to(work, settings.compare_zoom)
         try:
             gripper, probe = yield from see_both(work)
         finally:
-            work.zoomed = None
+            work.shared.zoomed = None
         yield from zoom_to(work, work.settings.zoom)
         if not math.hypot(*gripper.off_um) <= settings.residual_px * gripper.scale_um_px:
             return None
@@ -234,7 +315,7 @@ class ComparePlaces(Calibrated):
         return replace(entry, values=_both(off))
 
     @override
-    def restore(self, work: FibreWork, entry: CalibrationEntry) -> None:
+    def restore(self, work: HandlingContext, entry: CalibrationEntry) -> None:
         known, values = work.calibration, entry.values
         known.probe_off_um = values["off_x_um"], values["off_y_um"]
         known.seen_off_um = values["seen_x_um"], values["seen_y_um"]
@@ -245,7 +326,7 @@ def _both(off_um: tuple[float, float]) -> dict[str, float]:
     return {"off_x_um": x, "off_y_um": y, "seen_x_um": x, "seen_y_um": y}
 
 
-def see_both(work: FibreWork) -> Generator[Wish, object, tuple[TipOff, TipOff]]:
+def see_both(work: HandlingContext) -> Generator[Yielded, object, tuple[TipOff, TipOff]]:
     """Return where gripper and probe are seen on one picture; raises `NotAvailable`."""
     yield from beside_jaws(work)
     picture = yield work.picture()
@@ -254,7 +335,7 @@ def see_both(work: FibreWork) -> Generator[Wish, object, tuple[TipOff, TipOff]]:
     return tip_off(work, picture, work.gripper), tip_off(work, picture, work.probe)
 
 
-def beside_jaws(work: FibreWork) -> Steps:
+def beside_jaws(work: HandlingContext) -> Steps:
     """Hold the jaws where fibres are pushed, and the probe beside them: both in one picture."""
     places, settings = work.settings.places, work.settings.calibration
     hold_x = places.hold_x_um * work.jaws.forward
@@ -274,7 +355,7 @@ class TurnOn(FibreOperation):
     name = "turn the table on"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
+    def steps(self, work: HandlingContext) -> Steps:
         places = work.settings.places
         yield from retract_probe(work)
         yield work.go_up(max(places.travel_um, work.height_now()))
@@ -283,10 +364,22 @@ class TurnOn(FibreOperation):
         yield work.go({work.table: angle if angle <= largest else angle - 2.0 * largest})
 
 
-def zoom_to(work: FibreWork, zoom: float) -> Steps:
+def zoom_to(work: HandlingContext, zoom: float) -> Steps:
     """Zoom there, where the lens is not there already."""
     lens = work.vico.lens
-    if lens is None or work.zoomed == zoom:
+    if lens is None or work.shared.zoomed == zoom:
         return
     yield lens.zoom_to(zoom)
-    work.zoomed = zoom
+    work.shared.zoomed = zoom
+
+
+def make_safe(work: HandlingContext) -> Steps:
+    """Take the probe back and grippers up; nothing is opened, for a fibre may be held."""
+    work.shared.surveyed, work.shared.zoomed = False, None
+    for arm in work.arms:
+        arm.ready = False
+    touching = [arm for arm in work.arms if arm.calibration.touching]
+    yield from retract_probe((touching or [work])[0])
+    with work.mico.collision.contact("grasp"):
+        for arm in work.arms:
+            yield arm.go_up(max(arm.settings.places.travel_um, arm.height_now()))

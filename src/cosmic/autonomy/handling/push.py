@@ -1,26 +1,292 @@
-"""Operations of the probe: it looks for the held fibre and pushes it, span after span."""
+"""Pushing a fibre span by span: the force is ready, each span is measured, and fitted."""
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from typing import Final
 
+import numpy as np
 from typing_extensions import override
 
 from cosmic.autonomy.bending.fit import fit_bending
-from cosmic.autonomy.bending.plan import DRY_EI_N_M2, SpanLimits, guess_ei, plan_spans
+from cosmic.autonomy.bending.plan import DRY_EI_N_M2, PlannedSpan, SpanLimits, guess_ei, plan_spans
 from cosmic.autonomy.bending.result import BendingError
-from cosmic.autonomy.handling.force_ready import ready_force
+from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
+from cosmic.autonomy.handling.force import ForceMean
 from cosmic.autonomy.handling.grasp import shape_of
-from cosmic.autonomy.handling.in_hand import FibreInHand
-from cosmic.autonomy.handling.one_span import NO_CONTACT, OneSpan
-from cosmic.autonomy.handling.operation import FibreOperation
-from cosmic.autonomy.handling.work import FibreWork
-from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
+from cosmic.autonomy.handling.held_fibre import HeldFibre
+from cosmic.autonomy.handling.prepare import retract_probe
+from cosmic.autonomy.handling.retrying_move import RetryingMove
+from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Yielded
 from cosmic.daqco.core.settings import LimitSettings
-from cosmic.frame.errors import NotAvailable
+from cosmic.frame.errors import DeviceError, NotAvailable
 
 logger = logging.getLogger(__name__)
+
+NO_FORCE: Final = "force sensor"
+LOOKS: Final = 8
+APART_S: Final = 4.0
+LOOK_S: Final = 0.02
+HIGHEST_PART: Final = 0.5
+"""Of the force that stops everything: what the sensor may read with nothing at the probe."""
+
+
+class SeeForce(FibreOperation):
+    """The force sensor reads what it should with nothing at the probe; no fibre is taken before."""
+
+    name = "see the force"
+
+    @override
+    def steps(self, work: HandlingContext) -> Steps:
+        yield from ready_force(work)
+        yield SAFE_POINT
+
+
+def ready_force(work: HandlingContext) -> Steps:
+    """Have samples come, and wait until they are near zero and alive; no limit is armed before.
+
+    Acquisition that has ended is begun again. From a sensor that stands far from zero the probe is
+    taken away: what was overloaded comes back, and what pressed on it is gone.
+
+    Raises
+    ------
+    OperationFailed
+        It is not so after some time; the text says what to look at.
+    """
+    push, trouble = work.settings.push, ""
+    highest_un = HIGHEST_PART * max(push.stop_un, push.limit_un)
+    for look in range(LOOKS):
+        if look:
+            logger.warning("%s; checked again in %g s", trouble, APART_S)
+            yield APART_S
+        try:
+            if not work.daqco.running:
+                work.daqco.start()
+            mean = yield work.forces.wanted(LOOK_S, settle_s=push.settle_s)
+        except (NotAvailable, DeviceError) as exc:
+            trouble = str(exc)
+            continue
+        assert isinstance(mean, ForceMean)
+        if not abs(mean.mean_un) <= highest_un:
+            trouble = (
+                f"the force sensor reads {mean.mean_un:.0f} uN with nothing at the probe, and at "
+                f"most {highest_un:.0f} uN is allowed"
+            )
+            yield from retract_probe(work)
+        elif not mean.spread_un >= push.quiet_un:
+            trouble = (
+                f"the force sensor reads {mean.mean_un:.1f} uN without any noise, as one does that "
+                "is dead or cut off"
+            )
+        else:
+            return
+    raise OperationFailed(
+        NO_FORCE,
+        f"{trouble}; check the sensor, its cable and the acquisition, then start again",
+    )
+
+
+NO_CONTACT: Final = "no contact"
+TOO_HIGH: Final = "force too high"
+IN_THE_WAY: Final = "probe in contact"
+UN_UM2: Final = 1e18
+LIMIT_PART: Final = 0.4
+"""Of the force limit: what one step of the search may add at most."""
+GROWTH: Final = 1.5
+"""How much more than the step before one step may add, when the next is foreseen."""
+
+
+@dataclass(slots=True)
+class _Points:
+    """What was measured on the way of one span."""
+
+    way_um: list[float] = field(default_factory=list)
+    force_un: list[float] = field(default_factory=list)
+    std_un: list[float] = field(default_factory=list)
+    time_s: list[float] = field(default_factory=list)
+    loading: list[bool] = field(default_factory=list)
+
+    def add(self, way_um: float, mean: ForceMean, *, loading: bool) -> None:
+        self.way_um.append(way_um)
+        self.force_un.append(mean.mean_un)
+        self.std_un.append(max(mean.std_un, 1e-3))
+        self.time_s.append(mean.time_s)
+        self.loading.append(loading)
+
+
+Reading = Generator[Yielded, object, tuple[float, ForceMean]]
+
+
+class OneSpan:
+    """One push, out and back, at one place."""
+
+    def __init__(self, work: HandlingContext, fibre: HeldFibre, plan: PlannedSpan) -> None:
+        self._work = work
+        self._fibre = fibre
+        self._plan = plan
+        self._push = work.settings.push
+        self._probe = work.probe
+        self._points = _Points()
+        self._shape = shape_of(work, fibre)
+        # The probe pushes along its own direction; way grows as it does.
+        self._sign = 1.0 if work.probe.forward[1] > 0.0 else -1.0
+
+    def steps(self) -> Steps:
+        """Find the fibre, push it, let it go, and keep the span."""
+        yield from self._go_in_front()
+        base = yield from self._baseline()
+        contact = yield from self._search(base)
+        yield from self._out(base, contact)
+        yield from self._back(contact)
+        self._keep()
+
+    def _way(self, tip_y_um: float) -> float:
+        return self._sign * tip_y_um
+
+    def _to_way(self, way_um: float) -> RetryingMove:
+        return self._work.go({self._probe.y_axis: self._sign * way_um - self._probe.tip_um[1]})
+
+    def _surface_um(self) -> float:
+        """Return the way at which the probe should meet the fibre: as it bows, as it was met."""
+        if not self._fibre.contacts:
+            return self._foreseen_um()
+        # It lies elsewhere than foreseen because of where it is held, or of how it bows: the
+        # probe comes up as if to the nearer of both.
+        along, off = self._fibre.contacts[-1]
+        return self._foreseen_um() + min(off, off * (self._plan.span_um / along) ** 2)
+
+    def _foreseen_um(self) -> float:
+        _, hold_y = self._work.tip_now(self._work.gripper)
+        _, off_y = self._work.calibration.probe_off_um
+        bow = self._shape.bow_um(self._plan.span_um)
+        return self._way(hold_y + bow - off_y) - self._fibre.width_um / 2.0
+
+    def _go_in_front(self) -> Steps:
+        work, push = self._work, self._push
+        hold_x, _ = work.tip_now(work.gripper)
+        off_x, _ = work.calibration.probe_off_um
+        x = hold_x + work.jaws.forward * self._plan.span_um - off_x
+        surface, known = self._surface_um(), bool(self._fibre.contacts)
+        bow = abs(self._shape.bow_um(self._plan.span_um))
+        aside = surface - push.stand_off_um - push.bow_part * bow
+        _, y = work.tip_now(self._probe)
+        if self._way(y) > aside:
+            yield self._to_way(aside)
+        if self._fibre.zero_un is None:
+            self._fibre.zero_un = yield from self._mean_un(push.average_s)
+        yield work.go({self._probe.x_axis: x - self._probe.tip_um[0]})
+        if self._fibre.tilts:
+            part = self._plan.span_um / push.tilt_longest_um
+            side = -1.0 if self._fibre.tilts % 2 else 1.0
+            yield work.go_up(work.hold_tip_um + side * push.tilt_um * part)
+        for way in (aside, surface - push.retreat_um) if known else (aside,):
+            yield from self._come_to(way)
+
+    def _come_to(self, way_um: float) -> Steps:
+        """Go there, and back again as long as something is felt that should not be there."""
+        push, back = self._push, 0.0
+        while True:
+            yield self._to_way(way_um - back)
+            force = yield from self._mean_un(push.search_average_s)
+            if abs(force - (self._fibre.zero_un or 0.0)) <= 2.0 * push.contact_un:
+                return
+            back += push.stand_off_um
+            if back > push.search_um + push.stand_off_um:
+                raise OperationFailed(
+                    IN_THE_WAY, f"the probe feels {force:.0f} uN where nothing should be"
+                )
+
+    def _mean_un(self, seconds: float) -> Generator[Yielded, object, float]:
+        mean = yield self._work.forces.wanted(seconds, settle_s=self._push.settle_s)
+        assert isinstance(mean, ForceMean)
+        return mean.mean_un
+
+    def _measure(self, seconds: float, *, loading: bool) -> Reading:
+        mean = yield self._work.forces.wanted(seconds, settle_s=self._push.settle_s)
+        assert isinstance(mean, ForceMean)
+        _, y = self._work.tip_now(self._probe)
+        self._points.add(self._way(y), mean, loading=loading)
+        return self._way(y), mean
+
+    def _baseline(self) -> Generator[Yielded, object, float]:
+        _, mean = yield from self._measure(self._push.average_s, loading=True)
+        self._fibre.zero_un = mean.mean_un
+        return mean.mean_un
+
+    def _to(self, way_um: float, seconds: float, *, loading: bool) -> Reading:
+        yield self._to_way(way_um)
+        return (yield from self._measure(seconds, loading=loading))
+
+    def _step_um(self) -> float:
+        """Return the largest step at which even the stiffest fibre pushes back little enough."""
+        ei = self._push.stiffest_ei_n_m2
+        if self._fibre.ei_guess_n_m2 is not None:
+            ei = min(ei, 2.0 * self._fibre.ei_guess_n_m2)
+        stiffness = 3.0 * ei * UN_UM2 / self._plan.span_um**3
+        return min(self._push.search_step_um, LIMIT_PART * self._push.limit_un / stiffness)
+
+    def _search(self, base_un: float) -> Generator[Yielded, object, float]:
+        push, step = self._push, self._step_um()
+        way = self._points.way_um[-1]
+        end = self._surface_um() + push.search_um
+        while way < end:
+            before = way
+            way, mean = yield from self._to(way + step, push.search_average_s, loading=True)
+            if mean.mean_un - base_un > push.contact_un:
+                self._fibre.contacts.append((self._plan.span_um, before - self._foreseen_um()))
+                return before
+        raise OperationFailed(
+            NO_CONTACT,
+            f"the probe met nothing {push.search_um:g} um beyond where fibre "
+            f"{self._fibre.number} should be, {self._plan.span_um:.0f} um from the jaws",
+        )
+
+    def _out(self, base_un: float, contact_um: float) -> Steps:
+        push, points = self._push, self._points
+        step = self._plan.stroke_um / push.steps_out
+        top = contact_um + self._plan.stroke_um
+        while points.way_um[-1] < top - 0.5 * step:
+            force, before = points.force_un[-1] - base_un, points.force_un[-2] - base_un
+            slope = max(0.0, (force - before) / max(points.way_um[-1] - points.way_um[-2], 0.5))
+            if force + GROWTH * slope * step > push.limit_un:
+                break
+            yield from self._to(
+                points.way_um[-1] + min(step, self._step_um()), push.average_s, loading=True
+            )
+        if points.force_un[-1] - base_un > push.limit_un * GROWTH:
+            raise OperationFailed(TOO_HIGH, f"{points.force_un[-1] - base_un:.0f} uN")
+
+    def _back(self, contact_um: float) -> Steps:
+        push = self._push
+        top, end = self._points.way_um[-1], contact_um - push.retreat_um / 2.0
+        for way in np.linspace(top, end, push.steps_back + 1)[1:].tolist():
+            yield from self._to(way, push.average_s, loading=False)
+        yield from self._to(contact_um - push.retreat_um, push.average_s, loading=False)
+
+    def _keep(self) -> None:
+        work, points = self._work, self._points
+        probe_x, _ = work.tip_now(self._probe)
+        hold_x, _ = work.tip_now(work.gripper)
+        off_x, _ = work.calibration.probe_off_um
+        ahead = (probe_x + off_x - hold_x) * work.jaws.forward
+        # A bowed fibre gives way as a straight one that is a little longer: the fit knows only
+        # straight ones.
+        longer = self._shape.lever_um(ahead) - ahead
+        self._fibre.spans.append(
+            Span(
+                nominal_um=ahead + longer,
+                probe_x_um=probe_x - self._probe.tip_um[0] + longer * work.jaws.forward,
+                hold_x_um=hold_x - work.gripper.tip_um[0],
+                way_um=np.array(points.way_um),
+                force_un=np.array(points.force_un),
+                force_std_un=np.array(points.std_un),
+                time_s=np.array(points.time_s),
+                loading=np.array(points.loading, dtype=np.bool_),
+            )
+        )
+
 
 TOO_SHORT: Final = "too short"
 NOT_TRUSTED: Final = "not trusted"
@@ -32,8 +298,8 @@ class PushSpans(FibreOperation):
     name = "push the spans"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
-        fibre = work.in_hand()
+    def steps(self, work: HandlingContext) -> Steps:
+        fibre = work.held_fibre()
         fibre.spans.clear()
         fibre.contacts.clear()
         fibre.zero_un = None
@@ -45,7 +311,7 @@ class PushSpans(FibreOperation):
         yield from ready_force(work)
         if work.beside_another and not fibre.peak_un:
             work.forces.take_peak_un()  # was that of the fibre before
-        before = arm(work)
+        before = arm_force_limit(work)
         try:
             yield from self._spans(work, fibre)
         finally:
@@ -53,7 +319,7 @@ class PushSpans(FibreOperation):
             fibre.peak_un = max(fibre.peak_un, work.forces.take_peak_un())
 
     @staticmethod
-    def _spans(work: FibreWork, fibre: FibreInHand) -> Steps:
+    def _spans(work: HandlingContext, fibre: HeldFibre) -> Steps:
         push = work.settings.push
         while True:
             guess = fibre.ei_guess_n_m2 or DRY_EI_N_M2
@@ -66,23 +332,23 @@ class PushSpans(FibreOperation):
             yield SAFE_POINT
 
 
-def span_limits(work: FibreWork) -> SpanLimits:
+def span_limits(work: HandlingContext) -> SpanLimits:
     """Return what spans there may be; shorter ones for a fibre that points up or down."""
     push = work.settings.push
-    if not work.in_hand().tilts:
+    if not work.held_fibre().tilts:
         return push.spans
     longest = min(push.spans.longest_um, push.tilt_longest_um)
     return push.spans.model_copy(update={"longest_um": longest})
 
 
-def limit_of(work: FibreWork) -> LimitSettings | None:
+def limit_of(work: HandlingContext) -> LimitSettings | None:
     """Return the force limit that is in force for the channel of the probe."""
     channel = work.settings.push.channel
     limits = (each.settings for each in work.daqco.limits)
     return next((each for each in limits if each.channel == channel), None)
 
 
-def arm(work: FibreWork) -> LimitSettings | None:
+def arm_force_limit(work: HandlingContext) -> LimitSettings | None:
     """Arm the force limit of a push, which stops everything; return the one that was there."""
     push, before = work.settings.push, limit_of(work)
     if push.stop_un > 0.0:
@@ -93,19 +359,19 @@ def arm(work: FibreWork) -> LimitSettings | None:
     return before
 
 
-def put_back(work: FibreWork, before: LimitSettings | None) -> None:
-    """Have the force limit as it was before `arm`."""
+def put_back(work: HandlingContext, before: LimitSettings | None) -> None:
+    """Have the force limit as it was before `arm_force_limit`."""
     now = limit_of(work)
-    if now is None or work.settings.push.stop_un <= 0.0:
+    if now is None or now == before:
         return
     try:
         work.daqco.set_limit(before or now.model_copy(update={"armed": False}))
     except NotAvailable as exc:  # nothing is acquired: that has stopped everything already
-        logger.warning("the force limit is not armed again: %s", exc)
+        logger.warning("the force limit was not re-armed: %s", exc)
 
 
 @contextmanager
-def armed_while_pushing(work: FibreWork) -> Iterator[None]:
+def armed_while_pushing(work: HandlingContext) -> Iterator[None]:
     """Have the force limit armed while the probe pushes, and afterwards as it was.
 
     Between pushes a campaign deals itself with a board or a sensor that fails.
@@ -128,8 +394,8 @@ class FitSpans(FibreOperation):
     name = "fit the bending stiffness"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
-        fibre = work.in_hand()
+    def steps(self, work: HandlingContext) -> Steps:
+        fibre = work.held_fibre()
         fit = work.settings.push.fit.model_copy(update={"fibre_width_um": fibre.width_um})
         fibre.bending = fit_bending(fibre.spans, settings=fit)
         if not fibre.bending.trusted:
@@ -146,8 +412,8 @@ class StepBack(FibreOperation):
     name = "step back"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
-        fibre, push = work.in_hand(), work.settings.push
+    def steps(self, work: HandlingContext) -> Steps:
+        fibre, push = work.held_fibre(), work.settings.push
         _, failure = work.failures[-1]
         fibre.tilts += failure.cause == NO_CONTACT
         x, y = work.tip_now(work.probe)
@@ -161,7 +427,7 @@ class Retract(FibreOperation):
     name = "retract the probe"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
+    def steps(self, work: HandlingContext) -> Steps:
         x, y = work.tip_now(work.probe)
         away = work.settings.places.probe_away_y_um
         if y < away - 1.0:

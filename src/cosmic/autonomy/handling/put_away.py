@@ -5,12 +5,11 @@ from typing import Final
 import numpy as np
 from typing_extensions import override
 
+from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.grasp import in_jaws, seen_at
-from cosmic.autonomy.handling.in_hand import FibreInHand
+from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.jaws import move_jaws
-from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.prepare import retract_probe
-from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.vico.core.picture import Picture
 
@@ -29,31 +28,31 @@ class ToBin(FibreOperation):
     name = "carry to the bin"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
+    def steps(self, work: HandlingContext) -> Steps:
         places = work.settings.places
         if not work.beside_another:  # who may have the probe just then
             yield from retract_probe(work)
         yield work.go_up(max(places.travel_um, work.height_now()))
-        if work.in_hand().bending is not None:
+        if work.held_fibre().bending is not None:
             yield from self._look_on_the_way(work)
         yield work.go(bin_place(work))
         with work.mico.collision.contact("grasp"):
             yield work.go_up(places.bin_um)
 
     @staticmethod
-    def _look_on_the_way(work: FibreWork) -> Steps:
+    def _look_on_the_way(work: HandlingContext) -> Steps:
         """See that a measured fibre is still there: one that fell must not be measured again."""
-        fibre, places = work.in_hand(), work.settings.places
+        fibre, places = work.held_fibre(), work.settings.places
         x = places.view_x_um * work.jaws.forward
         yield work.go(work.at(work.gripper, x, places.view_y_um))
         picture = yield work.picture()
         assert isinstance(picture, Picture)
         if not seen_at(work, fibre, picture, in_jaws(work, fibre), work.height_now()):
-            fibre.held, work.surveyed = False, False
-            work.spilled.append(fibre)
+            fibre.held, work.shared.surveyed = False, False
+            work.shared.dropped.append(fibre)
 
 
-def bin_place(work: FibreWork) -> dict[str, float]:
+def bin_place(work: HandlingContext) -> dict[str, float]:
     """Return where the gripper's axes stand above the bin."""
     places = work.settings.places
     return work.at(work.gripper, places.bin_x_um * work.jaws.forward, places.bin_y_um)
@@ -65,38 +64,38 @@ class Release(FibreOperation):
     name = "release"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
+    def steps(self, work: HandlingContext) -> Steps:
         places, forward = work.settings.places, work.jaws.forward
         gap = work.gap_um or 0.0
         yield from move_jaws(work, work.settings.grasp.gap_um - gap)
         with work.mico.collision.contact("grasp"):
             yield work.go_up(places.travel_um)
         # Each time elsewhere: what is seen may lie on the plate and not hang at the jaws.
-        y = places.view_y_um + ASIDE_UM * work.in_hand().looks
+        y = places.view_y_um + ASIDE_UM * work.held_fibre().looks
         yield work.go(work.at(work.gripper, places.view_x_um * forward, y))
 
     @override
-    def verify(self, work: FibreWork) -> Steps | None:
+    def verify(self, work: HandlingContext) -> Steps | None:
         return see_released(work)
 
 
-def see_released(work: FibreWork) -> Steps:
+def see_released(work: HandlingContext) -> Steps:
     """See by picture that nothing hangs at the jaws.
 
     They are not moved aside for a second look: a fibre that falls off there is in the sample again.
     """
-    fibre = work.in_hand()
+    fibre = work.held_fibre()
     picture = yield work.picture()
     assert isinstance(picture, Picture)
     if _hangs(work, fibre, picture):
         fibre.looks += 1
-        failure = OperationFailed(ADHESION, f"fibre {fibre.number} still hangs at the jaws")
+        failure = OperationFailed(ADHESION, f"fibre {fibre.number} still sticks to the jaws")
         work.failures.append((Release.name, failure))
         raise failure
     fibre.held = False
 
 
-def _hangs(work: FibreWork, fibre: FibreInHand, picture: Picture) -> bool:
+def _hangs(work: HandlingContext, fibre: HeldFibre, picture: Picture) -> bool:
     """Return whether something lies where the fibre would: what sticks goes with one jaw."""
     line, apart = in_jaws(work, fibre), 0.5 * (work.gap_um or 0.0)
     places = (line + np.array([0.0, y]) for y in (0.0, apart, -apart))
@@ -110,7 +109,7 @@ class Wipe(FibreOperation):
     name = "shake and wipe"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
+    def steps(self, work: HandlingContext) -> Steps:
         places = work.settings.places
         yield work.go_up(max(places.travel_um, work.height_now()))
         yield work.go(bin_place(work))
@@ -131,22 +130,22 @@ class Finish(FibreOperation):
     name = "note the result"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
-        fibre = work.in_hand()
+    def steps(self, work: HandlingContext) -> Steps:
+        fibre = work.held_fibre()
         fibre.done_s, fibre.put_away = work.clock.now_s(), True
-        work.finished.append(fibre)
+        work.shared.finished.append(fibre)
         work.fibre = None
         yield SAFE_POINT
 
 
 class NoteFailure(FibreOperation):
-    """Keeps what the fibre in hand failed by, before anything else is done with it."""
+    """Keeps what the held fibre failed by, before anything else is done with it."""
 
     name = "note the failure"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
-        fibre = work.in_hand()
+    def steps(self, work: HandlingContext) -> Steps:
+        fibre = work.held_fibre()
         if work.failures:
             operation, failure = work.failures[-1]
             fibre.failure = OperationFailed(failure.cause, f"{operation}: {failure.text}")
@@ -159,13 +158,13 @@ class GiveUp(FibreOperation):
     name = "give it up"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
-        fibre = work.in_hand()
+    def steps(self, work: HandlingContext) -> Steps:
+        fibre = work.held_fibre()
         fibre.done_s = work.clock.now_s()
-        work.finished.append(fibre)
+        work.shared.finished.append(fibre)
         if not fibre.put_away and fibre.tries:
-            work.surveyed = False
-        work.given_up.append(fibre.reach.candidate)
+            work.shared.surveyed = False
+        work.shared.skipped.append(fibre.reach.candidate)
         work.fibre = None
         yield SAFE_POINT
         raise fibre.failure or OperationFailed(GIVEN_UP, f"fibre {fibre.number}")
@@ -177,15 +176,15 @@ class ClearUp(FibreOperation):
     name = "clear up"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
+    def steps(self, work: HandlingContext) -> Steps:
         fibre = work.fibre
         if fibre is None:
             return
-        work.ready, work.surveyed, work.zoomed = False, False, None
+        work.ready, work.shared.surveyed, work.shared.zoomed = False, False, None
         yield from ToBin().steps(work)
         yield from Wipe().steps(work)
         yield from Release().steps(work)
         fibre.failure = fibre.failure or OperationFailed(INTERRUPTED, "the run before was ended")
         fibre.done_s = work.clock.now_s()
-        work.finished.append(fibre)
+        work.shared.finished.append(fibre)
         work.fibre = None

@@ -5,13 +5,12 @@ from typing import Final
 import numpy as np
 from typing_extensions import override
 
-from cosmic.autonomy.handling.in_hand import FibreInHand
+from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
+from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.jaws import move_jaws, note_gap
-from cosmic.autonomy.handling.operation import FibreOperation
 from cosmic.autonomy.handling.plate import along, ways
 from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen, trace_along
 from cosmic.autonomy.handling.tips import see_tip
-from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.pixel_map import Floats
@@ -34,8 +33,8 @@ class Turn(FibreOperation):
     name = "turn the table"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
-        fibre = work.in_hand()
+    def steps(self, work: HandlingContext) -> Steps:
+        fibre = work.held_fibre()
         (x, y), angle = fibre.reach.tip_um, fibre.reach.angle_deg
         yield work.go_up(max(work.settings.places.travel_um, work.height_now()))
         behind = work.at(work.gripper, x - STAND_BACK_UM * work.jaws.forward, y)
@@ -49,8 +48,8 @@ class FindAgain(FibreOperation):
     name = "find it again"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
-        fibre = work.in_hand()
+    def steps(self, work: HandlingContext) -> Steps:
+        fibre = work.held_fibre()
         if fibre.tries:
             x, y = work.tip_now(work.gripper)
             yield work.go_up(work.settings.places.travel_um)
@@ -70,13 +69,11 @@ class FindAgain(FibreOperation):
                 return
         fibre.pictures["not found"] = picture
         # One that was grasped, and is gone, lies somewhere else now.
-        work.surveyed = work.surveyed and not fibre.tries
-        raise OperationFailed(
-            LOST, f"fibre {fibre.number} was not found again where the table has turned it"
-        )
+        work.shared.surveyed = work.shared.surveyed and not fibre.tries
+        raise OperationFailed(LOST, f"fibre {fibre.number} was not found where the table turned it")
 
 
-def _where_foretold(work: FibreWork, fibre: FibreInHand, picture: Picture) -> bool:
+def _where_foretold(work: HandlingContext, fibre: HeldFibre, picture: Picture) -> bool:
     """Take note of a fibre that lies where the turn should have brought it."""
     mapped, candidate = work.mapped(picture), fibre.reach.candidate
     line_px = mapped.to_px(fibre.reach.line_um)
@@ -90,7 +87,7 @@ def _where_foretold(work: FibreWork, fibre: FibreInHand, picture: Picture) -> bo
     return True
 
 
-def _matching(found: list[SeenFibre], fibre: FibreInHand) -> SeenFibre | None:
+def _matching(found: list[SeenFibre], fibre: HeldFibre) -> SeenFibre | None:
     """Return the fibre that is meant, known by its place and length."""
     wanted, length = fibre.reach.line_um, fibre.reach.candidate.length_um
     fitting = []
@@ -101,7 +98,7 @@ def _matching(found: list[SeenFibre], fibre: FibreInHand) -> SeenFibre | None:
     return min(fitting, key=lambda pair: pair[0])[1] if fitting else None
 
 
-def _take_note(work: FibreWork, fibre: FibreInHand, seen: SeenFibre, picture: Picture) -> None:
+def _take_note(work: HandlingContext, fibre: HeldFibre, seen: SeenFibre, picture: Picture) -> None:
     start = fibre.reach.line_um[0]
     turned = np.linalg.norm(seen.line_um[0] - start) > np.linalg.norm(seen.line_um[-1] - start)
     step = -1 if turned else 1
@@ -112,7 +109,7 @@ def _take_note(work: FibreWork, fibre: FibreInHand, seen: SeenFibre, picture: Pi
     fibre.pictures["geometry"] = picture
 
 
-def line_of(fibre: FibreInHand) -> Floats:
+def line_of(fibre: HeldFibre) -> Floats:
     """Return the fibre's line on the platform, from the end that is grasped."""
     return fibre.reach.line_um if fibre.line_um is None else fibre.line_um
 
@@ -123,8 +120,8 @@ class Shift(FibreOperation):
     name = "try beside it"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
-        fibre, shift = work.in_hand(), work.settings.grasp.shift_um
+    def steps(self, work: HandlingContext) -> Steps:
+        fibre, shift = work.held_fibre(), work.settings.grasp.shift_um
         side = 1.0 if fibre.tries % 2 else -1.0
         fibre.shift_um = side * shift * ((fibre.tries + 1) // 2)
         yield SAFE_POINT
@@ -136,15 +133,15 @@ class Approach(FibreOperation):
     name = "approach and descend"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
-        fibre = work.in_hand()
+    def steps(self, work: HandlingContext) -> Steps:
+        fibre = work.held_fibre()
         x, y = along(line_of(fibre), fibre.inside_um).tolist()
         yield work.go(work.at(work.gripper, x, y))
         with work.mico.collision.contact("grasp"):
             yield work.go_up(work.grasp_um)
 
     @override
-    def undo(self, work: FibreWork) -> Steps:
+    def undo(self, work: HandlingContext) -> Steps:
         with work.mico.collision.contact("grasp"):
             yield work.go_up(work.settings.places.travel_um)
 
@@ -155,8 +152,8 @@ class Refine(FibreOperation):
     name = "refine by picture"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
-        fibre, settings = work.in_hand(), work.settings.grasp
+    def steps(self, work: HandlingContext) -> Steps:
+        fibre, settings = work.held_fibre(), work.settings.grasp
         for _ in range(settings.corrections):
             picture = yield work.picture()
             assert isinstance(picture, Picture)
@@ -173,11 +170,11 @@ class Refine(FibreOperation):
         off = _off_um(work, fibre, picture)
         if off is None or abs(off - fibre.shift_um) > 2.0 * settings.close_enough_um:
             raise OperationFailed(
-                TIP_NOT_SEEN, "the jaws were not seen around the fibre; look at light and focus"
+                TIP_NOT_SEEN, "the jaws were not seen around the fibre: check light and focus"
             )
 
 
-def _off_um(work: FibreWork, fibre: FibreInHand, picture: Picture) -> float | None:
+def _off_um(work: HandlingContext, fibre: HeldFibre, picture: Picture) -> float | None:
     """Return how far the fibre is from the middle between the jaws, in y; None: not seen."""
     found = see_tip(work, picture, work.gripper)
     if not isinstance(found, GripperTips):
@@ -200,12 +197,12 @@ class CloseJaws(FibreOperation):
     name = "close the gripper"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
+    def steps(self, work: HandlingContext) -> Steps:
         gap = work.gap_um if work.gap_um is not None else work.settings.grasp.gap_um
         yield from move_jaws(work, -(gap + work.settings.grasp.closing_um))
         work.gap_um = 0.0
-        work.in_hand().tries += 1
+        work.held_fibre().tries += 1
 
     @override
-    def undo(self, work: FibreWork) -> Steps:
+    def undo(self, work: HandlingContext) -> Steps:
         yield from move_jaws(work, work.settings.grasp.gap_um)

@@ -1,5 +1,6 @@
 """Settings of the operations that handle fibres; they are the parameters of a recipe."""
 
+from collections.abc import Collection
 from typing import Literal
 
 from pydantic import Field
@@ -7,8 +8,35 @@ from pydantic import Field
 from cosmic.autonomy.bending.plan import SpanLimits
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.calibrating.settings import CalibrationSettings
-from cosmic.autonomy.handling.pair_settings import PairSettings
-from cosmic.frame.config import StrictModel
+from cosmic.frame.config import StrictModel, not_there
+
+
+class PairSettings(StrictModel):
+    """How two arms keep out of each other's way, each on its own side of the middle.
+
+    Attributes
+    ----------
+    apart_um : float
+        How far from the middle the tips of an arm stay at the plate and before the probe.
+    behind_um : float
+        How far behind that an arm waits with its fibre, and draws back to from the probe.
+    beside_um : float
+        How far beside the place before the probe it waits, towards the operator.
+    hidden_um : float
+        How far from that place, towards the operator, fibres must lie to be taken while the other
+        arm is there: nearer they may be hidden.
+    probe_back_um : float
+        How far the probe draws back between two fibres.
+    stuck : int
+        Fibres in a row that an arm cannot put away before it stands aside.
+    """
+
+    apart_um: float = Field(250.0, gt=0.0)
+    behind_um: float = Field(4000.0, gt=0.0)
+    beside_um: float = Field(1000.0, ge=0.0)
+    hidden_um: float = Field(400.0, ge=0.0)
+    probe_back_um: float = Field(1500.0, gt=0.0)
+    stuck: int = Field(3, ge=1)
 
 
 class PlaceSettings(StrictModel):
@@ -207,3 +235,48 @@ class HandlingSettings(StrictModel):
     push: PushSettings = Field(default_factory=PushSettings)
     calibration: CalibrationSettings = Field(default_factory=CalibrationSettings)
     pair: PairSettings = Field(default_factory=PairSettings)
+
+    def misfits(
+        self, *, tools: Collection[str], cameras: Collection[str], channels: Collection[str]
+    ) -> list[str]:
+        """Return a line for each name that a platform with these has not, with its key."""
+        named = [
+            ("gripper", "tool", self.gripper, tools),
+            ("other", "tool", self.other, tools),
+            ("probe", "tool", self.probe, tools),
+            ("camera", "camera", self.camera, cameras),
+            ("push.channel", "channel", self.push.channel, channels),
+        ]
+        optional = {"other", "camera"}
+        return [
+            f"{key}: {not_there(what, name, known)}"
+            for key, what, name, known in named
+            if name not in known and (name or key not in optional)
+        ]
+
+
+def of_arm(settings: HandlingSettings, gripper: str) -> HandlingSettings:
+    """Return the settings of one of two arms.
+
+    Each stays on its own side, so that neither is ever in the other's way. Fibres are let go
+    from where the arms travel: the table, with all that stands up from it, turns below.
+    """
+    pair, places, grasp = settings.pair, settings.places, settings.grasp
+    own = {
+        "hold_x_um": min(places.hold_x_um, -pair.apart_um),
+        "bin_um": max(places.bin_um, places.travel_um),
+    }
+    # Of two fibres, one before the probe and one drawn back, neither reaches the other.
+    longest_um = pair.apart_um + pair.behind_um / 2.0 + grasp.inside_um
+    sides = {
+        "reach_x_um": min(grasp.reach_x_um, -pair.apart_um),
+        "longest_um": min(grasp.longest_um, longest_um),
+    }
+    return settings.model_copy(
+        update={
+            "gripper": gripper,
+            "other": "right" if gripper == "left" else "left",
+            "places": places.model_copy(update=own),
+            "grasp": grasp.model_copy(update=sides),
+        }
+    )

@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 from typing_extensions import override
 
-from cosmic.autonomy.handling.in_hand import FibreInHand
-from cosmic.autonomy.handling.operation import FibreOperation
+from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
+from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Neighbours, Reach, distance_um, reaches
 from cosmic.autonomy.handling.prepare import clear_picture
 from cosmic.autonomy.handling.sight import SeenFibre, find_seen
-from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.pixel_map import Floats
@@ -44,67 +43,67 @@ class Survey(FibreOperation):
     name = "survey"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
-        due = work.settings.re_survey and work.since_survey >= work.settings.re_survey
-        if work.surveyed and work.candidates and not due:
+    def steps(self, work: HandlingContext) -> Steps:
+        due = work.settings.re_survey and work.shared.since_survey >= work.settings.re_survey
+        if work.shared.surveyed and work.shared.candidates and not due:
             return
         yield from clear_picture(work)
         picture = yield work.picture()
         assert isinstance(picture, Picture)
         mapped = work.mapped(picture)
         look(work, find_seen(picture, mapped))
-        if not work.candidates:
-            raise OperationFailed(NONE_LEFT, none_left(work.skipped))
+        if not work.shared.candidates:
+            raise OperationFailed(NONE_LEFT, none_left(work.shared.skip_reasons))
         yield SAFE_POINT
 
 
-def none_left(skipped: Mapping[str, int]) -> str:
+def none_left(skip_reasons: Mapping[str, int]) -> str:
     """Return what is said where no fibre can be taken up, and what to do.
 
     Parameters
     ----------
-    skipped : mapping of str to int
+    skip_reasons : mapping of str to int
         Why fibres on the plate are not taken, and how many.
     """
-    told = ", ".join(f"{count} {why}" for why, count in sorted(skipped.items()))
+    told = ", ".join(f"{count} {why}" for why, count in sorted(skip_reasons.items()))
     if not told:
-        return "the plate is empty; put a sample there, or look at light and focus"
-    return f"none on the plate can be taken up ({told}); spread them, or put another sample there"
+        return "the plate is empty: put a sample there, or check light and focus"
+    return f"none on the plate can be grasped ({told}): spread them, or put another sample there"
 
 
-def look(work: FibreWork, seen: list[SeenFibre]) -> None:
+def look(work: HandlingContext, seen: list[SeenFibre]) -> None:
     """Take note of what lies on the plate, and of what may be taken."""
     angle, frame = work.table_deg, work.calibration.frame
     found = [_candidate(work, each, frame.on_plate(each.line_um, angle)) for each in seen]
-    before, work.lines_um = work.lines_um, [each.line_um for each in found]
+    before, work.shared.lines_um = work.shared.lines_um, [each.line_um for each in found]
     judged = [replace(each, problem=each.problem or _lonely(work, each)) for each in found]
-    judged = leave_spilled(judged, work.spilled)
+    judged = leave_dropped(judged, work.shared.dropped)
     judged = _leave_fallen(work, judged, before)
-    work.candidates = [each for each in judged if not each.problem]
-    work.skipped = Counter(each.problem for each in judged if each.problem)
-    work.surveyed, work.since_survey, work.survey_deg = True, 0, angle
+    work.shared.candidates = [each for each in judged if not each.problem]
+    work.shared.skip_reasons = Counter(each.problem for each in judged if each.problem)
+    work.shared.surveyed, work.shared.since_survey, work.shared.survey_deg = True, 0, angle
 
 
 def _leave_fallen(
-    work: FibreWork, candidates: list[Candidate], before: list[Floats]
+    work: HandlingContext, candidates: list[Candidate], before: list[Floats]
 ) -> list[Candidate]:
     """Return the sightings; one like a measured fibre, where nothing lay before, is not taken.
 
     It clung to the jaws, was seen nowhere, and fell when nobody looked.
     """
-    measured = [each for each in work.finished if each.bending is not None]
+    measured = [each for each in work.shared.finished if each.bending is not None]
     left = []
     for each in candidates:
         new = all(distance_um(each.line_um, line) > SAME_UM for line in before)
         if before and new and any(_unlike(each, fibre) < 1.0 for fibre in measured):
-            work.given_up.append(each)
+            work.shared.skipped.append(each)
             left.append(replace(each, problem=MEASURED))
         else:
             left.append(each)
     return left
 
 
-def _candidate(work: FibreWork, seen: SeenFibre, line_um: Floats) -> Candidate:
+def _candidate(work: HandlingContext, seen: SeenFibre, line_um: Floats) -> Candidate:
     settings, doubts = work.settings.grasp, " ".join(seen.fibre.doubts)
     problem = ""
     if "border" in doubts:
@@ -132,12 +131,12 @@ def _candidate(work: FibreWork, seen: SeenFibre, line_um: Floats) -> Candidate:
     )
 
 
-def _lonely(work: FibreWork, candidate: Candidate) -> str:
-    if any(same_fibre(candidate, each) for each in work.given_up):
+def _lonely(work: HandlingContext, candidate: Candidate) -> str:
+    if any(same_fibre(candidate, each) for each in work.shared.skipped):
         return GIVEN_UP
     near = (
         distance_um(candidate.line_um, line) < work.settings.grasp.clear_um
-        for line in work.lines_um
+        for line in work.shared.lines_um
         if line is not candidate.line_um
     )
     return TOO_NEAR if any(near) else ""
@@ -150,10 +149,10 @@ def same_fibre(one: Candidate, other: Candidate) -> bool:
     return near and abs(one.length_um - other.length_um) < SAME_LENGTH * other.length_um
 
 
-def leave_spilled(candidates: list[Candidate], spilled: list[FibreInHand]) -> list[Candidate]:
+def leave_dropped(candidates: list[Candidate], dropped: list[HeldFibre]) -> list[Candidate]:
     """Return the sightings; of each fibre that fell the one most like it is not to be taken."""
     left = list(candidates)
-    for fibre in spilled:
+    for fibre in dropped:
         likes = [(_unlike(each, fibre), number) for number, each in enumerate(left)]
         unlike, number = min(likes, default=(math.inf, 0))
         if unlike < 1.0:
@@ -161,7 +160,7 @@ def leave_spilled(candidates: list[Candidate], spilled: list[FibreInHand]) -> li
     return left
 
 
-def _unlike(one: Candidate, other: FibreInHand) -> float:
+def _unlike(one: Candidate, other: HeldFibre) -> float:
     """Return how little a sighting is like a fibre that was measured; 1 and more is another."""
     if one.problem:
         return math.inf
@@ -178,43 +177,49 @@ class Choose(FibreOperation):
     name = "choose a fibre"
 
     @override
-    def steps(self, work: FibreWork) -> Steps:
+    def steps(self, work: HandlingContext) -> Steps:
         angle = work.table_deg
-        ways = [way for each in work.candidates for way in ways_of(work, each, angle)]
+        ways = [way for each in work.shared.candidates for way in ways_of(work, each, angle)]
         best = min(ways, key=lambda each: self.rank(work, each, angle), default=None)
         if best is None:
             raise self.none(work)
-        work.candidates = [each for each in work.candidates if each is not best.candidate]
-        gone = best.candidate.line_um.mean(axis=0)
-        work.lines_um = [
-            line for line in work.lines_um if np.linalg.norm(line.mean(axis=0) - gone) > OWN_UM
+        work.shared.candidates = [
+            each for each in work.shared.candidates if each is not best.candidate
         ]
-        work.numbers += 1
-        work.since_survey += 1
-        work.fibre = FibreInHand(work.numbers, best, found_s=work.clock.now_s())
+        gone = best.candidate.line_um.mean(axis=0)
+        work.shared.lines_um = [
+            line
+            for line in work.shared.lines_um
+            if np.linalg.norm(line.mean(axis=0) - gone) > OWN_UM
+        ]
+        work.shared.numbers += 1
+        work.shared.since_survey += 1
+        work.fibre = HeldFibre(work.shared.numbers, best, found_s=work.clock.now_s())
         if work.beside_another:
-            work.fibre.hand = work.settings.gripper
+            work.fibre.arm = work.settings.gripper
         else:
             work.forces.take_peak_un()
         yield SAFE_POINT
 
-    def rank(self, work: FibreWork, way: Reach, angle_deg: float) -> tuple[float, ...]:  # noqa: ARG002
+    def rank(self, work: HandlingContext, way: Reach, angle_deg: float) -> tuple[float, ...]:  # noqa: ARG002
         """Return by what the best way is known: the smallest."""
         return way.under, abs(way.angle_deg - angle_deg)
 
-    def none(self, work: FibreWork) -> OperationFailed:
+    def none(self, work: HandlingContext) -> OperationFailed:
         """Return what it fails with where none can be taken."""
-        if work.candidates:
-            work.skipped[OUT_OF_REACH] += len(work.candidates)
-        work.candidates = []
-        cause = LOOK_AGAIN if work.since_survey else NONE_LEFT
-        return OperationFailed(cause, none_left(work.skipped))
+        if work.shared.candidates:
+            work.shared.skip_reasons[OUT_OF_REACH] += len(work.shared.candidates)
+        work.shared.candidates = []
+        cause = LOOK_AGAIN if work.shared.since_survey else NONE_LEFT
+        return OperationFailed(cause, none_left(work.shared.skip_reasons))
 
 
-def ways_of(work: FibreWork, candidate: Candidate, angle_deg: float) -> list[Reach]:
+def ways_of(work: HandlingContext, candidate: Candidate, angle_deg: float) -> list[Reach]:
     """Return the ways to take a candidate, the best first."""
     own = candidate.line_um.mean(axis=0)
-    others = [line for line in work.lines_um if np.linalg.norm(line.mean(axis=0) - own) > OWN_UM]
+    others = [
+        line for line in work.shared.lines_um if np.linalg.norm(line.mean(axis=0) - own) > OWN_UM
+    ]
     return reaches(
         candidate,
         work.calibration.frame,

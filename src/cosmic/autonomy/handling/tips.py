@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
+from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.plate import PlateFrame
 from cosmic.autonomy.handling.sight import map_at
-from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.places import REACH_PX, PlatformPlaces
 from cosmic.autonomy.tools import expected, tip_um
 from cosmic.frame.errors import CosmicError, NotAvailable
@@ -42,14 +42,14 @@ class TipOff:
     certain: bool = True
 
 
-def tip_off(work: FibreWork, picture: Picture, tool: ToolSettings) -> TipOff:
+def tip_off(work: HandlingContext, picture: Picture, tool: ToolSettings) -> TipOff:
     """Return how far a tip is from where it should be seen; raises `NotAvailable`."""
     found = see_tip(work, picture, tool)
     if isinstance(found, NotSeen):
         raise NotAvailable(f"{tool.shown} was not seen: {found.reason}")
     believed = tip_um(tool, picture.circumstances.positions)
     if believed is None:
-        raise NotAvailable(f"{tool.name}: where it stands is not known")
+        raise NotAvailable(f"{tool.name}: its position is unknown")
     mapped = work.mapped(picture, believed[2])
     seen_px = found.hold_px if isinstance(found, GripperTips) else found.tip_px
     x, y = mapped.to_um(seen_px).tolist()
@@ -57,7 +57,7 @@ def tip_off(work: FibreWork, picture: Picture, tool: ToolSettings) -> TipOff:
     return TipOff((x - believed[0], y - believed[1]), std_um, mapped.scale_um_px, found.certain)
 
 
-def shift_maps(work: FibreWork, off_um: Off) -> None:
+def shift_maps(work: HandlingContext, off_um: Off) -> None:
     """Have the maps made by the gripper follow its tip, which is now off by so much.
 
     What lies on the plate keeps its place there: the rotation centre goes along.
@@ -72,20 +72,20 @@ def shift_maps(work: FibreWork, off_um: Off) -> None:
 
 
 def see_tip(
-    work: FibreWork, picture: Picture, tool: ToolSettings
+    work: HandlingContext, picture: Picture, tool: ToolSettings
 ) -> GripperTips | ToolEnd | NotSeen:
     """Look for a tool's tip where its stages say it is, with the jaws as far open as counted."""
     positions = picture.circumstances.positions
     tip = tip_um(tool, positions)
     if tip is None:
-        return NotSeen("where it stands is not known")
+        return NotSeen("its position is unknown")
     try:
         mapped = map_at(work.vision.places, picture, tip[2])
     except CosmicError as exc:
         return NotSeen(str(exc))
     wanted = expected(tool, mapped, tip[:2], positions, REACH_PX)
     if wanted is None:
-        return NotSeen("it is too small on the picture; zoom in")
+        return NotSeen("it is too small in the image: zoom in")
     if not tool.gap_axis:
         return find_probe(grey(picture.data), wanted)
     gap_px = (work.gap_um or 0.0) / mapped.scale_um_px

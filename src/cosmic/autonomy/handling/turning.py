@@ -6,13 +6,13 @@ from typing import Final
 import numpy as np
 from typing_extensions import override
 
-from cosmic.autonomy.calibrating.book import CalibrationEntry
 from cosmic.autonomy.calibrating.calibrated import Calibrated
+from cosmic.autonomy.calibrating.registry import CalibrationEntry
+from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.plate import Candidate, PlateFrame
 from cosmic.autonomy.handling.prepare import TABLE, clear_picture
 from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen
-from cosmic.autonomy.handling.work import FibreWork
-from cosmic.autonomy.procedures.operation import OperationFailed, Steps, Wish
+from cosmic.autonomy.procedures.operation import OperationFailed, Steps, Yielded
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.core.calibration_fit import CalibrationRefused, RotationFit, fit_rotation
 from cosmic.vico.core.picture import Picture
@@ -32,7 +32,7 @@ class FindRotationCentre(Calibrated):
     key = TABLE
 
     @override
-    def measure(self, work: FibreWork) -> Steps:
+    def measure(self, work: HandlingContext) -> Steps:
         settings = work.settings.calibration
         if not settings.rotation_centre:
             x, y = work.calibration.frame.centre_um
@@ -41,11 +41,11 @@ class FindRotationCentre(Calibrated):
                 work, 0.0, "um", settings.rotation_std_um, values=values, how="taken as it is"
             )
             return
-        if not work.candidates:
-            raise OperationFailed("no fibre", "no clear fibre lies on the plate to be followed")
+        if not work.shared.candidates:
+            raise OperationFailed("no fibre", "no fibre on the plate is clear enough to follow")
         yield from clear_picture(work)
         begun = work.table_deg
-        nearest = sorted(work.candidates, key=lambda each: float(np.hypot(*each.place_um)))
+        nearest = sorted(work.shared.candidates, key=lambda each: float(np.hypot(*each.place_um)))
         why = ""
         for candidate in nearest[:MOST_FIBRES]:
             try:
@@ -62,14 +62,14 @@ class FindRotationCentre(Calibrated):
         raise NotAvailable(why)
 
     @override
-    def restore(self, work: FibreWork, entry: CalibrationEntry) -> None:
+    def restore(self, work: HandlingContext, entry: CalibrationEntry) -> None:
         centre_um = entry.values["centre_x_um"], entry.values["centre_y_um"]
         _put_in_force(work, PlateFrame(centre_um))
 
 
 def _followed(
-    work: FibreWork, candidate: Candidate, begun_deg: float
-) -> Generator[Wish, object, RotationFit]:
+    work: HandlingContext, candidate: Candidate, begun_deg: float
+) -> Generator[Yielded, object, RotationFit]:
     angles: list[float] = []
     places: list[Floats] = []
     for away in AWAY_DEG:
@@ -80,14 +80,14 @@ def _followed(
         wanted = work.calibration.frame.on_platform(candidate.line_um, angle)
         seen = _nearest(work, picture, wanted, candidate.length_um)
         if seen is None:
-            raise NotAvailable(f"the fibre was not followed to {angle:.0f} degrees")
+            raise NotAvailable(f"the fibre was lost at {angle:.0f} degrees")
         angles.append(angle)
         places.append(_in_order(seen.line_um, wanted))
     return best_circle(angles, places)
 
 
 def _nearest(
-    work: FibreWork, picture: Picture, wanted: Floats, length_um: float
+    work: HandlingContext, picture: Picture, wanted: Floats, length_um: float
 ) -> SeenFibre | None:
     mapped = work.mapped(picture)
     box = box_around(mapped.to_px(wanted), MARGIN_UM / mapped.scale_um_px, picture)
@@ -122,7 +122,7 @@ def best_circle(angles_deg: list[float], places: list[Floats]) -> RotationFit:
         None of them is good enough.
     """
     fits: list[RotationFit] = []
-    refusal = CalibrationRefused("rotation centre: nothing was followed")
+    refusal = CalibrationRefused("rotation centre: no fibre was followed")
     for index in range(3):
         way = [(float(each[index][0]), float(each[index][1])) for each in places]
         try:
@@ -134,15 +134,15 @@ def best_circle(angles_deg: list[float], places: list[Floats]) -> RotationFit:
     return min(fits, key=lambda each: each.std_um)
 
 
-def _put_in_force(work: FibreWork, frame: PlateFrame) -> None:
+def _put_in_force(work: HandlingContext, frame: PlateFrame) -> None:
     """Take a new centre; what was seen on the plate before lies a little elsewhere in its frame."""
     # Seen at the angle of the survey, places were right on the platform, whatever the centre.
-    old, angle = work.calibration.frame, work.survey_deg
+    old, angle = work.calibration.frame, work.shared.survey_deg
 
     def again(line: Floats) -> Floats:
         return frame.on_plate(old.on_platform(line, angle), angle)
 
     work.calibration.frame = frame
-    work.lines_um = [again(each) for each in work.lines_um]
-    work.candidates = [each.moved(again(each.line_um)) for each in work.candidates]
-    work.given_up = [each.moved(again(each.line_um)) for each in work.given_up]
+    work.shared.lines_um = [again(each) for each in work.shared.lines_um]
+    work.shared.candidates = [each.moved(again(each.line_um)) for each in work.shared.candidates]
+    work.shared.skipped = [each.moved(again(each.line_um)) for each in work.shared.skipped]

@@ -1,6 +1,7 @@
-"""Putting operations together: in order, again, instead, under a condition, and side by side."""
+"""Putting operations together: in order, again, instead, guarded, side by side, and sharing."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
+from itertools import pairwise
 from typing import Final, TypeVar
 
 from typing_extensions import override
@@ -10,9 +11,18 @@ from cosmic.autonomy.procedures.failures import (
     UndoFailed,
     failure_of,
 )
-from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed
-from cosmic.autonomy.procedures.pending import ForAny, Pending, Watch, Watched
-from cosmic.autonomy.procedures.walk import Branch, Course, Node, Part, Place, Walk, perform
+from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, UnitOperation
+from cosmic.autonomy.procedures.procedure import (
+    Branch,
+    ExecutionContext,
+    Node,
+    NodeSteps,
+    Part,
+    Place,
+    perform,
+)
+from cosmic.autonomy.procedures.tree import OPERATION, NodeState, Outline
+from cosmic.autonomy.procedures.waits import ForAny, ForTurn, Pending, Resource, Watch, Watched
 from cosmic.frame.errors import CosmicError
 
 W = TypeVar("W")
@@ -30,7 +40,7 @@ class Sequence(Node[W]):
     kind = "sequence"
 
     @override
-    def steps(self, place: Place[W]) -> Course:
+    def steps(self, place: Place[W]) -> NodeSteps:
         for number, part in enumerate(self.parts):
             yield from perform(part, place.child(number))
 
@@ -73,17 +83,17 @@ class Retry(Node[W]):
         self.only: Final = None if only is None else frozenset(only)
 
     @override
-    def steps(self, place: Place[W]) -> Course:
-        walk = place.walk
+    def steps(self, place: Place[W]) -> NodeSteps:
+        context = place.context
         for attempt in range(1, self.times + 1):
-            mark = len(walk.begun)
+            mark = len(context.begun)
             try:
                 yield from perform(self.parts[0], place.child(0, attempt=attempt))
                 return
             except OperationFailed as exc:
                 if attempt == self.times or not self._worth_another(exc):
                     raise
-            yield from walk.undo_back(mark)
+            yield from context.undo_back(mark)
             for between in self.parts[1:]:
                 yield from perform(between, place.child(1, attempt=attempt))
 
@@ -108,10 +118,10 @@ class Fallback(Node[W]):
         super().__init__(name, *parts)
 
     @override
-    def steps(self, place: Place[W]) -> Course:
+    def steps(self, place: Place[W]) -> NodeSteps:
         last = len(self.parts) - 1
         for number, part in enumerate(self.parts):
-            mark = len(place.walk.begun)
+            mark = len(place.context.begun)
             try:
                 yield from perform(part, place.child(number))
                 return
@@ -120,7 +130,7 @@ class Fallback(Node[W]):
             except OperationFailed:
                 if number == last:
                     raise
-            yield from place.walk.undo_failed(mark)
+            yield from place.context.undo_failed(mark)
 
 
 class Guard(Node[W]):
@@ -149,13 +159,13 @@ class Guard(Node[W]):
         self.cause: Final = cause
 
     @override
-    def steps(self, place: Place[W]) -> Course:
-        walk = place.walk
-        mark = len(walk.begun)
-        watch = Watch(lambda: self.condition(walk.work))
+    def steps(self, place: Place[W]) -> NodeSteps:
+        context = place.context
+        mark = len(context.begun)
+        watch = Watch(lambda: self.condition(context.work))
         if watch.broken():
-            raise self._failure(watch, "it was so before the part began")
-        branch = Branch(perform(self.parts[0], place.child(0)), walk.reins)
+            raise self._failure(watch, "it was true before the part started")
+        branch = Branch(perform(self.parts[0], place.child(0)), context.control)
         try:
             while not watch.broken():
                 branch.go()
@@ -165,9 +175,9 @@ class Guard(Node[W]):
         finally:
             left = branch.end()
         yield branch.until_ended(left)
-        failure = self._failure(watch, "it became so on the way")
+        failure = self._failure(watch, "it became true while the part ran")
         if not isinstance(failure, ProcedureStopped):
-            yield from walk.undo_back(mark)
+            yield from context.undo_back(mark)
         raise failure
 
     def _failure(self, watch: Watch, text: str) -> OperationFailed:
@@ -178,7 +188,7 @@ class Guard(Node[W]):
             raise error
         failure = failure_of(error)
         if not isinstance(failure, ProcedureStopped):
-            text = f"whether it is so could not be told: {error}"
+            text = f"the condition could not be evaluated: {error}"
             failure = OperationFailed(self.cause, text)
             failure.__cause__ = error
         return failure
@@ -194,11 +204,11 @@ class Parallel(Node[W]):
     kind = "parallel"
 
     @override
-    def steps(self, place: Place[W]) -> Course:
-        walks = [place.walk.fork() for _ in self.parts]
+    def steps(self, place: Place[W]) -> NodeSteps:
+        contexts = [place.context.fork() for _ in self.parts]
         branches = [
-            Branch(perform(part, place.child(number, walk=walk)), walk.reins)
-            for number, (part, walk) in enumerate(zip(self.parts, walks, strict=True))
+            Branch(perform(part, place.child(number, context=context)), context.control)
+            for number, (part, context) in enumerate(zip(self.parts, contexts, strict=True))
         ]
         failed: int | None = None
         failure: OperationFailed | None = None
@@ -220,21 +230,24 @@ class Parallel(Node[W]):
                 branch.cancel()
             left = [branch.end() for branch in branches]
         if failure is None:
-            for walk in walks:
-                place.walk.begun.extend(walk.begun)
+            for context in contexts:
+                place.context.begun.extend(context.begun)
             return
         yield branches[0].until_ended(*left)
-        yield from self._give_up(place.walk, walks, failed, failure)
+        yield from self._give_up(place.context, contexts, failed, failure)
 
     @staticmethod
     def _give_up(
-        walk: Walk[W], walks: list[Walk[W]], failed: int | None, failure: OperationFailed
-    ) -> Course:
-        for number, each in enumerate(walks):
+        context: ExecutionContext[W],
+        contexts: list[ExecutionContext[W]],
+        failed: int | None,
+        failure: OperationFailed,
+    ) -> NodeSteps:
+        for number, each in enumerate(contexts):
             if number != failed and not isinstance(failure, ProcedureStopped):
                 yield from each.undo_back(0)
         if failed is not None:
-            walk.begun.extend(walks[failed].begun)
+            context.begun.extend(contexts[failed].begun)
         raise failure
 
 
@@ -256,13 +269,128 @@ class Repeat(Node[W]):
         self.until: Final = until
 
     @override
-    def steps(self, place: Place[W]) -> Course:
-        walk = place.walk
+    def steps(self, place: Place[W]) -> NodeSteps:
+        context = place.context
         number = 0
-        while not self.until(walk.work):
+        while not self.until(context.work):
             number += 1
-            mark = len(walk.begun)
-            walk.keeper.reset(place.path)
+            mark = len(context.begun)
+            context.tree.reset(place.path)
             yield SAFE_POINT
             yield from perform(self.parts[0], place.child(0, round_=number))
-            del walk.begun[mark:]
+            del context.begun[mark:]
+
+
+class Holding(Node[W]):
+    """A part that needs things which one branch uses at a time; it waits until it has them.
+
+    They are given back when the part has ended, well or not. What a part around it holds is its
+    own already.
+
+    Parameters
+    ----------
+    needs : callable
+        Of the work: what is needed; asked when the part's turn has come.
+    leaving : Part or None
+        Done before they are given back, even where the part failed, to make room for the next;
+        not after a stop or an abort.
+
+    Raises
+    ------
+    ValueError
+        While it runs: what is needed is not of a higher rank than what is held already.
+    """
+
+    kind = "holding"
+
+    def __init__(
+        self,
+        part: Part[W],
+        needs: Callable[[W], Iterable[Resource]],
+        *,
+        leaving: Part[W] | None = None,
+        name: str,
+    ) -> None:
+        super().__init__(name, *((part,) if leaving is None else (part, leaving)))
+        self.needs: Final = needs
+
+    @override
+    def steps(self, place: Place[W]) -> NodeSteps:
+        context = place.context
+        needed = sorted(self.needs(context.work), key=lambda each: each.rank)
+        wanted = [each for each in needed if each not in context.holds]
+        ranks = [each.rank for each in (*context.holds, *wanted)]
+        if not all(rank < after for rank, after in pairwise(ranks)):
+            raise ValueError(f"{self.name}: {wanted[0].name} must be taken before what is held")
+        mine = context.fork()
+        mine.begun = context.begun
+        token = object()
+        try:
+            for each in wanted:
+                each.ask(token)
+                if not each.held_by(token):
+                    context.tree.change(place.path, NodeState.QUEUED, f"waits for {each.name}")
+                    yield ForTurn(each, token, context.control)
+            if wanted:
+                names = " and ".join(each.name for each in wanted)
+                context.tree.change(place.path, NodeState.HOLDING, f"has {names}")
+            mine.holds = (*context.holds, *wanted)
+            yield from self._held(Place(mine, place.path, place.attempt, place.round))
+        finally:
+            for each in wanted:
+                each.give_back(token)
+
+    def _held(self, place: Place[W]) -> NodeSteps:
+        mark = len(place.context.begun)
+        failure: OperationFailed | None = None
+        try:
+            yield from perform(self.parts[0], place.child(0))
+        except ProcedureStopped:
+            raise
+        except OperationFailed as exc:
+            failure = exc
+            if self.parts[1:]:
+                yield from place.context.undo_failed(mark)
+        try:
+            for leaving in self.parts[1:]:
+                yield from perform(leaving, place.child(1))
+        except OperationFailed as exc:
+            if failure is None or isinstance(exc, ProcedureStopped):
+                raise
+            raise failure from exc
+        if failure is not None:
+            raise failure
+
+
+class Role(Node[W]):
+    """A part that is carried out for one of several that do the same, with a work of its own.
+
+    Parameters
+    ----------
+    name : str
+        Whose part it is, such as "left arm"; all events below it carry it.
+    work_of : callable
+        Of the work of the part above: the one to go on with.
+    """
+
+    kind = "role"
+
+    def __init__(self, name: str, part: Part[W], work_of: Callable[[W], W]) -> None:
+        super().__init__(name, part)
+        self.work_of: Final = work_of
+
+    @override
+    def steps(self, place: Place[W]) -> NodeSteps:
+        context = place.context
+        own = context.fork()
+        own.work, own.begun = self.work_of(context.work), context.begun
+        yield from perform(self.parts[0], place.child(0, context=own))
+
+
+def outline_of(part: Part[W], role: str = "") -> Outline:
+    """Return the shape of the tree under `part`, which is done for `role`."""
+    if isinstance(part, UnitOperation):
+        return Outline(part.name or type(part).__name__, OPERATION, role=role)
+    role = part.name if isinstance(part, Role) else role
+    below = tuple(outline_of(each, role) for each in part.parts)
+    return Outline(part.name, part.kind, below, role)

@@ -31,10 +31,10 @@ class SafePoint:
 
 SAFE_POINT: Final = SafePoint()
 
-Wish = Awaited | float | SafePoint
+Yielded = Awaited | float | SafePoint
 """What an operation yields: something to wait for, seconds of the platform's time, or a rest."""
 
-Steps = Generator[Wish, object, None]
+Steps = Generator[Yielded, object, None]
 """An operation on its way. What `wait` of an `Awaited` returned is sent back into it."""
 
 

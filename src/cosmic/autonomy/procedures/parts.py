@@ -3,9 +3,11 @@
 from cosmic.autonomy.procedures.combinators import (
     Fallback,
     Guard,
+    Holding,
     Parallel,
     Repeat,
     Retry,
+    Role,
     Sequence,
 )
 from cosmic.autonomy.procedures.operation import (
@@ -15,9 +17,8 @@ from cosmic.autonomy.procedures.operation import (
     UnitOperation,
 )
 from cosmic.autonomy.procedures.procedure import Procedure
-from cosmic.autonomy.procedures.resources import Resource
-from cosmic.autonomy.procedures.sharing import Holding, Role
 from cosmic.autonomy.procedures.tree import NodeEvent, NodeState
+from cosmic.autonomy.procedures.waits import Resource
 
 __all__ = [
     "SAFE_POINT",

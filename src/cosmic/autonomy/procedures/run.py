@@ -3,25 +3,78 @@
 import logging
 import threading
 from collections.abc import Callable
+from enum import StrEnum
 from typing import Generic, TypeVar
 
 from typing_extensions import override
 
-from cosmic.autonomy.procedures.conduct import Conductor
+from cosmic.autonomy.procedures.combinators import outline_of
+from cosmic.autonomy.procedures.executor import Executor
 from cosmic.autonomy.procedures.failures import ProcedureAborted, ProcedureStopped, defect_of
-from cosmic.autonomy.procedures.procedure import Procedure, outline_of
-from cosmic.autonomy.procedures.reins import Reins
-from cosmic.autonomy.procedures.run_state import OVER, RunState
-from cosmic.autonomy.procedures.run_thread import RunThread
+from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.times import OperationTimes
-from cosmic.autonomy.procedures.tree import NodeEvent, NodeView, TreeKeeper
+from cosmic.autonomy.procedures.tree import NodeEvent, NodeView, ProcedureTreeState
+from cosmic.autonomy.procedures.waits import RunControl
 from cosmic.frame.clock import Clock
-from cosmic.frame.errors import CosmicError, DeviceTimeout, NotAvailable, WrongThreadError
+from cosmic.frame.errors import CosmicError, NotAvailable, WrongThreadError
+from cosmic.frame.events import Event, Unsubscribe
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.listeners import tell
-from cosmic.frame.threads import forbid_waiting_here
+from cosmic.frame.operation import Operation
+from cosmic.frame.threads import WorkerThread, forbid_waiting_here
 
 logger = logging.getLogger(__name__)
+
+
+class RunState(StrEnum):
+    """What a run is at; the value is the word."""
+
+    READY = "ready"
+    RUNNING = "running"
+    PAUSING = "pausing"
+    PAUSED = "paused"
+    ABORTING = "aborting"
+    DONE = "done"
+    FAILED = "failed"
+    ABORTED = "aborted"
+
+
+OVER = frozenset({RunState.DONE, RunState.FAILED, RunState.ABORTED})
+
+
+_kept: list[WorkerThread] = []
+
+
+def _keep(thread: WorkerThread) -> None:
+    """Hold on to it until it has ended: Qt aborts the process over one let go before."""
+    _kept[:] = [*(each for each in _kept if not each.isFinished()), thread]
+
+
+class RunThread(WorkerThread):
+    """The thread of one run."""
+
+    def __init__(
+        self,
+        carry_out: Callable[[], None],
+        abort: Callable[[str], None],
+        name: str,
+        policy: FailurePolicy,
+    ) -> None:
+        super().__init__(f"procedure {name}", policy)
+        self._carry_out: Callable[[], None] | None = carry_out
+        self._abort = abort
+        _keep(self)
+
+    @override
+    def run_body(self) -> None:
+        carry_out, self._carry_out = self._carry_out, None
+        if carry_out is not None:
+            carry_out()
+
+    @override
+    def request_end(self) -> None:
+        self._abort("the program is closing")
+        super().request_end()
+
 
 W = TypeVar("W")
 
@@ -56,17 +109,16 @@ class ProcedureRun(Generic[W]):
         self.work = work
         self.times = OperationTimes()
         self._policy = policy
-        self._keeper = TreeKeeper(outline_of(procedure.root), clock)
-        self._keeper.subscribe(self._on_event)
-        self._reins = Reins(clock)
-        self._conductor = Conductor(
-            procedure, work, self._keeper, self._reins, self._on_rest, stopped
+        self._tree = ProcedureTreeState(outline_of(procedure.root), clock)
+        self._tree.subscribe(self._on_event)
+        self._control = RunControl(clock)
+        self._executor = Executor(
+            procedure, work, self._tree, self._control, self._on_rest, stopped
         )
         self._lock = threading.RLock()
         self._state = RunState.READY
-        self._failure: Exception | None = None
-        self._over = threading.Event()
-        self._listeners: tuple[Callable[[], object], ...] = ()
+        self._ended = Operation[None](procedure.name)
+        self._change: Event[[]] = Event()
         self._thread: RunThread | None = None
         self._ident: int | None = None
 
@@ -89,37 +141,30 @@ class ProcedureRun(Generic[W]):
     @property
     def over(self) -> bool:
         """True when it has ended, well or not."""
-        return self._over.is_set()
+        return self._ended.done
 
     @property
     def failure(self) -> Exception | None:
         """What it failed with; None while it runs, and when it ended well."""
-        return self._failure
+        return self._ended.failure
 
     @property
     def not_safe(self) -> str:
         """Why things could not be made safe at the end; empty when they were, or need not be."""
-        return self._conductor.not_safe
+        return self._executor.not_safe
 
     @property
     def tree(self) -> NodeView:
         """What each part is at now."""
-        return self._keeper.snapshot()
+        return self._tree.snapshot()
 
     def subscribe(self, listener: Callable[[NodeEvent], object]) -> Callable[[], None]:
         """Call `listener(event)` at each change of a part, in order, in the run's thread."""
-        return self._keeper.subscribe(listener)
+        return self._tree.subscribe(listener)
 
-    def on_change(self, listener: Callable[[], object]) -> Callable[[], None]:
+    def on_change(self, listener: Callable[[], object]) -> Unsubscribe:
         """Call `listener()` when anything changed, in any thread; returns what ends it."""
-        with self._lock:
-            self._listeners = (*self._listeners, listener)
-
-        def remove() -> None:
-            with self._lock:
-                self._listeners = tuple(each for each in self._listeners if each != listener)
-
-        return remove
+        return self._change.subscribe(listener)
 
     # What can be asked of it
 
@@ -150,15 +195,14 @@ class ProcedureRun(Generic[W]):
         forbid_waiting_here(f"running {self.name!r}")
         self._begin()
         self._carry_out()
-        if self._failure is not None:
-            raise self._failure
+        self._ended.wait()
 
     def pause(self) -> None:
         """Rest at the next place where that is safe; harmless when it does not run."""
         with self._lock:
             if self._state not in (RunState.RUNNING, RunState.PAUSING):
                 return
-            self._reins.pausing = True
+            self._control.pausing = True
             self._state = RunState.PAUSING
         self._changed()
 
@@ -167,8 +211,8 @@ class ProcedureRun(Generic[W]):
         with self._lock:
             if self._state not in (RunState.PAUSED, RunState.PAUSING):
                 return
-            self._reins.pausing = self._reins.stepping = False
-            self._reins.turn += 1
+            self._control.pausing = self._control.stepping = False
+            self._control.turn += 1
             self._state = RunState.RUNNING
         self._changed()
 
@@ -182,10 +226,10 @@ class ProcedureRun(Generic[W]):
         """
         with self._lock:
             if self._state in OVER or self._state is RunState.ABORTING:
-                raise NotAvailable(f"{self.name} is over; begin a new run")
+                raise NotAvailable(f"{self.name} has ended: make a new run")
             begin = self._state is RunState.READY
-            self._reins.pausing, self._reins.stepping = False, True
-            self._reins.turn += 1
+            self._control.pausing, self._control.stepping = False, True
+            self._control.turn += 1
             if not begin:
                 self._state = RunState.PAUSING
         if begin:
@@ -201,9 +245,9 @@ class ProcedureRun(Generic[W]):
         with self._lock:
             if self._state in OVER:
                 return
-            self._reins.aborts += 1
-            if self._reins.abort_reason is None:
-                self._reins.abort_reason = reason
+            self._control.aborts += 1
+            if self._control.abort_reason is None:
+                self._control.abort_reason = reason
             begun = self._state is not RunState.READY
             self._state = RunState.ABORTING if begun else RunState.ABORTED
         if begun:
@@ -223,15 +267,11 @@ class ProcedureRun(Generic[W]):
         WrongThreadError
             Called in the GUI thread, or in the run's own.
         """
-        if not self.over:
-            forbid_waiting_here(f"waiting for {self.name!r}")
-            if threading.get_ident() == self._ident:
-                raise WrongThreadError(f"{self.name} cannot wait for itself")
-        if not self._over.wait(timeout_s):
-            raise DeviceTimeout(f"{self.name} had not ended after {timeout_s:g} s")
+        if not self.over and threading.get_ident() == self._ident:
+            raise WrongThreadError(f"{self.name} cannot wait for itself")
+        self._ended.exception(timeout_s)
         self.join()
-        if self._failure is not None:
-            raise self._failure
+        self._ended.wait()
 
     def join(self) -> None:
         """Wait until its thread is gone; for whoever closes the platform, after `abort`."""
@@ -243,16 +283,16 @@ class ProcedureRun(Generic[W]):
     def _begin(self) -> None:
         with self._lock:
             if self._state is not RunState.READY:
-                raise NotAvailable(f"{self.name} was begun already; make a new run of it")
-            self._state = RunState.PAUSING if self._reins.stepping else RunState.RUNNING
+                raise NotAvailable(f"{self.name} has already started: make a new run")
+            self._state = RunState.PAUSING if self._control.stepping else RunState.RUNNING
         logger.info("%s begins", self.name)
         self._changed()
 
     def _carry_out(self) -> None:
         self._ident = threading.get_ident()
         try:
-            with self._reins.held():
-                self._conductor.carry_out()
+            with self._control.carrying_out():
+                self._executor.carry_out()
         except ProcedureAborted as exc:
             self._end(RunState.ABORTED, exc)
         except CosmicError as exc:
@@ -267,32 +307,35 @@ class ProcedureRun(Generic[W]):
             self._end(RunState.DONE, None)
 
     def _end(self, state: RunState, failure: Exception | None) -> None:
-        with self._lock:
-            self._state, self._failure = state, failure
         if failure is None:
             logger.info("%s finished", self.name)
         else:
             meant = state is RunState.ABORTED or isinstance(failure, ProcedureStopped)
             told = logger.warning if meant else logger.error
             told("%s %s: %s", self.name, state, failure)
-        self._over.set()
+        with self._lock:
+            self._state = state
+            if failure is None:
+                self._ended.finish(None)
+            else:
+                self._ended.fail(failure)
         self._changed()
 
     def _on_event(self, event: NodeEvent) -> None:
         self.times.note(event)
-        tell(self._listeners)
+        self._change.emit()
 
     def _on_rest(self, *, resting: bool) -> None:
         with self._lock:
             if self._state is RunState.ABORTING:
                 return
-            reins = self._reins
-            if not (reins.pausing or reins.stepping):
+            control = self._control
+            if not (control.pausing or control.stepping):
                 self._state = RunState.RUNNING
             else:
                 self._state = RunState.PAUSED if resting else RunState.PAUSING
-        tell(self._listeners)
+        self._change.emit()
 
     def _changed(self) -> None:
-        self._reins.ring()
-        tell(self._listeners)
+        self._control.wake()
+        self._change.emit()

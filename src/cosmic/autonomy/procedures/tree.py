@@ -7,7 +7,7 @@ from threading import Lock
 
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.frame.clock import Clock
-from cosmic.frame.listeners import tell
+from cosmic.frame.events import Event, Unsubscribe
 
 Path = tuple[int, ...]
 """Where a part stands in the tree: the number of the child at each level; the root is ()."""
@@ -140,7 +140,7 @@ class Outline:
     role: str = ""
 
 
-class TreeKeeper:
+class ProcedureTreeState:
     """Knows what each part is at, and tells of every change, in order.
 
     One thread writes; any thread reads.
@@ -154,7 +154,7 @@ class TreeKeeper:
         self._rested_before: dict[Path, float] = {}
         self._rested_s = 0.0
         self._resting_since_s: float | None = None
-        self._listeners: tuple[Callable[[NodeEvent], object], ...] = ()
+        self._changed: Event[NodeEvent] = Event()
         self._lay_out(outline, ())
 
     def _lay_out(self, outline: Outline, path: Path) -> None:
@@ -164,21 +164,14 @@ class TreeKeeper:
         for number, child in enumerate(outline.children):
             self._lay_out(child, (*path, number))
 
-    def subscribe(self, listener: Callable[[NodeEvent], object]) -> Callable[[], None]:
+    def subscribe(self, listener: Callable[[NodeEvent], object]) -> Unsubscribe:
         """Call `listener(event)` at each change, in the thread that makes it.
 
         Returns the function that ends it.
         """
-        with self._lock:
-            self._listeners = (*self._listeners, listener)
+        return self._changed.subscribe(listener)
 
-        def remove() -> None:
-            with self._lock:
-                self._listeners = tuple(each for each in self._listeners if each != listener)
-
-        return remove
-
-    # What the walk through the tree tells
+    # What the run reports
 
     def begin(self, path: Path, attempt: int, round_: int) -> None:
         """Say that a part begins."""
@@ -245,8 +238,7 @@ class TreeKeeper:
     def _put(self, event: NodeEvent) -> None:
         with self._lock:
             self._events[event.path] = event
-            listeners = self._listeners
-        tell(listeners, event)
+        self._changed.emit(event)
 
     # Reading
 

@@ -1,11 +1,19 @@
-"""The bend test: a fibre is taken up, pushed as a cantilever at several spans, and put away."""
+"""The bend test: take a fibre up, push it as a cantilever at several spans, put it away.
 
-from cosmic.autonomy.handling.force_ready import SeeForce
+The transport goes the same way and measures nothing.
+"""
+
+from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.grasp import MISSED, Carry, TestGrasp
-from cosmic.autonomy.handling.initialise import InitialiseAgain
-from cosmic.autonomy.handling.one_span import NO_CONTACT
-from cosmic.autonomy.handling.prepare import MakeReady
-from cosmic.autonomy.handling.push import NOT_TRUSTED, FitSpans, PushSpans, StepBack
+from cosmic.autonomy.handling.prepare import InitialiseAgain, MakeReady, make_safe
+from cosmic.autonomy.handling.push import (
+    NO_CONTACT,
+    NOT_TRUSTED,
+    FitSpans,
+    PushSpans,
+    SeeForce,
+    StepBack,
+)
 from cosmic.autonomy.handling.put_away import (
     ADHESION,
     ClearUp,
@@ -25,21 +33,18 @@ from cosmic.autonomy.handling.reach import (
     Shift,
     Turn,
 )
-from cosmic.autonomy.handling.safe import make_safe
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.survey import LOOK_AGAIN, Choose, Survey
 from cosmic.autonomy.handling.turning import FindRotationCentre
-from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.combinators import Fallback, Retry, Sequence
-from cosmic.autonomy.procedures.procedure import Procedure
-from cosmic.autonomy.procedures.walk import Part
+from cosmic.autonomy.procedures.procedure import Part, Procedure
 from cosmic.autonomy.shipped.calibrate import calibrated
 
 RELEASES = 4
 PUSHES = 3
 
 
-def build_bend_test(settings: HandlingSettings | None = None) -> Procedure[FibreWork]:
+def build_bend_test(settings: HandlingSettings | None = None) -> Procedure[HandlingContext]:
     """Return the procedure for one fibre; run it again for the next, on the same work."""
     settings = settings or HandlingSettings()
     return Procedure(
@@ -49,7 +54,9 @@ def build_bend_test(settings: HandlingSettings | None = None) -> Procedure[Fibre
     )
 
 
-def beginning(settings: HandlingSettings, *more: Part[FibreWork]) -> tuple[Part[FibreWork], ...]:
+def beginning(
+    settings: HandlingSettings, *more: Part[HandlingContext]
+) -> tuple[Part[HandlingContext], ...]:
     """Return what comes before a fibre, `more` included; little of it where all is fresh."""
     return (
         Sequence(
@@ -62,11 +69,11 @@ def beginning(settings: HandlingSettings, *more: Part[FibreWork]) -> tuple[Part[
             FindRotationCentre(),
             *more,
         ),
-        Retry(Sequence[FibreWork]("choose", Survey(), Choose()), 2, only={LOOK_AGAIN}),
+        Retry(Sequence[HandlingContext]("choose", Survey(), Choose()), 2, only={LOOK_AGAIN}),
     )
 
 
-def one_fibre(settings: HandlingSettings, treated: Part[FibreWork]) -> Part[FibreWork]:
+def one_fibre(settings: HandlingSettings, treated: Part[HandlingContext]) -> Part[HandlingContext]:
     """Return the way of one fibre from the plate by `treated` to the bin, whatever happens."""
     return Fallback(
         "one fibre",
@@ -75,27 +82,40 @@ def one_fibre(settings: HandlingSettings, treated: Part[FibreWork]) -> Part[Fibr
     )
 
 
-def measured() -> Part[FibreWork]:
+def measured() -> Part[HandlingContext]:
     """Return the measurement of a fibre that is held before the probe."""
     return Retry(
-        Sequence[FibreWork]("measure", PushSpans(), FitSpans()),
+        Sequence[HandlingContext]("measure", PushSpans(), FitSpans()),
         PUSHES,
         only={NO_CONTACT, NOT_TRUSTED},
         between=StepBack(),
     )
 
 
-def grasped(settings: HandlingSettings) -> Part[FibreWork]:
+def grasped(settings: HandlingSettings) -> Part[HandlingContext]:
     """Return the grasp of a fibre that the table has turned into place."""
     return Retry(
-        Sequence[FibreWork]("grasp", FindAgain(), Approach(), Refine(), CloseJaws(), TestGrasp()),
+        Sequence[HandlingContext](
+            "grasp", FindAgain(), Approach(), Refine(), CloseJaws(), TestGrasp()
+        ),
         settings.grasp.tries,
         only={MISSED, TIP_NOT_SEEN},
         between=Shift(),
     )
 
 
-def put_away() -> Part[FibreWork]:
+def put_away() -> Part[HandlingContext]:
     """Return the way to the bin, with the jaws seen to be empty at the end."""
     released = Retry(Release(), RELEASES, only={ADHESION}, between=Wipe())
     return Sequence("put away", ToBin(), released)
+
+
+def build_transport(settings: HandlingSettings | None = None) -> Procedure[HandlingContext]:
+    """Return the procedure for one fibre; run it again for the next, on the same work."""
+    settings = settings or HandlingSettings()
+    nothing = Sequence[HandlingContext]("nothing is measured")
+    return Procedure(
+        "transport",
+        Sequence("transport", *beginning(settings), one_fibre(settings, nothing)),
+        make_safe=make_safe,
+    )

@@ -5,28 +5,26 @@ from cosmic.autonomy.calibrating.drift import CheckDrift
 from cosmic.autonomy.calibrating.heights import HeightByFocus, HeightsAsFiled
 from cosmic.autonomy.calibrating.touching import TouchJaw
 from cosmic.autonomy.calibrating.zooms import CalibrateZooms
-from cosmic.autonomy.handling.initialise import InitialiseAgain
-from cosmic.autonomy.handling.operation import FibreOperation
+from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.prepare import (
     CalibrateHeld,
     CalibratePlate,
     ComparePlaces,
+    InitialiseAgain,
     MakeReady,
     TurnOn,
+    make_safe,
 )
 from cosmic.autonomy.handling.put_away import ClearUp
-from cosmic.autonomy.handling.safe import make_safe
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.survey import Survey
 from cosmic.autonomy.handling.turning import FindRotationCentre
-from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.combinators import Fallback, Retry, Sequence
-from cosmic.autonomy.procedures.procedure import Procedure
-from cosmic.autonomy.procedures.walk import Part
+from cosmic.autonomy.procedures.procedure import Part, Procedure
 
 
-def calibrated(settings: HandlingSettings) -> tuple[Part[FibreWork], ...]:
-    """Return what is calibrated of a hand before it sees any fibre; nothing where all is fresh."""
+def calibrated(settings: HandlingSettings) -> tuple[Part[HandlingContext], ...]:
+    """Return what is calibrated of an arm before it sees any fibre; nothing where all is fresh."""
     chosen = settings.calibration
     heights = Fallback("heights", HeightByFocus(), HeightsAsFiled())
     return (
@@ -39,7 +37,7 @@ def calibrated(settings: HandlingSettings) -> tuple[Part[FibreWork], ...]:
 
 def build_calibrate(
     settings: HandlingSettings | None = None, *, zooms: bool = True
-) -> Procedure[FibreWork]:
+) -> Procedure[HandlingContext]:
     """Return the procedure that calibrates everything that is not fresh.
 
     Parameters
@@ -68,6 +66,6 @@ def build_calibrate(
     return Procedure("calibrate", root, make_safe=make_safe)
 
 
-def _tried(settings: HandlingSettings, part: FibreOperation) -> Part[FibreWork]:
+def _tried(settings: HandlingSettings, part: FibreOperation) -> Part[HandlingContext]:
     """Return an operation tried several times: what lies below may hide a tool."""
     return Retry(part, settings.calibration.tries, only={POOR}, between=TurnOn())

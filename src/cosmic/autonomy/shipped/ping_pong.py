@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from cosmic.autonomy.handling.force_ready import SeeForce
-from cosmic.autonomy.handling.in_turn import (
+from cosmic.autonomy.handling.context import HandlingContext
+from cosmic.autonomy.handling.dual_gripper import (
     CarryInTurn,
     ChooseInTurn,
     ClearAway,
@@ -17,11 +17,12 @@ from cosmic.autonomy.handling.in_turn import (
     hidden,
     over,
 )
-from cosmic.autonomy.handling.initialise import InitialiseAgain
 from cosmic.autonomy.handling.prepare import (
+    InitialiseAgain,
     MakeReady,
+    make_safe,
 )
-from cosmic.autonomy.handling.push import Retract
+from cosmic.autonomy.handling.push import Retract, SeeForce
 from cosmic.autonomy.handling.put_away import (
     ADHESION,
     ClearUp,
@@ -32,30 +33,34 @@ from cosmic.autonomy.handling.put_away import (
     ToBin,
 )
 from cosmic.autonomy.handling.reach import Turn
-from cosmic.autonomy.handling.safe import make_safe
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.survey import Survey
 from cosmic.autonomy.handling.turning import FindRotationCentre
-from cosmic.autonomy.handling.work import FibreWork
-from cosmic.autonomy.procedures.combinators import Fallback, Parallel, Repeat, Retry, Sequence
-from cosmic.autonomy.procedures.procedure import Procedure
-from cosmic.autonomy.procedures.resources import Resource
-from cosmic.autonomy.procedures.sharing import Holding, Role
-from cosmic.autonomy.procedures.walk import Part
+from cosmic.autonomy.procedures.combinators import (
+    Fallback,
+    Holding,
+    Parallel,
+    Repeat,
+    Retry,
+    Role,
+    Sequence,
+)
+from cosmic.autonomy.procedures.procedure import Part, Procedure
+from cosmic.autonomy.procedures.waits import Resource
 from cosmic.autonomy.shipped.bend_test import RELEASES, grasped, measured
 from cosmic.autonomy.shipped.calibrate import calibrated
 
-HANDS = ("left", "right")
+ARMS = ("left", "right")
 
 
-def build_ping_pong(settings: HandlingSettings | None = None) -> Procedure[FibreWork]:
-    """Return the procedure for all fibres of a sample, until the bench says that it is enough."""
+def build_ping_pong(settings: HandlingSettings | None = None) -> Procedure[HandlingContext]:
+    """Return the procedure for all fibres of a sample, until enough are done."""
     settings = settings or HandlingSettings()
     one_round = Sequence(
         "round",
         *_each(ClearAway()),
-        _as(HANDS[0], Survey()),
-        Parallel("both hands", *(_as(name, _fibres(settings)) for name in HANDS)),
+        _as(ARMS[0], Survey()),
+        Parallel("both arms", *(_as(name, _fibres(settings)) for name in ARMS)),
         EndRound(),
     )
     return Procedure(
@@ -63,31 +68,31 @@ def build_ping_pong(settings: HandlingSettings | None = None) -> Procedure[Fibre
         Sequence(
             "bend test with two hands",
             prepare(settings),
-            Repeat(one_round, lambda work: work.bench.enough(), name="until none is left"),
+            Repeat(one_round, lambda work: work.shared.enough(), name="until none is left"),
         ),
         make_safe=make_safe,
     )
 
 
-def _as(name: str, part: Part[FibreWork]) -> Role[FibreWork]:
-    return Role(name, part, _hand(name))
+def _as(name: str, part: Part[HandlingContext]) -> Role[HandlingContext]:
+    return Role(name, part, _arm(name))
 
 
-def _each(part: Part[FibreWork]) -> tuple[Role[FibreWork], ...]:
-    return tuple(_as(name, part) for name in HANDS)
+def _each(part: Part[HandlingContext]) -> tuple[Role[HandlingContext], ...]:
+    return tuple(_as(name, part) for name in ARMS)
 
 
-def _hand(name: str) -> Callable[[FibreWork], FibreWork]:
-    def hand(work: FibreWork) -> FibreWork:
-        hands = {each: work.hand(each) for each in HANDS}
-        return hands[name]
+def _arm(name: str) -> Callable[[HandlingContext], HandlingContext]:
+    def arm(work: HandlingContext) -> HandlingContext:
+        arms = {each: work.arm(each) for each in ARMS}
+        return arms[name]
 
-    return hand
+    return arm
 
 
-def prepare(settings: HandlingSettings) -> Part[FibreWork]:
-    """Return what comes before the fibres; each hand has calibrations of its own."""
-    first, second = HANDS
+def prepare(settings: HandlingSettings) -> Part[HandlingContext]:
+    """Return what comes before the fibres; each arm has calibrations of its own."""
+    first, second = ARMS
     return Sequence(
         "prepare",
         InitialiseAgain(),
@@ -101,14 +106,16 @@ def prepare(settings: HandlingSettings) -> Part[FibreWork]:
     )
 
 
-def _fibres(settings: HandlingSettings) -> Part[FibreWork]:
-    """Return what one hand does until the round is over."""
+def _fibres(settings: HandlingSettings) -> Part[HandlingContext]:
+    """Return what one arm does until the round is over."""
     fetched = Holding(
         Sequence(
             "fetch",
             ChooseInTurn(),
             Holding(
-                Sequence[FibreWork]("take up", Turn(), grasped(settings)), _view, name="see it"
+                Sequence[HandlingContext]("take up", Turn(), grasped(settings)),
+                _view,
+                name="see it",
             ),
         ),
         _plate,
@@ -116,7 +123,7 @@ def _fibres(settings: HandlingSettings) -> Part[FibreWork]:
         name="at the plate",
     )
     bent = Holding(
-        Sequence[FibreWork]("measure", CarryInTurn(), measured()),
+        Sequence[HandlingContext]("measure", CarryInTurn(), measured()),
         _probe,
         leaving=Withdraw(),
         name="at the probe",
@@ -130,19 +137,19 @@ def _fibres(settings: HandlingSettings) -> Part[FibreWork]:
     return Repeat(one, over, name="fibre after fibre")
 
 
-def _put_away() -> Part[FibreWork]:
+def _put_away() -> Part[HandlingContext]:
     wiped = Holding(WipeInTurn(), _plate, name="at the bin")
     return Sequence("put away", ToBin(), Retry(Release(), RELEASES, only={ADHESION}, between=wiped))
 
 
-def _plate(work: FibreWork) -> tuple[Resource, ...]:
-    return (work.bench.plate,)
+def _plate(work: HandlingContext) -> tuple[Resource, ...]:
+    return (work.shared.plate,)
 
 
-def _probe(work: FibreWork) -> tuple[Resource, ...]:
-    return (work.bench.probe,)
+def _probe(work: HandlingContext) -> tuple[Resource, ...]:
+    return (work.shared.probe,)
 
 
-def _view(work: FibreWork) -> tuple[Resource, ...]:
+def _view(work: HandlingContext) -> tuple[Resource, ...]:
     """Return the place before the probe where whoever is there would hide the fibre."""
-    return (work.bench.probe,) if hidden(work, work.in_hand().reach) else ()
+    return (work.shared.probe,) if hidden(work, work.held_fibre().reach) else ()

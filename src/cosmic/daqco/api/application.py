@@ -10,13 +10,11 @@ from typing import Final, TypeVar
 from PySide6.QtCore import QObject, Qt
 from typing_extensions import override
 
-from cosmic.daqco.api.errands import Errands, Told, do_and_tell
-from cosmic.daqco.api.files import LocalFiles
 from cosmic.daqco.api.recorder import Recorder
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.guarded import check_arming, check_guarded, successor
 from cosmic.daqco.core.left_behind import OpenRecordings
-from cosmic.daqco.core.limits import Crossing, Limit, LimitGuard
+from cosmic.daqco.core.limits import Limit, LimitGuard
 from cosmic.daqco.core.plan import AcquisitionPlan, make_plan, restarts
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings, ScaleSettings
@@ -25,9 +23,11 @@ from cosmic.daqco.core.udaq_core import UDaqCore
 from cosmic.daqco.hw.interface import Board, BoardInfo, BoardLibrary, OverrunError
 from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import WALL, Clock
+from cosmic.frame.errands import Errands, Told, do_and_tell
 from cosmic.frame.errors import ConfigError, CosmicError, DeviceError, NotAvailable
+from cosmic.frame.events import Event, Unsubscribe
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.frame.task_application import TaskApplication
 from cosmic.frame.threads import WorkerThread
 
@@ -114,7 +114,6 @@ class DaqcoApplication(TaskApplication):
         self.buffer = UDaqBuffer()
         self.guard = LimitGuard(clock)
         self.guard.check = self._check_arming
-        self.files = LocalFiles(self)
         self._policy = policy
         self._settings = settings
         self._lock = RLock()
@@ -123,8 +122,9 @@ class DaqcoApplication(TaskApplication):
         self._core: UDaqCore | None = None
         self._problem = ""
         self._silence = SilenceWatch(self.guard, policy)
-        self._errands = Errands(policy)
+        self._errands = Errands("DAQCo errands", policy)
         self._before_change: tuple[Callable[[DaqcoSettings], None], ...] = ()
+        self._failed: Event[str] = Event()
         self._restarts = RestartBudget()
         self.recorder = Recorder(
             self, policy, software=software, configuration=configuration, notes=notes
@@ -136,11 +136,6 @@ class DaqcoApplication(TaskApplication):
     def settings(self) -> DaqcoSettings:
         """What is in force."""
         return self._settings
-
-    @property
-    def away(self) -> str:
-        """Why the station with the boards cannot be reached: it is here."""
-        return ""
 
     @property
     def directory(self) -> Path:
@@ -408,6 +403,11 @@ class DaqcoApplication(TaskApplication):
     def _fail(self, text: str) -> None:
         self._problem = text
         logger.error("DAQCo: %s", text)
+        self._failed.emit(text)
+
+    def on_failure(self, listener: Callable[[str], object]) -> Unsubscribe:
+        """Call `listener(text)` each time acquisition ends by itself, or cannot begin."""
+        return self._failed.subscribe(listener)
 
     def set_scale(self, channel: str, scale: Scale) -> None:
         """Give a channel a scale of any name; others of that name are replaced by it.
@@ -428,10 +428,6 @@ class DaqcoApplication(TaskApplication):
             for each in settings.channel
         )
         self.apply(settings.model_copy(update={"scale": scales, "channel": channels}))
-
-    def on_crossing(self, listener: Callable[[Crossing], object]) -> None:
-        """Call `listener(crossing)` after each trip, in the thread that saw it."""
-        self.guard.subscribe(lambda crossing: (listener(crossing), None)[1])
 
     def carry_out(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
         """Do `action` and tell how it ended: at once, or in another thread what is `slow`."""

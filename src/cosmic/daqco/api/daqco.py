@@ -1,26 +1,59 @@
-"""The DAQCo part of the scripted API: ``rig.daqco``; windows use it as well."""
+"""The one interface of DAQCo: ``rig.daqco``, its windows, plans and stations use nothing else."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
+from typing import Final, TypeVar
 
 from PySide6.QtCore import Qt
+from typing_extensions import override
 
+from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.channel_shape import ChannelHandle
-from cosmic.daqco.api.ports import DaqcoHost
+from cosmic.daqco.api.files import (
+    EXPORTS,
+    RECORDINGS,
+    NamedFile,
+    RecordingFolders,
+    named_file,
+    recordings_in,
+)
+from cosmic.daqco.api.limit_watch import LimitWatch
 from cosmic.daqco.api.recorder import RecordingState
-from cosmic.daqco.core.chunk import DataChunk
-from cosmic.daqco.core.limits import LOWEST_RATE_HZ, Crossing, Limit
+from cosmic.daqco.core.chunk import DataChunk, missing_samples
+from cosmic.daqco.core.display_pieces import DISPLAY_S, DisplayPieces
+from cosmic.daqco.core.limits import LOWEST_RATE_HZ, Crossing, Limit, LimitGuard
 from cosmic.daqco.core.plan import highest_rate_hz
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, LimitSettings
 from cosmic.daqco.hw.interface import BoardInfo
+from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.arguments import checked_class
-from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
-from cosmic.frame.listeners import tell
-from cosmic.frame.task import Task
+from cosmic.frame.clock import Clock
+from cosmic.frame.declaration import Companion, Declared, command, newest, state, stream
+from cosmic.frame.errands import Told
+from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable, RecordingError
+from cosmic.frame.file_names import NameOption, directory_problem, space_left
+from cosmic.frame.network.application import RemoteApplication
+from cosmic.frame.network.caller import called_from_elsewhere
+from cosmic.frame.network.transport import Rule
+from cosmic.frame.operation import Task
+from cosmic.frame.weakly import weakly
+
+T = TypeVar("T")
+
+SLOW_S: Final = 20.0
+"""Opening boards and closing files may take that long."""
+FOLDER_AGE_S: Final = 2.0
+"""How old what is known of a directory elsewhere may become before it is asked for again."""
+MOST_CROSSINGS: Final = 20
+NOTHING_KNOWN: Final = DaqcoSettings(
+    channel=(ChannelSettings(name="unknown", board="unknown", input="ai0", active=False),)
+)
+"""Stands for settings while a station was never reached."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,34 +77,44 @@ class DaqLimit:
 
 
 @checked_class
-class Daqco:
+class Daqco(Declared):
     """Channels, recordings and limits of the platform; any thread."""
 
-    def __init__(self, application: DaqcoHost) -> None:
+    def __init__(self, application: DaqcoApplication) -> None:
         self._application = application
         self._recorder = application.recorder
-        self._listeners: tuple[Callable[[], object], ...] = ()
+        self._folders = RecordingFolders((application.directory,))
         self._handles: dict[str, ChannelHandle] = {}
-        # At once and by a function that keeps this object: a call that still waits in a queue when
-        # a plain object goes would reach what is no more.
+        self._guard: LimitGuard | LimitWatch = application.guard
+        # At once: a call that still waits in a queue when a plain object goes would reach what is
+        # no more.
         direct = Qt.ConnectionType.DirectConnection
-        application.status_changed.connect(lambda: self._tell(), direct)
-        self._recorder.on_change(self._tell)
-        application.guard.subscribe(self._on_crossing)
+        application.status_changed.connect(weakly(self.note_change), direct)
+        self._recorder.on_change(self.note_change)
+        application.guard.subscribe(lambda _crossing: self.note_change())
+
+    @override
+    def made_companion(self) -> Companion:
+        """Hear of crossings here, where the boards are elsewhere."""
+        watch = LimitWatch(self)
+        self._guard, self._handles = watch, {}
+        return watch
 
     # What is in force
 
     @property
-    def application(self) -> DaqcoHost:
-        """The application behind it."""
+    def application(self) -> DaqcoApplication:
+        """The application behind it, where its boards are here."""
         return self._application
 
     @property
-    def away(self) -> str:
-        """Why the station with the boards cannot be reached; empty while it can, and at home."""
-        return self._application.away
+    @override
+    def clock(self) -> Clock:
+        """The clock by which the samples are dated."""
+        return self._application.clock
 
     @property
+    @state(unknown=NOTHING_KNOWN)
     def settings(self) -> DaqcoSettings:
         """Rate, channels, scales and limits in force."""
         return self._application.settings
@@ -90,14 +133,22 @@ class Daqco:
     @property
     def scales(self) -> dict[str, Scale]:
         """Scale in force of every channel, by its name."""
-        return self._application.scales()
+        settings = self.settings
+        known = settings.scales()
+        return {each.name: known[each.scale] for each in settings.channel}
 
     @property
     def running(self) -> bool:
-        """Samples are being acquired."""
+        """Samples are being acquired, and the station with the boards is there."""
+        return not self.away and self._acquiring
+
+    @property
+    @state
+    def _acquiring(self) -> bool:
         return self._application.running
 
     @property
+    @state(unknown=NOTHING_KNOWN.rate_hz)
     def rate_hz(self) -> float:
         """The rate that the boards really make; that of the settings while nothing runs."""
         return self._application.rate_hz
@@ -105,22 +156,37 @@ class Daqco:
     @property
     def problem(self) -> str:
         """Why acquisition stopped by itself, or cannot run; empty when all is well."""
+        return self.away or self._fault
+
+    @property
+    @state
+    def _fault(self) -> str:
         return self._application.problem
 
     @property
     def counters(self) -> DaqCounters:
         """What has been counted since acquisition began."""
-        state = self._recorder.state
-        buffer = self._application.buffer
-        return DaqCounters(buffer.samples, state.lost + buffer.lost, state.backlog)
+        recording = self.recording
+        return DaqCounters(self._samples, recording.lost + self.missed, recording.backlog)
+
+    @property
+    @state(quiet=True)
+    def _samples(self) -> int:
+        return self._application.buffer.samples
 
     def boards(self) -> Sequence[BoardInfo]:
         """Return the boards there are, as found at the last look for them."""
+        return self._boards
+
+    @property
+    @state
+    def _boards(self) -> tuple[BoardInfo, ...]:
         return tuple(self._application.infos.values())
 
     def highest_rate_hz(self, channels: Sequence[ChannelSettings] | None = None) -> float:
         """Return the highest rate for the active ones of `channels`, or of those in force."""
-        return highest_rate_hz(channels or self.settings.channel, self._application.infos)
+        infos = {each.name: each for each in self._boards}
+        return highest_rate_hz(channels or self.settings.channel, infos)
 
     def __getitem__(self, channel: str) -> ChannelHandle:
         """Return an active channel, for plans; raises `ConfigError` where none is named so."""
@@ -129,7 +195,7 @@ class Daqco:
             raise ConfigError(f"there is no active channel {channel!r}; there are {names}")
         handle = self._handles.get(channel)
         if handle is None:
-            handle = ChannelHandle(self, channel, self._application.clock)
+            handle = ChannelHandle(self, channel, self.clock)
             self._handles[channel] = handle
         return handle
 
@@ -142,6 +208,7 @@ class Daqco:
     # Data
 
     @property
+    @newest("follow")
     def latest_chunk(self) -> DataChunk | None:
         """The newest chunk; None before the first."""
         return self._application.buffer.latest_chunk
@@ -154,11 +221,12 @@ class Daqco:
         NotAvailable
             Nothing has been acquired yet.
         """
-        values = self._application.buffer.get_latest_data()
-        if not values:
+        chunk = self.latest_chunk
+        if chunk is None:
             raise NotAvailable(self.problem or "nothing has been acquired yet")
-        return values
+        return chunk.newest()
 
+    @stream(Rule.ALL, topic="chunks", missing=missing_samples)
     def subscribe(self, receiver: Callable[[DataChunk], object]) -> Callable[[], None]:
         """Call `receiver(chunk)` with every chunk; returns the function that ends it.
 
@@ -166,23 +234,28 @@ class Daqco:
         """
         return self._application.buffer.subscribe(lambda chunk: (receiver(chunk), None)[1])
 
-    def on_change(self, listener: Callable[[], object]) -> Callable[[], None]:
-        """Call `listener()`, in any thread, when anything but samples changed."""
-        self._listeners = (*self._listeners, listener)
+    @stream(Rule.LATEST, topic="display")
+    def follow(self, receiver: Callable[[DataChunk], object]) -> Callable[[], None]:
+        """Call `receiver(chunk)` with the newest samples, for a display, some 20 times a second.
 
-        def forget() -> None:
-            self._listeners = tuple(each for each in self._listeners if each is not listener)
+        From another station some may be passed over.
+        """
+        display_s = DISPLAY_S * max(1.0, self._application.clock.rate)
+        pieces = DisplayPieces(receiver, display_s)
+        return self._application.buffer.subscribe(pieces.take)
 
-        return forget
+    @override
+    def carry_out(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
+        """Do what may have to wait for a line or a disk, without waiting in a window's thread.
 
-    def _tell(self) -> None:
-        tell(self._listeners)
-
-    def _on_crossing(self, _crossing: Crossing) -> None:
-        self._tell()
+        `told` takes the result, or the `CosmicError` that was raised. Where the boards are here it
+        is called at once, unless it is `slow`: then a thread waits for it.
+        """
+        self._application.carry_out(action, told, slow=slow)
 
     # Acquisition
 
+    @command(timeout_s=SLOW_S)
     def start(self) -> None:
         """Begin to acquire; harmless while it runs.
 
@@ -197,11 +270,13 @@ class Daqco:
             self._application.look_for_boards()
         self._application.start_acquisition()
 
+    @command(timeout_s=SLOW_S)
     def stop(self) -> None:
         """End acquiring; a recording is closed first."""
         self._recorder.stop()
         self._application.stop_acquisition()
 
+    @command(timeout_s=SLOW_S)
     def apply(self, settings: DaqcoSettings) -> None:
         """Put `settings` in force; acquisition goes on with them if it ran.
 
@@ -212,7 +287,17 @@ class Daqco:
         NotAvailable
             Rate or channels would change while recording.
         """
+        if called_from_elsewhere():
+            self._check_change(settings)
         self._application.apply(settings)
+
+    def _check_change(self, settings: DaqcoSettings) -> None:
+        """Refuse what another station may not change."""
+        present = self._application.settings
+        if settings.directory != present.directory:
+            self._folders.folder(settings.directory)
+        if (settings.backend, settings.clock_sources) != (present.backend, present.clock_sources):
+            raise ConfigError("driver and clocks of the boards are set in the platform file only")
 
     def configure(self, *, rate_hz: float) -> None:
         """Set the sampling rate, 10 to 15000 Hz and as far as the boards go; raises as `apply`."""
@@ -223,6 +308,7 @@ class Daqco:
             raise ConfigError(f"rate_hz: {rate_hz!r} is not accepted: {exc}") from None
         self.apply(settings)
 
+    @command(timeout_s=SLOW_S)
     def set_scale(self, channel: str, scale: Scale) -> None:
         """Give a channel another scale; raises `ConfigError` where there is no such channel."""
         self._application.set_scale(channel, scale)
@@ -230,17 +316,22 @@ class Daqco:
     # Recording
 
     @property
+    @state(unknown=RecordingState())
     def recording(self) -> RecordingState:
         """The recording that runs, or the last one."""
         return self._recorder.state
 
     @property
+    @state(unknown=Path())
     def directory(self) -> Path:
         """Where recordings go unless somebody says otherwise."""
         return self._application.directory
 
+    @command(timeout_s=SLOW_S)
     def start_recording(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write what is acquired to `path` until `stop_recording`.
+
+        Where the boards are elsewhere the file lies there, and a relative path begins there.
 
         Raises
         ------
@@ -250,8 +341,9 @@ class Daqco:
             The name, the directory or the disk forbid it, or there is such a file and
             `overwrite` is False.
         """
-        self._recorder.start(Path(path), overwrite=overwrite)
+        self._recorder.start(self._file(path, RECORDINGS), overwrite=overwrite)
 
+    @command(timeout_s=SLOW_S)
     def stop_recording(self) -> None:
         """Close the file; returns when it is closed."""
         self._recorder.stop()
@@ -273,14 +365,45 @@ class Daqco:
         if self.recording.failure:
             raise CosmicError(self.recording.failure)
 
+    @command
     def mark(self, text: str) -> None:
         """Write a mark into the recording that runs."""
         self._recorder.mark(text)
 
+    @command(reads=True, remembered_s=FOLDER_AGE_S, meanwhile="")
+    def folder_problem(self, directory: str) -> str:
+        """Return why nothing can be recorded in `directory`; empty when it can."""
+        if not called_from_elsewhere() or not directory.strip():
+            return directory_problem(directory)
+        try:
+            return directory_problem(str(self._folders.folder(directory)))
+        except RecordingError as exc:
+            return str(exc)
+
+    @command(reads=True, remembered_s=FOLDER_AGE_S)
     def free_bytes(self, directory: Path) -> int:
         """Return how much room there is for recordings in `directory`."""
-        return self._application.files.free_bytes(directory)
+        return space_left(self._folder(directory), 1.0).free_bytes
 
+    @command(reads=True)
+    def name_recording(
+        self, base: str, option: NameOption, directory: Path, when: datetime
+    ) -> NamedFile:
+        """Return the file for a recording begun at `when`, a time with its zone.
+
+        Raises
+        ------
+        RecordingError
+            The directory cannot be used.
+        """
+        return named_file(base, option, self._folder(directory), when.astimezone())
+
+    @command(reads=True)
+    def recordings(self, directory: Path) -> tuple[Path, ...]:
+        """Return the newest recordings in a directory, newest first; raises `RecordingError`."""
+        return recordings_in(self._folder(directory))
+
+    @command(timeout_s=SLOW_S)
     def export(self, source: Path, target: Path) -> Task:
         """Begin to export a recording to CSV or TDMS, by the suffix of `target`.
 
@@ -289,17 +412,76 @@ class Daqco:
         NotAvailable
             Another long operation is under way.
         """
-        return self._application.files.export(source, target)
+        # Imported here: its libraries take their time to load.
+        from cosmic.daqco.api.export import export_file
+
+        source, target = self._file(source, RECORDINGS), self._file(target, EXPORTS)
+
+        def job(task: Task) -> None:
+            def report(fraction: float) -> bool:
+                task.report(fraction, target.name)
+                return not task.cancel_requested
+
+            try:
+                export_file(source, target.suffix.lstrip("."), target, report)
+                task.report(1.0, "done")
+                task.finish()
+            except CosmicError as exc:
+                task.fail(exc)
+
+        return self._application.begin(f"Export to {target.name}", job)
+
+    def _file(self, path: str | Path, suffixes: tuple[str, ...]) -> Path:
+        """Return a file as it was named here, or where other stations may have it."""
+        return self._folders.file(str(path), suffixes) if called_from_elsewhere() else Path(path)
+
+    def _folder(self, directory: Path) -> Path:
+        return self._folders.folder(str(directory)) if called_from_elsewhere() else directory
 
     # Limits
 
     @property
+    def guard(self) -> LimitGuard | LimitWatch:
+        """What watches the limits; its `trip` is called before anybody hears of a crossing."""
+        return self._guard
+
+    def on_crossing(self, listener: Callable[[Crossing], object]) -> None:
+        """Call `listener(crossing)` when a limit was crossed, or nobody can say it was not.
+
+        The station with the boards has stopped what it has to stop by then.
+        """
+        self._guard.subscribe(lambda crossing: (listener(crossing), None)[1])
+
+    @property
+    @state
+    def limits_there(self) -> tuple[Limit, ...]:
+        """The limits as they are watched where the boards are."""
+        return tuple(self._application.guard.limits.values())
+
+    @property
+    @state(quiet=True)
+    def crossings_there(self) -> tuple[Crossing, ...]:
+        """The newest crossings seen where the boards are, oldest first."""
+        return self._application.guard.crossings[-MOST_CROSSINGS:]
+
+    @stream(Rule.ALL, topic="crossings")
+    def watch_crossings(self, receiver: Callable[[Crossing], object]) -> Callable[[], None]:
+        """Call `receiver(crossing)` with each crossing seen where the boards are."""
+        guard = self._application.guard
+        return guard.subscribe(lambda crossing: (receiver(crossing), None)[1])
+
+    @stream(Rule.ALL, topic="failures")
+    def watch_failures(self, receiver: Callable[[str], object]) -> Callable[[], None]:
+        """Call `receiver(text)` each time acquisition ends by itself, or cannot begin."""
+        return self._application.on_failure(receiver)
+
+    @property
     def limits(self) -> tuple[DaqLimit, ...]:
         """The limits there are."""
-        newest = {each.channel: each for each in self._application.guard.crossings}
+        newest = {each.channel: each for each in self._guard.crossings}
         return tuple(
             self._shown(limit, newest.get(limit.channel) if limit.tripped else None)
-            for limit in self._application.guard.limits.values()
+            for limit in self._guard.limits.values()
         )
 
     def _shown(self, limit: Limit, crossing: Crossing | None) -> DaqLimit:
@@ -326,6 +508,7 @@ class Daqco:
             reason=reason,
         )
 
+    @command(timeout_s=SLOW_S)
     def set_limit(self, limit: LimitSettings) -> None:
         """Put the limit of a channel in force; crossing it while armed stops every actuator.
 
@@ -348,7 +531,7 @@ class Daqco:
                 armed=limit.armed,
             )
         )
-        self._tell()
+        self.note_change()
 
     def arm_limit(
         self,
@@ -367,6 +550,7 @@ class Daqco:
             raise ConfigError(f"limit of {channel}: {exc}") from None
         self.set_limit(limit)
 
+    @command(timeout_s=SLOW_S)
     def disarm_limit(self, channel: str) -> None:
         """Watch a channel no longer; its limit stays, to be armed again by `set_limit`.
 
@@ -379,13 +563,15 @@ class Daqco:
         if limit is None:
             raise ConfigError(f"{channel!r} has no limit that could be disarmed")
         self._application.guard.set_limit(replace(limit, armed=False, suspended=False))
-        self._tell()
+        self.note_change()
 
+    @command(timeout_s=SLOW_S)
     def remove_limit(self, channel: str) -> None:
         """Take away the limit of a channel."""
         self._application.guard.remove(channel)
-        self._tell()
+        self.note_change()
 
+    @command(timeout_s=SLOW_S)
     def reset_limit(self, channel: str) -> None:
         """Forget that the limit of a channel was crossed.
 
@@ -395,4 +581,19 @@ class Daqco:
             The channel is still beyond it.
         """
         self._application.guard.acknowledge(channel)
-        self._tell()
+        self.note_change()
+
+
+def daqco_of(application: CosmicApplicationBase) -> Daqco:
+    """Return what an application offers, whether its boards are here or at another station.
+
+    Raises
+    ------
+    TypeError
+        It is no DAQCo.
+    """
+    if isinstance(application, DaqcoApplication):
+        return Daqco(application)
+    if isinstance(application, RemoteApplication) and isinstance(application.api, Daqco):
+        return application.api
+    raise TypeError(f"{application!r} is no DAQCo")

@@ -122,7 +122,14 @@ def event_lines(recording: Recording) -> Lines:
         for each in recording.events
     ]
     lines += [
-        (each.time_s, each.sample, "overrun", "", float(each.lost), "samples lost before this one")
+        (
+            each.time_s,
+            each.sample,
+            "overrun",
+            "",
+            float(each.lost),
+            f"samples lost before this one, number {each.column} of the recording from 0",
+        )
         for each in recording.overruns
     ]
     return lines

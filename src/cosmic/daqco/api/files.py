@@ -1,16 +1,17 @@
-"""Where recordings go: names, directories, room and exports, on the disk of this computer."""
+"""Where recordings go on this computer's disk, and which of it other stations may use."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Final
 
 from cosmic.daqco.core.recording_format import SUFFIX
-from cosmic.frame.errors import CosmicError, RecordingError
-from cosmic.frame.file_names import NameOption, directory_problem, file_name, space_left
-from cosmic.frame.task import Task
-from cosmic.frame.task_application import TaskApplication
+from cosmic.frame.errors import RecordingError
+from cosmic.frame.file_names import NameOption, file_name
 
+RECORDINGS: Final = (".h5",)
+EXPORTS: Final = (".csv", ".tdms")
 MOST_LISTED: Final = 200
 
 
@@ -41,52 +42,41 @@ def recordings_in(directory: Path) -> tuple[Path, ...]:
     return tuple(each for _, each in sorted(dated, reverse=True)[:MOST_LISTED])
 
 
-class LocalFiles:
-    """The files of an application whose boards are at this computer; any thread."""
+class RecordingFolders:
+    """Keeps what others name inside some folders; any thread.
 
-    elsewhere = ""
-    """Where the files lie, as the operator is told; empty on this computer."""
+    Parameters
+    ----------
+    folders : iterable of Path
+        Where, with everything below; the first is where a relative path begins.
+    """
 
-    def __init__(self, application: TaskApplication) -> None:
-        self._application = application
+    def __init__(self, folders: Iterable[Path]) -> None:
+        self._folders = tuple(each.expanduser().resolve() for each in folders)
 
-    def problem(self, directory: str) -> str:
-        """Return why nothing can be stored in `directory`; empty when it can."""
-        return directory_problem(directory)
-
-    def free_bytes(self, directory: Path) -> int:
-        """Return how much room there is for recordings; raises `RecordingError`."""
-        return space_left(directory, 1.0).free_bytes
-
-    def name(self, base: str, option: NameOption, directory: Path, when: datetime) -> NamedFile:
-        """Return the file for a recording that is begun now; raises `RecordingError`."""
-        return named_file(base, option, directory, when)
-
-    def recordings(self, directory: Path) -> tuple[Path, ...]:
-        """Return the newest recordings in a directory, newest first; raises `RecordingError`."""
-        return recordings_in(directory)
-
-    def export(self, source: Path, target: Path) -> Task:
-        """Begin to export a recording to CSV or TDMS, by the suffix of `target`.
+    def folder(self, text: str) -> Path:
+        """Return a directory as an absolute path without links.
 
         Raises
         ------
-        NotAvailable
-            Another long operation is under way.
+        RecordingError
+            It lies outside of the folders for recordings.
         """
-        # Imported here: its libraries take their time to load.
-        from cosmic.daqco.api.export import export_file
+        try:
+            whole = (self._folders[0] / Path(text).expanduser()).resolve()
+        except (OSError, ValueError, RuntimeError) as exc:
+            raise RecordingError(f"{text[:200]!r} is no path: {exc}") from exc
+        if not any(whole.is_relative_to(each) for each in self._folders):
+            inside = ", ".join(str(each) for each in self._folders)
+            raise RecordingError(
+                f"{text[:200]}: other stations may use files in {inside} only; "
+                "choose a folder there"
+            )
+        return whole
 
-        def job(task: Task) -> None:
-            def report(fraction: float) -> bool:
-                task.report(fraction, target.name)
-                return not task.cancel_requested
-
-            try:
-                export_file(source, target.suffix.lstrip("."), target, report)
-                task.report(1.0, "done")
-                task.finish()
-            except CosmicError as exc:
-                task.fail(exc)
-
-        return self._application.begin(f"Export to {target.name}", job)
+    def file(self, text: str, suffixes: tuple[str, ...]) -> Path:
+        """Return a file of one of some kinds; raises `RecordingError` as `folder`."""
+        whole = self.folder(text)
+        if whole.suffix.lower() not in suffixes:
+            raise RecordingError(f"{text[:200]}: its name has to end in {' or '.join(suffixes)}")
+        return whole

@@ -20,8 +20,8 @@ from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.daqco.core.unclosed_file import is_unclosed
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.frame.events import Event
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.listeners import tell
 
 if TYPE_CHECKING:
     from cosmic.daqco.api.application import DaqcoApplication
@@ -97,7 +97,7 @@ class Recorder:
         self._failure = ""
         self._left_behind: list[UDaqFileWriter] = []
         self._positions_due_s = 0.0
-        self._listeners: tuple[Callable[[], object], ...] = ()
+        self._changed: Event[[]] = Event()
         self.position_source: PositionSource | None = None
         application.guard.subscribe(self._on_crossing)
         application.guard.on_note(self._on_limit_note)
@@ -105,7 +105,7 @@ class Recorder:
 
     def on_change(self, listener: Callable[[], object]) -> None:
         """Call `listener()` when a recording begins, goes on or ends, in any thread."""
-        self._listeners = (*self._listeners, listener)
+        self._changed.subscribe(listener)
 
     @property
     def state(self) -> RecordingState:
@@ -148,7 +148,7 @@ class Recorder:
             writer.start()
             self._unsubscribe = self._application.buffer.subscribe(self._write)
         logger.info("recording to %s", writer.path)
-        tell(self._listeners)
+        self._changed.emit()
 
     def stop(self) -> None:
         """Close the file and wait until it is closed; harmless when nothing is recorded."""
@@ -172,7 +172,7 @@ class Recorder:
             self._forget(writer.path)
             duration_s = self._stats.duration_s if self._stats else 0.0
             logger.info("recorded %.1f s to %s", duration_s, writer.path)
-        tell(self._listeners)
+        self._changed.emit()
 
     def _forget(self, path: Path) -> None:
         """Take the note of a recording away, if it is closed: else the next start closes it."""
@@ -256,9 +256,9 @@ class Recorder:
 
     def _on_recorded(self, stats: RecordingStats) -> None:
         self._stats = stats
-        tell(self._listeners)
+        self._changed.emit()
 
     def _on_failed(self, error: CosmicError) -> None:
         self._failure = str(error)
         logger.error("the recording ended: %s", error)
-        tell(self._listeners)
+        self._changed.emit()

@@ -162,9 +162,16 @@ class Recording:
     @property
     def overruns(self) -> tuple[Overrun, ...]:
         """Where samples are missing."""
+        rows = self._source.tables["overruns"]
+        placed = "column" in (rows.dtype.names or ())  # files of before lack it
         return tuple(
-            Overrun(int(row["sample"]), int(row["lost"]), float(row["time_s"]))
-            for row in self._source.tables["overruns"]
+            Overrun(
+                sample=int(row["sample"]),
+                lost=int(row["lost"]),
+                time_s=(time_s := float(row["time_s"])),
+                column=int(row["column"]) if placed else self._source.columns(time_s, None).first,
+            )
+            for row in rows
         )
 
     @property

@@ -29,6 +29,11 @@ class DataChunk:
         Read-only.
     scales : tuple of Scale
         In force when it was acquired, one a channel.
+
+    Raises
+    ------
+    ValueError
+        They do not fit together.
     """
 
     first_sample: int
@@ -39,6 +44,10 @@ class DataChunk:
     scales: tuple[Scale, ...]
 
     def __post_init__(self) -> None:
+        rows = len(self.channels)
+        fits = self.volts.ndim == 2 and len(self.volts) == rows == len(self.scales)
+        if not (fits and self.volts.dtype == float and self.samples > 0 and self.rate_hz > 0.0):
+            raise ValueError("samples, channels and scales do not fit together")
         self.volts.flags.writeable = False
 
     @property
@@ -51,6 +60,19 @@ class DataChunk:
         """Platform time of the sample after the last."""
         return self.time_s + self.samples / self.rate_hz
 
+    @property
+    def nbytes(self) -> int:
+        """Size by which a backlog is limited."""
+        return self.volts.nbytes
+
+    def newest(self) -> dict[str, float]:
+        """Return the newest value of every channel in its physical unit."""
+        values = (
+            float(scale.apply(volts))
+            for scale, volts in zip(self.scales, self.volts[:, -1], strict=True)
+        )
+        return dict(zip(self.channels, values, strict=True))
+
     @cached_property
     def values(self) -> Values:
         """Physical values, shape (channels, n), float64, in the unit of each scale; read-only."""
@@ -59,3 +81,11 @@ class DataChunk:
             values[row] = scale.apply(self.volts[row])
         values.flags.writeable = False
         return values
+
+
+def missing_samples(before: DataChunk, after: DataChunk) -> int:
+    """Return how many samples a channel are missing between two chunks that came in this order.
+
+    Numbers that begin anew belong to another acquisition, and nothing is missing.
+    """
+    return max(0, after.first_sample - before.first_sample - before.samples)

@@ -13,7 +13,7 @@ from cosmic.daqco.core.chunk import DataChunk, Values
 from cosmic.daqco.core.scale import Scale
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import ConfigError, NotAvailable
-from cosmic.frame.listeners import tell
+from cosmic.frame.events import Event, Unsubscribe
 
 logger = logging.getLogger(__name__)
 
@@ -110,8 +110,8 @@ class LimitGuard:
         self._lock = Lock()
         self._telling = RLock()
         self._limits: dict[str, Limit] = {}
-        self._listeners: tuple[Callable[[Crossing], None], ...] = ()
-        self._note_listeners: tuple[Callable[[str, str], None], ...] = ()
+        self._crossed: Event[Crossing] = Event()
+        self._noted: Event[str, str] = Event()
         self._rate_hz = 0.0
         self._crossings: tuple[Crossing, ...] = ()
         self._scales: dict[str, Scale] = {}
@@ -139,13 +139,16 @@ class LimitGuard:
         if self._telling.acquire(timeout=_TOLD_S):
             self._telling.release()
 
-    def subscribe(self, listener: Callable[[Crossing], None]) -> None:
-        """Call `listener(crossing)` after each trip, in the thread that saw it."""
-        self._listeners = (*self._listeners, listener)
+    def subscribe(self, listener: Callable[[Crossing], object]) -> Unsubscribe:
+        """Call `listener(crossing)` after each trip, in the thread that saw it.
+
+        Returns the function that ends it.
+        """
+        return self._crossed.subscribe(listener)
 
     def on_note(self, listener: Callable[[str, str], None]) -> None:
         """Call `listener(channel, text)` when a limit is armed, disarmed, suspended or removed."""
-        self._note_listeners = (*self._note_listeners, listener)
+        self._noted.subscribe(listener)
 
     def watch_silence(self, silence_s: float, *, simulated: bool) -> None:
         """Set for how long data may stay away while a limit is armed.
@@ -284,7 +287,7 @@ class LimitGuard:
 
     def _tell_note(self, channel: str, text: str) -> None:
         logger.warning("%s: %s", channel, text)
-        tell(self._note_listeners, channel, text)
+        self._noted.emit(channel, text)
 
     # Watching
 
@@ -381,4 +384,4 @@ class LimitGuard:
             self._note(limit, beyond=True)
             self._crossings = (*self._crossings[-99:], crossing)
             logger.warning("%s; stopped after %.1f ms", crossing.text, 1000.0 * reaction_s)
-            tell(self._listeners, crossing)
+            self._crossed.emit(crossing)

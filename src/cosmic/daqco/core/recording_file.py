@@ -1,6 +1,7 @@
 """`RecordingFile`: a recording being written, without a thread of its own."""
 
 from collections.abc import Iterable
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any, Final
 
@@ -147,7 +148,7 @@ class RecordingFile:
     def add_overrun(self, overrun: Overrun) -> None:
         """Say that samples are missing."""
         self._lost += overrun.lost
-        self._rows["overruns"].append((overrun.sample, overrun.lost, overrun.time_s))
+        self._rows["overruns"].append(astuple(overrun))
 
     def flush(self) -> None:
         """Make everything given so far visible to readers, and safe from the end of the process."""
@@ -237,7 +238,7 @@ class RecordingFile:
         if self._next is not None and chunk.first_sample != self._next[0]:
             sample, time_s = self._next
             lost = _gap_samples(chunk, sample=sample, time_s=time_s)
-            self.add_overrun(Overrun(chunk.first_sample, lost, time_s))
+            self.add_overrun(Overrun(chunk.first_sample, lost, time_s, self.samples))
         self._next = (chunk.first_sample + chunk.samples, chunk.end_time_s)
 
     def _note_scales(self, scales: tuple[Scale, ...], time_s: float) -> None:

@@ -85,13 +85,18 @@ class Overrun:
 
     Attributes
     ----------
+    sample : int
+        Counted since acquisition began, anew where it began again.
     time_s : float
         Platform time of the first that is missing.
+    column : int
+        Where `sample` stands in the recording, counted from 0.
     """
 
     sample: int
     lost: int
     time_s: float
+    column: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +179,9 @@ EVENT: Final = np.dtype(
         ("text", text_type(TEXT_BYTES)),
     ]
 )
-OVERRUN: Final = np.dtype([("sample", "<i8"), ("lost", "<i8"), ("time_s", "<f8")])
+OVERRUN: Final = np.dtype(
+    [("sample", "<i8"), ("lost", "<i8"), ("time_s", "<f8"), ("column", "<i8")]
+)
 POSITION: Final = np.dtype(
     [
         ("time_s", "<f8"),

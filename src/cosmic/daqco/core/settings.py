@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from cosmic.daqco.core.scale import VOLTS, Scale
 from cosmic.daqco.hw.interface import InputMode
-from cosmic.frame.config import StrictModel
+from cosmic.frame.config import StrictModel, not_there
 from cosmic.frame.errors import ConfigError
 
 LOWEST_RATE_HZ: Final = 10.0
@@ -107,13 +107,13 @@ class DaqcoSettings(StrictModel):
         except ConfigError as exc:
             raise ValueError(str(exc)) from None
         wrong += [
-            f"channel {each.name!r}: there is no scale {each.scale!r}"
+            f"channel {each.name!r}: {not_there('scale', each.scale, known)}"
             for each in self.channel
             if each.scale not in known
         ]
-        channels = {each.name for each in self.channel}
+        channels = [each.name for each in self.channel]
         wrong += [
-            f"limit: there is no channel {each.channel!r}"
+            f"limit: {not_there('channel', each.channel, channels)}"
             for each in self.limit
             if each.channel not in channels
         ]

@@ -1,12 +1,12 @@
 """`UDaqBuffer`: keeps the latest values and hands every chunk on (thesis 6.2.1, Fig. 6.12)."""
 
+import threading
 from collections.abc import Callable
-from threading import Event, Lock
 
 from PySide6.QtCore import QObject, Signal
 
 from cosmic.daqco.core.chunk import DataChunk
-from cosmic.frame.listeners import tell
+from cosmic.frame.events import Event, Unsubscribe
 
 Receiver = Callable[[DataChunk], None]
 
@@ -27,11 +27,10 @@ class UDaqBuffer(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._lock = Lock()
-        self._receivers: tuple[Receiver, ...] = ()
+        self._arrived: Event[DataChunk] = Event()
         self._latest: DataChunk | None = None
         self._samples = 0
-        self._filled = Event()
+        self._filled = threading.Event()
 
     @property
     def latest_chunk(self) -> DataChunk | None:
@@ -43,39 +42,17 @@ class UDaqBuffer(QObject):
         """How many samples a channel came in since the start."""
         return self._samples
 
-    @property
-    def lost(self) -> int:
-        """How many samples a channel did not reach this process: none on the way to here."""
-        return 0
-
     def get_latest_data(self) -> dict[str, float]:
         """Return the newest value of every channel in its physical unit; empty before any."""
         chunk = self._latest
-        if chunk is None:
-            return {}
-        newest = (
-            float(scale.apply(volts))
-            for scale, volts in zip(chunk.scales, chunk.volts[:, -1], strict=True)
-        )
-        return dict(zip(chunk.channels, newest, strict=True))
+        return chunk.newest() if chunk is not None else {}
 
-    def subscribe(self, receiver: Receiver) -> Callable[[], None]:
+    def subscribe(self, receiver: Receiver) -> Unsubscribe:
         """Call `receiver(chunk)` with every chunk; returns the function that ends it.
 
         It runs in the acquisition thread, in the order of subscription, and must return at once.
         """
-        with self._lock:
-            self._receivers = (*self._receivers, receiver)
-
-        def unsubscribe() -> None:
-            with self._lock:
-                self._receivers = tuple(each for each in self._receivers if each is not receiver)
-
-        return unsubscribe
-
-    def follow(self, receiver: Receiver) -> Callable[[], None]:
-        """As `subscribe`: here a display gets every chunk as well."""
-        return self.subscribe(receiver)
+        return self._arrived.subscribe(receiver)
 
     def wait_for_data(self, timeout_s: float) -> bool:
         """Wait until there is a latest value; False after `timeout_s` of wall time."""
@@ -92,6 +69,6 @@ class UDaqBuffer(QObject):
         self._samples = chunk.first_sample + chunk.samples
         if not self._filled.is_set():
             self._filled.set()
-        tell(self._receivers, chunk)
+        self._arrived.emit(chunk)
         self.data_ready.emit()
         self.data_chunk_ready.emit(chunk)

@@ -2,14 +2,14 @@
 
 from typing import Final
 
-from cosmic.daqco.gui.ports import Recording
+from cosmic.daqco.api.recorder import RecordingState
 from cosmic.frame.gui.amounts import duration_text, size_text
 
 LITTLE_ROOM_S: Final = 600.0
 LATE_S: Final = 1.0
 
 
-def recording_text(recording: Recording, behind_s: float) -> str:
+def recording_text(recording: RecordingState, behind_s: float) -> str:
     """Return how long and how large a recording is; empty when there has been none."""
     amount = f"{duration_text(recording.duration_s)}, {size_text(recording.size_bytes)}"
     if recording.active:

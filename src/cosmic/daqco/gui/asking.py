@@ -2,14 +2,15 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
+from functools import partial
 from typing import Protocol, TypeVar
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
-from shiboken6 import isValid
 
-from cosmic.daqco.api.errands import Told
+from cosmic.frame.errands import Told
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.relay import Relay
 
 T = TypeVar("T")
 
@@ -25,12 +26,10 @@ class CarriesOut(Protocol):
 class Asking(QObject):
     """Belongs to a widget, which is told in the GUI thread; nothing is told once it is gone."""
 
-    _told = Signal(object, object, object)
-
-    def __init__(self, port: CarriesOut, widget: QWidget) -> None:
+    def __init__(self, daqco: CarriesOut, widget: QWidget) -> None:
         super().__init__(widget)
-        self._port = port
-        self._told.connect(self._on_told)
+        self._daqco = daqco
+        self._relay = Relay(self._on_told)
 
     def ask(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
         """Have `action` done and call `told(result, error)`.
@@ -39,10 +38,9 @@ class Asking(QObject):
         """
 
         def tell(result: T | None, error: CosmicError | None) -> None:
-            if isValid(self):  # the widget may go while a station is asked
-                self._told.emit(told, result, error)
+            self._relay(partial(told, result, error))
 
-        self._port.carry_out(action, tell, slow=slow)
+        self._daqco.carry_out(action, tell, slow=slow)
 
-    def _on_told(self, told: Told[object], result: object, error: CosmicError | None) -> None:
-        told(result, error)
+    def _on_told(self, tell: Callable[[], object]) -> None:
+        tell()

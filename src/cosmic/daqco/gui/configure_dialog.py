@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.core.scale import VOLTS
 from cosmic.daqco.core.settings import HIGHEST_RATE_HZ, LOWEST_RATE_HZ
 from cosmic.daqco.gui.asking import Asking
@@ -22,13 +23,12 @@ from cosmic.daqco.gui.channel_form import ChannelForm
 from cosmic.daqco.gui.channel_tree import ChannelTree
 from cosmic.daqco.gui.dialog import FieldDialog, button_box
 from cosmic.daqco.gui.draft import Draft
-from cosmic.daqco.gui.ports import DaqPort
 from cosmic.daqco.gui.scale_editor import ScaleEditor, ScaleView
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.quantity_field import QuantityField
-from cosmic.frame.gui.relay import PortRelay
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import STEP_PX
 
 REFRESH_HZ: Final = (1.0, 300.0)
@@ -39,11 +39,11 @@ Button = QDialogButtonBox.StandardButton
 class UDaqConfigureDialog(FieldDialog):
     """Edits a draft; Apply and OK put it in force, Cancel forgets what was not applied."""
 
-    def __init__(self, port: DaqPort, parent: QWidget | None = None) -> None:
+    def __init__(self, daqco: Daqco, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setWindowTitle("Configure acquisition")
-        self._port = port
-        self._draft = Draft(port.settings)
+        self._daqco = daqco
+        self._draft = Draft(daqco.settings)
         self._row = -1
         draft = self._draft
         self.rate = QuantityField(
@@ -72,9 +72,8 @@ class UDaqConfigureDialog(FieldDialog):
         self.buttons = button_box(Button.Apply | Button.Ok | Button.Cancel)
         self._build()
         self._connect()
-        self._asking = Asking(port, self)
-        self._relay = PortRelay(port, self)
-        self._relay.changed.connect(self._on_changed)
+        self._asking = Asking(daqco, self)
+        self._relay = Relay(self._on_changed).follow(daqco.on_change)
         self._fill(0)
 
     def _build(self) -> None:
@@ -123,7 +122,7 @@ class UDaqConfigureDialog(FieldDialog):
         """Show the draft, with one channel selected."""
         draft = self._draft
         self._row = min(row, len(draft.channels) - 1)
-        self.tree.fill(self._port.boards(), draft.channels, self._row)
+        self.tree.fill(self._daqco.boards(), draft.channels, self._row)
         self._show_form()
         self._fill_menu()
         self._show_highest()
@@ -136,7 +135,7 @@ class UDaqConfigureDialog(FieldDialog):
     def _fill_menu(self) -> None:
         menu = self.add.menu()
         menu.clear()
-        for info in self._port.boards():
+        for info in self._daqco.boards():
             under = menu.addMenu(f"{info.name}, {info.product}")
             free = self._draft.free_inputs(info)
             under.setEnabled(bool(free))
@@ -152,10 +151,10 @@ class UDaqConfigureDialog(FieldDialog):
         self.highest.setText(f"highest for {what}: {self._highest_hz():g} Hz")
 
     def _highest_hz(self) -> float:
-        return min(HIGHEST_RATE_HZ, self._port.highest_rate_hz(self._draft.channels))
+        return min(HIGHEST_RATE_HZ, self._daqco.highest_rate_hz(self._draft.channels))
 
     def _lock(self) -> None:
-        reason = _RECORDING if self._port.recording.active else ""
+        reason = _RECORDING if self._daqco.recording.active else ""
         self.form.lock(reason)
         self.rate.setEnabled(not reason)
         for widget, tip in (
@@ -185,7 +184,7 @@ class UDaqConfigureDialog(FieldDialog):
             return False
         if channel != draft.channels[row]:
             draft.replace(row, channel)
-            self.tree.fill(self._port.boards(), draft.channels, row)
+            self.tree.fill(self._daqco.boards(), draft.channels, row)
             self._show_highest()
         return True
 
@@ -260,11 +259,11 @@ class UDaqConfigureDialog(FieldDialog):
         except CosmicError as exc:
             told(None, exc)
             return
-        if settings == self._port.settings:
+        if settings == self._daqco.settings:
             told(None, None)
             return
         self.buttons.setEnabled(False)
-        self._asking.ask(lambda: self._port.apply(settings), told)
+        self._asking.ask(lambda: self._daqco.apply(settings), told)
 
     def _on_applied(self, _result: object, error: CosmicError | None) -> None:
         self.buttons.setEnabled(True)

@@ -16,14 +16,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from cosmic.daqco.api.errands import Told
+from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.api.files import NamedFile
 from cosmic.daqco.core.recording_format import SUFFIX
 from cosmic.daqco.gui.amounts import recording_text, room_text
 from cosmic.daqco.gui.append_row import append_row
 from cosmic.daqco.gui.asking import Asking
 from cosmic.daqco.gui.file_naming import name_pattern
-from cosmic.daqco.gui.ports import DaqPort
+from cosmic.frame.errands import Told
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.file_names import NameOption, name_problem
 from cosmic.frame.gui.ask_directory import ask_directory
@@ -31,7 +31,7 @@ from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.overwrite_question import overwrite_question
 from cosmic.frame.gui.refusal import mark_refusal
-from cosmic.frame.gui.relay import PortRelay
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, number_font
 from cosmic.frame.overrides import override
@@ -55,21 +55,21 @@ class UDaqFileWidget(QWidget):
 
     def __init__(
         self,
-        port: DaqPort,
+        daqco: Daqco,
         parent: QWidget | None = None,
         *,
         now: Callable[[], datetime] = datetime.now,
     ) -> None:
         super().__init__(parent)
-        self._port, self._now = port, now
+        self._daqco, self._now = daqco, now
         self._question: QMessageBox | None = None
         self._waits = ""
-        self._asking = Asking(port, self)
+        self._asking = Asking(daqco, self)
         self._error, self._columns, self._chosen = "", 0, False
         self.base = tipped(QLineEdit("recording"), "Base of the file name")
         self.full_name = tipped(QLineEdit(), "")
         self.full_name.setReadOnly(True)
-        self._offered = str(port.directory)
+        self._offered = str(daqco.directory)
         self.directory = tipped(QLineEdit(self._offered), "Where the file is stored")
         self.browse = push_button("Browse…", _BROWSE)
         self.start = named(push_button("Start recording", ""), "startRecording")
@@ -83,8 +83,7 @@ class UDaqFileWidget(QWidget):
         self._look = QTimer(self, interval=LOOK_MS)
         self._look.timeout.connect(self.refresh)
         self._look.start()
-        self._relay = PortRelay(port, self)
-        self._relay.changed.connect(self.refresh)
+        self._relay = Relay(self.refresh).follow(daqco.on_change)
         self.refresh()
 
     def _build(self) -> None:
@@ -178,10 +177,10 @@ class UDaqFileWidget(QWidget):
     def refresh(self) -> None:
         """Show what is being recorded, what may be done now and how much room there is."""
         self._offer_directory()
-        recording = self._port.recording
+        recording = self._daqco.recording
         wrong_name = "" if recording.active else name_problem(self.base.text(), SUFFIX)
         text = self.directory.text()
-        wrong_folder = "" if recording.active else self._port.folder_problem(text)
+        wrong_folder = "" if recording.active else self._daqco.folder_problem(text)
         mark_refusal(self.base, wrong_name)
         mark_refusal(self.directory, wrong_folder)
         self._show_name(wrong_name)
@@ -194,12 +193,12 @@ class UDaqFileWidget(QWidget):
 
     def _offer_directory(self) -> None:
         """Take over another usual directory, unless the operator typed one."""
-        before, self._offered = self._offered, str(self._port.directory)
+        before, self._offered = self._offered, str(self._daqco.directory)
         if before != self._offered and self.directory.text() == before:
             self.directory.setText(self._offered)
 
     def _show_name(self, wrong: str) -> None:
-        recording = self._port.recording
+        recording = self._daqco.recording
         if recording.active and recording.path is not None:
             text, tip = recording.path.name, str(recording.path)
         elif wrong:
@@ -211,12 +210,12 @@ class UDaqFileWidget(QWidget):
         self.full_name.setToolTip(tip)
 
     def _show_browse(self) -> None:
-        where = self._port.elsewhere
+        where = self._daqco.elsewhere
         self.browse.setEnabled(self.browse.isEnabled() and not where)
         self.browse.setToolTip(f"The files lie {where}; type the directory" if where else _BROWSE)
 
     def _example(self) -> str:
-        if self._port.elsewhere:
+        if self._daqco.elsewhere:
             return "The name is completed when the recording begins"
         try:
             return f"Now: {self._name_now().path.name}"
@@ -224,15 +223,16 @@ class UDaqFileWidget(QWidget):
             return str(exc)
 
     def _name_now(self) -> NamedFile:
-        return self._port.name_recording(self.base.text(), self.append, self.folder, self._now())
+        when = self._now().astimezone()  # the station's clock may be in another zone
+        return self._daqco.name_recording(self.base.text(), self.append, self.folder, when)
 
     def _enable(self, wrong: str) -> None:
-        recording, asking = self._port.recording, self._question is not None
+        recording, asking = self._daqco.recording, self._question is not None
         reasons = (
             (recording.active, "A recording is running"),
             (asking, "Answer the question first"),
             (bool(self._waits), self._waits),
-            (not self._port.running, "Nothing is being acquired: start the acquisition first"),
+            (not self._daqco.running, "Nothing is being acquired: start the acquisition first"),
             (bool(wrong), wrong),
         )
         reason = next((text for applies, text in reasons if applies), "")
@@ -244,12 +244,12 @@ class UDaqFileWidget(QWidget):
         )
 
     def _tell(self) -> None:
-        recording = self._port.recording
+        recording = self._daqco.recording
         error = self._error or ("" if recording.active else recording.failure)
         state = State.ERROR if error else State.BUSY if recording.active else State.OK
         self.badge.set_state(state, error)
         self.badge.setVisible(bool(error) or recording.active or recording.path is not None)
-        behind_s = self._port.counters.backlog / self._port.rate_hz
+        behind_s = self._daqco.counters.backlog / self._daqco.rate_hz
         self.told.set_text(error or recording_text(recording, behind_s))
 
     def _show_room(self, wrong: str) -> None:
@@ -257,12 +257,12 @@ class UDaqFileWidget(QWidget):
             self.room.set_text(wrong)
             return
         try:
-            free = self._port.free_bytes(self.folder)
+            free = self._daqco.free_bytes(self.folder)
         except CosmicError as exc:
             self.room.set_text(str(exc))
         else:
-            active = sum(each.active for each in self._port.settings.channel)
-            bytes_a_second = max(1.0, active * self._port.rate_hz * BYTES_A_SAMPLE)
+            active = sum(each.active for each in self._daqco.settings.channel)
+            bytes_a_second = max(1.0, active * self._daqco.rate_hz * BYTES_A_SAMPLE)
             self.room.set_text(room_text(free, free / bytes_a_second))
 
     # Reactions
@@ -316,14 +316,14 @@ class UDaqFileWidget(QWidget):
 
     def _record(self, path: Path, *, overwrite: bool = False) -> None:
         self._ask(
-            lambda: self._port.start_recording(path, overwrite=overwrite),
+            lambda: self._daqco.start_recording(path, overwrite=overwrite),
             self._on_done,
             "The recording begins",
         )
 
     def _on_stop(self) -> None:
         what = "The file is being closed"
-        self._ask(self._port.stop_recording, self._on_done, what, slow=True)
+        self._ask(self._daqco.stop_recording, self._on_done, what, slow=True)
 
     def _on_done(self, _result: object, error: CosmicError | None) -> None:
         self._answered(error)

@@ -5,15 +5,15 @@ from collections.abc import Sequence
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
+from cosmic.daqco.api.daqco import DaqLimit
 from cosmic.daqco.gui.plot.units import display_unit
-from cosmic.daqco.gui.ports import LimitState
 from cosmic.frame.gui.build import named, push_button
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State
 
 
-def limit_text(limit: LimitState, unit: str) -> str:
+def limit_text(limit: DaqLimit, unit: str) -> str:
     """Return what happened at a limit that was crossed."""
     shown = display_unit(unit)
     sides = [
@@ -50,7 +50,7 @@ class LimitBanner(QWidget):
         row.addWidget(self.reset)
         self.hide()
 
-    def show_limits(self, limits: Sequence[LimitState], units: dict[str, str]) -> None:
+    def show_limits(self, limits: Sequence[DaqLimit], units: dict[str, str]) -> None:
         """Show the first limit that is latched, and how many more there are."""
         crossed = [limit for limit in limits if limit.crossed]
         self.setVisible(bool(crossed))

@@ -12,10 +12,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from cosmic.daqco.api.daqco import Daqco, DaqLimit
 from cosmic.daqco.core.settings import LimitSettings
 from cosmic.daqco.gui.asking import Asking
 from cosmic.daqco.gui.dialog import FieldDialog, button_box
-from cosmic.daqco.gui.ports import DaqPort, LimitState
 from cosmic.daqco.gui.value_field import ValueField
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import push_button, tipped
@@ -27,12 +27,12 @@ Button = QDialogButtonBox.StandardButton
 class LimitDialog(FieldDialog):
     """Low, high, hysteresis and armed, for one channel at a time; OK puts them in force."""
 
-    def __init__(self, port: DaqPort, channel: str = "", parent: QWidget | None = None) -> None:
+    def __init__(self, daqco: Daqco, channel: str = "", parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setWindowTitle("Limits")
-        self._port = port
+        self._daqco = daqco
         self.channel = tipped(QComboBox(), "The channel that is watched")
-        self.channel.addItems([each.name for each in port.settings.channel if each.active])
+        self.channel.addItems([each.name for each in daqco.settings.channel if each.active])
         self.low, self.high = (
             ValueField("Low limit", empty=True),
             ValueField("High limit", empty=True),
@@ -43,7 +43,7 @@ class LimitDialog(FieldDialog):
         self.message = QLabel()
         self.message.setWordWrap(True)
         self.buttons = button_box(Button.Ok | Button.Cancel)
-        self._asking = Asking(port, self)
+        self._asking = Asking(daqco, self)
         self._build()
         self.channel.setCurrentText(channel)
         self._show()
@@ -66,13 +66,13 @@ class LimitDialog(FieldDialog):
         self.buttons.accepted.connect(self._on_ok)
         self.buttons.rejected.connect(self.reject)
 
-    def _limit(self) -> LimitState | None:
+    def _limit(self) -> DaqLimit | None:
         name = self.channel.currentText()
-        return next((each for each in self._port.limits if each.settings.channel == name), None)
+        return next((each for each in self._daqco.limits if each.settings.channel == name), None)
 
     def _show(self) -> None:
-        name, scales = self.channel.currentText(), self._port.settings.scales()
-        units = {each.name: scales[each.scale].unit for each in self._port.settings.channel}
+        name, scales = self.channel.currentText(), self._daqco.settings.scales()
+        units = {each.name: scales[each.scale].unit for each in self._daqco.settings.channel}
         limit = self._limit()
         given = limit.settings if limit else None
         for field in (self.low, self.high, self.hysteresis):
@@ -109,11 +109,11 @@ class LimitDialog(FieldDialog):
     def _on_ok(self) -> None:
         wanted = self._read()
         if wanted is not None:
-            self._ask(lambda: self._port.set_limit(wanted))
+            self._ask(lambda: self._daqco.set_limit(wanted))
 
     def _on_remove(self) -> None:
         channel = self.channel.currentText()
-        self._ask(lambda: self._port.remove_limit(channel))
+        self._ask(lambda: self._daqco.remove_limit(channel))
 
     def _ask(self, action: Callable[[], None]) -> None:
         self.buttons.setEnabled(False)

@@ -8,10 +8,9 @@ from typing import Final
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QWidget
 
-from cosmic.daqco.api.window_port import WindowPort
+from cosmic.daqco.api.daqco import Daqco, DaqLimit
 from cosmic.daqco.gui.limit_banner import limit_text
 from cosmic.daqco.gui.plot.units import display_unit
-from cosmic.daqco.gui.ports import LimitState
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.gui.chip import Chip, Tone
 
@@ -27,14 +26,14 @@ class LimitReading:
     tip: str
 
 
-def distance(limit: LimitState, value: float) -> float:
+def distance(limit: DaqLimit, value: float) -> float:
     """Return how far a value is from the nearer side of a limit; negative beyond it."""
     low, high = limit.settings.low, limit.settings.high
     below = math.inf if high is None else high - value
     return min(below, math.inf if low is None else value - low)
 
 
-def reading(limit: LimitState, unit: str, value: float | None) -> LimitReading:
+def reading(limit: DaqLimit, unit: str, value: float | None) -> LimitReading:
     """Return what is shown of a limit; `value` is None where the channel is not measured."""
     given, shown = limit.settings, display_unit(unit)
     sides = " to ".join("free" if each is None else f"{each:g}" for each in (given.low, given.high))
@@ -55,9 +54,9 @@ def reading(limit: LimitState, unit: str, value: float | None) -> LimitReading:
 class LimitIndicator(Chip):
     """The limit that matters most: crossed, not watched, or else the nearest; GUI thread."""
 
-    def __init__(self, port: WindowPort, parent: QWidget | None = None) -> None:
+    def __init__(self, daqco: Daqco, parent: QWidget | None = None) -> None:
         super().__init__("", parent=parent)
-        self._port = port
+        self._daqco = daqco
         self._timer = QTimer(self, interval=LOOK_MS)
         self._timer.timeout.connect(self.look)
         self._timer.start()
@@ -65,22 +64,22 @@ class LimitIndicator(Chip):
 
     def look(self) -> None:
         """Show how things stand now."""
-        port = self._port
+        daqco = self._daqco
         try:
-            values = port.latest() if port.running and not port.away else {}
+            values = daqco.latest() if daqco.running and not daqco.away else {}
         except NotAvailable:
             values = {}
-        self.show_limits(port.limits, port.units, values)
+        self.show_limits(daqco.limits, daqco.units, values)
 
     def show_limits(
-        self, limits: Sequence[LimitState], units: Mapping[str, str], values: Mapping[str, float]
+        self, limits: Sequence[DaqLimit], units: Mapping[str, str], values: Mapping[str, float]
     ) -> None:
         """Show the most urgent of `limits`; nothing where there are none."""
         self.setVisible(bool(limits))
         if not limits:
             return
 
-        def urgency(limit: LimitState) -> tuple[bool, bool, float]:
+        def urgency(limit: DaqLimit) -> tuple[bool, bool, float]:
             value = values.get(limit.settings.channel, math.nan)
             left = distance(limit, value)
             return (not limit.crossed, limit.settings.armed, left if math.isfinite(left) else 0.0)

@@ -16,23 +16,21 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from cosmic.daqco.api.application import DaqcoApplication
-from cosmic.daqco.api.remote_application import RemoteDaqcoApplication
-from cosmic.daqco.api.window_port import WindowPort
+from cosmic.daqco.api.daqco import Daqco, daqco_of
 from cosmic.daqco.gui.asking import Asking
 from cosmic.daqco.gui.configure_dialog import UDaqConfigureDialog
 from cosmic.daqco.gui.export_dialog import StationExportDialog
 from cosmic.daqco.gui.file_widget import UDaqFileWidget
 from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.plotter import UDaqPlotter
-from cosmic.daqco.gui.ports import DaqPort
 from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.elided_label import ElidedLabel
-from cosmic.frame.gui.relay import PortRelay
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.task_bar import TaskBar
 from cosmic.frame.gui.theme import STEP_PX, number_font
+from cosmic.frame.operation import Task
 from cosmic.frame.overrides import override
 
 RECORDINGS: Final = "Recordings (*.h5)"
@@ -53,12 +51,12 @@ class UDaqMainWidget(QWidget):
 
     close_requested = Signal()
 
-    def __init__(self, port: DaqPort, parent: QWidget | None = None) -> None:
+    def __init__(self, daqco: Daqco, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setWindowTitle("DAQCo")
-        self._port = port
-        self.plotter = UDaqPlotter(port)
-        self.files = UDaqFileWidget(port)
+        self._daqco = daqco
+        self.plotter = UDaqPlotter(daqco)
+        self.files = UDaqFileWidget(daqco)
         tip = "End the export; what is written is deleted"
         self.export_bar = TaskBar(cancel_tip=tip, closable=True)
         self.export_bar.setContentsMargins(STEP_PX, 0, STEP_PX, 0)
@@ -70,9 +68,8 @@ class UDaqMainWidget(QWidget):
         self._build_menus()
         self._build()
         self.plotter.limit_requested.connect(self.edit_limit)
-        self._asking = Asking(port, self)
-        self._relay = PortRelay(port, self)
-        self._relay.changed.connect(self._on_changed)
+        self._asking = Asking(daqco, self)
+        self._relay = Relay(self._on_changed).follow(daqco.on_change)
         self._on_changed()
 
     def _build(self) -> None:
@@ -140,8 +137,8 @@ class UDaqMainWidget(QWidget):
     # Following the application
 
     def _on_changed(self) -> None:
-        port = self._port
-        running, recording, away = port.running, port.recording.active, port.away
+        daqco = self._daqco
+        running, recording, away = daqco.running, daqco.recording.active, daqco.away
         for widget in (self.plotter, self.files):
             widget.setEnabled(not away)
         for action in (self.configure, self.limits):
@@ -149,15 +146,15 @@ class UDaqMainWidget(QWidget):
             action.setToolTip(away)
         self.state.setText("AWAY" if away else "ACQUIRING" if running else "STOPPED")
         self.state.set_tone("quiet" if running else "warning")
-        active = sum(each.active for each in port.settings.channel)
-        self.rate_text.set_text(f"{active} × {port.rate_hz:g} Hz")
+        active = sum(each.active for each in daqco.settings.channel)
+        self.rate_text.set_text(f"{active} × {daqco.rate_hz:g} Hz")
         self.start.setEnabled(not running and not away)
         self.stop.setEnabled(running)
         self.start_recording.setEnabled(running and not recording)
         self.stop_recording.setEnabled(recording and not away)
         self.export.setEnabled(not away)
-        self.quit.setText("&Close this panel" if port.elsewhere else "&Stop DAQCo")
-        self._say(port.problem)
+        self.quit.setText("&Close this panel" if daqco.elsewhere else "&Stop DAQCo")
+        self._say(daqco.problem)
 
     def _say(self, text: str) -> None:
         self.error.set_text(f"■ {text}" if text else "")
@@ -174,24 +171,24 @@ class UDaqMainWidget(QWidget):
     # Menus
 
     def _on_start(self) -> None:
-        self._do(self._port.start)
+        self._do(self._daqco.start)
 
     def _on_stop(self) -> None:
-        self._do(self._port.stop)
+        self._do(self._daqco.stop)
 
     def _on_quit(self) -> None:
-        if self._port.running and not self._port.elsewhere:
-            self._do(self._port.stop)
+        if self._daqco.running and not self._daqco.elsewhere:
+            self._do(self._daqco.stop)
         self.close_requested.emit()
         if self.isWindow():
             self.close()
 
     def _on_configure(self) -> None:
-        self._open(UDaqConfigureDialog(self._port, self))
+        self._open(UDaqConfigureDialog(self._daqco, self))
 
     def edit_limit(self, channel: str = "") -> None:
         """Open the dialog for limits, at a channel."""
-        self._open(LimitDialog(self._port, channel, self))
+        self._open(LimitDialog(self._daqco, channel, self))
 
     def _open(self, dialog: QDialog) -> None:
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -200,9 +197,9 @@ class UDaqMainWidget(QWidget):
     # Export
 
     def _on_export(self) -> None:
-        if self._port.elsewhere:
+        if self._daqco.elsewhere:
             folder = self.files.folder
-            self._asking.ask(lambda: self._port.recordings(folder), self._on_listed)
+            self._asking.ask(lambda: self._daqco.recordings(folder), self._on_listed)
             return
         dialog = QFileDialog(self, "Recording to export", str(self.files.folder), RECORDINGS)
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
@@ -213,7 +210,7 @@ class UDaqMainWidget(QWidget):
         if found is None:
             self._say(str(error))
             return
-        dialog = StationExportDialog(found, self._port.elsewhere, self)
+        dialog = StationExportDialog(found, self._daqco.elsewhere, self)
         dialog.chosen.connect(self.export_recording)
         self._open(dialog)
 
@@ -232,14 +229,15 @@ class UDaqMainWidget(QWidget):
 
     def export_recording(self, source: Path, target: Path) -> None:
         """Export a recording to CSV or TDMS, by the suffix of `target`, and show how far it is."""
-        try:
-            self.export_bar.follow(self._port.export(source, target))
-        except CosmicError as exc:
-            self.export_bar.say(str(exc), refused=True)
+        self._asking.ask(lambda: self._daqco.export(source, target), self._on_export_begun)
+
+    def _on_export_begun(self, task: Task | None, error: CosmicError | None) -> None:
+        if task is not None:
+            self.export_bar.follow(task)
+        else:
+            self.export_bar.say(str(error), refused=True)
 
 
 def make_daqco_gui(application: CosmicApplicationBase) -> UDaqMainWidget:
     """Return the GUI component of DAQCo, here or at another station; its `gui_factory`."""
-    if not isinstance(application, (DaqcoApplication, RemoteDaqcoApplication)):
-        raise TypeError(f"{application!r} is no DaqcoApplication")
-    return UDaqMainWidget(WindowPort(application))
+    return UDaqMainWidget(daqco_of(application))

@@ -7,6 +7,7 @@ import numpy as np
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QVBoxLayout, QWidget
 
+from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.settings import ChannelSettings
 from cosmic.daqco.gui.asking import Asking
@@ -18,13 +19,12 @@ from cosmic.daqco.gui.plot.marks import Cursors, LimitLines
 from cosmic.daqco.gui.plot.refresh import shown_rate_hz
 from cosmic.daqco.gui.plot.unit_ranges import UnitRanges
 from cosmic.daqco.gui.plot.units import AxisRange
-from cosmic.daqco.gui.ports import DaqPort
 from cosmic.daqco.gui.scaling_bar import ScalingBar
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.elided_label import ElidedLabel
-from cosmic.frame.gui.relay import PortRelay
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import STEP_PX, number_font
 from cosmic.frame.overrides import override
 
@@ -41,16 +41,16 @@ class UDaqPlotter(QWidget):
 
     Parameters
     ----------
-    port : DaqPort
+    daqco : Daqco
         The application; chunks come from it in its own thread and are only kept there.
     """
 
     limit_requested = Signal(str)
     """The limit of a channel is to be set."""
 
-    def __init__(self, port: DaqPort, parent: QWidget | None = None) -> None:
+    def __init__(self, daqco: Daqco, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._port = port
+        self._daqco = daqco
         self._key: _Key | None = None
         self._hidden: set[str] = set()
         self._ranges = UnitRanges()
@@ -69,10 +69,9 @@ class UDaqPlotter(QWidget):
         self._readout = QTimer(self, interval=READOUT_MS)
         self._build()
         self._connect()
-        self._asking = Asking(port, self)
-        self._relay = PortRelay(port, self)
-        self._relay.changed.connect(self._on_changed)
-        self._relay.keep(port.follow(self.inbox.put))
+        self._asking = Asking(daqco, self)
+        self._relay = Relay(self._on_changed).follow(daqco.on_change)
+        self._relay.keep(daqco.follow(self.inbox.put))
         self._on_changed()
         self._readout.start()
 
@@ -130,7 +129,7 @@ class UDaqPlotter(QWidget):
     @property
     def refresh_hz(self) -> float:
         """How often the picture is looked at: the setting, or what the screen can show."""
-        return shown_rate_hz(self._port.settings.refresh_hz, self.screen())
+        return shown_rate_hz(self._daqco.settings.refresh_hz, self.screen())
 
     @property
     def ranges(self) -> dict[str, AxisRange]:
@@ -169,7 +168,7 @@ class UDaqPlotter(QWidget):
 
     def _knows(self, chunk: DataChunk) -> bool:
         """Return whether the settings have its channels: another station may tell of them later."""
-        return {each.name for each in self._port.settings.channel}.issuperset(chunk.channels)
+        return {each.name for each in self._daqco.settings.channel}.issuperset(chunk.channels)
 
     def read_out(self) -> None:
         """Show values, counters and, with Auto, fitting axes."""
@@ -182,14 +181,14 @@ class UDaqPlotter(QWidget):
         self.channels.channels.set_values(0, values)
         self._show_age()
         self._show_cursors()
-        lost, skipped = self._port.counters.lost, self.inbox.skipped
+        lost, skipped = self._daqco.counters.lost, self.inbox.skipped
         self.lost.setText(f"lost {lost}" + (f", not shown {skipped}" if skipped else ""))
         self.lost.set_tone("alarm" if lost else "quiet")
 
     def _show_age(self) -> None:
         """Show values that are not measured any more as old ones."""
         age_s = WALL.now_s() - self._heard_s
-        measured = self._port.running and age_s <= OLD_S
+        measured = self._daqco.running and age_s <= OLD_S
         self.channels.channels.set_age(None if measured else age_s)
         if self.chart.frozen:
             self.state.setText("HISTORY")
@@ -200,11 +199,11 @@ class UDaqPlotter(QWidget):
     # Following the application
 
     def _on_changed(self) -> None:
-        settings, scales = self._port.settings, self._port.settings.scales()
+        settings, scales = self._daqco.settings, self._daqco.settings.scales()
         active = [each for each in settings.channel if each.active]
         key = (
             tuple(each.name for each in active),
-            self._port.rate_hz,
+            self._daqco.rate_hz,
             tuple(scales[each.scale] for each in active),
         )
         if key != self._key:
@@ -213,22 +212,22 @@ class UDaqPlotter(QWidget):
             self._set_traces(self._traces_of(active))
         self._timer.start(max(1, round(1000.0 / self.refresh_hz)))
         units = {trace.name: trace.unit for trace in self.chart.traces}
-        self.banner.show_limits(self._port.limits, units)
-        self.problem.set_text(self._port.problem)
+        self.banner.show_limits(self._daqco.limits, units)
+        self.problem.set_text(self._daqco.problem)
         self._show_limits()
 
     def _begin(self, key: _Key) -> None:
         self._key = key
-        named_channels = {each.name: each for each in self._port.settings.channel}
+        named_channels = {each.name: each for each in self._daqco.settings.channel}
         active = [named_channels[name] for name in key[0] if name in named_channels]
         traces = self._traces_of(active)
-        self._ranges.add(active, self._port.settings.scales())
+        self._ranges.add(active, self._daqco.settings.scales())
         self.chart.begin(traces, key[1])
         self.channels.channels.set_traces(traces)
         self._show_ranges()
 
     def _traces_of(self, active: list[ChannelSettings]) -> tuple[Trace, ...]:
-        scales = self._port.settings.scales()
+        scales = self._daqco.settings.scales()
         return tuple(
             Trace(each.name, scales[each.scale].unit, each.colour, each.name not in self._hidden)
             for each in active
@@ -254,7 +253,7 @@ class UDaqPlotter(QWidget):
         self._show_limits()
 
     def _show_limits(self) -> None:
-        self.limit_lines.show(self._port.limits, self.ranges)
+        self.limit_lines.show(self._daqco.limits, self.ranges)
 
     def _on_rescale(self, unit: str, wanted: AxisRange) -> None:
         self._ranges.put(unit, wanted)
@@ -311,7 +310,7 @@ class UDaqPlotter(QWidget):
             self.window_text.setText(self.cursors.text())
 
     def _on_reset_requested(self, channel: str) -> None:
-        self._asking.ask(lambda: self._port.reset_limit(channel), self._on_reset)
+        self._asking.ask(lambda: self._daqco.reset_limit(channel), self._on_reset)
 
     def _on_reset(self, _result: object, error: CosmicError | None) -> None:
         if error is not None:

@@ -14,7 +14,12 @@ def set_style_property(widget: QWidget, name: str, value: object) -> None:
     if widget.property(name) == value:
         return
     widget.setProperty(name, value)
-    for each in (widget, *widget.findChildren(QWidget)):
+    restyle(widget, *widget.findChildren(QWidget))
+
+
+def restyle(*widgets: QWidget) -> None:
+    """Have widgets styled anew; each costs a new layout."""
+    for each in widgets:
         each.style().unpolish(each)
         each.style().polish(each)
 

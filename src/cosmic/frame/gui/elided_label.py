@@ -1,9 +1,10 @@
 """A label for one line of any length: what does not fit is elided and stands in the tooltip."""
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QFontMetrics, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QFontMetrics, QMouseEvent, QPainter, QPaintEvent, QPalette
 from PySide6.QtWidgets import QLabel, QSizePolicy, QStyle, QStyleOption, QWidget
 
+from cosmic.frame.gui.theme import current_palette
 from cosmic.frame.overrides import override
 
 
@@ -22,6 +23,7 @@ class ElidedLabel(QLabel):
         super().__init__(parent)
         self._hint = hint
         self._whole: str | None = None
+        self._dim = False
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.set_text(text)
@@ -35,6 +37,12 @@ class ElidedLabel(QLabel):
         self.setToolTip("\n".join(part for part in (text, self._hint) if part))
         self.setAccessibleName(line)
         self.setText(line)
+
+    def set_dim(self, dim: bool) -> None:
+        """Write in the colour of what matters less; costs a repaint, not a new style."""
+        if dim != self._dim:
+            self._dim = dim
+            self.update()
 
     @override
     def sizeHint(self) -> QSize:
@@ -57,6 +65,8 @@ class ElidedLabel(QLabel):
         text = QFontMetrics(self.font()).elidedText(
             self.text(), Qt.TextElideMode.ElideRight, room.width()
         )
+        if self._dim:
+            painter.setPen(QColor(current_palette().dim))
         style.drawItemText(
             painter,
             room,
@@ -64,7 +74,7 @@ class ElidedLabel(QLabel):
             option.palette,
             self.isEnabled(),
             text,
-            self.foregroundRole(),
+            QPalette.ColorRole.NoRole if self._dim else self.foregroundRole(),
         )
 
     @override

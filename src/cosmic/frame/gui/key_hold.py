@@ -9,6 +9,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
 from cosmic.frame.clock import WALL
+from cosmic.frame.gui.application_events import ApplicationEvents
 from cosmic.frame.gui.key_focus import takes_text
 from cosmic.frame.gui.stop_key import combination_of
 from cosmic.frame.overrides import override
@@ -71,7 +72,8 @@ class HoldKeys(QObject):
         self._guard = QTimer(self, interval=GUARD_MS)
         self._guard.timeout.connect(self._on_guard)
         self.set_keys(keys)
-        app.installEventFilter(self)
+        ApplicationEvents.of(app).add(self, self._on_key_event, QKeyEvent)
+        app.focusWindowChanged.connect(self._on_window_changed)
         app.focusChanged.connect(self._on_focus_changed)
         app.applicationStateChanged.connect(self._on_guard)
 
@@ -101,15 +103,12 @@ class HoldKeys(QObject):
                 self.hold_lost.emit(self._held[key], why)
             self._end(key)
 
-    @override
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        # Everything that happens to any widget comes by; the class is quick to ask, the type slow.
-        if not isinstance(event, QKeyEvent):
-            if self._held and event.type() == QEvent.Type.WindowDeactivate:
-                self.release_all(WINDOW_LOST)
-            return False
+    def _on_window_changed(self) -> None:
+        self.release_all(WINDOW_LOST)
+
+    def _on_key_event(self, _watched: QObject, event: QEvent) -> bool:
         kind = event.type()
-        if kind not in _KEY_EVENTS:
+        if not isinstance(event, QKeyEvent) or kind not in _KEY_EVENTS:
             return False
         if event.key() in self._held:
             return self._on_held_key(event)

@@ -1,51 +1,71 @@
-"""Brings what an application tells, in any thread, to a widget in the GUI thread."""
+"""`Relay`: the one way from whatever thread something happens in to the GUI thread."""
 
-from abc import abstractmethod
 from collections.abc import Callable
-from typing import Protocol
+from typing import Generic, Self, TypeVarTuple
+from weakref import WeakMethod
 
-from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QObject, Qt, Signal
+from shiboken6 import isValid
 
-Unsubscribe = Callable[[], None]
+from cosmic.frame.events import Unsubscribe
 
-
-class TellsChanges(Protocol):
-    """What an application offers to its widgets, as far as it matters here."""
-
-    @abstractmethod
-    def on_change(self, listener: Callable[[], object]) -> Unsubscribe:
-        """Call `listener()`, in any thread, when something changed."""
+Ts = TypeVarTuple("Ts")
 
 
-class PortRelay(QObject):
-    """Belongs to a widget; stops listening when the widget goes.
+class Relay(QObject, Generic[*Ts]):
+    """Called in any thread, it calls a method of a QObject in the GUI thread; made there.
 
-    Signals
-    -------
-    changed()
-        Anything changed that the port tells of; connect a method of the widget.
+    It has no parent: whoever calls it keeps it alive, and meets no deleted object. Once the
+    QObject is gone, nothing is called any more, and what it follows is unsubscribed.
+
+    Parameters
+    ----------
+    receiver : bound method of a QObject
+        What is called, with the arguments that the relay was called with.
+    queued : bool
+        In the GUI thread too it is called by the event loop, after what was sent before.
     """
 
-    changed = Signal()
+    _called = Signal(object)
 
-    def __init__(self, port: TellsChanges, widget: QWidget) -> None:
-        super().__init__(widget)
+    def __init__(self, receiver: Callable[[*Ts], object], *, queued: bool = False) -> None:
+        super().__init__()
+        owner = getattr(receiver, "__self__", None)
+        if not isinstance(owner, QObject):
+            raise TypeError(f"a relay calls a method of a QObject, not {receiver!r}")
+        self._receiver = WeakMethod(receiver)
         self._ends: list[Unsubscribe] = []
-        self.keep(port.on_change(self.changed.emit))
-        widget.destroyed.connect(_ender(self._ends))
+        owner.destroyed.connect(_ender(self._ends))
+        kind = Qt.ConnectionType
+        self._called.connect(
+            self._on_called, kind.QueuedConnection if queued else kind.AutoConnection
+        )
+
+    def __call__(self, *args: *Ts) -> None:
+        """Have the receiver called; any thread."""
+        self._called.emit(args)
+
+    def follow(self, subscribe: Callable[[Callable[[*Ts], object]], Unsubscribe]) -> Self:
+        """Subscribe to something, until the receiver goes or `end` is called."""
+        self.keep(subscribe(self))
+        return self
 
     def keep(self, unsubscribe: Unsubscribe) -> None:
-        """Call this as well when the widget goes."""
+        """Call this as well when the receiver goes."""
         self._ends.append(unsubscribe)
 
     def end(self) -> None:
-        """Stop listening now; harmless the second time."""
+        """Unsubscribe now; harmless the second time."""
         _end_all(self._ends)
+
+    def _on_called(self, args: tuple[*Ts]) -> None:
+        receiver = self._receiver()
+        if receiver is not None and isValid(getattr(receiver, "__self__", None)):
+            receiver(*args)
 
 
 def _ender(ends: list[Unsubscribe]) -> Callable[[], None]:
-    return lambda: _end_all(ends)  # must not hold the widget, which is gone by then
+    return lambda: _end_all(ends)  # must not hold the receiver, which is gone by then
 
 
 def _end_all(ends: list[Unsubscribe]) -> None:

@@ -5,6 +5,7 @@ from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QDialog, QScrollArea, QWidget
 from shiboken6 import isValid
 
+from cosmic.frame.gui.application_events import ApplicationEvents
 from cosmic.frame.gui.build import named
 from cosmic.frame.overrides import override
 
@@ -45,11 +46,10 @@ class DialogFitter(QObject):
 
     def __init__(self, app: QApplication, parent: QObject | None = None) -> None:
         super().__init__(parent or app)
-        app.installEventFilter(self)
+        ApplicationEvents.of(app).add(self, self._on_shown, QShowEvent)
 
-    @override
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if isinstance(event, QShowEvent) and isinstance(watched, QDialog):
+    def _on_shown(self, watched: QObject, _event: QEvent) -> bool:
+        if isinstance(watched, QDialog):
             QTimer.singleShot(0, lambda: fit_to_screen(watched) if isValid(watched) else None)
         return False
 

@@ -7,8 +7,8 @@ from PySide6.QtCore import QEvent, QKeyCombination, QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QApplication
 
+from cosmic.frame.gui.application_events import ApplicationEvents
 from cosmic.frame.gui.key_focus import escape_is_for
-from cosmic.frame.overrides import override
 
 _KEY_EVENTS: Final = (QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress, QEvent.Type.KeyRelease)
 
@@ -59,7 +59,7 @@ class StopKeyFilter(QObject):
         self._told = False
         self._escape_down = self._escape_taken = False
         self._down_stamp = self._up_stamp = 0
-        app.installEventFilter(self)
+        ApplicationEvents.of(app).add(self, self._on_key_event, QKeyEvent)
 
     @property
     def key(self) -> str:
@@ -73,9 +73,7 @@ class StopKeyFilter(QObject):
         """
         self._cancels.insert(0, cancel)
 
-    @override
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        # Everything that happens to any widget comes by; the class is quick to ask, the type slow.
+    def _on_key_event(self, _watched: QObject, event: QEvent) -> bool:
         if not isinstance(event, QKeyEvent) or event.type() not in _KEY_EVENTS:
             return False
         if event.key() == self._key:

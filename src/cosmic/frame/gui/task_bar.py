@@ -8,7 +8,7 @@ from cosmic.frame.gui.build import push_button
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.task_watch import TaskWatch
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
-from cosmic.frame.task import Progress, Task
+from cosmic.frame.operation import Progress, Task
 
 
 class TaskBar(QWidget):

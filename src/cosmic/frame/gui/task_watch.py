@@ -1,9 +1,11 @@
 """Brings how far a task is, told in any thread, to a widget in the GUI thread."""
 
-from PySide6.QtCore import QObject, Signal
-from shiboken6 import isValid
+from functools import partial
 
-from cosmic.frame.task import Progress, Task
+from PySide6.QtCore import QObject, Signal
+
+from cosmic.frame.gui.relay import Relay
+from cosmic.frame.operation import Progress, Task
 
 
 class TaskWatch(QObject):
@@ -16,12 +18,11 @@ class TaskWatch(QObject):
     """
 
     progressed = Signal(object)
-    _told = Signal(object, object)
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
         self.task: Task | None = None
-        self._told.connect(self._on_told)
+        self._relay = Relay(self._on_progressed)
 
     @property
     def busy(self) -> bool:
@@ -31,13 +32,8 @@ class TaskWatch(QObject):
     def follow(self, task: Task) -> None:
         """Tell of `task` from now on."""
         self.task = task
+        task.subscribe(partial(self._relay, task))
 
-        def tell(progress: Progress) -> None:
-            if isValid(self):  # the widget may go while its task goes on
-                self._told.emit(task, progress)
-
-        task.subscribe(tell)
-
-    def _on_told(self, task: Task, progress: Progress) -> None:
+    def _on_progressed(self, task: Task, progress: Progress) -> None:
         if task is self.task:
             self.progressed.emit(progress)

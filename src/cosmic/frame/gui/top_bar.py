@@ -15,14 +15,14 @@ from PySide6.QtWidgets import (
 )
 
 from cosmic.frame.gui.build import named, push_button, tight_row
-from cosmic.frame.gui.chip import Chip, set_style_property
+from cosmic.frame.gui.chip import Chip, restyle
 from cosmic.frame.gui.clearance_meter import Clearance, ClearanceMeter
 from cosmic.frame.gui.controls_sign import ControlsSign
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.mode_selector import ModeSelector
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.stop_button import StopButton
-from cosmic.frame.gui.theme import LARGE_PX, STEP_PX, State, ui_font
+from cosmic.frame.gui.theme import LARGE_PX, STEP_PX, State, current_palette, ui_font
 
 NO_COLLISION_MODEL = "no collision model"
 _NAMES_SHOWN: Final = 2
@@ -57,6 +57,7 @@ class TopBar(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # a click on it ends typing in a field
         self._latched = False
+        self._theme_then = current_palette().name
         self._make_widgets(title, stop_key)
         self._arrange()
         self._stop.stop_requested.connect(self.stop_requested)
@@ -109,6 +110,7 @@ class TopBar(QWidget):
         row.addWidget(self._latched_text, 1)
         row.addWidget(self._reset)
         self._pages = QStackedWidget()
+        self._normal = normal
         self._pages.addWidget(normal)
         self._pages.addWidget(latched)
         self._pages.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -240,7 +242,14 @@ class TopBar(QWidget):
         self._latched = reason is not None
         self._latched_text.set_text(f"■ STOPPED: {reason}" if reason else "■ STOPPED")
         self._pages.setCurrentIndex(1 if self._latched else 0)
-        set_style_property(self, "latched", self._latched)
+        if self.property("latched") == self._latched:
+            return
+        self.setProperty("latched", self._latched)
+        theme = current_palette().name
+        # Another theme put on meanwhile has styled what was not seen, too.
+        same_theme, self._theme_then = theme == self._theme_then or self._latched, theme
+        unseen = set(self._normal.findChildren(QWidget)) if same_theme else set()
+        restyle(self, *(each for each in self.findChildren(QWidget) if each not in unseen))
 
     def set_stop_key(self, key_text: str) -> None:
         """Write another key on the STOP button."""

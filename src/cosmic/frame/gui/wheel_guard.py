@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from cosmic.frame.overrides import override
+from cosmic.frame.gui.application_events import ApplicationEvents
 
 _NEVER: Final = (QComboBox, QTabBar)
 """A list is chosen from when it is open; a tab is clicked."""
@@ -31,11 +31,9 @@ class WheelGuard(QObject):
 
     def __init__(self, app: QApplication, parent: QObject | None = None) -> None:
         super().__init__(parent or app)
-        app.installEventFilter(self)
+        ApplicationEvents.of(app).add(self, self._on_wheel, QWheelEvent)
 
-    @override
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        # Everything that happens to any widget comes by; the class is quick to ask.
+    def _on_wheel(self, watched: QObject, event: QEvent) -> bool:
         if not isinstance(event, QWheelEvent):
             return False
         if not isinstance(watched, QWidget):

@@ -73,6 +73,12 @@ def current_call() -> Call | None:
     return _current.get()
 
 
+def called_from_elsewhere() -> bool:
+    """Return whether this thread does what another process asked for."""
+    call = _current.get()
+    return call is not None and not call.caller.local
+
+
 @contextmanager
 def carrying_out(call: Call) -> Iterator[None]:
     """Say what this thread carries out, while it does."""

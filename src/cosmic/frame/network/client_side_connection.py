@@ -8,15 +8,16 @@ from typing import Final
 from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
+from cosmic.frame.errands import Errands
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.events import Event, notify
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.listeners import tell
 from cosmic.frame.network.addresses import topic_key
 from cosmic.frame.network.client_session import ClientSession, What, read_hosted
 from cosmic.frame.network.errors import CallRefused, StationAway, StationTimeout
 from cosmic.frame.network.incoming import Incoming
 from cosmic.frame.network.messages import Order
-from cosmic.frame.network.ongoing import Ticket
+from cosmic.frame.network.ongoing import Answered, Ticket
 from cosmic.frame.network.remote_task import RemoteTasks
 from cosmic.frame.network.transport import (
     CALL_TIMEOUT_S,
@@ -28,7 +29,7 @@ from cosmic.frame.network.transport import (
     Subscription,
 )
 from cosmic.frame.network.wire import Wire
-from cosmic.frame.threads import WorkerThread, forbid_waiting_here
+from cosmic.frame.threads import WorkerThread, forbid_waiting_here, may_wait_here
 
 logger = logging.getLogger(__name__)
 
@@ -75,8 +76,9 @@ class ClientSideConnection(WorkerThread):
         self._wire: Wire | None = None
         self._hosted: dict[tuple[str, str], tuple[bool, bool]] = {}
         self._presence = Presence(station, here=False, why="not connected yet")
-        self._listeners: tuple[PresenceListener, ...] = ()
+        self._presence_changed: Event[Presence] = Event()
         self._tasks = RemoteTasks(self._cancel_task)
+        self._errands = Errands(f"cancels at {station}", policy)
         self._session = ClientSession(station, name, policy, clock, self._tasks.on_message)
         self._incoming: list[Incoming] = []
         self._closed = False
@@ -129,6 +131,8 @@ class ClientSideConnection(WorkerThread):
         valid_s = min(timeout_s, MOVE_AGE_LIMIT_S) if moves else timeout_s
         what = What(Order.CALL, application, function, arguments or {}, valid_s, at_once)
         result = self._exchange(wire, what, timeout_s)
+        if isinstance(result, Answered) and isinstance(result.result, Ticket):
+            return Answered(self._tasks.made(result.result), result.state)
         return self._tasks.made(result) if isinstance(result, Ticket) else result
 
     def publish(self, topic: str, payload: object) -> None:
@@ -152,15 +156,9 @@ class ClientSideConnection(WorkerThread):
 
     def presence(self, listener: PresenceListener) -> Callable[[], None]:
         """As `Transport.presence`."""
-        with self._lock:
-            self._listeners = (*self._listeners, listener)
-        tell([listener], self._presence)
-
-        def remove() -> None:
-            with self._lock:
-                self._listeners = tuple(each for each in self._listeners if each is not listener)
-
-        return remove
+        end = self._presence_changed.subscribe(listener)
+        notify(listener, self._presence)
+        return end
 
     def take_lease(self) -> None:
         """As `Transport.take_lease`."""
@@ -182,6 +180,8 @@ class ClientSideConnection(WorkerThread):
         """As `Transport.close`."""
         self.request_end()
         self.join()
+        self._errands.request_end()
+        self._errands.join()
         with self._lock:
             if self._closed:
                 return
@@ -273,7 +273,10 @@ class ClientSideConnection(WorkerThread):
             raise StationAway(f"{self._station} is away: {exc}") from exc
 
     def _cancel_task(self, number: str) -> None:
-        self._order(Order.CANCEL, number)
+        if may_wait_here():
+            self._order(Order.CANCEL, number)
+        else:
+            self._errands.do(lambda: self._order(Order.CANCEL, number), lambda *_: None)
 
     def _note_lease(self, *, holds: bool) -> None:
         self._lease_orders += 1
@@ -294,7 +297,7 @@ class ClientSideConnection(WorkerThread):
             return
         if before.here != presence.here:
             logger.info("%s is %s", self._station, "here" if presence.here else presence.why)
-        tell(self._listeners, presence)
+        self._presence_changed.emit(presence)
 
     def _forget(self, incoming: Incoming) -> None:
         with self._lock:

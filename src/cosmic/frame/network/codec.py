@@ -12,12 +12,14 @@ from dataclasses import fields, is_dataclass
 from datetime import UTC, datetime
 from enum import Enum
 from functools import cache
+from pathlib import Path, PurePath
 from typing import Any, Final, get_type_hints
 
 import msgpack
 import numpy as np
 
-from cosmic.frame.errors import ProtocolError
+from cosmic.frame.config import StrictModel
+from cosmic.frame.errors import ConfigError, ProtocolError
 from cosmic.frame.network.conform import Mismatch, conform
 from cosmic.frame.network.transfer import known_class, may_travel
 
@@ -32,7 +34,7 @@ _PREFIX: Final = struct.Struct(">BBI")
 _ALIGNMENT: Final = 16
 _DEPTH_LIMIT: Final = 16
 _DIMENSIONS_LIMIT: Final = 8
-_ARRAY, _TIME, _ENUM, _DATA, _TUPLE = 1, 2, 3, 4, 5
+_ARRAY, _TIME, _ENUM, _DATA, _TUPLE, _MODEL, _PATH = 1, 2, 3, 4, 5, 6, 7
 
 
 def encode(value: object, limit_bytes: int = MESSAGE_LIMIT_BYTES) -> bytes:
@@ -107,6 +109,12 @@ def _pack_other(
         return item.item()
     if isinstance(item, Enum) and may_travel(type(item)):
         return msgpack.ExtType(_ENUM, pack([type(item).__name__, item.name]))
+    if isinstance(item, PurePath):
+        return msgpack.ExtType(_PATH, pack([str(item)]))
+    if isinstance(item, StrictModel) and may_travel(type(item)):
+        return msgpack.ExtType(
+            _MODEL, pack([type(item).__name__, item.model_dump(mode="json", warnings=False)])
+        )
     if isinstance(item, datetime):
         if item.tzinfo is None:
             raise TypeError("a time without its zone")
@@ -170,6 +178,10 @@ class _Reader:
             return _enum(inner)
         if code == _DATA:
             return _data(inner)
+        if code == _MODEL:
+            return _model(inner)
+        if code == _PATH and len(inner) == 1 and isinstance(inner[0], str):
+            return Path(inner[0])
         raise ProtocolError(f"a message holds a value of the unknown type {code}")
 
     def _array(self, said: list[Any]) -> np.ndarray[Any, Any]:
@@ -226,5 +238,15 @@ def _data(said: list[Any]) -> object:
             name: conform(value, hints[name]) for name, value in zip(wanted, said[1], strict=True)
         }
         return cls(**values)
-    except (Mismatch, TypeError, ValueError) as exc:
+    except (Mismatch, TypeError, ValueError, ConfigError) as exc:
         raise ProtocolError(f"a broken {said[0]} came: {exc}") from exc
+
+
+def _model(said: list[Any]) -> object:
+    cls = known_class(said[0]) if len(said) == 2 else None
+    if cls is None or not issubclass(cls, StrictModel):
+        raise ProtocolError(f"settings of an unknown kind came: {said[:1]!r}"[:200])
+    try:
+        return cls.model_validate(said[1])
+    except ValueError as exc:
+        raise ProtocolError(f"a broken {said[0]} came: {exc}"[:2000]) from exc

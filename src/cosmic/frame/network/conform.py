@@ -5,9 +5,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import is_dataclass
 from datetime import datetime
 from enum import Enum
+from pathlib import Path
 from typing import Any, Final, Literal, Union, get_args, get_origin
 
 import numpy as np
+
+from cosmic.frame.config import StrictModel
 
 _PLAIN: Final = (bool, int, str, bytes, datetime, type(None))
 _SEQUENCES: Final = (list, Sequence, Iterable)
@@ -91,7 +94,7 @@ def _conform_tuple(value: object, annotation: Any, arguments: tuple[Any, ...]) -
 def is_kind(annotation: Any) -> bool:
     """Return whether a class may stand in the signature of a remote function."""
     return isinstance(annotation, type) and (
-        issubclass(annotation, (Enum, np.ndarray)) or is_dataclass(annotation)
+        issubclass(annotation, (Enum, np.ndarray, Path, StrictModel)) or is_dataclass(annotation)
     )
 
 

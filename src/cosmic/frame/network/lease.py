@@ -9,7 +9,7 @@ from typing import Final
 
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import refusal
-from cosmic.frame.listeners import tell
+from cosmic.frame.events import Event, notify
 from cosmic.frame.network.caller import MOVE_LIMIT_S
 from cosmic.frame.network.dead_man import DeadMan, Pulse
 from cosmic.frame.network.transfer import transferable
@@ -77,7 +77,7 @@ class StationLease:
         self._grant: _Grant | None = None
         self._offered = offered
         self._why = ""
-        self._listeners: tuple[Callable[[LeaseState], None], ...] = ()
+        self._changed: Event[LeaseState] = Event()
 
     @property
     def local_token(self) -> str:
@@ -91,17 +91,11 @@ class StationLease:
         with self._lock:
             return self._state()
 
-    def subscribe(self, listener: Callable[[LeaseState], None]) -> Callable[[], None]:
+    def subscribe(self, listener: Callable[[LeaseState], object]) -> Callable[[], None]:
         """Call `listener` at once and at each change; returns the function that ends it."""
-        with self._lock:
-            self._listeners = (*self._listeners, listener)
-        tell([listener], self.state)
-
-        def remove() -> None:
-            with self._lock:
-                self._listeners = tuple(each for each in self._listeners if each is not listener)
-
-        return remove
+        end = self._changed.subscribe(listener)
+        notify(listener, self.state)
+        return end
 
     def take(self, name: str, token: str, *, in_process: bool = False) -> None:
         """Give it to the session `token`, or leave it there.
@@ -208,7 +202,7 @@ class StationLease:
         with self._lock:
             state = self._state()
         logger.info("the right to move: %s (%s)", state.holder, state.why)
-        tell(self._listeners, state)
+        self._changed.emit(state)
 
 
 def _refused(text: str, what_to_do: str = "") -> MoveVerdict:

@@ -14,7 +14,7 @@ from cosmic.frame.errors import CosmicError
 from cosmic.frame.network.errors import CallRefused, RemoteDefect
 from cosmic.frame.network.transfer import transferable
 from cosmic.frame.network.travelling_errors import to_plain
-from cosmic.frame.task import Progress
+from cosmic.frame.operation import Progress
 
 logger = logging.getLogger(__name__)
 
@@ -51,6 +51,41 @@ class Ticket:
     title: str
 
 
+@transferable
+@dataclass(frozen=True, slots=True)
+class StateMessage:
+    """State of a declared object, and of its parts.
+
+    Attributes
+    ----------
+    start : str
+        Another one at each start of the station.
+    number : int
+        Counts the messages of that start; the newest replaces all before it.
+    at : tuple of str
+        Which object: names of parts and their keys, from the application down.
+    values : dict
+        By the name of a property or a part.
+    clock_rate : float
+        How many seconds of the platform go by in one of the wall.
+    """
+
+    start: str
+    number: int
+    at: tuple[str, ...]
+    values: dict[str, object]
+    clock_rate: float
+
+
+@transferable
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """What a command returned, and the state of its object after it."""
+
+    result: object
+    state: StateMessage
+
+
 Tell = Callable[[list[object]], None]
 
 
@@ -77,6 +112,8 @@ class Tickets:
         CallRefused
             Too much goes on for this session; what came last was cancelled.
         """
+        if isinstance(result, Answered):
+            return Answered(self.wrap(result.result, moves=moves), result.state)
         if isinstance(result, _PLAIN) or not isinstance(result, Ongoing):
             return result
         number = secrets.token_hex(8)

@@ -3,7 +3,7 @@
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, TypeVar, get_type_hints, overload
+from typing import Any, Final, Protocol, TypeVar, get_type_hints, overload, runtime_checkable
 
 from cosmic.frame.network.caller import MOVE_LIMIT_S
 from cosmic.frame.network.conform import Mismatch, can_check, conform
@@ -110,14 +110,27 @@ class Offered:
         return checked
 
 
+@runtime_checkable
+class Offers(Protocol):
+    """Says itself what may be called."""
+
+    @property
+    def offered(self) -> dict[str, Offered]:
+        """What may be called, by name."""
+
+
 def offered_by(application: object) -> dict[str, Offered]:
     """Return what `application` offers: the functions and properties of its class so marked.
+
+    One that `Offers` says itself what it offers.
 
     Raises
     ------
     TypeError
         A marked function cannot be checked: an annotation is missing or of a kind unknown here.
     """
+    if isinstance(application, Offers):
+        return application.offered
     found: dict[str, Offered] = {}
     for name, member in inspect.getmembers_static(type(application)):
         if isinstance(member, property) and member.fget is not None:

@@ -2,127 +2,37 @@
 
 import logging
 from collections.abc import Callable
-from threading import Condition, Lock
+from threading import Lock
 from typing import Any, Final
 
-from cosmic.frame.errors import CosmicError, DeviceTimeout, ProtocolError
-from cosmic.frame.listeners import tell
+from cosmic.frame.errors import CosmicError, ProtocolError
 from cosmic.frame.network.codec import decode
 from cosmic.frame.network.errors import StationAway
 from cosmic.frame.network.ongoing import Ticket
 from cosmic.frame.network.travelling_errors import from_plain
-from cosmic.frame.task import Progress
-from cosmic.frame.threads import forbid_waiting_here
+from cosmic.frame.operation import Operation, Progress
 
 logger = logging.getLogger(__name__)
 
 _EARLY_LIMIT: Final = 256
 
 
-class RemoteTask:
+class RemoteTask(Operation[object]):
     """A task or a movement at another station; any thread.
 
-    It has what both have: `done`, `success`, `exception`, `wait`, `cancel`, `add_callback`,
-    `progress` and `subscribe`. When the connection is lost it ends with `StationAway`.
+    When the connection is lost it ends with `StationAway`.
     """
 
     def __init__(self, ticket: Ticket, cancel: Callable[[str], None]) -> None:
-        self._ticket = ticket
-        self._cancel = cancel
-        self._changed = Condition()
-        self._done = False
-        self._result: object = None
-        self._error: CosmicError | None = None
-        self._progress: Progress | None = None
-        self._callbacks: list[Callable[[RemoteTask], None]] = []
-        self._listeners: list[Callable[[Progress], None]] = []
-
-    @property
-    def title(self) -> str:
-        """What is being done."""
-        return self._ticket.title
-
-    @property
-    def done(self) -> bool:
-        """True when it has ended, well or not."""
-        return self._done
-
-    @property
-    def success(self) -> bool:
-        """True when it has ended well."""
-        return self._done and self._error is None
-
-    @property
-    def progress(self) -> Progress | None:
-        """How far it is, where it tells."""
-        return self._progress
-
-    def exception(self, timeout: float | None = 0.0) -> CosmicError | None:
-        """Return why it failed, or None; waits up to `timeout` s for its end."""
-        self._wait(timeout)
-        return self._error
-
-    def wait(self, timeout_s: float | None = None) -> object:
-        """Wait for the end and return its result; raises what it failed with.
-
-        Raises
-        ------
-        DeviceTimeout
-            It had not ended after `timeout_s` of wall time; it goes on.
-        StationAway
-            The connection was lost.
-        WrongThreadError
-            Called in the GUI thread.
-        """
-        self._wait(timeout_s)
-        if self._error is not None:
-            raise self._error
-        return self._result
-
-    def cancel(self) -> None:
-        """End it early; what it has set in motion is stopped."""
-        if not self._done:
-            self._cancel(self._ticket.number)
-
-    def add_callback(self, callback: "Callable[[RemoteTask], None]") -> None:
-        """Call `callback(self)` at its end, or now if it has ended."""
-        with self._changed:
-            if not self._done:
-                self._callbacks.append(callback)
-                return
-        tell([callback], self)
-
-    def subscribe(self, listener: Callable[[Progress], None]) -> None:
-        """Call `listener(progress)` at each step that is told."""
-        with self._changed:
-            self._listeners.append(listener)
-            progress = self._progress
-        if progress is not None:
-            tell([listener], progress)
-
-    def _wait(self, timeout_s: float | None) -> None:
-        if not self._done:
-            forbid_waiting_here(f"waiting for {self.title!r}")
-        with self._changed:
-            if not self._changed.wait_for(lambda: self._done, timeout_s):
-                raise DeviceTimeout(f"{self.title} had not ended after {timeout_s:g} s")
-
-    # For whoever hears of it
-
-    def note_progress(self, progress: Progress) -> None:
-        """Note how far it is."""
-        self._progress = progress
-        tell(tuple(self._listeners), progress)
+        super().__init__(ticket.title)
+        self.on_cancel(lambda: cancel(ticket.number))
 
     def end(self, result: object, error: CosmicError | None) -> None:
-        """Note that it has ended."""
-        with self._changed:
-            if self._done:
-                return
-            self._done, self._result, self._error = True, result, error
-            callbacks, self._callbacks = self._callbacks, []
-            self._changed.notify_all()
-        tell(callbacks, self)
+        """Note that it has ended; for whoever hears of it."""
+        if error is not None:
+            self.fail(error)
+        else:
+            self.finish(result)
 
 
 class RemoteTasks:
@@ -173,7 +83,7 @@ class RemoteTasks:
     def _apply(self, task: RemoteTask, event: list[Any]) -> None:
         number, progress, done, result, error = event
         if isinstance(progress, Progress):
-            task.note_progress(progress)
+            task.report(progress.fraction, progress.text)
         if done:
             with self._lock:
                 self._running.pop(number, None)

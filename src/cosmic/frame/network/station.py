@@ -5,8 +5,8 @@ from threading import Lock
 from typing import Protocol, runtime_checkable
 
 from cosmic.frame.clock import WALL, Clock
+from cosmic.frame.events import Event, notify
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.listeners import tell
 from cosmic.frame.network.bus import Bus
 from cosmic.frame.network.errors import CallRefused
 from cosmic.frame.network.invoker import ApplicationInvoker
@@ -52,7 +52,7 @@ class Station:
         self._lock = Lock()
         self._invokers: dict[str, ApplicationInvoker] = {}
         self._clients: dict[str, Presence] = {}
-        self._listeners: tuple[PresenceListener, ...] = ()
+        self._client_changed: Event[Presence] = Event()
         self._lease.subscribe(lambda state: self._bus.publish(LEASE_TOPIC, state))
 
     @property
@@ -143,16 +143,11 @@ class Station:
     def presence(self, listener: PresenceListener) -> Callable[[], None]:
         """Call `listener` with each client that is here, and at each change."""
         with self._lock:
-            self._listeners = (*self._listeners, listener)
+            end = self._client_changed.subscribe(listener)
             here = list(self._clients.values())
         for each in here:
-            tell([listener], each)
-
-        def remove() -> None:
-            with self._lock:
-                self._listeners = tuple(each for each in self._listeners if each is not listener)
-
-        return remove
+            notify(listener, each)
+        return end
 
     def note_client(self, key: str, presence: Presence) -> None:
         """Remember that a client came or went, and tell; for whoever lets clients in."""
@@ -161,8 +156,7 @@ class Station:
                 self._clients[key] = presence
             elif self._clients.pop(key, None) is None:
                 return
-            listeners = self._listeners
-        tell(listeners, presence)
+        self._client_changed.emit(presence)
 
 
 def checked_name(name: str) -> str:

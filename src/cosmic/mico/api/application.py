@@ -11,19 +11,18 @@ from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import CosmicError, DeviceError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.ways import Way, way_from_plan
-from cosmic.mico.core.caution import Cautions, ClosedGrippers
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT, CollisionChecker
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.collision_manager import CollisionManager
-from cosmic.mico.core.device_manager import DeviceManager
 from cosmic.mico.core.mode import Mode
+from cosmic.mico.core.motion.manager import DeviceManager
+from cosmic.mico.core.motion.undo import Cautions, ClosedGrippers, UndoHistory
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
-from cosmic.mico.core.undo import UndoHistory
 from cosmic.mico.core.way_finder import WayFinder
 from cosmic.mico.hw.interface import Controller
 

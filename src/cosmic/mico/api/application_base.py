@@ -7,14 +7,14 @@ from typing import Final
 from PySide6.QtCore import Signal
 
 from cosmic.frame.errors import CosmicError, MoveRefused, NotAvailable
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.frame.task_application import TaskApplication
 from cosmic.mico.api.initialisation import Confirm, InitialisationRun
 from cosmic.mico.api.ports import CollisionPort, UndoPort
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.ways import Way, follow
-from cosmic.mico.core.caution import Cautions
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
+from cosmic.mico.core.motion.undo import Cautions
 from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 

@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 
 from cosmic.frame.arguments import checked_class
 from cosmic.mico.api.axis import Axis
-from cosmic.mico.core.device_commander import DeviceCommander
+from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.ports import DevicePort, ManagerPort
 
 

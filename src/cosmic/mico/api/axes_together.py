@@ -5,12 +5,13 @@ from typing import Literal, overload
 
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import MoveRefused
+from cosmic.frame.operation import wait_or_cancel
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.axes import Axes
 from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.entry import Number, as_number
-from cosmic.mico.api.group import GroupMovement, waited_for
-from cosmic.mico.core.orders import Motion, MoveBy, MoveTo
+from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.core.motion.orders import Motion, MoveBy, MoveTo
 
 
 @checked_class
@@ -121,7 +122,7 @@ class AxesTogether(Axes):
             motions, source=self._source, consent=consent, match_arrival=match_arrival
         )
         group = GroupMovement.of(orders)
-        return waited_for(group) if wait else group
+        return wait_or_cancel(group) if wait else group
 
     def group(self, *names: str, name: str = "") -> AxisGroup:
         """Return axes that a bluesky plan moves as one; raises `UnknownAxisError`."""

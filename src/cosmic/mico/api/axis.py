@@ -7,18 +7,18 @@ from typing_extensions import override
 
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import NotAvailable, refusal
+from cosmic.frame.operation import wait_or_cancel
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.api.axis_facts import AxisFacts
 from cosmic.mico.api.axis_shape import AxisMovable
 from cosmic.mico.api.entry import Number, as_number, as_whole
-from cosmic.mico.api.group import waited_for
 from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.linked import linked_movement
-from cosmic.mico.core.device_commander import DeviceCommander
-from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import FREQUENCY_HZ, Motion, MoveBy, MoveTo
+from cosmic.mico.core.motion.device_commander import DeviceCommander
+from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.core.motion.orders import FREQUENCY_HZ, Motion, MoveBy, MoveTo
+from cosmic.mico.core.motion.positioner import Confidence, class_for
 from cosmic.mico.core.ports import ManagerPort
-from cosmic.mico.core.positioner import Confidence, class_for
 from cosmic.mico.hw.interface import Direction
 
 
@@ -256,7 +256,7 @@ class Axis(AxisFacts):
 
     @staticmethod
     def _result(movement: Movement, *, wait: bool) -> float | Movement | None:
-        return waited_for(movement) if wait else movement
+        return wait_or_cancel(movement) if wait else movement
 
     def _number(self, value: Number) -> float:
         return as_number(value, self.unit, self._name)

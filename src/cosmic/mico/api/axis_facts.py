@@ -6,12 +6,12 @@ from PySide6.QtCore import QObject, Qt
 
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import NotAvailable
-from cosmic.frame.listeners import tell
+from cosmic.frame.events import notify
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.api.axis_shape import AxisShape
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
-from cosmic.mico.core.device_commander import DeviceCommander
-from cosmic.mico.core.positioner import Confidence, PositionerState, Status
+from cosmic.mico.core.motion.device_commander import DeviceCommander
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState, Status
 from cosmic.mico.hw.interface import Activity, PositionerKind
 
 
@@ -138,7 +138,7 @@ class AxisFacts(AxisShape):
 
         def on_state(state: PositionerState) -> None:
             if state.name == self._name:
-                tell([callback], state)
+                notify(callback, state)
 
         direct = Qt.ConnectionType.DirectConnection
         connection = self.commander.state_changed.connect(on_state, direct)

@@ -79,7 +79,7 @@ class AxisGroup:
 
     def stop(self, success: bool = False) -> None:
         """Stop every axis of the group; otherwise as `Axis.stop`."""
-        if success and self._asked is not None:
+        if success is True and self._asked is not None:  # whatever it is, this stops
             self._asked.finish()
         for axis in self._axes:
             axis.stop(success=success)

@@ -20,10 +20,10 @@ from cosmic.frame.plan_shape import (
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.entry import Number, as_number
 from cosmic.mico.api.move_status import MoveStatus, refused
-from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import MoveTo
+from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.core.motion.orders import MoveTo
+from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.core.ports import ManagerPort
-from cosmic.mico.core.positioner import PositionerState
 
 # How far from a target an axis still counts as standing at it: more than the noise of any sensor.
 STANDS_AT: Final = {"um": 1.0, "deg": 0.1}
@@ -81,7 +81,7 @@ class AxisShape:
         What `set` began fails with `MoveCancelled`. With `success`, which bluesky says of a stop
         that belongs to the plan, such as a pause, it ends well.
         """
-        if success and self._asked is not None:
+        if success is True and self._asked is not None:  # whatever it is, this stops
             self._asked[1].finish()
         self._halt()
 

@@ -14,11 +14,11 @@ from cosmic.frame.errors import (
     MoveRefused,
     refusal,
 )
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.api.group import move_together
+from cosmic.mico.core.motion.positioner import Confidence
 from cosmic.mico.core.ports import ManagerPort
-from cosmic.mico.core.positioner import Confidence
 from cosmic.mico.core.sequence.plan import PlannedStep, plan_sequence
 from cosmic.mico.core.sequence.report import SequenceReport, StepReport, StepState
 from cosmic.mico.core.sequence.settings import StepKind

@@ -3,9 +3,9 @@
 from types import TracebackType
 from typing import Self
 
-from cosmic.mico.core.device_commander import DeviceCommander
-from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import Order
+from cosmic.mico.core.motion.device_commander import DeviceCommander
+from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.core.motion.orders import Order
 
 
 class Jogging:

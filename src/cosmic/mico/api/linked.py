@@ -5,8 +5,8 @@ from threading import Lock
 
 from cosmic.frame.errors import CosmicError, MoveCancelled
 from cosmic.mico.api.group import GroupMovement
-from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import Motion
+from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.core.motion.orders import Motion
 from cosmic.mico.core.ports import ManagerPort
 
 

@@ -7,24 +7,23 @@ from typing_extensions import override
 
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import NotAvailable
-from cosmic.frame.task import Progress, Task
+from cosmic.frame.operation import Progress, Task, wait_or_cancel
 from cosmic.frame.threads import forbid_waiting_here
 from cosmic.mico.api.application_base import WAY_BUDGET_S, MicoApplicationBase
 from cosmic.mico.api.axes_together import AxesTogether
 from cosmic.mico.api.collision import Collision
 from cosmic.mico.api.entry import Number
-from cosmic.mico.api.group import GroupMovement, waited_for
+from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.initialisation import Confirm
 from cosmic.mico.api.links import check_linkable, check_links_may_change
 from cosmic.mico.api.poses import Poses
-from cosmic.mico.api.task_wait import wait_or_cancel
 from cosmic.mico.api.trajectories import Trajectories
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
-from cosmic.mico.core.links import Link
+from cosmic.mico.core.motion.links import Link
+from cosmic.mico.core.motion.undo import UndoEntry, undo_text
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
-from cosmic.mico.core.undo import UndoEntry, undo_text
 
 
 @checked_class
@@ -272,16 +271,15 @@ class Mico(AxesTogether):
         movement.add_callback(forget)
         if not wait:
             return movement
-        reached = waited_for(movement)
+        reached = wait_or_cancel(movement)
         history.drop(entry)
         return reached
 
     def undo_doubts(self, entry: UndoEntry) -> tuple[str, ...]:
         """Return what speaks against taking `entry` back: felt since, or so now."""
         since = [each for each in self.undo_entries if each.number >= entry.number]
-        told = [f"when a movement ended, {text}" for each in since for text in each.felt]
-        now = self._application.cautions.reasons()
-        return tuple(dict.fromkeys([*now, *(told if not now else ())]))
+        told = [text for each in since for text in each.felt]
+        return tuple(dict.fromkeys([*self._application.cautions.reasons(), *told]))
 
     # Collisions
 

@@ -1,8 +1,10 @@
 """A movement of one or several axes, as a plan sees it."""
 
+from typing_extensions import override
+
 from cosmic.frame.plan_shape import PlanStatus
 from cosmic.mico.api.group import GroupMovement
-from cosmic.mico.core.movement import Movement
+from cosmic.mico.core.motion.movement import Movement
 
 
 class MoveStatus(PlanStatus):
@@ -30,8 +32,10 @@ class MoveStatus(PlanStatus):
         else:
             self.fail(error)
 
+    @override
     def cancel(self) -> None:
         """Stop what still moves."""
+        super().cancel()
         if self.movement is not None:
             self.movement.cancel()
 

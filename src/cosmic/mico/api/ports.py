@@ -10,8 +10,8 @@ from PySide6.QtCore import SignalInstance
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.callback import CollisionCallbackBase
 from cosmic.mico.core.collision.model import BodyPair, SceneModel
-from cosmic.mico.core.orders import Order
-from cosmic.mico.core.undo import UndoEntry
+from cosmic.mico.core.motion.orders import Order
+from cosmic.mico.core.motion.undo import UndoEntry
 
 
 class CollisionPort(Protocol):

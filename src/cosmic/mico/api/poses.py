@@ -5,13 +5,12 @@ from pathlib import Path
 
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable, UnknownAxisError
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task, wait_or_cancel
 from cosmic.mico.api.group import move_together
-from cosmic.mico.api.task_wait import wait_or_cancel
 from cosmic.mico.api.trajectory_site import TrajectorySite
-from cosmic.mico.core.orders import Motion, MoveTo
-from cosmic.mico.core.poses import Pose
-from cosmic.mico.core.positioner import Confidence
+from cosmic.mico.core.motion.orders import Motion, MoveTo
+from cosmic.mico.core.motion.positioner import Confidence
+from cosmic.mico.core.poses import Pose, pose_misfits
 
 WAY_BUDGET_S = 2.0
 
@@ -108,11 +107,15 @@ class Poses:
         Raises
         ------
         NotAvailable
-            There is no such pose, or another long operation is under way.
+            There is no such pose, it names an axis that is not there, or another long operation is
+            under way.
         MoveRefused
             The gate refused it; with `way`, none was found.
         """
         pose = self._site.poses[name]
+        wrong = pose_misfits({name: pose}, self._site.manager.settings.kinds)
+        if wrong:
+            raise NotAvailable(f"pose {'; '.join(wrong)}")
         task = self._site.worker.begin(
             f"Going to {name}", lambda task: self._go(pose, task, way=way)
         )

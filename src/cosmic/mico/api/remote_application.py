@@ -13,7 +13,7 @@ from cosmic.frame.errors import CosmicError, NotAvailable, ProtocolError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.ongoing import Ongoing
 from cosmic.frame.network.transport import Presence, Rule, Subscription, Transport
-from cosmic.frame.task import Progress, Task
+from cosmic.frame.operation import Progress, Task
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.remote_line import CommandLine, may_wait_here
 from cosmic.mico.api.remote_manager import RemoteManager
@@ -21,9 +21,9 @@ from cosmic.mico.api.remote_mirrors import RemoteCollision
 from cosmic.mico.api.station_words import EVENTS, POSITIONS, MicoFacts, MicoPicture
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.ways import Way
-from cosmic.mico.core.caution import Cautions
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.model import SceneModel
+from cosmic.mico.core.motion.undo import Cautions
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 
 logger = logging.getLogger(__name__)

@@ -32,13 +32,13 @@ from cosmic.mico.api.station_words import (
     StartedTogether,
 )
 from cosmic.mico.core.collision.model import SceneModel
-from cosmic.mico.core.device_commander import CommanderType, DeviceCommander, join
-from cosmic.mico.core.group_start import GroupStarted
-from cosmic.mico.core.lease import Lease
-from cosmic.mico.core.orders import Order
-from cosmic.mico.core.positioner import Confidence, PositionerState
+from cosmic.mico.core.motion.device_commander import CommanderType, DeviceCommander, join
+from cosmic.mico.core.motion.group_start import GroupStarted
+from cosmic.mico.core.motion.lease import Lease
+from cosmic.mico.core.motion.orders import Order
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState
+from cosmic.mico.core.motion.undo import UndoEntry
 from cosmic.mico.core.settings import MicoSettings, PositionerSettings
-from cosmic.mico.core.undo import UndoEntry
 from cosmic.mico.hw.interface import Channel, PositionerKind
 
 logger = logging.getLogger(__name__)

@@ -11,9 +11,9 @@ from cosmic.frame.network.ongoing import Ongoing
 from cosmic.frame.network.travelling_errors import from_plain
 from cosmic.mico.api.remote_line import CommandLine, when_over
 from cosmic.mico.api.station_words import Begun, Ended, Outcomes, Refused
-from cosmic.mico.core.messages import MovementEnded
-from cosmic.mico.core.orders import Jog, Order
-from cosmic.mico.core.positioner import PositionerBase, PositionerState, class_for
+from cosmic.mico.core.motion.messages import MovementEnded
+from cosmic.mico.core.motion.orders import Jog, Order
+from cosmic.mico.core.motion.positioner import PositionerBase, PositionerState, class_for
 from cosmic.mico.core.settings import PositionerSettings
 from cosmic.mico.core.state_news import StateNews
 

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Final
 from cosmic.frame.clock import WALL
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.core.collision.checker import NoCollisionModel
-from cosmic.mico.core.judgement import Picture, Request, judge
-from cosmic.mico.core.orders import Motion
-from cosmic.mico.core.rules import Limits
+from cosmic.mico.core.motion.checks import Limits, PlatformSnapshot, Request, judge
+from cosmic.mico.core.motion.orders import Motion
 
 if TYPE_CHECKING:
     from cosmic.mico.api.remote_manager import RemoteManager
@@ -22,7 +21,7 @@ def foreseen(
     motions: Mapping[str, Motion], manager: "RemoteManager", *, consent: bool
 ) -> MoveVerdict:
     """Judge `motions` by all but collisions and the lease, with what the station told last."""
-    picture = Picture(
+    picture = PlatformSnapshot(
         stop_reason=manager.latch.state.reason,
         token=_HERE,
         states=manager.states(),

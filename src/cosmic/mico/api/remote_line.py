@@ -2,23 +2,23 @@
 
 import logging
 from collections.abc import Callable, Mapping
-from queue import SimpleQueue
-from threading import Event, Lock
-from typing import Final, Protocol, runtime_checkable
+from threading import Lock
+from typing import Final, Protocol, TypeVar, runtime_checkable
 from weakref import WeakKeyDictionary
 
-from typing_extensions import override
-
-from cosmic.frame.errors import CosmicError, WrongThreadError
+from cosmic.frame.errors import CosmicError, DeviceTimeout, WrongThreadError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.network.errors import StationAway, StationTimeout
 from cosmic.frame.network.ongoing import Ongoing
 from cosmic.frame.network.transport import CALL_TIMEOUT_S, Transport
-from cosmic.frame.threads import WorkerThread, forbid_waiting_here
-from cosmic.mico.core.movement import Movement
+from cosmic.frame.operation import Operation
+from cosmic.frame.threads import forbid_waiting_here
+from cosmic.mico.core.motion.movement import Movement
 
 logger = logging.getLogger(__name__)
 
+T = TypeVar("T")
 Arguments = Mapping[str, object]
 
 APPLICATION: Final = "mico"
@@ -35,61 +35,6 @@ def may_wait_here() -> bool:
     except WrongThreadError:
         return False
     return True
-
-
-class Lane(WorkerThread):
-    """Carries out what is put in, one after the other; a lane does not wait for another."""
-
-    def __init__(self, name: str, policy: FailurePolicy) -> None:
-        super().__init__(name, policy)
-        self._jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
-
-    def put(self, job: Callable[[], None]) -> None:
-        """Have `job` carried out; returns at once. It may raise a `CosmicError`."""
-        self._jobs.put(job)
-
-    @override
-    def run_body(self) -> None:
-        while not self.end_requested:
-            job = self._jobs.get()
-            if job is None:
-                continue
-            try:
-                job()
-            except CosmicError as exc:
-                logger.warning("%s: %s", self.name, exc)
-
-    @override
-    def request_end(self) -> None:
-        super().request_end()
-        self._jobs.put(None)
-
-
-class Waited:
-    """A job that somebody may wait for."""
-
-    def __init__(self, job: Callable[[], object]) -> None:
-        self._job = job
-        self._over = Event()
-        self._result: object = None
-        self._error: CosmicError | None = None
-
-    def run(self) -> None:
-        """Carry it out; in the lane's thread."""
-        try:
-            self._result = self._job()
-        except CosmicError as exc:
-            self._error = exc
-        finally:
-            self._over.set()
-
-    def wait(self, timeout_s: float) -> object:
-        """Return its result; raises what it raised, and `StationTimeout`."""
-        if not self._over.wait(timeout_s):
-            raise StationTimeout(f"{APPLICATION}: no answer after {timeout_s:g} s")
-        if self._error is not None:
-            raise self._error
-        return self._result
 
 
 @runtime_checkable
@@ -109,11 +54,11 @@ class CommandLine:
     def __init__(self, transport: Transport, policy: FailurePolicy) -> None:
         self._transport = transport
         self._policy = policy
-        self._orders = Lane("mico orders", policy)
-        self._stops = Lane("mico stops", policy)
-        self._renewals = Lane("mico keeps alive", policy)
+        self._orders = JobQueue("mico orders", policy)
+        self._stops = JobQueue("mico stops", policy)
+        self._renewals = JobQueue("mico keeps alive", policy)
         self._lock = Lock()
-        self._newest: dict[tuple[str, int], Callable[[], None]] = {}
+        self._newest: dict[tuple[str, int], Callable[[], object]] = {}
         self._numbers: WeakKeyDictionary[Movement, int] = WeakKeyDictionary()
         self._open = False
         self.heed: Callable[[object], None] = lambda _told: None
@@ -158,7 +103,7 @@ class CommandLine:
     def post(self, job: Callable[[], None]) -> None:
         """Have `job` carried out after what was put in before; returns at once."""
         self._check_open()
-        self._orders.put(job)
+        self._orders.submit(job, "an order").when_failed(_log)
 
     def run(self, job: Callable[[], object], timeout_s: float = 2 * CALL_TIMEOUT_S) -> object:
         """Have `job` carried out after what was put in before, and return its result.
@@ -171,9 +116,7 @@ class CommandLine:
             What it raised.
         """
         self._check_open()
-        waited = Waited(job)
-        self._orders.put(waited.run)
-        return waited.wait(timeout_s)
+        return _waited_for(self._orders.submit(job, "an order"), timeout_s)
 
     def do(self, function: str, arguments: Arguments) -> None:
         """Call a function in its order; what it says of the axes is taken note of.
@@ -200,9 +143,10 @@ class CommandLine:
             self.at_once_later(function, arguments)
             return
         self._check_open()
-        waited = Waited(lambda: self.heed(self.call(function, arguments, STOP_LIMIT_S)))
-        self._stops.put(waited.run)
-        waited.wait(2 * STOP_LIMIT_S)
+        sent = self._stops.submit(
+            lambda: self.heed(self.call(function, arguments, STOP_LIMIT_S)), function
+        )
+        _waited_for(sent, 2 * STOP_LIMIT_S)
 
     def at_once_later(self, function: str, arguments: Arguments) -> None:
         """Call what overtakes everything, without waiting; a failure goes to the policy, loudly."""
@@ -214,14 +158,17 @@ class CommandLine:
                 self._policy.report(exc, f"{function} was NOT carried out at the station")
 
         if self._open:
-            self._stops.put(loud)
+            self._stops.submit(loud, function)
         else:
             logger.warning("%s: %s", function, _CLOSED)
 
     def withdraw(self, number: int) -> None:
         """Give an order up; returns at once, from any thread."""
         arguments = {"numbers": [number]}
-        self._stops.put(lambda: _forget(self.call("withdraw", arguments, STOP_LIMIT_S)))
+        sent = self._stops.submit(
+            lambda: self.call("withdraw", arguments, STOP_LIMIT_S), "giving an order up"
+        )
+        sent.when_failed(_log)
 
     def open_orders(self) -> list[int]:
         """Return the numbers of the orders whose movements have not ended."""
@@ -244,9 +191,9 @@ class CommandLine:
         key = (axis, number)
         with self._lock:
             waiting = key in self._newest
-            self._newest[key] = lambda: _forget(self.call(function, arguments, RENEW_LIMIT_S))
+            self._newest[key] = lambda: self.call(function, arguments, RENEW_LIMIT_S)
         if not waiting:
-            self._renewals.put(lambda: self._send_newest(key))
+            self._renewals.submit(lambda: self._send_newest(key), function).when_failed(_log)
 
     def _send_newest(self, key: tuple[str, int]) -> None:
         with self._lock:
@@ -269,5 +216,15 @@ def when_over(ongoing: Ongoing, callback: Callable[[], None]) -> None:
         subscribe(lambda progress: callback() if progress.done else None)
 
 
-def _forget(_result: object) -> None:
-    """Do nothing with what a call returned."""
+def _waited_for(sent: Operation[T], timeout_s: float) -> T:
+    """Return the result of what was sent; raises what it raised, and `StationTimeout`."""
+    try:
+        return sent.wait(timeout_s)
+    except DeviceTimeout:
+        if sent.done:
+            raise
+    raise StationTimeout(f"{APPLICATION}: no answer after {timeout_s:g} s")
+
+
+def _log(error: CosmicError) -> None:
+    logger.warning("MiCo of the station: %s", error)

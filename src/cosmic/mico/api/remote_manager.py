@@ -15,10 +15,10 @@ from cosmic.mico.api.remote_axes import RemoteAxes
 from cosmic.mico.api.remote_device import follow
 from cosmic.mico.api.remote_foresight import foreseen
 from cosmic.mico.api.remote_line import may_wait_here
-from cosmic.mico.core.group_start import GroupStart
-from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import Motion, MoveTo, Order
-from cosmic.mico.core.undo import UndoEntry
+from cosmic.mico.core.motion.group_start import GroupStart
+from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.core.motion.orders import Motion, MoveTo, Order
+from cosmic.mico.core.motion.undo import UndoEntry
 
 logger = logging.getLogger(__name__)
 

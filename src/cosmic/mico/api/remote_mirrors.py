@@ -8,18 +8,17 @@ from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
 
 from cosmic.frame.errors import NotAvailable, ProtocolError
-from cosmic.frame.listeners import tell
 from cosmic.frame.network.errors import CallRefused
 from cosmic.mico.api.remote_line import CommandLine
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.callback import CollisionCallbackBase
 from cosmic.mico.core.collision.exemptions import Exemptions
 from cosmic.mico.core.collision.model import BodyPair, SceneModel, pair_of
-from cosmic.mico.core.links import Link, LinkTable
-from cosmic.mico.core.orders import Order
+from cosmic.mico.core.motion.links import Link, LinkTable
+from cosmic.mico.core.motion.orders import Order
+from cosmic.mico.core.motion.stop_latch import StopLatch, StopState
+from cosmic.mico.core.motion.undo import UndoEntry
 from cosmic.mico.core.poses import Pose, PoseBook
-from cosmic.mico.core.stop_latch import StopLatch, StopState
-from cosmic.mico.core.undo import UndoEntry
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +64,7 @@ class RemoteLinks(LinkTable):
             if links == self._links:
                 return
             self._set(links)
-        tell(self._listeners)
+        self._changed.emit()
 
 
 class RemoteCollision(Exemptions):
@@ -88,7 +87,7 @@ class RemoteCollision(Exemptions):
             self.model = model
             self._contacts = model.contacts if model is not None else ()
             self._note_ignored()
-        tell(self._listeners)
+        self._changed.emit()
 
     def _note_ignored(self) -> None:
         self._ignored = frozenset(
@@ -157,7 +156,7 @@ class RemoteCollision(Exemptions):
             changed = before != (self._taken_out, self._allowed)
             self._note_ignored()
         if changed:
-            tell(self._listeners)
+            self._changed.emit()
 
 
 class RemotePoses(PoseBook):

@@ -10,9 +10,9 @@ from cosmic.frame.network.errors import RemoteDefect
 from cosmic.frame.network.travelling_errors import to_plain
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.station_tell import MicoTeller
-from cosmic.mico.api.station_words import Outcome, Outcomes
-from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import Order
+from cosmic.mico.api.station_words import AxisOutcome, Outcomes
+from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.core.motion.orders import Order
 
 _KEPT: Final = 512
 
@@ -54,11 +54,11 @@ class Ordered:
         of = {name: self._outcome(name, each) for name, each in self._group.movements.items()}
         return Outcomes(of, self._teller.status(), self._group.start_skew_ms)
 
-    def _outcome(self, name: str, movement: Movement) -> Outcome:
+    def _outcome(self, name: str, movement: Movement) -> AxisOutcome:
         error = movement.exception()
         if error is not None and not isinstance(error, CosmicError):
             error = RemoteDefect(f"{type(error).__name__}: {error}")
-        return Outcome(
+        return AxisOutcome(
             position=movement.wait() if error is None else None,
             error=None if error is None else to_plain(error),
             state=self._teller.state_of(name),

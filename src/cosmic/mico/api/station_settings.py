@@ -17,7 +17,7 @@ from cosmic.mico.api.station_words import (
 )
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.collision.collision_manager import CollisionManager
-from cosmic.mico.core.orders import FREQUENCY_HZ
+from cosmic.mico.core.motion.orders import FREQUENCY_HZ
 from cosmic.mico.core.poses import Pose
 
 

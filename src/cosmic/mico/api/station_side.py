@@ -6,7 +6,7 @@ from cosmic.frame.errors import MoveCancelled, NotAvailable, refusal
 from cosmic.frame.network.caller import JOG_LIMIT_S, MOVE_LIMIT_S
 from cosmic.frame.network.remote import remote
 from cosmic.frame.network.station import Station
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.api.application_base import WAY_BUDGET_S
 from cosmic.mico.api.group import GroupMovement
@@ -23,7 +23,7 @@ from cosmic.mico.api.station_words import (
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.model import SceneModel
-from cosmic.mico.core.orders import Jog, Order, Steer
+from cosmic.mico.core.motion.orders import Jog, Order, Steer
 
 LONGEST_SEARCH_S: Final = 60.0
 """For how long a client may have a way looked for; other long operations wait for it."""

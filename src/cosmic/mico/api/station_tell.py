@@ -26,10 +26,10 @@ from cosmic.mico.api.station_words import (
     StampedState,
     StartedTogether,
 )
-from cosmic.mico.core.device import Device
-from cosmic.mico.core.group_start import GroupStarted
-from cosmic.mico.core.messages import MovementBegun, MovementEnded
-from cosmic.mico.core.positioner import PositionerState
+from cosmic.mico.core.motion.device import Device
+from cosmic.mico.core.motion.group_start import GroupStarted
+from cosmic.mico.core.motion.messages import MovementBegun, MovementEnded
+from cosmic.mico.core.motion.positioner import PositionerState
 
 if TYPE_CHECKING:
     from cosmic.mico.api.application import MicoApplication

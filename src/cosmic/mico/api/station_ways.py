@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from cosmic.frame.errors import CosmicError
-from cosmic.frame.task import Progress, Task
+from cosmic.frame.operation import Progress, Task
 from cosmic.mico.api.ways import Way
 
 if TYPE_CHECKING:

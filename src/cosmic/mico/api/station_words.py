@@ -19,9 +19,9 @@ from cosmic.mico.core.collision.model import (
     Shape,
     WatchedPair,
 )
-from cosmic.mico.core.links import Link
-from cosmic.mico.core.messages import MovementBegun
-from cosmic.mico.core.orders import (
+from cosmic.mico.core.motion.links import Link
+from cosmic.mico.core.motion.messages import MovementBegun
+from cosmic.mico.core.motion.orders import (
     Calibrate,
     Jog,
     MoveBy,
@@ -31,10 +31,10 @@ from cosmic.mico.core.orders import (
     Step,
     ToEndStop,
 )
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState
+from cosmic.mico.core.motion.stop_latch import StopState
+from cosmic.mico.core.motion.undo import UndoEntry
 from cosmic.mico.core.poses import Pose
-from cosmic.mico.core.positioner import Confidence, PositionerState
-from cosmic.mico.core.stop_latch import StopState
-from cosmic.mico.core.undo import UndoEntry
 from cosmic.mico.hw.interface import (
     Activity,
     Channel,
@@ -204,7 +204,7 @@ class StartedTogether:
 
 @transferable
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class AxisOutcome:
     """How a movement of one axis ended.
 
     Attributes
@@ -227,7 +227,7 @@ class Outcome:
 class Outcomes:
     """How the movements of one order ended, by axis, and how MiCo is since."""
 
-    of: Mapping[str, Outcome]
+    of: Mapping[str, AxisOutcome]
     status: MicoStatus
     skew_ms: float | None = None
 

@@ -9,7 +9,7 @@ from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable, refusa
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.entry import Number, as_number
-from cosmic.mico.core.movement import Movement
+from cosmic.mico.core.motion.movement import Movement
 
 logger = logging.getLogger(__name__)
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 from threading import Lock
 
 from cosmic.frame.errors import CosmicError, DeviceError, MoveCancelled, MoveRefused, refusal
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.trajectory_places import AwayFromStartError
 from cosmic.mico.api.trajectory_site import TrajectorySite
-from cosmic.mico.core.orders import Motion, MoveTo, Step
+from cosmic.mico.core.motion.orders import Motion, MoveTo, Step
 from cosmic.mico.core.trajectory.binding import BoundLeg, BoundSpeed
 from cosmic.mico.core.trajectory.timing import scaled_hz
 

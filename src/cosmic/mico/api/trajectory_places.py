@@ -7,7 +7,7 @@ from cosmic.frame.errors import NotAvailable
 from cosmic.frame.units import format_quantity
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.trajectory_state import StartMode
-from cosmic.mico.core.orders import MoveTo
+from cosmic.mico.core.motion.orders import MoveTo
 from cosmic.mico.core.trajectory.binding import Bound, BoundLeg, BoundStep
 
 WAY_BUDGET_S: Final = 2.0

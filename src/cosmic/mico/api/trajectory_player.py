@@ -7,8 +7,8 @@ from typing import Final
 
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import CosmicError, DeviceTimeout, MoveCancelled, NotAvailable
-from cosmic.frame.listeners import tell
-from cosmic.frame.task import Task
+from cosmic.frame.events import Event, Unsubscribe, notify
+from cosmic.frame.operation import Task
 from cosmic.frame.threads import forbid_waiting_here
 from cosmic.mico.api.trajectory_moves import at_line
 from cosmic.mico.api.trajectory_run import TrajectoryRun
@@ -55,7 +55,7 @@ class TrajectoryPlayer:
         self._changed = self._control.changed
         self._run = TrajectoryRun(site, bound, self._control, source)
         self._telling = RLock()
-        self._listeners: tuple[Callable[[PlayProgress], None], ...] = ()
+        self._progressed: Event[PlayProgress] = Event()
         self._state = PlayState.READY
         self._failure: CosmicError | None = None
         self._task: Task | None = None
@@ -118,11 +118,11 @@ class TrajectoryPlayer:
             error=str(self._failure) if self._failure else "",
         )
 
-    def subscribe(self, listener: Callable[[PlayProgress], None]) -> None:
+    def subscribe(self, listener: Callable[[PlayProgress], object]) -> Unsubscribe:
         """Call `listener(progress)` at each line and change, in the thread that makes it."""
         with self._telling:
-            self._listeners = (*self._listeners, listener)
-            tell([listener], self.progress)
+            notify(listener, self.progress)
+            return self._progressed.subscribe(listener)
 
     # How it goes
 
@@ -279,4 +279,4 @@ class TrajectoryPlayer:
 
     def _tell(self) -> None:
         with self._telling:
-            tell(self._listeners, self.progress)
+            self._progressed.emit(self.progress)

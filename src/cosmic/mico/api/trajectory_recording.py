@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, Qt
 
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import RecordingError
-from cosmic.frame.listeners import tell
+from cosmic.frame.events import notify
 from cosmic.mico.core.trajectory_recorder import TrajectoryRecorder
 
 
@@ -50,7 +50,7 @@ class TrajectoryRecording:
         """
 
         def on_change(_what: object) -> None:
-            tell([callback])
+            notify(callback)
 
         direct = Qt.ConnectionType.DirectConnection
         connections = [

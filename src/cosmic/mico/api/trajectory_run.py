@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Final
 
 from cosmic.frame.errors import MoveCancelled, refusal
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.frame.verdict import Reason, refuse
 from cosmic.mico.api.trajectory_moves import LegMover
 from cosmic.mico.api.trajectory_places import Places

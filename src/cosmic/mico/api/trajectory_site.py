@@ -1,5 +1,6 @@
 """What trajectories need of a platform: its facts, its poses, and a stage for rehearsals."""
 
+import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from threading import Lock
@@ -7,15 +8,15 @@ from typing import TYPE_CHECKING, Protocol
 
 from cosmic.frame.config import user_file
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.frame.task_application import Job
 from cosmic.mico.api.ports import CollisionPort
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
+from cosmic.mico.core.motion.checks import Limits
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState, class_for
 from cosmic.mico.core.ports import ManagerPort
-from cosmic.mico.core.poses import PoseBook
-from cosmic.mico.core.positioner import Confidence, PositionerState, class_for
-from cosmic.mico.core.rules import Limits
+from cosmic.mico.core.poses import PoseBook, pose_misfits
 from cosmic.mico.core.trajectory.binding import AxisFacts, Bound, PlatformFacts
 from cosmic.mico.core.trajectory.clearance import ClearanceSearch
 from cosmic.mico.core.trajectory.pure_gate import PureAnswers, pure_copy
@@ -24,6 +25,8 @@ from cosmic.mico.core.trajectory.rehearsal import Rehearsal, Stage, Told, rehear
 if TYPE_CHECKING:
     from cosmic.mico.api.trajectory_player import TrajectoryPlayer
     from cosmic.mico.core.trajectory_recorder import TrajectoryRecorder
+
+logger = logging.getLogger(__name__)
 
 
 class Worker(Protocol):
@@ -69,6 +72,8 @@ class TrajectorySite:
         self.manager = worker.manager
         self.platform = platform
         self.poses = PoseBook(user_file(self.manager.settings.poses, folder))
+        for text in pose_misfits(self.poses.poses, self.manager.settings.kinds):
+            logger.warning("%s: %s", self.poses.path, text)
         self._answers: PureAnswers | None = None
         self._rehearsing = Lock()
 

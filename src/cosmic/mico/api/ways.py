@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from cosmic.frame.errors import CosmicError, MoveCancelled
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.mico.api.group import move_together
-from cosmic.mico.core.orders import Motion, MoveTo
+from cosmic.mico.core.motion.orders import Motion, MoveTo
 from cosmic.mico.core.planning.problem import Plan
 from cosmic.mico.core.ports import ManagerPort
 

@@ -5,7 +5,7 @@ from typing import Final, Self
 
 from pydantic import model_validator
 
-from cosmic.frame.config import StrictModel
+from cosmic.frame.config import StrictModel, not_there
 
 RATIO: Final = (0.001, 1000.0)
 """Smallest and largest amount of a ratio."""
@@ -50,7 +50,7 @@ def link_misfits(links: Iterable[LinkSettings], kinds: Mapping[str, str]) -> lis
         where = f"link[{number}]"
         for name in (link.first, link.second):
             if name not in kinds:
-                wrong.append(f"{where}: there is no positioner {name!r}")
+                wrong.append(f"{where}: {not_there('positioner', name, kinds)}")
             elif kinds[name] == "open-loop":
                 wrong.append(f"{where}: {name} has no sensor: it cannot be linked")
         if kinds.get(link.first, "") != kinds.get(link.second, ""):

@@ -9,14 +9,14 @@ from PySide6.QtCore import SignalInstance
 from cosmic.frame.clock import Clock
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.core.collision.exemptions import Exemptions
-from cosmic.mico.core.device_commander import Commanded, CommanderType, DeviceCommander
-from cosmic.mico.core.lease import Lease
-from cosmic.mico.core.links import LinkTable
-from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import Motion, Order
-from cosmic.mico.core.positioner import PositionerBase, PositionerState
+from cosmic.mico.core.motion.device_commander import Commanded, CommanderType, DeviceCommander
+from cosmic.mico.core.motion.lease import Lease
+from cosmic.mico.core.motion.links import LinkTable
+from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.core.motion.orders import Motion, Order
+from cosmic.mico.core.motion.positioner import PositionerBase, PositionerState
+from cosmic.mico.core.motion.stop_latch import StopLatch
 from cosmic.mico.core.settings import MicoSettings
-from cosmic.mico.core.stop_latch import StopLatch
 from cosmic.mico.hw.interface import Channel
 
 

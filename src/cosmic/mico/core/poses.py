@@ -3,6 +3,7 @@
 import logging
 import math
 import re
+import reprlib
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from pathlib import Path
 from threading import RLock
 from typing import Final
 
-from cosmic.frame.config import read_toml
+from cosmic.frame.config import not_there, read_toml
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.kept_file import write_whole
 
@@ -123,9 +124,31 @@ def read_poses(path: Path) -> dict[str, Pose]:
         for axis, value in table.items():
             number = isinstance(value, int | float) and not isinstance(value, bool)
             if not number or not math.isfinite(value):
-                raise ConfigError(f"{path}: {name}.{axis}: {value!r} is no position")
+                raise ConfigError(f"{path}: {name}.{axis}: {reprlib.repr(value)} is no position")
         poses[name] = Pose(name, {axis: float(value) for axis, value in table.items()})
     return poses
+
+
+def pose_misfits(poses: Mapping[str, Pose], kinds: Mapping[str, str]) -> list[str]:
+    """Return a line for each axis of `poses` that nothing brings there.
+
+    Parameters
+    ----------
+    kinds : mapping of str
+        "linear", "rotary" or "open-loop" of every positioner, by name.
+    """
+    return [
+        f"{pose.name}.{axis}: {text}"
+        for pose in poses.values()
+        for axis in pose.positions
+        if (text := _misfit(axis, kinds))
+    ]
+
+
+def _misfit(axis: str, kinds: Mapping[str, str]) -> str:
+    if axis not in kinds:
+        return not_there("positioner", axis, kinds)
+    return f"{axis} has no sensor: no pose brings it back" if kinds[axis] == "open-loop" else ""
 
 
 def _replaced(text: str, name: str, pose: Pose | None) -> str:

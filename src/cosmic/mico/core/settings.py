@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cosmic.frame.config import StrictModel
+from cosmic.frame.config import StrictModel, not_there
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.core.link_settings import LinkSettings, link_misfits
 from cosmic.mico.core.sequence.settings import InitialisationSettings, misfits
@@ -210,17 +210,23 @@ class MicoSettings(StrictModel):
             *self._twice("key", self._keys()),
             *self._twice("serial", [str(serial) for serial in self.serials]),
             *self._unknown_names(),
-            *link_misfits(self.link, {each.name: each.kind for each in self.positioner}),
+            *self.mirror.misfits(self.kinds),
+            *link_misfits(self.link, self.kinds),
             *misfits(
                 self.initialisation.step,
-                {each.name: each.kind for each in self.positioner},
+                self.kinds,
                 tuple(group.title for group in self.group),
             ),
-            *self.teleoperation.mistakes({each.name: each.kind for each in self.positioner}),
+            *self.teleoperation.mistakes(self.kinds),
         ]
         if wrong:
             raise ValueError("; ".join(wrong))
         return self
+
+    @property
+    def kinds(self) -> dict[str, str]:
+        """Kind of every positioner by name: "linear", "rotary" or "open-loop"."""
+        return {each.name: each.kind for each in self.positioner}
 
     @property
     def start_regions(self) -> dict[str, tuple[float, float]]:
@@ -251,10 +257,10 @@ class MicoSettings(StrictModel):
         ]
 
     def _unknown_names(self) -> list[str]:
-        known = {each.name for each in self.positioner}
+        known = [each.name for each in self.positioner]
         used = [(f"group {group.title!r}", group.positioners) for group in self.group]
         return [
-            f"{where}: there is no positioner {name!r}"
+            f"{where}: {not_there('positioner', name, known)}"
             for where, names in used
             for name in names
             if name not in known

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from cosmic.mico.core.messages import PositionChanged
-from cosmic.mico.core.positioner import PositionerState
+from cosmic.mico.core.motion.messages import PositionChanged
+from cosmic.mico.core.motion.positioner import PositionerState
 
 
 class StateNews:

@@ -14,9 +14,9 @@ from cosmic.frame.errors import RecordingError, RecordingExistsError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.file_names import check_base_name, check_directory
 from cosmic.frame.threads import WorkerThread
-from cosmic.mico.core.messages import MovementBegun, MovementEnded
+from cosmic.mico.core.motion.messages import MovementBegun, MovementEnded
+from cosmic.mico.core.motion.positioner import class_for
 from cosmic.mico.core.ports import DevicePort, ManagerPort
-from cosmic.mico.core.positioner import class_for
 from cosmic.mico.core.trajectory.model import Place, Statement, Trajectory
 from cosmic.mico.core.trajectory.reader import END_OF_RECORDING
 from cosmic.mico.core.trajectory.segments import SegmentBuilder

@@ -8,10 +8,10 @@ from cosmic.frame.errors import refusal
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.collision.helper_link import GateProcess, NoAnswerError
 from cosmic.mico.core.collision.model import SceneModel
-from cosmic.mico.core.device_manager import DeviceManager
+from cosmic.mico.core.motion.manager import DeviceManager
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.core.planning.problem import NoWay, Plan, Problem, validate
 from cosmic.mico.core.planning.timing import duration_s
-from cosmic.mico.core.positioner import Confidence, PositionerState
 
 PLANNER: Final = "cosmic.mico.core.planning.planner:plan"
 PATIENCE_S: Final = 5.0

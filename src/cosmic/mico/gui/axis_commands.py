@@ -7,10 +7,10 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
 from cosmic.frame.errors import CosmicError, MoveCancelled, MoveRefused
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.verdict import MoveVerdict, Reason
 from cosmic.mico.api.stepwise import StepwiseMove
-from cosmic.mico.core.movement import Movement
-from cosmic.mico.gui.movement_relay import MovementRelay
+from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.gui.way_request import HINT, Goal, WayRequest
 
 Make = Callable[[bool], Movement | StepwiseMove]
@@ -80,8 +80,7 @@ class AxisCommands(QObject):
     def __init__(self, axis_name: str, parent: QObject) -> None:
         super().__init__(parent)
         self._axis_name = axis_name
-        self._relay = MovementRelay()
-        self._relay.ended.connect(self._on_ended)
+        self._relay = Relay(self._on_ended)
         self._newest: _Command | None = None
         self._series: StepwiseMove | None = None
         self._moved = False
@@ -122,7 +121,7 @@ class AxisCommands(QObject):
         movement = made.movement if isinstance(made, StepwiseMove) else made
         self._newest = replace(command, movement=movement)
         self.begun.emit()
-        self._relay.follow(movement)
+        movement.add_callback(self._relay)
 
     def abandon_series(self) -> None:
         """Let a series begin no further part: something newer is about to come."""
@@ -141,7 +140,7 @@ class AxisCommands(QObject):
         self._blocked = None
         self._moved = False
         self.begun.emit()
-        self._relay.follow(movement)
+        movement.add_callback(self._relay)
 
     def _on_ended(self, movement: Movement) -> None:
         command = self._newest

@@ -20,7 +20,7 @@ from cosmic.frame.gui.theme import (
 )
 from cosmic.frame.overrides import override
 from cosmic.frame.units import DISPLAY, format_quantity
-from cosmic.mico.core.positioner import Confidence
+from cosmic.mico.core.motion.positioner import Confidence
 
 _EDGE_PX: Final = 3
 _LOUD_PX: Final = 2.0
@@ -129,7 +129,7 @@ class ConfidenceMark(Chip):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("≈ estimated", "warning", parent=parent)
         self.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.setFixedWidth(self.fontMetrics().horizontalAdvance("≈ estimated") + 3 * STEP_PX)
+        self.setFixedWidth(self.fontMetrics().horizontalAdvance("≈ estimated") + 2 * STEP_PX + 2)
         self.set_confidence(Confidence.UNKNOWN)
 
     def set_confidence(self, confidence: Confidence, std: float = math.inf) -> None:

@@ -12,8 +12,8 @@ from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.overrides import override
 from cosmic.frame.units import format_quantity
-from cosmic.mico.core.orders import FREQUENCY_HZ
-from cosmic.mico.core.positioner import PositionerState
+from cosmic.mico.core.motion.orders import FREQUENCY_HZ
+from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.gui.axis_menu import AxisMenu
 from cosmic.mico.gui.link_switch import LinkSwitch
 from cosmic.mico.gui.move_row import MoveFields
@@ -87,13 +87,13 @@ class ClosedLoopGUI(PositionerBaseGUI):
     @override
     def _first_row(self) -> Sequence[QWidget]:
         signs = (self._linked, self._link)
-        return *super()._first_row()[:-1], *signs, self._menu.button, self._stop
+        return *super()._first_row()[:-1], *signs, self._stop
 
     @override
     def _second_row(self) -> Sequence[QWidget]:
         move = self._move
         buttons = (self._backward, move.distance, self._forward)
-        return *buttons, _gap(), move.target, move.go_to
+        return *buttons, _gap(), move.target, move.go_to, self._menu.button
 
     @override
     def _more_row(self) -> QWidget:

@@ -2,14 +2,12 @@
 
 from PySide6.QtCore import QObject, Signal
 
+from cosmic.frame.gui.relay import Relay
 from cosmic.mico.api.ports import CollisionPort
 
 
 class CollisionStatus(QObject):
     """Follows the collision model, whoever changes it; GUI thread.
-
-    It has no parent: the subscription keeps it alive, so that a change made in another thread
-    while the window closes meets no deleted object.
 
     Signals
     -------
@@ -18,14 +16,13 @@ class CollisionStatus(QObject):
     """
 
     changed = Signal()
-    _told = Signal()
 
     def __init__(self, model: CollisionPort | None) -> None:
         super().__init__()
         self._model = model
-        self._told.connect(self._on_told)
+        self._relay = Relay(self._on_changed)
         if model is not None:
-            model.subscribe(self._tell)
+            self._relay.follow(model.subscribe)
 
     @property
     def has_model(self) -> bool:
@@ -42,8 +39,5 @@ class CollisionStatus(QObject):
         """Contacts that are allowed at the moment, sorted."""
         return () if self._model is None else tuple(sorted(self._model.allowed_contacts))
 
-    def _tell(self) -> None:
-        self._told.emit()  # in the thread of the change; Qt takes it to this object's own
-
-    def _on_told(self) -> None:
+    def _on_changed(self) -> None:
         self.changed.emit()

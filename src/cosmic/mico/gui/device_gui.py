@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QToolButton, QVBoxLayout
 from cosmic.frame.gui.build import named, tipped
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, ui_font
-from cosmic.mico.core.positioner import PositionerState
+from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.gui.positioner_gui import STATES, PositionerBaseGUI
 
 _GRAVITY: Final = (State.OK, State.BUSY, State.UNKNOWN, State.ERROR)

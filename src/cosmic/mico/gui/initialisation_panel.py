@@ -16,11 +16,11 @@ from PySide6.QtWidgets import (
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.theme import STEP_PX, State, state_look, ui_font
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.frame.units import format_quantity
 from cosmic.mico.api.initialisation import Asker, plan
 from cosmic.mico.api.mico import Mico
-from cosmic.mico.core.positioner import Confidence, PositionerState
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.core.sequence.report import SequenceReport, StepReport, StepState
 from cosmic.mico.hw.interface import PositionerKind
 

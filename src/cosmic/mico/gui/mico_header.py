@@ -18,8 +18,8 @@ from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look
-from cosmic.frame.task import Progress, Task
-from cosmic.mico.core.orders import FREQUENCY_HZ
+from cosmic.frame.operation import Progress, Task
+from cosmic.mico.core.motion.orders import FREQUENCY_HZ
 from cosmic.mico.core.settings import JogSettings
 from cosmic.mico.hw.interface import PositionerKind
 

@@ -8,10 +8,10 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.gui.theme import State
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.mico import Mico
-from cosmic.mico.core.group_start import GroupStarted
+from cosmic.mico.core.motion.group_start import GroupStarted
 from cosmic.mico.core.settings import GroupSettings, MicoSettings, PositionerSettings
 from cosmic.mico.gui.arrangement import arranged_groups
 from cosmic.mico.gui.axis_commands import ConsentRequest

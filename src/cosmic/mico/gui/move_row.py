@@ -9,7 +9,7 @@ from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.overrides import override
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.stepwise import StepwiseMove
-from cosmic.mico.core.movement import Movement
+from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.settings import MotionDefaults
 from cosmic.mico.gui.way_request import Goal
 

@@ -2,29 +2,21 @@
 
 from typing import Final
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QComboBox, QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import STEP_PX
+from cosmic.frame.operation import Progress
 from cosmic.frame.overrides import override
-from cosmic.frame.task import Progress, Task
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.settings import GroupSettings
 
 ALL: Final = "all axes"
-
-
-class _Relay(QObject):
-    """Brings the progress of tasks to the window's thread; outlives the box."""
-
-    progressed = Signal(object)
-
-    def follow(self, task: Task) -> None:
-        task.subscribe(self.progressed.emit)
 
 
 class PosesBox(QWidget):
@@ -41,8 +33,7 @@ class PosesBox(QWidget):
     def __init__(self, mico: Mico, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._mico = mico
-        self._relay = _Relay()
-        self._relay.progressed.connect(self._on_progressed)
+        self._relay = Relay(self._on_progressed)
         self.poses = named(tipped(QComboBox(), "Named poses"), "poses")
         self.go = named(push_button("Go", "Move all axes of the pose there, together"), "goPose")
         self.way = named(
@@ -130,7 +121,7 @@ class PosesBox(QWidget):
             self.told.set_text(str(exc))
             return
         self.told.set_text("")
-        self._relay.follow(task)
+        task.subscribe(self._relay)
 
     def _on_progressed(self, progress: Progress) -> None:
         if progress.done:

@@ -8,14 +8,13 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QToolButton, QVBoxLayout
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, tipped
-from cosmic.frame.gui.chip import set_style_property
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.palette import OKABE_ITO
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look, ui_font
 from cosmic.mico.api.axis import Axis
-from cosmic.mico.core.positioner import PositionerState, Status
+from cosmic.mico.core.motion.positioner import PositionerState, Status
 from cosmic.mico.core.settings import MotionDefaults, PositionerSettings
 from cosmic.mico.gui.axis_commands import AxisCommands
 from cosmic.mico.gui.card import Card, ConfidenceMark, PositionDisplay
@@ -226,7 +225,7 @@ class PositionerBaseGUI(Card):
             text = self._note or self._stopped or ("" if self._watched else UNWATCHED_TEXT)
         loud = bool(text)
         self._line.set_text(text or self._usual_line(state))
-        set_style_property(self._line, "role", "" if loud else "dim")
+        self._line.set_dim(not loud)
 
     def _usual_line(self, state: PositionerState) -> str:  # noqa: ARG002 - other kinds look at it
         return "no sensor: the position is counted from steps"

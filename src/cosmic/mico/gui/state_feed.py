@@ -5,8 +5,8 @@ from typing import Final, Protocol
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from cosmic.mico.api.mico import Mico
-from cosmic.mico.core.device_commander import DeviceCommander
-from cosmic.mico.core.positioner import PositionerState
+from cosmic.mico.core.motion.device_commander import DeviceCommander
+from cosmic.mico.core.motion.positioner import PositionerState
 
 PERIOD_MS: Final = 33
 

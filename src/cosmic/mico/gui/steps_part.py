@@ -6,8 +6,8 @@ from cosmic.frame.gui.build import named
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.mico.api.axis import Axis
-from cosmic.mico.core.movement import Movement
-from cosmic.mico.core.orders import AMPLITUDE_V, FREQUENCY_HZ, LARGEST_STEPS
+from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.core.motion.orders import AMPLITUDE_V, FREQUENCY_HZ, LARGEST_STEPS
 from cosmic.mico.core.settings import MotionDefaults
 
 

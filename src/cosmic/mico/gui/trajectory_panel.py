@@ -5,16 +5,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFileDialog, QLabel, QVBoxLayout, QWidget
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, tight_row
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, ui_font
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.trajectory_player import TrajectoryPlayer
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
@@ -38,14 +39,6 @@ _STATES: Final = {
     PlayState.CANCELLED: State.REFUSED,
     PlayState.ENDED: State.OK,
 }
-
-
-class _Relay(QObject):
-    """Brings what happens in other threads to the window's; outlives the panel."""
-
-    loaded = Signal(object, object)
-    rehearsed = Signal(object)
-    failed = Signal(str)
 
 
 class TrajectoryPanel(QWidget):
@@ -114,10 +107,9 @@ class TrajectoryPanel(QWidget):
             column.addWidget(widget)
 
     def _connect(self) -> None:
-        self._relay = _Relay()
-        self._relay.loaded.connect(self._on_loaded)
-        self._relay.rehearsed.connect(self._on_rehearsed)
-        self._relay.failed.connect(self._on_failed)
+        self._tell_loaded = Relay(self._on_loaded)
+        self._tell_rehearsed = Relay(self._on_rehearsed)
+        self._tell_failed = Relay(self._on_failed)
         self._recorder.recorded.connect(self.open)
         self.open_button.clicked.connect(self._on_open)
         self.mirror_button.clicked.connect(self.mirror)
@@ -151,9 +143,9 @@ class TrajectoryPanel(QWidget):
             try:
                 found = self._api.load(path, lambda part: task.report(part, "reading"))
             except CosmicError as exc:
-                self._relay.loaded.emit(path, exc)
+                self._tell_loaded(path, exc)
             else:
-                self._relay.loaded.emit(path, found)
+                self._tell_loaded(path, found)
             task.finish()
 
         self._begin(f"Reading {path.name}", read)
@@ -232,10 +224,10 @@ class TrajectoryPanel(QWidget):
                     trajectory, task.report, speed=speed, cancelled=lambda: task.cancel_requested
                 )
             except CosmicError as exc:
-                self._relay.failed.emit(str(exc))
+                self._tell_failed(str(exc))
                 task.fail(exc)
             else:
-                self._relay.rehearsed.emit(found)
+                self._tell_rehearsed(found)
                 task.finish()
 
         self._say("rehearsing", State.BUSY)

@@ -1,22 +1,18 @@
 """`PlayControl`: runs the trajectory of the panel, as its bar and its question say."""
 
 from collections.abc import Callable
+from functools import partial
 
 from PySide6.QtCore import QObject, Signal
 
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.relay import Relay
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.trajectory_places import AwayFromStartError
 from cosmic.mico.api.trajectory_player import TrajectoryPlayer
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState, StartMode
 from cosmic.mico.core.trajectory.model import Trajectory
 from cosmic.mico.gui.trajectory_bars import RunBar, StartQuestion
-
-
-class _Relay(QObject):
-    """Brings what happens in other threads to the window's; outlives the panel."""
-
-    progressed = Signal(object, object)
 
 
 class PlayControl(QObject):
@@ -42,8 +38,7 @@ class PlayControl(QObject):
         self._trajectory: Trajectory | None = None
         self._player: TrajectoryPlayer | None = None
         self._asked: Callable[[StartMode], None] | None = None
-        self._relay = _Relay()
-        self._relay.progressed.connect(self._on_progressed)
+        self._relay = Relay(self._on_progressed)
         bar.run_requested.connect(self.run)
         bar.step_requested.connect(self.step)
         bar.pause_requested.connect(self._on_pause)
@@ -116,8 +111,7 @@ class PlayControl(QObject):
         except CosmicError as exc:
             self.refused.emit(str(exc))
             return None
-        relay = self._relay
-        player.subscribe(lambda progress: relay.progressed.emit(player, progress))
+        player.subscribe(partial(self._relay, player))
         return player
 
     def _on_pause(self) -> None:

@@ -5,16 +5,11 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.relay import Relay
 from cosmic.mico.api.trajectories import Trajectories
 from cosmic.mico.api.trajectory_recording import TrajectoryRecording
 from cosmic.mico.gui.trajectory_bars import RecordBar
 from cosmic.mico.gui.trajectory_texts import recording_text
-
-
-class _Relay(QObject):
-    """Brings what happens in other threads to the window's; outlives the panel."""
-
-    changed = Signal()
 
 
 class RecordControl(QObject):
@@ -33,8 +28,7 @@ class RecordControl(QObject):
         self._api = api
         self._bar = bar
         self._recording: TrajectoryRecording | None = None
-        self._relay = _Relay()
-        self._relay.changed.connect(self._on_changed)
+        self._relay = Relay(self._on_changed)
         bar.stop_requested.connect(self.stop)
 
     def record(self, path: Path) -> None:
@@ -52,7 +46,7 @@ class RecordControl(QObject):
         except CosmicError as exc:
             bar.show_recording(str(exc), recording=False)
             return
-        self._recording.subscribe(self._relay.changed.emit)
+        self._recording.subscribe(self._relay)
         self._on_changed()
 
     def stop(self) -> None:

@@ -2,24 +2,19 @@
 
 from typing import Final
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import QWidget
 
 from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import State
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.mico import Mico
-from cosmic.mico.core.undo import UndoEntry, undo_text
+from cosmic.mico.core.motion.undo import UndoEntry, undo_text
 from cosmic.mico.gui.caution_dialog import CautionDialog
 
 UNDO_KEY: Final = "Ctrl+Z"
-
-
-class _Relay(QObject):
-    """Brings the end of a movement to the window's thread; outlives it."""
-
-    ended = Signal(object)
 
 
 class UndoGui(QObject):
@@ -46,8 +41,7 @@ class UndoGui(QObject):
         self._mico = mico
         self._window = parent
         self._question: CautionDialog | None = None
-        self._relay = _Relay()
-        self._relay.ended.connect(self._on_ended, Qt.ConnectionType.QueuedConnection)
+        self._relay = Relay(self._on_ended, queued=True)
         shortcut = QShortcut(QKeySequence(UNDO_KEY), parent)
         shortcut.activated.connect(self.undo)
         mico.application.undo.changed.connect(self.show_available)
@@ -113,7 +107,7 @@ class UndoGui(QObject):
             self.said.emit(f"Undo: {exc}", State.REFUSED)
             return
         self.said.emit(f"Undo: {where}, slowly", State.BUSY)
-        movement.add_callback(self._relay.ended.emit)
+        movement.add_callback(self._relay)
 
     def _poses(self, entry: UndoEntry) -> list[dict[str, float]]:
         states = self._mico.application.manager.states().values()

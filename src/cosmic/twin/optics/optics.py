@@ -7,21 +7,25 @@ from threading import Lock
 from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from cosmic.twin.force_side import ForceSide
 from cosmic.twin.kinematics import Floats, Point
 from cosmic.twin.lens import LensAxisName, TwinLens
 from cosmic.twin.light import TwinLight
+from cosmic.twin.optics.drawing import (
+    Drawer,
+    Drawing,
+    LocalDrawer,
+    Pixels,
+    RemoteDrawer,
+    drawing_process,
+)
 from cosmic.twin.optics.projection import Area, Projection, project
 from cosmic.twin.settings import TwinSettings
 from cosmic.twin.stage import Stage
 
 if TYPE_CHECKING:
     from cosmic.twin.optics.subjects import Subjects
-    from cosmic.twin.optics.view import View
-
-Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
 MICROSCOPE: Final = "microscope"
 OVERVIEW: Final = "overview"
@@ -66,6 +70,8 @@ class Optics:
         Fibres and tools.
     seed : int
         Of dirt and noise.
+    apart : bool
+        Images are drawn in a process of their own, which all scenes of a program share.
     """
 
     def __init__(
@@ -77,6 +83,8 @@ class Optics:
         lens: TwinLens,
         light: TwinLight,
         seed: int,
+        *,
+        apart: bool = False,
     ) -> None:
         self.settings = settings.optics
         self._twin = settings
@@ -85,9 +93,13 @@ class Optics:
         self._force_side = force_side
         self._lens = lens
         self._light = light
-        self._seed = seed
+        self._drawer: Drawer
+        if apart:
+            self._drawer = RemoteDrawer(drawing_process(), settings.optics, seed)
+        else:
+            self._drawer = LocalDrawer(settings.optics, seed)
         self._lock = Lock()
-        self._drawn: tuple[Subjects, dict[str, View]] | None = None
+        self._made: Subjects | None = None
 
     @property
     def views(self) -> tuple[str, ...]:
@@ -122,16 +134,34 @@ class Optics:
         bits : int
             8: uint8; 16: uint16.
         """
-        subjects, views = self._ready()
-        return views[view].draw(
-            subjects.at(at_s),
-            at_s,
+        return self.expose(at_s, exposure_s, gain_db, roi, binning, bits, view).pixels()
+
+    def expose(
+        self,
+        at_s: float,
+        exposure_s: float = 0.02,
+        gain_db: float = 0.0,
+        roi: RoiLike | None = None,
+        binning: int = 1,
+        bits: int = 8,
+        view: str = MICROSCOPE,
+    ) -> Drawing:
+        """Begin to draw what a camera sees at `at_s`; the parameters are those of `render`."""
+        from cosmic.twin.optics.view import Shot
+
+        shot = Shot(
+            subject=self._subjects.at(at_s),
+            at_s=at_s,
+            zoom=self._zoom(view)(at_s),
+            focus=self._focus(view)(at_s),
+            percent=self._light.given_percent(at_s),
             exposure_s=exposure_s,
             gain_db=gain_db,
             area=self._area(roi, binning),
             binning=binning,
             bits=bits,
         )
+        return self._drawer.begin(view, shot)
 
     # ------------------------------------------------------------------ truth, for tests only
 
@@ -176,8 +206,9 @@ class Optics:
 
         Those that lie come first.
         """
-        subject = self._ready()[0].at(at_s)
-        return tuple(strand.line_um for strand in (*subject.lying(), *subject.held))
+        subject = self._subjects.at(at_s)
+        lying = (each.in_world(subject.plate) for each in subject.lying)
+        return tuple(strand.line_um for strand in (*lying, *subject.held))
 
     # ------------------------------------------------------------------ inside
 
@@ -205,35 +236,15 @@ class Optics:
 
         return part
 
-    def _ready(self) -> tuple["Subjects", dict[str, "View"]]:
-        """Make what draws, at the first picture: it takes OpenCV, which takes time to import."""
-        with self._lock:
-            if self._drawn is None:
-                self._drawn = self._made()
-            return self._drawn
-
-    def _made(self) -> tuple["Subjects", dict[str, "View"]]:
-        from cosmic.twin.optics.ground import make_dirt
-        from cosmic.twin.optics.noise import Noise
+    @property
+    def _subjects(self) -> "Subjects":
+        """What is to be seen, made at the first image."""
         from cosmic.twin.optics.subjects import Subjects
-        from cosmic.twin.optics.view import View
 
-        width, height = self.sensor_px
-        noise = Noise(width_px=width, height_px=height, seed=self._seed)
-        dirt = make_dirt(self.settings.picture, self._seed)
-        views = {
-            name: View(
-                self.settings,
-                view,
-                dirt,
-                noise,
-                zoom=self._zoom(name),
-                focus=self._focus(name),
-                percent=self._light.given_percent,
-            )
-            for name, view in self.settings.views.items()
-        }
-        return Subjects(self._twin, self._folder, self._stages, self._force_side), views
+        with self._lock:
+            if self._made is None:
+                self._made = Subjects(self._twin, self._folder, self._stages, self._force_side)
+            return self._made
 
 
 def _at_low_end(at_s: float) -> float:  # noqa: ARG001

@@ -1,6 +1,6 @@
 """What there is to be seen at a moment: fibres, tools, the plate."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,6 +35,19 @@ class Strand:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Lying:
+    """One fibre on the plate: its centre line in the frame of the plate, shape (n, 2), um."""
+
+    line_um: Floats
+    height_um: float
+    width_um: float
+
+    def in_world(self, plate: Floats) -> Strand:
+        """Return it where the plate is, `world_from_plate`."""
+        return Strand(on_plate(self.line_um, plate, self.height_um), self.width_um)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Solid:
     """One convex body: its corners in the world, shape (n, 3), um."""
 
@@ -49,14 +62,14 @@ class Solid:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Subject:
-    """Everything to be seen at one moment.
+    """Everything to be seen at one moment; plain data.
 
     Attributes
     ----------
     plate : ndarray, shape (4, 4), float64
         `world_from_plate`, um.
-    lying : callable
-        Returns the fibres on the plate; seldom needed, because their picture is kept.
+    lying : tuple of Lying
+        Fibres on the plate.
     lying_key : tuple
         Differs when a fibre lies elsewhere on the plate.
     held : tuple of Strand
@@ -64,7 +77,7 @@ class Subject:
     """
 
     plate: Floats
-    lying: Callable[[], tuple[Strand, ...]]
+    lying: tuple[Lying, ...]
     lying_key: tuple[tuple[float, ...], ...]
     held: tuple[Strand, ...]
     solids: tuple[Solid, ...]
@@ -89,6 +102,7 @@ class Subjects:
         self._settings = settings
         self._stages = stages
         self._force_side = force_side
+        self._flats: dict[int, tuple[tuple[float, ...], Lying]] = {}
         skeleton = force_side.skeleton
         bodies = read_solids(folder / settings.geometry.urdf, settings.optics.picture.hidden)
         self._bodies: list[tuple[str, Slide, tuple[Floats, ...]]] = [
@@ -110,7 +124,7 @@ class Subjects:
         tips = self._force_side.tips(at_s)
         return Subject(
             plate=plate,
-            lying=lambda: tuple(self._lying(state, plate) for state in lying),
+            lying=tuple(self._flat(state) for state in lying),
             lying_key=tuple(_pose_key(state) for state in lying),
             held=tuple(self._carried(moment, state, tips) for state in carried),
             solids=self._solids(values, at_s),
@@ -126,10 +140,16 @@ class Subjects:
             found += [Solid(link, part + place) for part in parts]
         return tuple(found)
 
-    def _lying(self, state: FibreState, plate: Floats) -> Strand:
-        flat = state.shape.placed(*state.plate_pose)
-        fibre = state.settings
-        return Strand(on_plate(flat, plate, 0.5 * fibre.thickness_um), fibre.width_um)
+    def _flat(self, state: FibreState) -> Lying:
+        """Return a fibre on the plate; one that stays is reckoned once."""
+        key = _pose_key(state)
+        before = self._flats.get(state.number)
+        if before is None or before[0] != key:
+            fibre = state.settings
+            line = state.shape.placed(*state.plate_pose)
+            before = key, Lying(line, 0.5 * fibre.thickness_um, fibre.width_um)
+            self._flats[state.number] = before
+        return before[1]
 
     # ------------------------------------------------------------------ held
 

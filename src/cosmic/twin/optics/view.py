@@ -1,7 +1,7 @@
 """Draws what one camera sees."""
 
 import math
-from collections.abc import Callable
+from dataclasses import dataclass
 from threading import Lock
 from typing import Final
 
@@ -19,7 +19,6 @@ from cosmic.twin.optics.strokes import Shade, stroke
 from cosmic.twin.optics.subjects import Solid, Strand, Subject
 
 Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
-Part = Callable[[float], float]
 
 PER_GREY: Final = 64
 """Steps of a layer in one grey level of 255: four times full white fit in."""
@@ -30,16 +29,38 @@ RIM_UM: Final = 6.0
 RIM_SHADE: Final = 0.75
 
 
-class View:
-    """One camera's view, with what does not move kept from picture to picture; any thread.
+@dataclass(frozen=True, slots=True, eq=False)
+class Shot:
+    """One exposure: what there is to be seen, and how it is taken; plain data.
 
-    Parameters
+    Attributes
     ----------
-    zoom, focus : callable
-        Where the lens is at a time, 0 to 1.
-    percent : callable
-        How bright the lamp is at a time, 0 to 100.
+    at_s : float
+        Platform time; the same time gives the same noise.
+    zoom, focus : float
+        Where the lens is, 0 to 1.
+    percent : float
+        How bright the lamp is, 0 to 100.
+    binning : int
+        So many pixels across and down are averaged into one.
+    bits : int
+        8: uint8; 16: uint16.
     """
+
+    subject: Subject
+    at_s: float
+    zoom: float
+    focus: float
+    percent: float
+    exposure_s: float
+    gain_db: float
+    area: Area
+    binning: int
+    bits: int
+
+
+class View:
+    """One camera's view, with what does not move kept from image to image; any thread."""
 
     def __init__(
         self,
@@ -47,16 +68,11 @@ class View:
         view: ViewSettings,
         dirt: Dirt,
         noise: Noise,
-        *,
-        zoom: Part,
-        focus: Part,
-        percent: Part,
     ) -> None:
         self._settings = settings
         self._view = view
         self._dirt = dirt
         self._noise = noise
-        self._zoom, self._focus, self._percent = zoom, focus, percent
         picture = settings.picture
         self._shade = Shade(picture.wall, picture.lumen, picture.wall_part)
         self._lock = Lock()
@@ -67,59 +83,44 @@ class View:
         self._lit_key: object = None
         self._lit: Layer = self._even
 
-    def projection(self, at_s: float, area: Area, binning: int) -> Projection:
-        """Return where things lie in a picture of that time."""
-        return project(
+    def draw(self, shot: Shot) -> Pixels:
+        """Return an image, shape (height, width), uint8 or uint16."""
+        subject, area = shot.subject, shot.area
+        projection = project(
             self._view,
             self._settings.camera,
-            zoom=self._zoom(at_s),
-            focus=self._focus(at_s),
+            zoom=shot.zoom,
+            focus=shot.focus,
             area=area,
-            binning=binning,
+            binning=shot.binning,
             wavelength_um=self._settings.picture.wavelength_um,
         )
-
-    def draw(
-        self,
-        subject: Subject,
-        at_s: float,
-        *,
-        exposure_s: float,
-        gain_db: float,
-        area: Area,
-        binning: int,
-        bits: int,
-    ) -> Pixels:
-        """Return a picture, shape (height, width), uint8 or uint16."""
-        projection = self.projection(at_s, area, binning)
-        gain = 10.0 ** (gain_db / 20.0)
-        grey = self._grey(at_s, projection) * exposure_s * gain
+        gain = 10.0 ** (shot.gain_db / 20.0)
+        grey = self._grey(shot.percent, projection) * shot.exposure_s * gain
         with self._lock:
             layer = self._lit_up(subject, projection, area, grey).copy()
         for strand in subject.held:
             self._strand(layer, projection, strand)
         for solid in sorted(subject.solids, key=lambda each: each.height_um):
             self._solid(layer, projection, solid, grey)
-        return self._exposed(layer, at_s, grey=grey, gain=gain, binning=binning, bits=bits)
+        return self._exposed(layer, shot, grey=grey, gain=gain)
 
     # ------------------------------------------------------------------ brightness
 
-    def _grey(self, at_s: float, projection: Projection) -> float:
+    def _grey(self, percent: float, projection: Projection) -> float:
         """Return the grey level of the bare plate for an exposure of one second at 0 dB."""
         picture = self._settings.picture
-        lamp = self._percent(at_s) / picture.full_percent + picture.stray
+        lamp = percent / picture.full_percent + picture.stray
         dimming = projection.magnification**-self._view.dimming
         return float(picture.ground_grey * lamp * dimming / picture.full_exposure_s)
 
-    def _exposed(
-        self, layer: Layer, at_s: float, *, grey: float, gain: float, binning: int, bits: int
-    ) -> Pixels:
+    def _exposed(self, layer: Layer, shot: Shot, *, grey: float, gain: float) -> Pixels:
         camera = self._settings.camera
         light = camera.shot_grey * gain * min(grey, 255.0)
         # Binned pixels are averaged: their noise is less, their brightness the same.
-        sigma = math.sqrt((camera.noise_grey * gain) ** 2 + light) / binning
+        sigma = math.sqrt((camera.noise_grey * gain) ** 2 + light) / shot.binning
         black = camera.black_grey * PER_GREY
-        return self._noise.expose(layer, sigma * PER_GREY, black, at_s, bits)
+        return self._noise.expose(layer, sigma * PER_GREY, black, shot.at_s, shot.bits)
 
     # ------------------------------------------------------------------ what stays
 
@@ -145,8 +146,8 @@ class View:
             self._even_key = even_key
         layer = self._even.copy()
         soil(layer, self._dirt, projection, sensor, subject.plate)
-        for strand in subject.lying():
-            self._strand(layer, projection, strand)
+        for each in subject.lying:
+            self._strand(layer, projection, each.in_world(subject.plate))
         return layer
 
     # ------------------------------------------------------------------ what is drawn

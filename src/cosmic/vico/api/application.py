@@ -11,7 +11,7 @@ from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.frame.task_application import TaskApplication
 from cosmic.vico.api.places import Places
 from cosmic.vico.core.camera_libraries import CameraLibraries
@@ -59,6 +59,7 @@ class VicoApplication(TaskApplication):
         parent: QObject | None = None,
     ) -> None:
         super().__init__("ViCo", policy, gui_factory, parent)
+        self.policy = policy
         self.settings = settings
         self.clock = clock
         self.libraries = CameraLibraries(make_library)

@@ -4,7 +4,7 @@ from typing import Final
 
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.vico.core.camera_unit import CameraUnit
 from cosmic.vico.core.focus import FocusAnswer, FocusFault, FocusSearch, sharpness
 from cosmic.vico.core.lens_control import PeripheralThread

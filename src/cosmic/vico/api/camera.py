@@ -1,33 +1,53 @@
-"""One camera of ``rig.vico``; its view uses this as well."""
+"""One camera of ``rig.vico``; its view and stations use nothing else."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from typing_extensions import override
 
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.clock import Clock
+from cosmic.frame.declaration import Declared, command, state, stream
 from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.file_names import space_left
-from cosmic.frame.task import Task
+from cosmic.frame.job_queue import JobQueue
+from cosmic.frame.network.caller import called_from_elsewhere
+from cosmic.frame.network.transport import Rule
+from cosmic.frame.operation import Task
 from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.api.camera_pictures import (
+    CameraPictures,
+    PicturesElsewhere,
+    PicturesHere,
+    always,
+)
 from cosmic.vico.api.camera_places import CameraPlaces
 from cosmic.vico.api.camera_shape import CameraShape
 from cosmic.vico.api.camera_shown import FormatShown, LinkShown, Seen, formats_shown, links_shown
-from cosmic.vico.api.places import Places
+from cosmic.vico.api.picture_wait import PictureWait
+from cosmic.vico.api.places import Places, RotationShown
+from cosmic.vico.api.sent_picture import SentPicture, SentSeen
 from cosmic.vico.core.camera_recordings import PictureRecordingState
-from cosmic.vico.core.job_thread import JobThread
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.recording.formats import FORMATS, picture_bytes_per_s
 from cosmic.vico.core.recording.snap import save_picture
 from cosmic.vico.core.recording.time_lapse import TimeLapsePlan
-from cosmic.vico.hw.interface import CameraCounters, CameraInfo, CameraRanges, CameraSettings
+from cosmic.vico.core.vision.chain import Analysis
+from cosmic.vico.hw.interface import (
+    CameraCounters,
+    CameraInfo,
+    CameraRanges,
+    CameraSettings,
+    FrameStatus,
+)
 
 BACKGROUND_FRAMES = 8
 
 
 @checked_class
-class CameraHandle(CameraPlaces, CameraShape):
+class CameraHandle(CameraPlaces, CameraShape, Declared):
     """One camera: its pictures, settings, recordings and what machine vision finds; any thread.
 
     It has the shape of a bluesky detector without importing bluesky.
@@ -38,32 +58,73 @@ class CameraHandle(CameraPlaces, CameraShape):
         self._unit = application.unit(name)
         self._thread = self._unit.thread
         self.name = name
+        self._pictures: CameraPictures = PicturesHere(application, self._unit)
+
+    @override
+    def prepare(self, key: str, policy: FailurePolicy) -> None:
+        """Take pictures over the line."""
+        self.name = key
+        self._pictures = PicturesElsewhere(self, policy)
+
+    @property
+    def pictures(self) -> CameraPictures:
+        """Where the pictures come from."""
+        return self._pictures
+
+    @override
+    @command(reads=True)
+    def now_s(self) -> float:
+        """Return the platform's time where the camera is, by which its pictures are dated."""
+        return self._application.clock.now_s()
 
     # What is in force
 
     @property
+    @state
     def title(self) -> str:
         """What the operator reads."""
         return self._unit.place.shown
 
     @property
     @override
+    def clock(self) -> Clock:
+        """The platform's."""
+        return self._application.clock
+
+    @property
+    @override
     def info(self) -> CameraInfo | None:
         """Which camera it is; None while none is connected."""
+        return None if self.away else self._info
+
+    @property
+    @state
+    def _info(self) -> CameraInfo | None:
         return self._thread.info
 
     @property
     def ranges(self) -> CameraRanges | None:
         """What it accepts now; None while it is not connected."""
+        return None if self.away else self._ranges
+
+    @property
+    @state
+    def _ranges(self) -> CameraRanges | None:
         return self._thread.ranges
 
     @property
     @override
     def settings(self) -> CameraSettings | None:
         """What is in force, as read back; None while it is not connected."""
+        return None if self.away else self._settings
+
+    @property
+    @state
+    def _settings(self) -> CameraSettings | None:
         return self._thread.settings
 
     @property
+    @state(unknown=CameraCounters(), quiet=True)
     def counters(self) -> CameraCounters:
         """What became of the frames since the start."""
         return self._thread.counters
@@ -71,23 +132,34 @@ class CameraHandle(CameraPlaces, CameraShape):
     @property
     def running(self) -> bool:
         """It takes pictures, or waits for its trigger."""
+        return not self.away and self._running
+
+    @property
+    @state
+    def _running(self) -> bool:
         return self._thread.running
 
     @property
     def problem(self) -> str:
         """Why no pictures come; empty when all is well."""
-        return self._thread.problem
+        return self.away or self._fault
 
     @property
-    def refused(self) -> str:
-        """Why the last wish of a window was not granted, where that was heard later; or empty."""
-        return ""
+    @state
+    def _fault(self) -> str:
+        return self._thread.problem
 
     # Pictures
 
     def latest(self) -> Picture | None:
         """Return the newest whole picture, background corrected; None before the first."""
-        return self._unit.shown()
+        return self._pictures.latest()
+
+    @command(reads=True)
+    def sent_latest(self) -> SentPicture | None:
+        """Return the newest whole picture as it travels to another station."""
+        newest = self.latest()
+        return None if newest is None else SentPicture.of(newest, self._places)
 
     @override
     def next_picture(self, timeout_s: float = 5.0, since_s: float | None = None) -> Picture:
@@ -100,39 +172,94 @@ class CameraHandle(CameraPlaces, CameraShape):
         WrongThreadError
             Called in the GUI thread.
         """
-        since = self._application.clock.now_s() if since_s is None else since_s
-        return self._thread.next_picture(since, timeout_s)
+        return self._pictures.next(timeout_s, since_s)
+
+    @command(reads=True)
+    def await_picture(self, since_s: float | None = None) -> PictureWait:
+        """Begin to wait for a whole picture exposed from `since_s` on; None is now."""
+        since = self.clock.now_s() if since_s is None else since_s
+        return PictureWait(self._thread, since, self._places)
 
     def picture_since(self, since_s: float) -> Picture | None:
         """Return the newest whole picture if it was exposed at `since_s` of platform time or later.
 
         Asked for often, it costs nothing: who wants a certain picture does not look at all.
         """
-        last = self._thread.last
-        if last is None or not last.frame.exposed_s >= since_s:
-            return None
-        return self._unit.corrected(last)
+        return self._pictures.since(since_s)
 
     def on_picture(self, listener: Callable[[], object]) -> Callable[[], None]:
         """Call `listener()` in the camera's thread at each whole picture; returns what ends it."""
-        return self._thread.on_newest(listener)
+        return self._pictures.on_picture(listener)
+
+    @stream(Rule.ALL, topic="pictures")
+    def watch_frames(
+        self, receiver: Callable[[SentPicture], object], wanted: Callable[[], bool] | None = None
+    ) -> Callable[[], None]:
+        """Call `receiver` with every frame as it came, in order, while it is `wanted`."""
+
+        def take(picture: Picture) -> None:
+            if wanted is None or wanted():
+                receiver(SentPicture.of(picture, self._places))
+
+        return self._thread.subscribe(take)
+
+    @stream(Rule.LATEST, topic="shown")
+    def watch_shown(
+        self, receiver: Callable[[SentPicture], object], wanted: Callable[[], bool] | None = None
+    ) -> Callable[[], None]:
+        """Call `receiver` with whole pictures as a view shows them, while they are `wanted`."""
+
+        def take(picture: Picture) -> None:
+            receiver(SentPicture.of(picture, self._places))
+
+        return self._unit.live.subscribe(take, wanted or always)
+
+    @stream(Rule.LATEST, topic="seen")
+    def watch_seen(
+        self, receiver: Callable[[SentSeen], object], wanted: Callable[[], bool] | None = None
+    ) -> Callable[[], None]:
+        """Call `receiver` with what machine vision finds, while it is `wanted`."""
+        over = False
+
+        def take(newest: Analysis) -> None:
+            if not over:
+                receiver(SentSeen.of(Seen.of(newest)))
+
+        def end() -> None:
+            nonlocal over
+            over = True
+
+        self._unit.vision.subscribe(take, lambda: not over and (wanted or always)())
+        return end
 
     @property
+    @state(quiet=True)
+    def newest_id(self) -> int | None:
+        """Number of the newest whole frame; None before the first."""
+        newest = self._thread.last
+        whole = newest is not None and newest.frame.status is FrameStatus.COMPLETE
+        return int(newest.frame.frame_id) if newest is not None and whole else None
+
+    @property
+    @state(quiet=True)
     def focus(self) -> float | None:
         """How sharp the newest picture is; None while that is not measured."""
         newest = self._unit.vision.newest
         return newest.get("focus", float) if newest is not None else None
 
     @property
+    @state
     def has_background(self) -> bool:
         """Pictures are corrected by a background."""
         return self._unit.background.frames > 0
 
+    @command(aside=True)
     def set_background(self) -> None:
         """Correct pictures by the mean of the next few: show an empty ground meanwhile."""
         self._unit.background.collect(BACKGROUND_FRAMES)
         self._application.status_changed.emit()
 
+    @command(aside=True)
     def clear_background(self) -> None:
         """Show pictures as they come."""
         self._unit.background.reset()
@@ -140,20 +267,24 @@ class CameraHandle(CameraPlaces, CameraShape):
 
     # Commands
 
+    @command
     def configure(self, settings: CameraSettings) -> Task:
         """Begin to put settings in force; the task fails with what the camera refuses."""
         return self._thread.configure(settings)
 
+    @command
     def start(self) -> Task:
         """Begin to take pictures."""
         return self._thread.start_pictures()
 
+    @command
     def stop(self, success: bool = True) -> Task:  # noqa: ARG002 - bluesky's signature
         """End taking pictures; a recording is closed."""
         self._unit.recordings.request_stop()
         return self._thread.stop_pictures()
 
     @override
+    @command(aside=True)
     def software_trigger(self) -> None:
         """Take one picture, with the software trigger; raises `NotAvailable` without it."""
         self._thread.trigger()
@@ -163,8 +294,15 @@ class CameraHandle(CameraPlaces, CameraShape):
     @property
     def algorithms(self) -> Sequence[LinkShown]:
         """The chain, in its order."""
+        links, away = self._links, self.away
+        return tuple(replace(each, problem=away) for each in links) if away else links
+
+    @property
+    @state
+    def _links(self) -> tuple[LinkShown, ...]:
         return links_shown(self._unit.chain.states, self._unit.vision.newest)
 
+    @command(aside=True)
     def switch(self, algorithm: str, *, on: bool) -> None:
         """Have an algorithm run on the pictures, or not; raises `ConfigError`."""
         self._unit.chain.switch(algorithm, on=on)
@@ -173,17 +311,12 @@ class CameraHandle(CameraPlaces, CameraShape):
     @property
     def analysis(self) -> Seen | None:
         """The newest result; None while nothing is on."""
-        newest = self._unit.vision.newest
-        return Seen.of(newest) if newest is not None else None
+        return self._pictures.analysis if any(each.on for each in self._links) else None
 
     # Files
 
     @property
-    def elsewhere(self) -> str:
-        """Whose disk files go to, where it is not this computer's; empty: it is."""
-        return ""
-
-    @property
+    @state(unknown=Path())
     def directory(self) -> Path:
         """Where pictures go unless the operator says otherwise."""
         return self._application.directory
@@ -191,13 +324,27 @@ class CameraHandle(CameraPlaces, CameraShape):
     @property
     def formats(self) -> Sequence[FormatShown]:
         """The ways to record; the first is the usual one."""
-        return formats_shown(self.settings)
+        formats, away = self._formats, self.away
+        return tuple(replace(each, problem=away) for each in formats) if away else formats
+
+    @property
+    @state
+    def _formats(self) -> tuple[FormatShown, ...]:
+        shown = formats_shown(self._settings)
+        return tuple(replace(each, name=str(each.name)) for each in shown)
 
     @property
     def recording(self) -> PictureRecordingState:
         """The recording that runs, or the last one."""
+        found = self._recording
+        return replace(found, active=False) if self.away else found
+
+    @property
+    @state(unknown=PictureRecordingState())
+    def _recording(self) -> PictureRecordingState:
         return self._unit.recordings.state
 
+    @command(reads=True, remembered_s=2.0, meanwhile=None)
     def room_s(self, directory: Path, format_name: str) -> float | None:
         """Return how long the disk lasts for a recording there; None while nobody knows."""
         settings = self.settings
@@ -206,8 +353,10 @@ class CameraHandle(CameraPlaces, CameraShape):
             return None
         return space_left(directory, picture_bytes_per_s(chosen, settings)).left_s
 
+    @command
     def snap(self, path: Path, *, overwrite: bool = False) -> Task:
         """Begin to write the newest picture to a .tif or .png; the camera goes on meanwhile."""
+        path = self._on_disk(path)
 
         def job(task: Task) -> None:
             try:
@@ -222,19 +371,25 @@ class CameraHandle(CameraPlaces, CameraShape):
 
         return self._application.begin(f"Saving {path.name}", job)
 
+    @command(aside=True)
     def record(
         self, path: Path | str, format_name: str = "ffv1", *, overwrite: bool = False
     ) -> None:
         """Begin to record; see `CameraRecordings.start` for what it raises."""
-        self._unit.recordings.start(Path(path), format_name, overwrite=overwrite)
+        self._unit.recordings.start(self._on_disk(path), format_name, overwrite=overwrite)
 
     def stop_recording(self, *, wait: bool = False) -> None:
         """Ask for the file to be closed; it is when `recording.active` is False."""
+        self.end_recording()
         if wait:
-            self._unit.recordings.stop()
-        else:
-            self._unit.recordings.request_stop()
+            self._pictures.wait_closed()
 
+    @command(aside=True)
+    def end_recording(self) -> None:
+        """Ask for the file to be closed, and wait for nothing."""
+        self._unit.recordings.request_stop()
+
+    @command
     def time_lapse(
         self,
         path: Path,
@@ -248,31 +403,51 @@ class CameraHandle(CameraPlaces, CameraShape):
         plan = TimeLapsePlan(interval_s, count)
         now_s = self._application.clock.now_s()
         recordings = self._unit.recordings
+        path = self._on_disk(path)
         return recordings.time_lapse(path, format_name, plan, now_s, overwrite=overwrite)
 
-    # For its shape, and for the same over a line
+    def _on_disk(self, path: Path | str) -> Path:
+        """Return a path on this disk; named elsewhere, it begins where pictures go."""
+        if not called_from_elsewhere():
+            return Path(path)
+        return self._application.directory / Path(path).expanduser()
+
+    # For its shape
+
+    @property
+    @state
+    def axes(self) -> Mapping[str, str]:
+        """Unit of each axis whose position comes with the pictures."""
+        return dict(self._unit.recordings.axes)
+
+    @property
+    @state
+    def rotation(self) -> RotationShown | None:
+        """About which place the plate turns; None while it was not measured."""
+        places = self._application.places
+        return places.rotation_centre(self.name) if places is not None else None
 
     @property
     @override
     def _newest(self) -> Picture | None:
-        return self._thread.newest
+        return self._pictures.newest
 
     @property
     @override
     def _places(self) -> Places | None:
-        return self._application.places
+        return self._pictures.places
 
     @property
     @override
     def _clock(self) -> Clock:
-        return self._application.clock
+        return self.clock
 
     @property
     @override
-    def _jobs(self) -> JobThread:
-        return self._unit.jobs
+    def _jobs(self) -> JobQueue:
+        return self._pictures.jobs
 
     @property
     @override
     def _axes(self) -> Mapping[str, str]:
-        return self._unit.recordings.axes
+        return self.axes

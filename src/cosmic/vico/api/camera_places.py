@@ -2,12 +2,18 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import Final
 
 from cosmic.frame.arguments import checked_class
+from cosmic.frame.declaration import command
 from cosmic.frame.errors import NotAvailable
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.vico.api.places import CalibrationShown, Pixel, Places
+from cosmic.vico.api.sent_picture import same_place
 from cosmic.vico.core.picture import Picture
+
+WITHIN_UM: Final = 2.0
+"""How far two maps may differ for a click still to mean the same place."""
 
 
 @checked_class
@@ -54,10 +60,12 @@ class CameraPlaces(ABC):
         known = places.calibrated if places is not None else ()
         return tuple(each for each in known if each.camera == self.name)
 
+    @command(moves=True)
     def calibrate_stage(self, tool: str) -> Task:
         """Begin to measure such a map by moving a tool; see `Vico.calibrate_stage`."""
         return self._moving.calibrate_stage(tool, self.name)
 
+    @command(moves=True)
     def find_rotation_centre(self) -> Task:
         """Begin to measure about which place the plate turns; see `Vico.find_rotation_centre`."""
         return self._moving.find_rotation_centre(self.name)
@@ -81,3 +89,24 @@ class CameraPlaces(ABC):
         if places is None or newest is None:
             raise NotAvailable(self.calibration_problem)
         return places.move_to(newest, place_px, what)
+
+    @command(moves=True)
+    def click(self, place_px: Pixel, place_um: Pixel, what: str) -> str:
+        """Move `what` to a pixel of the newest picture, which must lie at `place_um`.
+
+        Raises
+        ------
+        MoveRefused, NotAvailable
+            The gate says no, or the picture has changed since.
+        """
+        there_um = self.platform_um(place_px)
+        if there_um is None:
+            raise NotAvailable(self.calibration_problem)
+        if not same_place(there_um, place_um, WITHIN_UM):
+            raise NotAvailable("the picture has changed since the click; click again")
+        return self.click_to_move(place_px, what)
+
+    @command(moves=True, aside=True)
+    def click_aside(self, place_px: Pixel, place_um: Pixel, what: str) -> None:
+        """As `click`, for a window, which does not wait."""
+        self.click(place_px, place_um, what)

@@ -11,6 +11,7 @@ from cosmic.frame.arguments import checked_class
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import ConfigError, NotAvailable, RecordingExistsError
 from cosmic.frame.file_names import check_directory
+from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.plan_shape import (
     DataKeys,
     PlanStatus,
@@ -21,7 +22,6 @@ from cosmic.frame.plan_shape import (
     unix_of_platform_s,
     whole_key,
 )
-from cosmic.vico.core.job_thread import JobThread
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.recording.snap import save_picture
 from cosmic.vico.hw.interface import CameraInfo, CameraSettings, Trigger
@@ -68,6 +68,10 @@ class CameraShape:
     def software_trigger(self) -> None:
         """Take one picture, with the software trigger."""
 
+    @abstractmethod
+    def now_s(self) -> float:
+        """Return the time by which pictures are dated."""
+
     @property
     @abstractmethod
     def _clock(self) -> Clock:
@@ -75,7 +79,7 @@ class CameraShape:
 
     @property
     @abstractmethod
-    def _jobs(self) -> JobThread:
+    def _jobs(self) -> JobQueue:
         """Takes the pictures."""
 
     @property
@@ -124,7 +128,7 @@ class CameraShape:
         picture comes in time, and with `RecordingError` where it cannot be kept.
         """
         status = PlanStatus(f"picture of {self.name}")
-        since_s = self._clock.now_s()
+        since_s = self.now_s()
         self._jobs.put(lambda: self._take(since_s), status)
         return status
 

@@ -1,8 +1,13 @@
 """The lens and the light of ``rig.vico``; their panels use these as well."""
 
+from typing_extensions import override
+
 from cosmic.frame.arguments import checked_class
+from cosmic.frame.clock import Clock
+from cosmic.frame.declaration import Declared, command
+from cosmic.frame.declaration import state as declared_state
 from cosmic.frame.errors import ConfigError, NotAvailable
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.autofocus import find_focus
 from cosmic.vico.core.zoom_scale import ZoomPoint, ZoomScale
@@ -10,7 +15,7 @@ from cosmic.vico.hw.peripherals import LensAxis, LensState
 
 
 @checked_class
-class LensHandle:
+class LensHandle(Declared):
     """The motorised lens; any thread, and everything returns at once."""
 
     def __init__(self, application: VicoApplication) -> None:
@@ -19,6 +24,13 @@ class LensHandle:
         self._search: Task | None = None
 
     @property
+    @override
+    def clock(self) -> Clock:
+        """The platform's."""
+        return self._application.clock
+
+    @property
+    @declared_state(unknown="Lens")
     def name(self) -> str:
         """What the operator reads."""
         return self._thread.lens_name or "Lens"
@@ -26,12 +38,22 @@ class LensHandle:
     @property
     def problem(self) -> str:
         """Why it cannot be used; empty when all is well."""
+        return self.away or self._fault
+
+    @property
+    @declared_state
+    def _fault(self) -> str:
         return self._thread.state.lens_problem
 
     @property
     def scale(self) -> ZoomScale:
         """Magnification and um per pixel for each position of the zoom."""
-        return self._application.zoom_scale
+        return ZoomScale(self._points)
+
+    @property
+    @declared_state
+    def _points(self) -> tuple[ZoomPoint, ...]:
+        return self._application.zoom_scale.points
 
     @property
     def steps(self) -> tuple[ZoomPoint, ...]:
@@ -52,8 +74,17 @@ class LensHandle:
 
     def state(self, axis: LensAxis) -> LensState | None:
         """Return what was last heard of a motor; None before."""
-        return self._thread.state.axis(axis)
+        motor = LensAxis.ZOOM if axis is LensAxis.ZOOM else LensAxis.FOCUS
+        found = self._motors.get(motor.name)
+        return None if self.away else found
 
+    @property
+    @declared_state
+    def _motors(self) -> dict[str, LensState | None]:
+        known = self._thread.state
+        return {each.name: known.axis(each) for each in LensAxis}
+
+    @command(moves=True)
     def home(self) -> Task:
         """Begin to run both motors to where counting begins."""
         return self._thread.home()
@@ -66,12 +97,19 @@ class LensHandle:
         ConfigError
             The magnification is not in the table.
         """
-        return self._thread.seek(LensAxis.ZOOM, self.scale.counts(zoom))
+        return self.seek_zoom(self.scale.counts(zoom))
 
+    @command(moves=True)
+    def seek_zoom(self, target_counts: int) -> Task:
+        """Begin to zoom there; the task fails with what the controller refuses."""
+        return self._thread.seek(LensAxis.ZOOM, target_counts)
+
+    @command(moves=True)
     def seek_focus(self, target_counts: int) -> Task:
         """Begin to focus there; the task fails with what the controller refuses."""
         return self._thread.seek(LensAxis.FOCUS, target_counts)
 
+    @command(moves=True)
     def autofocus(self, camera: str = "") -> Task:
         """Begin to look for the sharpest picture of a camera behind the lens.
 
@@ -93,25 +131,28 @@ class LensHandle:
         )
         return self._search
 
+    @command(at_once=True)
     def abort(self) -> None:
         """Stop both motors and whatever moves them."""
         if self._search is not None:
             self._search.cancel()
         self._thread.abort()
 
+    @command
     def reopen(self) -> Task:
         """Begin to connect again what was lost."""
         return self._thread.reopen()
 
 
 @checked_class
-class LightHandle:
+class LightHandle(Declared):
     """The lamp; any thread, and everything returns at once."""
 
     def __init__(self, application: VicoApplication) -> None:
         self._thread = application.peripherals
 
     @property
+    @declared_state(unknown="Light")
     def name(self) -> str:
         """What the operator reads."""
         return self._thread.light_name or "Light"
@@ -119,11 +160,21 @@ class LightHandle:
     @property
     def problem(self) -> str:
         """Why it cannot be used; empty when all is well."""
+        return self.away or self._fault
+
+    @property
+    @declared_state
+    def _fault(self) -> str:
         return self._thread.state.light_problem
 
     @property
     def percent(self) -> float | None:
         """How bright it is, 0 to 100; None while unknown."""
+        return None if self.away else self._percent
+
+    @property
+    @declared_state
+    def _percent(self) -> float | None:
         return self._thread.state.light_percent
 
     def set_percent(self, percent: float) -> Task:
@@ -136,4 +187,9 @@ class LightHandle:
         """
         if not 0.0 <= percent <= 100.0:
             raise ConfigError(f"light: {percent!r} is not between 0 and 100 %")
+        return self.dim(percent)
+
+    @command
+    def dim(self, percent: float) -> Task:
+        """Begin to make it so bright, without a look at the number first."""
         return self._thread.set_light(percent)

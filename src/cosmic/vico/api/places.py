@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Protocol
 
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.vico.core.picture import Picture
 
 Pixel = tuple[float, float]

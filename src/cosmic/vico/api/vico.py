@@ -1,76 +1,132 @@
-"""The ViCo part of the scripted API: ``rig.vico``; windows use it as well."""
+"""The one interface of ViCo: ``rig.vico``, its windows, plans and stations use nothing else."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
+from typing_extensions import override
 
+from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.arguments import checked_class
-from cosmic.frame.errors import CosmicError
-from cosmic.frame.listeners import tell
-from cosmic.frame.task import Task
+from cosmic.frame.clock import Clock
+from cosmic.frame.declaration import Companion, Declared, command, part, state
+from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.application import RemoteApplication
+from cosmic.frame.operation import Task
+from cosmic.frame.weakly import weakly
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.camera import CameraHandle
+from cosmic.vico.api.camera_pictures import PicturesElsewhere
 from cosmic.vico.api.lens import LensHandle, LightHandle
-from cosmic.vico.api.remote_application import RemoteVicoApplication
-from cosmic.vico.api.remote_camera import RemoteCameraHandle
-from cosmic.vico.api.remote_lens import RemoteLensHandle, RemoteLightHandle
+from cosmic.vico.api.places import CalibrationShown, Places, RotationShown
+from cosmic.vico.api.places_on_pictures import PlacesOnPictures
 from cosmic.vico.hw.interface import CameraInfo, Pixels
 
 if TYPE_CHECKING:
     from cosmic.vico.api.fibres import PlacedFibre
-    from cosmic.vico.api.places import CalibrationShown, RotationShown
+
+
+class _Follower(Companion):
+    """Has pictures of another station come only while somebody looks."""
+
+    def __init__(self, vico: "Vico") -> None:
+        self._vico = vico
+
+    @override
+    def look(self, silent_s: float) -> None:
+        for each in self._pictures():
+            each.tidy()
+
+    @override
+    def close(self) -> None:
+        for each in self._pictures():
+            each.close()
+
+    def _pictures(self) -> list[PicturesElsewhere]:
+        found = (each.pictures for each in self._vico.camera_handles.values())
+        return [each for each in found if isinstance(each, PicturesElsewhere)]
 
 
 @checked_class
-class Vico:
+class Vico(Declared):
     """Cameras, lens and light of the platform; any thread."""
 
-    def __init__(self, application: VicoApplication | RemoteVicoApplication) -> None:
+    def __init__(self, application: VicoApplication) -> None:
         self._application = application
-        self._handles: dict[str, CameraHandle] = {}
-        self._lens: LensHandle
-        self._light: LightHandle
-        if isinstance(application, RemoteVicoApplication):
-            self._lens, self._light = RemoteLensHandle(application), RemoteLightHandle(application)
-        else:
-            self._lens, self._light = LensHandle(application), LightHandle(application)
-        self._listeners: tuple[Callable[[], object], ...] = ()
-        # At once and by a function that keeps this object: a call that still waits in a queue when
-        # a plain object goes would reach what is no more.
+        self._handles = {name: CameraHandle(application, name) for name in application.cameras}
+        self._lens, self._light = LensHandle(application), LightHandle(application)
+        self._on_pictures: PlacesOnPictures | None = None
+        # At once: a call that still waits in a queue when a plain object goes would reach what is
+        # no more.
         direct = Qt.ConnectionType.DirectConnection
-        application.status_changed.connect(lambda: self._tell(), direct)
+        application.status_changed.connect(weakly(self._tell), direct)
+
+    def _tell(self) -> None:
+        self.note_change()
+        for each in (*self._handles.values(), self._lens, self._light):
+            each.note_change()
+
+    @override
+    def prepare(self, key: str, policy: FailurePolicy) -> None:
+        """Read places from the pictures that come."""
+        self._on_pictures = PlacesOnPictures(self)
+
+    @override
+    def made_companion(self) -> Companion:
+        """Follow what is looked at, where the cameras are elsewhere."""
+        return _Follower(self)
 
     @property
-    def application(self) -> VicoApplication | RemoteVicoApplication:
-        """The application behind it."""
+    def application(self) -> VicoApplication:
+        """The application behind it, where the cameras are here."""
         return self._application
+
+    @property
+    @override
+    def clock(self) -> Clock:
+        """The platform's."""
+        return self._application.clock
+
+    @property
+    @part
+    def camera_handles(self) -> Mapping[str, CameraHandle]:
+        """The cameras by their names, in the order of the platform file."""
+        return self._handles
 
     @property
     def cameras(self) -> Sequence[str]:
         """Names of the cameras, in the order of the platform file."""
-        return tuple(self._application.cameras)
+        return tuple(self.camera_handles)
 
     def camera(self, name: str = "") -> CameraHandle:
         """Return a camera, or the first; raises `ConfigError` where there is none of that name."""
-        chosen = name or self._application.first_camera
-        if chosen not in self._handles:
-            application = self._application
-            self._handles[chosen] = (
-                RemoteCameraHandle(application, chosen)
-                if isinstance(application, RemoteVicoApplication)
-                else CameraHandle(application, chosen)
-            )
-        return self._handles[chosen]
+        handles = self.camera_handles
+        chosen = name or self._first_camera
+        if chosen not in handles:
+            known = ", ".join(handles) or self.away or "none"
+            raise ConfigError(f"there is no camera {chosen!r}; the platform has: {known}")
+        handle = handles[chosen]
+        if self._on_pictures is not None and isinstance(handle.pictures, PicturesElsewhere):
+            handle.pictures.join_places(self._on_pictures)
+        return handle
 
     @property
+    def _first_camera(self) -> str:
+        for name in self.camera_handles:
+            return name
+        raise NotAvailable(self.away or "the platform file names no camera; add a [[vico.camera]]")
+
+    @property
+    @part
     def lens(self) -> LensHandle | None:
         """The motorised lens; None where there is none."""
         return self._lens if self._application.has_lens else None
 
     @property
+    @part
     def light(self) -> LightHandle | None:
         """The lamp; None where there is none."""
         return self._light if self._application.has_light else None
@@ -78,27 +134,22 @@ class Vico:
     @property
     def found(self) -> Sequence[CameraInfo]:
         """Every camera there was at the last look for them."""
-        return self._application.found
+        return self._found
 
+    @property
+    @state
+    def _found(self) -> tuple[CameraInfo, ...]:
+        return tuple(self._application.found)
+
+    @command
     def rescan(self) -> Task:
         """Begin to look for cameras."""
         return self._application.rescan()
 
+    @command
     def use(self, camera: str, key: str) -> Task:
         """Begin to take the pictures of `camera` with the one of that key."""
         return self._application.use(camera, key)
-
-    def on_change(self, listener: Callable[[], object]) -> Callable[[], None]:
-        """Call `listener()`, in any thread, when anything but pictures and counters changed."""
-        self._listeners = (*self._listeners, listener)
-
-        def forget() -> None:
-            self._listeners = tuple(each for each in self._listeners if each is not listener)
-
-        return forget
-
-    def _tell(self) -> None:
-        tell(self._listeners)
 
     # Pictures
 
@@ -124,21 +175,35 @@ class Vico:
         from cosmic.vico.api.fibres import place_fibres
 
         picture = self.camera(camera).next_picture(timeout_s)
-        return place_fibres(picture, self._application.places)
+        return place_fibres(picture, self._places)
 
     # Places on the platform
 
     @property
-    def tools(self) -> Sequence[str]:
-        """What can be moved to a place in a picture, and what calibrates, such as "left"."""
-        places = self._application.places
-        return places.targets if places is not None else ()
+    def _places(self) -> Places | None:
+        return self._on_pictures or self._application.places
 
     @property
-    def calibrated(self) -> "Sequence[CalibrationShown]":
-        """The maps from platform to picture that are in force."""
+    def tools(self) -> Sequence[str]:
+        """What can be moved to a place in a picture, and what calibrates, such as "left"."""
+        return () if self.away else self._tools
+
+    @property
+    @state
+    def _tools(self) -> tuple[str, ...]:
         places = self._application.places
-        return places.calibrated if places is not None else ()
+        return tuple(places.targets) if places is not None else ()
+
+    @property
+    def calibrated(self) -> Sequence[CalibrationShown]:
+        """The maps from platform to picture that are in force."""
+        return self._calibrated
+
+    @property
+    @state
+    def _calibrated(self) -> tuple[CalibrationShown, ...]:
+        places = self._application.places
+        return tuple(places.calibrated) if places is not None else ()
 
     def calibrate_stage(self, tool: str, camera: str = "") -> Task:
         """Begin to measure where on the platform the pixels of a camera lie, by moving a tool.
@@ -167,11 +232,9 @@ class Vico:
         """
         return self.camera(camera).find_rotation_centre()
 
-    def rotation_centre(self, camera: str = "") -> "RotationShown | None":
+    def rotation_centre(self, camera: str = "") -> RotationShown | None:
         """Return about which place the plate turns, as a camera saw it last; None before."""
-        places = self._application.places
-        chosen = camera or self._application.first_camera
-        return places.rotation_centre(chosen) if places is not None else None
+        return self.camera(camera).rotation
 
     # Recording
 
@@ -199,3 +262,18 @@ class Vico:
             handle.stop_recording(wait=True)
         if handle.recording.failure:
             raise CosmicError(handle.recording.failure)
+
+
+def vico_of(application: CosmicApplicationBase) -> Vico:
+    """Return what an application offers, whether its cameras are here or at another station.
+
+    Raises
+    ------
+    TypeError
+        It is no ViCo.
+    """
+    if isinstance(application, VicoApplication):
+        return Vico(application)
+    if isinstance(application, RemoteApplication) and isinstance(application.api, Vico):
+        return application.api
+    raise TypeError(f"{application!r} is no ViCo")

@@ -9,9 +9,9 @@ from threading import RLock
 from PySide6.QtCore import Qt
 
 from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.frame.events import Event, Unsubscribe
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.listeners import tell
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.vico.core.camera_thread import CameraThread
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.recording.formats import PictureFormat, traits
@@ -66,12 +66,12 @@ class CameraRecordings:
         self._writer: PictureRecorder | None = None
         self._unsubscribe: Callable[[], None] | None = None
         self._task: Task | None = None
-        self._listeners: tuple[Callable[[], object], ...] = ()
+        self._changed: Event[[]] = Event()
         self.axes: Mapping[str, str] = {}
 
-    def on_change(self, listener: Callable[[], object]) -> None:
+    def on_change(self, listener: Callable[[], object]) -> Unsubscribe:
         """Call `listener()` when a recording begins, goes on or ends, in any thread."""
-        self._listeners = (*self._listeners, listener)
+        return self._changed.subscribe(listener)
 
     @property
     def state(self) -> PictureRecordingState:
@@ -106,7 +106,7 @@ class CameraRecordings:
         with self._lock:
             writer = self._begin(path, picture_format, overwrite=overwrite)
             self._unsubscribe = self._camera.subscribe(writer.put)
-        tell(self._listeners)
+        self._changed.emit()
 
     def time_lapse(
         self,
@@ -134,7 +134,7 @@ class CameraRecordings:
             self._task = task
             task.on_cancel(self.request_stop)
             self._unsubscribe = self._camera.subscribe(choose)
-        tell(self._listeners)
+        self._changed.emit()
         return task
 
     def _begin(self, path: Path, picture_format: str, *, overwrite: bool) -> PictureRecorder:
@@ -186,7 +186,7 @@ class CameraRecordings:
             logger.warning("%s: still writing %d pictures", writer.path, writer.stats.waiting)
 
     def _on_recorded(self, _stats: object) -> None:
-        tell(self._listeners)
+        self._changed.emit()
 
     def _on_closed(self, path: Path) -> None:
         task, self._task = self._task, None
@@ -198,4 +198,4 @@ class CameraRecordings:
             else:
                 task.finish()
         logger.info("recorded to %s", path)
-        tell(self._listeners)
+        self._changed.emit()

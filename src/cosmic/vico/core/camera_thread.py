@@ -17,9 +17,9 @@ from cosmic.frame.errors import (
     NotAvailable,
     NotConnectedError,
 )
+from cosmic.frame.events import Event, Unsubscribe
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.listeners import tell
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.frame.threads import WorkerThread, forbid_waiting_here
 from cosmic.vico.core.picture import Circumstances, Picture
 from cosmic.vico.hw.interface import (
@@ -42,7 +42,6 @@ REFUSALS: Final = frozenset({DeviceFault.BUSY, DeviceFault.PARAMETER, DeviceFaul
 """What a camera may answer without being lost."""
 
 Receiver = Callable[[Picture], object]
-Unsubscribe = Callable[[], None]
 Command = Callable[[Camera], None]
 
 
@@ -98,8 +97,8 @@ class CameraThread(WorkerThread):
         self._shown: Picture | None = None
         self._looked_s = self._drawn_s = -SEARCH_S
         self._arrived = Condition()
-        self._receivers: tuple[Receiver, ...] = ()
-        self._waiting: tuple[Callable[[], object], ...] = ()
+        self._received: Event[Picture] = Event()
+        self._renewed: Event[[]] = Event()
         self._lock = Lock()
         self._over = False
 
@@ -154,25 +153,11 @@ class CameraThread(WorkerThread):
 
     def on_newest(self, listener: Callable[[], object]) -> Unsubscribe:
         """Call `listener()` in the camera's thread when there is a newer `last`."""
-        with self._lock:
-            self._waiting = (*self._waiting, listener)
-
-        def unsubscribe() -> None:
-            with self._lock:
-                self._waiting = tuple(each for each in self._waiting if each is not listener)
-
-        return unsubscribe
+        return self._renewed.subscribe(listener)
 
     def subscribe(self, receiver: Receiver) -> Unsubscribe:
         """Call `receiver(picture)` with every frame, in the camera's thread."""
-        with self._lock:
-            self._receivers = (*self._receivers, receiver)
-
-        def unsubscribe() -> None:
-            with self._lock:
-                self._receivers = tuple(each for each in self._receivers if each != receiver)
-
-        return unsubscribe
+        return self._received.subscribe(receiver)
 
     def next_picture(self, since_s: float, timeout_s: float) -> Picture:
         """Wait for a whole picture whose exposure began at `since_s` of platform time or later.
@@ -344,13 +329,13 @@ class CameraThread(WorkerThread):
             circumstances=self._circumstances(frame, settings),
             lost_before=max(0, lost),
         )
-        tell(self._receivers, picture)
+        self._received.emit(picture)
         if frame.status is FrameStatus.COMPLETE:
             self._show(picture)
             with self._arrived:
                 self._newest = picture
                 self._arrived.notify_all()
-            tell(self._waiting)
+            self._renewed.emit()
 
     def _show(self, picture: Picture) -> None:
         now_s = WALL.now_s()

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.job_queue import JobQueue
 from cosmic.vico.core.background import Background
 from cosmic.vico.core.camera_libraries import CameraLibraries
 from cosmic.vico.core.camera_recordings import CameraRecordings
 from cosmic.vico.core.camera_thread import CameraThread
-from cosmic.vico.core.job_thread import JobThread
+from cosmic.vico.core.live_view import LiveView
 from cosmic.vico.core.picture import Circumstances, Picture
 from cosmic.vico.core.settings import CameraPlace
 from cosmic.vico.core.vision.algorithms import make_chain
@@ -32,8 +33,10 @@ class CameraUnit:
     recordings : CameraRecordings
     vision : VisionThread
         Runs `chain` on the newest picture, background corrected.
-    jobs : JobThread
+    jobs : JobQueue
         Takes the pictures that plans ask for.
+    live : LiveView
+        Hands on what views at other stations show.
     """
 
     def __init__(
@@ -57,9 +60,11 @@ class CameraUnit:
             policy,
         )
         self.recordings = CameraRecordings(self.thread, policy)
-        self.jobs = JobThread(f"pictures of {place.name}", policy)
+        self.jobs = JobQueue(f"pictures of {place.name}", policy)
         self.vision: VisionThread[Analysis] = VisionThread(place.name, self._analyse, policy)
+        self.live = LiveView(place.name, self.corrected, policy)
         self.thread.subscribe(self._collect)
+        self.thread.subscribe(self.live.put)
         self.thread.subscribe(self.vision.put)
 
     @property
@@ -80,12 +85,14 @@ class CameraUnit:
     def start(self) -> None:
         """Begin to look for the camera and to take pictures."""
         self.vision.start()
+        self.live.start()
         self.thread.start()
 
     def request_end(self) -> None:
         """Ask everything to end; returns at once."""
         self.recordings.request_stop()
         self.jobs.request_end()
+        self.live.request_end()
         self.thread.request_end()
         self.vision.request_end()
 
@@ -94,6 +101,7 @@ class CameraUnit:
         self.recordings.stop()
         self.thread.join()
         self.jobs.join()
+        self.live.join()
         self.vision.join()
 
     def _collect(self, picture: Picture) -> None:

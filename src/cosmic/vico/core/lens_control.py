@@ -13,7 +13,7 @@ from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.caller import current_call
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.frame.threads import WorkerThread
 from cosmic.vico.core.lens_history import LensHistory
 from cosmic.vico.core.lens_move import Move

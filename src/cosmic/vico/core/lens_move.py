@@ -7,7 +7,7 @@ from typing import Final
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, DeviceError, DeviceFault, DeviceTimeout
 from cosmic.frame.network.dead_man import DeadMan
-from cosmic.frame.task import Task
+from cosmic.frame.operation import Task
 from cosmic.vico.hw.peripherals import LensAxis, LensState
 
 START_S: Final = 0.7

@@ -64,7 +64,7 @@ class VicoSettings(StrictModel):
     sources : tuple of str
         Films, folders of pictures and addresses, for the backend "opencv".
     producers : tuple of str
-        GenTL producers (.cti files), for the backend "harvesters".
+        GenTL producers (.cti files), for the backend "harvesters"; empty: those installed.
     """
 
     directory: str = ""

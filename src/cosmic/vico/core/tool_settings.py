@@ -1,11 +1,12 @@
 """What platform.toml says about the tools that stages carry through the picture."""
 
 import math
+from collections.abc import Collection, Sequence
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cosmic.frame.config import StrictModel
+from cosmic.frame.config import StrictModel, not_there
 
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 Place = Annotated[tuple[float, float, float], Field(strict=False)]
@@ -57,3 +58,13 @@ class ToolSettings(StrictModel):
         if len(set(self.axes)) != len(self.axes):
             raise ValueError(f"one positioner has two parts in the tool {self.name!r}")
         return self
+
+
+def tool_mistakes(tools: Sequence[ToolSettings], axes: Collection[str]) -> list[str]:
+    """Return a line for every axis that a tool names and that is not there."""
+    return [
+        f"vico.tool[{index}]: {tool.name}: {not_there('positioner', axis, axes)}"
+        for index, tool in enumerate(tools)
+        for axis in tool.axes
+        if axis not in axes
+    ]

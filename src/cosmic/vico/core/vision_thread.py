@@ -9,8 +9,8 @@ from PySide6.QtCore import QObject
 from typing_extensions import override
 
 from cosmic.frame.clock import WALL
+from cosmic.frame.events import Event
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.listeners import tell
 from cosmic.frame.threads import WorkerThread, may_wait_here
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.hw.interface import FrameStatus
@@ -52,7 +52,8 @@ class VisionThread(WorkerThread, Generic[T]):
         self._looked_s = -math.inf
         self._analysed = 0
         self._changed = Condition()
-        self._listeners: tuple[tuple[Callable[[T], object], Callable[[], bool]], ...] = ()
+        self._found: Event[T] = Event()
+        self._wanted: tuple[Callable[[], bool], ...] = ()
 
     @property
     def newest(self) -> T | None:
@@ -77,9 +78,7 @@ class VisionThread(WorkerThread, Generic[T]):
     @property
     def awake(self) -> bool:
         """True while pictures are analysed, because somebody wants to know."""
-        return WALL.now_s() - self._looked_s < LOOKED_S or any(
-            wanted() for _, wanted in self._listeners
-        )
+        return WALL.now_s() - self._looked_s < LOOKED_S or any(wanted() for wanted in self._wanted)
 
     @property
     def passed_over(self) -> int:
@@ -90,7 +89,13 @@ class VisionThread(WorkerThread, Generic[T]):
         self, listener: Callable[[T], object], wanted: Callable[[], bool] = lambda: True
     ) -> None:
         """Call `listener(found)` after each picture, in this thread, while it is `wanted`."""
-        self._listeners = (*self._listeners, (listener, wanted))
+
+        def hear(found: T) -> None:
+            if wanted():
+                listener(found)
+
+        self._wanted = (*self._wanted, wanted)
+        self._found.subscribe(hear)
 
     def put(self, picture: Picture) -> None:
         """Offer a picture; any thread, returns at once."""
@@ -123,7 +128,7 @@ class VisionThread(WorkerThread, Generic[T]):
                 self._analysed += 1
                 self._changed.notify_all()
             if found is not None:
-                tell([listener for listener, wanted in self._listeners if wanted()], found)
+                self._found.emit(found)
 
     def _due(self) -> bool:
         return self.end_requested or (self._next is not None and self.awake)

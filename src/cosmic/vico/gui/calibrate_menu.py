@@ -1,9 +1,8 @@
 """The button that begins calibrations of a camera, and says what was calibrated."""
 
-from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from datetime import UTC, datetime
-from typing import Final, Protocol
+from typing import Final
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QMenu, QToolButton, QWidget
@@ -13,66 +12,11 @@ from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, tipped
 from cosmic.frame.gui.task_watch import TaskWatch
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
-from cosmic.frame.task import Progress, Task
+from cosmic.frame.operation import Progress, Task
+from cosmic.vico.api.camera import CameraHandle
 
 REFUSED: Final = state_look(State.REFUSED).glyph
 TIP: Final = "Measure where on the platform the pixels lie: a tool goes to nine places and back"
-
-
-class MapShown(Protocol):
-    """One map from platform to picture that is in force."""
-
-    @property
-    @abstractmethod
-    def tool(self) -> str:
-        """What was moved."""
-
-    @property
-    @abstractmethod
-    def zoom_counts(self) -> float:
-        """Where the zoom stood."""
-
-    @property
-    @abstractmethod
-    def height_um(self) -> float:
-        """Of the tool's tip."""
-
-    @property
-    @abstractmethod
-    def scale_um_px(self) -> float:
-        """Size of a pixel."""
-
-    @property
-    @abstractmethod
-    def residual_px(self) -> float:
-        """What is left over, RMS."""
-
-    @property
-    @abstractmethod
-    def measured(self) -> datetime:
-        """With its time zone."""
-
-
-class Calibrating(Protocol):
-    """A camera that can be calibrated, as the menu sees it."""
-
-    @property
-    @abstractmethod
-    def targets(self) -> Sequence[str]:
-        """What can be moved, such as "left"."""
-
-    @property
-    @abstractmethod
-    def calibrated(self) -> Sequence[MapShown]:
-        """The maps in force."""
-
-    @abstractmethod
-    def calibrate_stage(self, tool: str) -> Task:
-        """Begin to measure a map by moving a tool."""
-
-    @abstractmethod
-    def find_rotation_centre(self) -> Task:
-        """Begin to measure about which place the plate turns."""
 
 
 class CalibrateButton(QToolButton):
@@ -88,7 +32,7 @@ class CalibrateButton(QToolButton):
 
     def __init__(
         self,
-        camera: Calibrating,
+        camera: CameraHandle,
         parent: QWidget | None = None,
         *,
         now: Callable[[], datetime] = lambda: datetime.now(UTC),

@@ -4,10 +4,10 @@ from PySide6.QtWidgets import QComboBox, QGridLayout, QWidget
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import push_button, tipped
-from cosmic.frame.gui.relay import PortRelay
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.task_bar import TaskBar
 from cosmic.frame.gui.theme import STEP_PX
-from cosmic.vico.gui.ports import VicoPort
+from cosmic.vico.api.vico import Vico
 from cosmic.vico.hw.interface import CameraInfo
 
 
@@ -20,9 +20,9 @@ def camera_text(info: CameraInfo) -> str:
 class CameraChooser(QWidget):
     """A list of the cameras found, and a button to look for them again."""
 
-    def __init__(self, port: VicoPort, name: str, parent: QWidget | None = None) -> None:
+    def __init__(self, vico: Vico, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._port, self._name = port, name
+        self._vico, self._name = vico, name
         self.box = tipped(QComboBox(), "The camera that takes the pictures shown here")
         self.box.setMinimumContentsLength(10)
         self.box.setSizeAdjustPolicy(
@@ -41,14 +41,13 @@ class CameraChooser(QWidget):
         self.box.activated.connect(self._on_chosen)
         self.rescan.clicked.connect(self._on_rescan)
         self.tasks.ended.connect(self.refresh)
-        self._relay = PortRelay(port, self)
-        self._relay.changed.connect(self.refresh)
+        self._relay = Relay(self.refresh).follow(vico.on_change)
         self.refresh()
 
     def refresh(self) -> None:
         """List what was found, and choose the one in use."""
-        used = self._port.camera(self._name).info
-        known = list(self._port.found)
+        used = self._vico.camera(self._name).info
+        known = list(self._vico.found)
         if used is not None and used.key not in [each.key for each in known]:
             known.insert(0, used)
         shown = [(camera_text(each), each.key) for each in known]
@@ -61,17 +60,17 @@ class CameraChooser(QWidget):
         box.setPlaceholderText("choose a camera" if known else "none found")
 
     def _on_chosen(self) -> None:
-        used = self._port.camera(self._name).info
+        used = self._vico.camera(self._name).info
         key = str(self.box.currentData())
         if used is None or used.key != key:
             try:
-                self.tasks.follow(self._port.use(self._name, key))
+                self.tasks.follow(self._vico.use(self._name, key))
             except CosmicError as exc:
                 self.tasks.say(str(exc), refused=True)
                 self.refresh()
 
     def _on_rescan(self) -> None:
         try:
-            self.tasks.follow(self._port.rescan())
+            self.tasks.follow(self._vico.rescan())
         except CosmicError as exc:
             self.tasks.say(str(exc), refused=True)

@@ -11,9 +11,11 @@ from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QScrollArea, QSizePolicy, 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named
-from cosmic.frame.gui.relay import PortRelay
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.overrides import override
+from cosmic.vico.api.places import Pixel
+from cosmic.vico.api.vico import Vico
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.gui.calibrate_menu import CalibrateButton
 from cosmic.vico.gui.camera_chooser import CameraChooser
@@ -24,9 +26,7 @@ from cosmic.vico.gui.levels import Histogram, histogram
 from cosmic.vico.gui.picture_tools import PictureTools
 from cosmic.vico.gui.picture_view import PictureView
 from cosmic.vico.gui.pointer_text import pointer_text
-from cosmic.vico.gui.ports import VicoPort
 from cosmic.vico.gui.record_bar import RecordBar
-from cosmic.vico.gui.seen import Pixel
 from cosmic.vico.gui.seen_layer import SeenLayer
 from cosmic.vico.gui.settings_form import SettingsForm
 from cosmic.vico.gui.status_row import StatusRow
@@ -48,7 +48,7 @@ class CameraView(QWidget):
 
     Parameters
     ----------
-    port : VicoPort
+    vico : Vico
         The application.
     name : str
         Which camera.
@@ -58,7 +58,7 @@ class CameraView(QWidget):
 
     def __init__(
         self,
-        port: VicoPort,
+        vico: Vico,
         name: str,
         parent: QWidget | None = None,
         *,
@@ -66,8 +66,9 @@ class CameraView(QWidget):
     ) -> None:
         super().__init__(parent)
         self.setWindowTitle(f"Camera {name}")
-        self._camera, self._now = port.camera(name), now
+        self._camera, self._now = vico.camera(name), now
         self._newest: Picture | None = None
+        self._coming: Picture | None = None
         self._came, self._came_s, self._drawn_s = "", WALL.now_s(), 0.0
         self._histogram: Histogram | None = None
         self._readouts, self._was_running, self._refused = 0, False, ""
@@ -80,7 +81,7 @@ class CameraView(QWidget):
         self.calibrate = self.row.add(CalibrateButton(self._camera))
         self.contrast, self.chain = ContrastPanel(), ChainPanel(self._camera)
         self.form = SettingsForm(self._camera, self)
-        self.chooser = CameraChooser(port, name)
+        self.chooser = CameraChooser(vico, name)
         self.recorder = RecordBar(self._camera, now=now)
         self.pointer, self.message = CornerText(top=False), CornerText(top=True)
         self.tools = PictureTools(self.view, self.row, self._camera, self)
@@ -90,8 +91,7 @@ class CameraView(QWidget):
         self._readout = QTimer(self, interval=READOUT_MS)
         self._build()
         self._connect()
-        self._relay = PortRelay(port, self)
-        self._relay.changed.connect(self.refresh)
+        self._relay = Relay(self.refresh).follow(vico.on_change)
         self.refresh()
 
     # Putting it together
@@ -178,17 +178,26 @@ class CameraView(QWidget):
         super().hideEvent(event)
         self._look.stop()  # nobody looks: the camera and its recording go on
         self._readout.stop()
+        self._coming = None
 
     # Pictures
 
     def look(self) -> None:
-        """Show the newest picture, unless the last one was shown just now."""
-        newest = self._camera.latest()
+        """Show the newest picture, unless the last one was shown just now, or it is not drawn yet.
+
+        The window waits for no picture: it is shown at a later look.
+        """
+        newest = self._coming or self._camera.latest()
         if newest is self._newest or newest is None:
             return
         now_s = WALL.now_s()
         if now_s - self._drawn_s < LEAST_S or newest.frame.status is not FrameStatus.COMPLETE:
             return
+        if not newest.frame.ready:
+            newest.frame.prepare()
+            self._coming = newest
+            return
+        self._coming = None
         first = self._newest is None
         self._newest, self._drawn_s = newest, now_s
         self._came, self._came_s = f"{self._now():%H:%M:%S}", now_s

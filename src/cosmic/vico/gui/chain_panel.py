@@ -9,15 +9,15 @@ from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import push_button, tight_row
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
-from cosmic.vico.gui.camera_port import CameraPort
+from cosmic.vico.api.camera import CameraHandle
 
 
 class ChainPanel(QWidget):
     """A tick a link, with what is wrong below it; then the background."""
 
-    def __init__(self, port: CameraPort, parent: QWidget | None = None) -> None:
+    def __init__(self, camera: CameraHandle, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._port = port
+        self._camera = camera
         self.ticks: dict[str, QCheckBox] = {}
         self._problems: dict[str, ElidedLabel] = {}
         self._links = QVBoxLayout()
@@ -42,7 +42,7 @@ class ChainPanel(QWidget):
 
     def refresh(self) -> None:
         """Show what is on."""
-        chain = self._port.algorithms
+        chain = self._camera.algorithms
         if [each.name for each in chain] != list(self.ticks):
             self._rebuild()
         for each in chain:
@@ -52,7 +52,7 @@ class ChainPanel(QWidget):
                 f"{state_look(State.ERROR).glyph} {each.problem}" if each.problem else ""
             )
             problem.setVisible(bool(each.problem))
-        taken = self._port.has_background
+        taken = self._camera.has_background
         self.clear.setEnabled(taken)
         self.clear.setToolTip(
             "Show pictures as they come" if taken else "No background has been taken"
@@ -63,7 +63,7 @@ class ChainPanel(QWidget):
             old.hide()
             old.deleteLater()
         self.ticks, self._problems = {}, {}
-        for each in self._port.algorithms:
+        for each in self._camera.algorithms:
             tick, problem = QCheckBox(each.name), ElidedLabel()
             tick.setToolTip(each.description)
             tick.clicked.connect(self._on_clicked)
@@ -72,16 +72,16 @@ class ChainPanel(QWidget):
             self.ticks[each.name], self._problems[each.name] = tick, problem
 
     def _on_clicked(self) -> None:
-        for each in self._port.algorithms:
+        for each in self._camera.algorithms:
             wanted = self.ticks[each.name].isChecked()
             if wanted != each.on:
-                self._try(partial(self._port.switch, each.name, on=wanted))
+                self._try(partial(self._camera.switch, each.name, on=wanted))
 
     def _on_take(self) -> None:
-        self._try(self._port.set_background)
+        self._try(self._camera.set_background)
 
     def _on_clear(self) -> None:
-        self._try(self._port.clear_background)
+        self._try(self._camera.clear_background)
 
     def _try(self, action: Callable[[], object]) -> None:
         self.reason.hide()

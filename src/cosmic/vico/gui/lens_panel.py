@@ -10,14 +10,15 @@ from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
-from cosmic.frame.gui.relay import PortRelay
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.task_bar import TaskBar
 from cosmic.frame.gui.theme import STEP_PX, State
+from cosmic.frame.operation import Task
 from cosmic.frame.overrides import override
-from cosmic.frame.task import Task
+from cosmic.vico.api.lens import LensHandle
+from cosmic.vico.api.vico import Vico
 from cosmic.vico.gui.amount_field import AmountField
-from cosmic.vico.gui.ports import LensPort, VicoPort
 from cosmic.vico.gui.slider_field import SliderField
 from cosmic.vico.hw.peripherals import LensAxis, LensState
 
@@ -33,14 +34,14 @@ class LensPanel(QWidget):
 
     Parameters
     ----------
-    port : VicoPort
+    vico : Vico
         The application; lens and lamp may be missing.
     """
 
-    def __init__(self, port: VicoPort, parent: QWidget | None = None) -> None:
+    def __init__(self, vico: Vico, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setWindowTitle("Lens and light")
-        self._port = port
+        self._vico = vico
         self._offered: tuple[str, ...] = ()
         self.badge, self.name = StateBadge(State.UNKNOWN), ElidedLabel()
         self.zoom = AmountField("Zoom", "x")
@@ -63,8 +64,7 @@ class LensPanel(QWidget):
         self._look = QTimer(self, interval=LOOK_MS)
         self._look.timeout.connect(self.refresh)
         self._look.start()
-        self._relay = PortRelay(port, self)
-        self._relay.changed.connect(self.refresh)
+        self._relay = Relay(self.refresh).follow(vico.on_change)
         self.refresh()
 
     # Putting it together
@@ -124,7 +124,7 @@ class LensPanel(QWidget):
         """Show where the motors are and what may be done."""
         self._show_cameras()
         self._show_light()
-        lens = self._port.lens
+        lens = self._vico.lens
         if lens is None:
             self.name.set_text(NO_LENS)
             self._allow(NO_LENS, NO_LENS)
@@ -146,7 +146,7 @@ class LensPanel(QWidget):
             self.focus.set_range(0.0, float(focus.limit_counts), 1.0)
             self.focus.set_value(float(focus.position_counts) if focus.homed else None)
 
-    def _show_state(self, lens: LensPort, states: list[LensState | None], *, homed: bool) -> None:
+    def _show_state(self, lens: LensHandle, states: list[LensState | None], *, homed: bool) -> None:
         moving = any(state is not None and state.moving for state in states)
         if lens.problem:
             self.badge.set_state(State.ERROR, lens.problem)
@@ -159,20 +159,20 @@ class LensPanel(QWidget):
             self.badge.set_state(State.UNKNOWN, NOT_HOMED)
 
     def _show_light(self) -> None:
-        lamp = self._port.light
+        lamp = self._vico.light
         reason = NO_LIGHT if lamp is None else lamp.problem
         self.light.set_usable(reason)
         if lamp is not None:
             self.light.set_value(lamp.percent)
 
     def _show_cameras(self) -> None:
-        names = list(self._port.cameras)
+        names = list(self._vico.cameras)
         if [self.camera.itemText(row) for row in range(self.camera.count())] != names:
             self.camera.clear()
             self.camera.addItems(names)
         self.camera.setVisible(len(names) > 1)
 
-    def _offer_steps(self, lens: LensPort) -> None:
+    def _offer_steps(self, lens: LensHandle) -> None:
         offered = tuple(step.name for step in lens.steps)
         if offered == self._offered:
             return
@@ -192,7 +192,7 @@ class LensPanel(QWidget):
         """Enable what can be used; what needs a homed lens has a reason of its own."""
         _enable(self.home, gone, "Run both motors to where counting begins")
         _enable(self.abort, gone, "Stop both motors now")
-        nothing = unknown or ("" if self._port.cameras else "There is no camera")
+        nothing = unknown or ("" if self._vico.cameras else "There is no camera")
         _enable(self.autofocus, nothing, "Look for the sharpest picture")
         self.focus.set_usable(unknown)
         self.zoom.set_usable(unknown)
@@ -203,8 +203,8 @@ class LensPanel(QWidget):
 
     # Commands
 
-    def _begin(self, begin: Callable[[LensPort], Task], refuse: Callable[[str], None]) -> None:
-        lens = self._port.lens
+    def _begin(self, begin: Callable[[LensHandle], Task], refuse: Callable[[str], None]) -> None:
+        lens = self._vico.lens
         if lens is None:
             return
         try:
@@ -224,7 +224,7 @@ class LensPanel(QWidget):
         self._begin(lambda lens: lens.seek_focus(round(counts)), self.focus.refuse)
 
     def _on_focus_step(self, step: int) -> None:
-        state = None if self._port.lens is None else self._port.lens.state(LensAxis.FOCUS)
+        state = None if self._vico.lens is None else self._vico.lens.state(LensAxis.FOCUS)
         if state is None:
             return
         target = state.position_counts + step
@@ -240,17 +240,17 @@ class LensPanel(QWidget):
         self._begin(lambda lens: lens.autofocus(self.camera.currentText()), self._say)
 
     def _on_abort(self) -> None:
-        if self._port.lens is not None:
-            self._port.lens.abort()
+        if self._vico.lens is not None:
+            self._vico.lens.abort()
         task = self.tasks.watch.task
         if task is not None and not task.done:
             task.cancel()
 
     def _on_light(self, percent: float) -> None:
-        if self._port.light is None:
+        if self._vico.light is None:
             return
         try:
-            self._port.light.set_percent(percent)
+            self._vico.light.set_percent(percent)
         except CosmicError as exc:
             self.light.refuse(str(exc))
 

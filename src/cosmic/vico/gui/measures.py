@@ -9,9 +9,9 @@ from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QPainter, QPainterPath
 
 from cosmic.frame.overrides import override
+from cosmic.vico.api.places import Pixel
 from cosmic.vico.gui.ink import HALO, PINK, YELLOW, label, pen, stroke
 from cosmic.vico.gui.picture_view import Layer, PictureView
-from cosmic.vico.gui.seen import Pixel
 from cosmic.vico.gui.texts import length_text
 
 NEAR_PX: Final = 9.0

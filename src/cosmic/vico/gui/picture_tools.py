@@ -5,10 +5,10 @@ from PySide6.QtWidgets import QMenu
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.theme import State, state_look
-from cosmic.vico.gui.camera_port import CameraPort
+from cosmic.vico.api.camera import CameraHandle
+from cosmic.vico.api.places import Pixel
 from cosmic.vico.gui.measures import MeasureLayer
 from cosmic.vico.gui.picture_view import Layer, PictureView, Tool
-from cosmic.vico.gui.seen import Pixel
 from cosmic.vico.gui.tool_row import ToolRow
 from cosmic.vico.gui.tools import AngleTool, ClickTool, DistanceTool, RoiLayer, RoiTool
 
@@ -28,7 +28,7 @@ class PictureTools(QObject):
     region_chosen = Signal(int, int, int, int)
 
     def __init__(
-        self, view: PictureView, row: ToolRow, camera: CameraPort, parent: QObject
+        self, view: PictureView, row: ToolRow, camera: CameraHandle, parent: QObject
     ) -> None:
         super().__init__(parent)
         self._view, self._row, self._camera = view, row, camera

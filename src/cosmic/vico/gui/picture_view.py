@@ -20,10 +20,10 @@ from PySide6.QtWidgets import QToolTip, QWidget
 
 from cosmic.frame.gui.theme import current_palette
 from cosmic.frame.overrides import override
+from cosmic.vico.api.places import Pixel
 from cosmic.vico.core.picture import Picture
 from cosmic.vico.gui.levels import Levels
 from cosmic.vico.gui.picture_item import PictureItem
-from cosmic.vico.gui.seen import Pixel
 
 
 class Layer(Protocol):

@@ -1,11 +1,11 @@
 """What is said of the pixel below the mouse."""
 
+from cosmic.vico.api.camera import CameraHandle
+from cosmic.vico.api.places import Pixel
 from cosmic.vico.core.picture import Picture
-from cosmic.vico.gui.camera_port import CameraPort
-from cosmic.vico.gui.seen import Pixel
 
 
-def pointer_text(camera: CameraPort, picture: Picture | None, place_px: Pixel | None) -> str:
+def pointer_text(camera: CameraHandle, picture: Picture | None, place_px: Pixel | None) -> str:
     """Return place and brightness of a pixel, and where that is on the platform."""
     if picture is None or place_px is None:
         return ""

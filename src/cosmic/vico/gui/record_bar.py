@@ -22,8 +22,9 @@ from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.overwrite_question import overwrite_question
 from cosmic.frame.gui.task_bar import TaskBar
 from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look
-from cosmic.frame.task import Task
-from cosmic.vico.gui.camera_port import CameraPort, VideoFormat
+from cosmic.frame.operation import Task
+from cosmic.vico.api.camera import CameraHandle
+from cosmic.vico.api.camera_shown import FormatShown
 from cosmic.vico.gui.file_fields import FileFields
 from cosmic.vico.gui.time_lapse_dialog import TimeLapseDialog
 
@@ -41,13 +42,13 @@ class RecordBar(QWidget):
 
     def __init__(
         self,
-        port: CameraPort,
+        camera: CameraHandle,
         parent: QWidget | None = None,
         *,
         now: Callable[[], datetime] = datetime.now,
     ) -> None:
         super().__init__(parent)
-        self._port = port
+        self._camera = camera
         self._error = ""
         self.snap = named(push_button("Snap", "Write the picture shown to a file"), "snap")
         self.record = named(push_button("Record", ""), "record")
@@ -56,7 +57,7 @@ class RecordBar(QWidget):
         self.more = push_button("File…", "Show the fields for name, directory and format")
         self.more.setCheckable(True)
         self.format = tipped(QComboBox(), "How recordings are written")
-        self.files = FileFields(port.directory, port.name, now=now, elsewhere=port.elsewhere)
+        self.files = FileFields(camera.directory, camera.name, now=now, elsewhere=camera.elsewhere)
         self.told, self.tasks = ElidedLabel(), TaskBar()
         self.told.setFont(number_font())
         self._fields = QWidget()
@@ -103,23 +104,23 @@ class RecordBar(QWidget):
     # Looking
 
     @property
-    def chosen(self) -> VideoFormat | None:
+    def chosen(self) -> FormatShown | None:
         """The format that is chosen."""
         row = self.format.currentIndex()
-        formats = self._port.formats
+        formats = self._camera.formats
         return formats[row] if 0 <= row < len(formats) else None
 
     def refresh(self) -> None:
         """Show what is being recorded and what may be done now."""
         self._show_formats()
-        recording, wrong = self._port.recording, self.files.problem
+        recording, wrong = self._camera.recording, self.files.problem
         self.files.setEnabled(not recording.active)
         self.format.setEnabled(not recording.active)
-        away = self._port.problem if self._port.elsewhere else ""
-        still_wrong = wrong or away or ("" if self._port.latest() else "There is no picture yet")
+        away = self._camera.problem if self._camera.elsewhere else ""
+        still_wrong = wrong or away or ("" if self._camera.latest() else "There is no picture yet")
         chosen = self.chosen
         wrong = wrong or (chosen.problem if chosen is not None else "There is no format")
-        wrong = wrong or ("" if self._port.running else "No pictures are taken: start the camera")
+        wrong = wrong or ("" if self._camera.running else "No pictures are taken: start the camera")
         _allow(self.snap, still_wrong, "Write the picture shown to a file")
         _allow(self.lapse, wrong or _busy(recording.active), "Record one picture every so often")
         self.record.setChecked(recording.active)
@@ -132,7 +133,7 @@ class RecordBar(QWidget):
         self._tell()
 
     def _show_formats(self) -> None:
-        formats = self._port.formats
+        formats = self._camera.formats
         texts = [f"{each.name} – {each.problem or each.description}" for each in formats]
         if [self.format.itemText(row) for row in range(self.format.count())] != texts:
             row = max(0, self.format.currentIndex())
@@ -142,7 +143,7 @@ class RecordBar(QWidget):
             self.format.setMinimumContentsLength(12)
 
     def _tell(self) -> None:
-        recording = self._port.recording
+        recording = self._camera.recording
         failure = self._error or ("" if recording.active else recording.failure)
         if failure:
             self.told.set_text(f"{state_look(State.ERROR).glyph} {failure}")
@@ -152,7 +153,7 @@ class RecordBar(QWidget):
             self.told.set_text(self._room_text())
 
     def _recording_text(self) -> str:
-        now = self._port.recording
+        now = self._camera.recording
         name = now.path.name if now.path is not None else ""
         left = "" if now.left_s is None else f", disk lasts {duration_text(now.left_s)}"
         waiting = f", {now.waiting} waiting" if now.active else ""
@@ -166,7 +167,7 @@ class RecordBar(QWidget):
             return self.files.problem
         chosen = self.chosen
         try:
-            room_s = self._port.room_s(self.files.folder, chosen.name if chosen else "")
+            room_s = self._camera.room_s(self.files.folder, chosen.name if chosen else "")
         except CosmicError as exc:
             return str(exc)
         return "" if room_s is None else f"disk lasts {duration_text(room_s)}"
@@ -185,7 +186,7 @@ class RecordBar(QWidget):
 
     def _unless_there(self, path: Path, act: Callable[[bool], object]) -> None:
         """Do it, after a question where it would overwrite something."""
-        if not self._port.elsewhere and path.exists():
+        if not self._camera.elsewhere and path.exists():
             overwrite_question(self, path, lambda: self._try(lambda: act(True))).open()
             self.refresh()
         else:
@@ -196,22 +197,24 @@ class RecordBar(QWidget):
         self._unless_there(path, lambda over: self._follow_snap(path, overwrite=over))
 
     def _follow_snap(self, path: Path, *, overwrite: bool) -> None:
-        self._follow(self._port.snap(path, overwrite=overwrite))
+        self._follow(self._camera.snap(path, overwrite=overwrite))
 
     def _follow(self, task: Task) -> None:
         self._lines.setCurrentWidget(self.tasks)
         self.tasks.follow(task)
 
     def _on_record(self) -> None:
-        self.record.setChecked(self._port.recording.active)
-        if self._port.recording.active:
-            self._try(self._port.stop_recording)
+        self.record.setChecked(self._camera.recording.active)
+        if self._camera.recording.active:
+            self._try(self._camera.stop_recording)
             return
         chosen = self.chosen
         if chosen is None:
             return
         path = self.files.path(chosen.suffix)
-        self._unless_there(path, lambda over: self._port.record(path, chosen.name, overwrite=over))
+        self._unless_there(
+            path, lambda over: self._camera.record(path, chosen.name, overwrite=over)
+        )
 
     def _on_lapse(self) -> None:
         dialog = TimeLapseDialog(self)
@@ -226,7 +229,7 @@ class RecordBar(QWidget):
         path = self.files.path(chosen.suffix)
 
         def begin(over: bool) -> None:
-            task = self._port.time_lapse(
+            task = self._camera.time_lapse(
                 path, chosen.name, interval_s=interval_s, count=count, overwrite=over
             )
             self._follow(task)

@@ -7,16 +7,18 @@ from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QPainter, QPainterPath, QPolygonF
 
 from cosmic.frame.overrides import override
+from cosmic.vico.api.camera_shown import Seen
+from cosmic.vico.core.vision.fibre import Fibre
+from cosmic.vico.core.vision.tool_tips import TipSeen
 from cosmic.vico.gui.ink import GREEN, HALO, ORANGE, SKY, WHITE, label, pen, stroke
 from cosmic.vico.gui.picture_view import Layer, PictureView
-from cosmic.vico.gui.seen import Analysis, FibreSeen, TipSeen
 from cosmic.vico.gui.texts import length_text
 
 NOT_SURE: Final = "not sure"
 MOST_POINTS: Final = 150
 
 
-def fibre_text(fibre: FibreSeen, scale_um_px: float | None) -> str:
+def fibre_text(fibre: Fibre, scale_um_px: float | None) -> str:
     """Return the label of a fibre: length, width, curl, and whether that is certain."""
     length = length_text(fibre.length_px, scale_um_px)
     width = length_text(fibre.width_px, scale_um_px)
@@ -29,7 +31,7 @@ class SeenLayer(Layer):
 
     def __init__(self) -> None:
         self.shown = True
-        self.analysis: Analysis | None = None
+        self.analysis: Seen | None = None
         self.labels: list[tuple[QRectF, str]] = []
         """Where labels stand on the screen, and what to say there."""
 
@@ -54,12 +56,12 @@ class SeenLayer(Layer):
         return [box for box, _ in self.labels]
 
     @staticmethod
-    def _fits(view: PictureView, found: Analysis) -> bool:
+    def _fits(view: PictureView, found: Seen) -> bool:
         """Tell whether it was found in a picture of the size shown."""
         return found.picture.data.shape[:2] == view.size_px[::-1]
 
     def _paint_fibre(
-        self, painter: QPainter, view: PictureView, fibre: FibreSeen, scale: float | None
+        self, painter: QPainter, view: PictureView, fibre: Fibre, scale: float | None
     ) -> None:
         colour = GREEN if fibre.certain else ORANGE
         path = _path(fibre.centre_line_px, view)

@@ -12,8 +12,8 @@ from cosmic.frame.gui.build import push_button, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.task_watch import TaskWatch
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
-from cosmic.frame.task import Progress
-from cosmic.vico.gui.camera_port import CameraPort
+from cosmic.frame.operation import Progress
+from cosmic.vico.api.camera import CameraHandle
 from cosmic.vico.gui.slider_field import SliderField
 from cosmic.vico.hw.interface import (
     CameraRanges,
@@ -41,9 +41,9 @@ class SettingsForm(QObject):
         The others, for the drawer.
     """
 
-    def __init__(self, port: CameraPort, parent: QWidget) -> None:
+    def __init__(self, camera: CameraHandle, parent: QWidget) -> None:
         super().__init__(parent)
-        self._port = port
+        self._camera = camera
         self._changed: SliderField | None = None
         self._watch = TaskWatch(self)
         self._watch.progressed.connect(self._on_progressed)
@@ -94,7 +94,7 @@ class SettingsForm(QObject):
 
     def refresh(self) -> None:
         """Show settings and ranges in force."""
-        settings, ranges = self._port.settings, self._port.ranges
+        settings, ranges = self._camera.settings, self._camera.ranges
         there = settings is not None and ranges is not None
         for widget in (self.binning, self.pixel_format, self.trigger, self.full_sensor):
             widget.setEnabled(there)
@@ -106,7 +106,7 @@ class SettingsForm(QObject):
         )
         if settings is None or ranges is None:
             for field in (self.exposure, self.gain, self.rate):
-                field.set_usable(self._port.problem or _GONE)
+                field.set_usable(self._camera.problem or _GONE)
             self.roi_text.setText("–")
             return
         _show(self.exposure, ranges.exposure_s, settings.exposure_s, MS)
@@ -130,7 +130,7 @@ class SettingsForm(QObject):
 
     def read_part(self, x_px: int, y_px: int, width_px: int, height_px: int) -> None:
         """Read a part of the picture shown; widened to what the camera can do."""
-        settings, ranges = self._port.settings, self._port.ranges
+        settings, ranges = self._camera.settings, self._camera.ranges
         if settings is None or ranges is None:
             return
         sensor = self._sensor(settings)
@@ -141,7 +141,7 @@ class SettingsForm(QObject):
 
     def read_all(self) -> None:
         """Read the whole sensor."""
-        settings = self._port.settings
+        settings = self._camera.settings
         if settings is not None:
             width, height = self._sensor(settings)
             roi = Roi(0, 0, width, height)
@@ -149,7 +149,7 @@ class SettingsForm(QObject):
 
     def _sensor(self, settings: CameraSettings) -> tuple[int, int]:
         """Return the sensor's size in binned pixels."""
-        info, ranges = self._port.info, self._port.ranges
+        info, ranges = self._camera.info, self._camera.ranges
         if info is not None and info.sensor_px != (0, 0):
             return info.sensor_px[0] // settings.binning, info.sensor_px[1] // settings.binning
         if ranges is None:
@@ -166,7 +166,7 @@ class SettingsForm(QObject):
         self._wish(lambda now: replace(now, rate_hz=rate_hz), self.rate)
 
     def _on_binning(self) -> None:
-        settings = self._port.settings
+        settings = self._camera.settings
         if settings is None:
             return
         binning = int(self.binning.currentData())
@@ -184,7 +184,7 @@ class SettingsForm(QObject):
 
     def _on_shoot(self) -> None:
         try:
-            self._port.software_trigger()
+            self._camera.software_trigger()
         except CosmicError as exc:
             self._refuse(str(exc))
 
@@ -195,7 +195,7 @@ class SettingsForm(QObject):
 
     def _ask(self) -> None:
         """Ask for all wishes that came meanwhile at once: a slider that is dragged makes many."""
-        settings = before = self._port.settings
+        settings = before = self._camera.settings
         waiting, self._waiting = self._waiting, []
         if settings is None:
             return
@@ -205,7 +205,7 @@ class SettingsForm(QObject):
             return
         self._refuse("")
         try:
-            self._watch.follow(self._port.configure(settings))
+            self._watch.follow(self._camera.configure(settings))
         except CosmicError as exc:
             self._refuse(str(exc))
 

@@ -8,7 +8,7 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State
-from cosmic.vico.gui.camera_port import CameraPort
+from cosmic.vico.api.camera import CameraHandle
 from cosmic.vico.gui.levels import Histogram
 from cosmic.vico.gui.readings import FocusBars, Reading
 from cosmic.vico.gui.texts import measure_text
@@ -19,10 +19,10 @@ RATE_OVER_S: Final = 1.0
 class StatusRow(QWidget):
     """Readings side by side; they go on in a new line where it is narrow."""
 
-    def __init__(self, port: CameraPort, parent: QWidget | None = None) -> None:
+    def __init__(self, camera: CameraHandle, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._port = port
-        self._since_s, self._since_count = WALL.now_s(), port.counters.completed
+        self._camera = camera
+        self._since_s, self._since_count = WALL.now_s(), camera.counters.completed
         self._rate_hz: float | None = None
         self.badge = StateBadge(State.UNKNOWN)
         self.rate = Reading("", "000.0", "Hz", "Pictures a second that came from the camera")
@@ -57,7 +57,7 @@ class StatusRow(QWidget):
 
     def refresh(self, histogram: Histogram | None) -> None:
         """Show the numbers as they are now."""
-        counters = self._port.counters
+        counters = self._camera.counters
         self._measure_rate(counters.completed)
         self.rate.show_number("–" if self._rate_hz is None else f"{self._rate_hz:.1f}")
         self.completed.show_number(f"{counters.completed}")
@@ -69,14 +69,14 @@ class StatusRow(QWidget):
             reading.show_number(f"{count}", alarm=count > 0)
         over = 0.0 if histogram is None else 100.0 * histogram.over
         self.over.show_number(f"{over:.2f}")
-        focus = self._port.focus
+        focus = self._camera.focus
         self.focus.show_number("–" if focus is None else measure_text(focus))
         if focus is not None:
             self.bars.add(focus)
 
     def _measure_rate(self, count: int) -> None:
         now_s = WALL.now_s()
-        if count < self._since_count or not self._port.running:
+        if count < self._since_count or not self._camera.running:
             self._since_s, self._since_count, self._rate_hz = now_s, count, None
         elif now_s - self._since_s >= RATE_OVER_S:
             self._rate_hz = (count - self._since_count) / (now_s - self._since_s)

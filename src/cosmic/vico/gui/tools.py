@@ -7,10 +7,10 @@ from PySide6.QtCore import QObject, QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QPainter
 
 from cosmic.frame.overrides import override
+from cosmic.vico.api.places import Pixel
 from cosmic.vico.gui.ink import HALO, SKY, label, pen
 from cosmic.vico.gui.measures import Measure, MeasureLayer
 from cosmic.vico.gui.picture_view import Layer, PictureView, Tool
-from cosmic.vico.gui.seen import Pixel
 
 LEAST_PX: Final = 2.0
 LEAST_ROI_PX: Final = 8

@@ -4,12 +4,9 @@ from PySide6.QtCore import QObject, Qt
 from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 
 from cosmic.frame.application import CosmicApplicationBase
-from cosmic.vico.api.application import VicoApplication
-from cosmic.vico.api.remote_application import RemoteVicoApplication
-from cosmic.vico.api.vico import Vico
+from cosmic.vico.api.vico import Vico, vico_of
 from cosmic.vico.gui.camera_view import CameraView
 from cosmic.vico.gui.lens_panel import LensPanel
-from cosmic.vico.gui.ports import VicoPort
 
 
 class VicoGui(QObject):
@@ -23,17 +20,15 @@ class VicoGui(QObject):
         Zoom, focus and light; says so where there are none.
     """
 
-    def __init__(self, port: VicoPort) -> None:
+    def __init__(self, vico: Vico) -> None:
         super().__init__()
-        self.cameras = {name: CameraView(port, name) for name in port.cameras}
-        self.lens = LensPanel(port)
+        self.cameras = {name: CameraView(vico, name) for name in vico.cameras}
+        self.lens = LensPanel(vico)
 
 
 def make_vico_gui(application: CosmicApplicationBase) -> VicoGui:
     """Make the GUI component of ViCo; GUI thread."""
-    if not isinstance(application, VicoApplication | RemoteVicoApplication):
-        raise TypeError(f"{application.title} is not ViCo")
-    vico = Vico(application)
+    vico = vico_of(application)
     gui = VicoGui(vico)
     for name, view in gui.cameras.items():
         view.setWindowTitle(vico.camera(name).title)
@@ -43,10 +38,10 @@ def make_vico_gui(application: CosmicApplicationBase) -> VicoGui:
 class VicoWidget(QWidget):
     """All of it in one widget, for a window without docks."""
 
-    def __init__(self, port: VicoPort, parent: QWidget | None = None) -> None:
+    def __init__(self, vico: Vico, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setWindowTitle("ViCo")
-        self.gui = VicoGui(port)
+        self.gui = VicoGui(vico)
         side = QSplitter(Qt.Orientation.Horizontal)
         for view in self.gui.cameras.values():
             side.addWidget(view)

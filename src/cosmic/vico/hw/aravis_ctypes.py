@@ -1,13 +1,15 @@
-"""Aravis' C interface, one to one: prototypes, constants, and binding by name.
+"""Aravis' C interface: its functions one to one, its errors as exceptions, its streams.
 
-Names and numbers are those of the headers of Aravis 0.8.26 and of GLib's GObject. Nothing is
-converted and nothing raises on an error here; that is one floor up in `aravis_calls`.
+Names and numbers are those of the headers of Aravis 0.8.26 and of GLib's GObject. What a camera
+makes of them is one floor up in `aravis`.
 """
 
 import ctypes
+import logging
 from ctypes import (
     CFUNCTYPE,
     POINTER,
+    byref,
     c_char_p,
     c_double,
     c_int,
@@ -21,9 +23,16 @@ from ctypes import (
 )
 from typing import Any, Final
 
-from cosmic.frame.errors import DeviceFault, NotConnectedError
+from cosmic.frame.errors import DeviceError, DeviceFault, DeviceTimeout, NotConnectedError
+from cosmic.vico.hw.camera_frames import buffers_for, copy_rows, empty_pixels
+from cosmic.vico.hw.interface import CameraSettings, Pixels
+
+logger = logging.getLogger(__name__)
 
 LIBRARY_NAME: Final = "libaravis-0.8.so.0"
+# Without packet sockets (CAP_NET_RAW) the kernel's default of 200 kB loses most frames; the
+# kernel cuts this to net.core.rmem_max.
+_SOCKET_BUFFER_BYTES: Final = 8_000_000
 
 # ArvBufferStatus
 ARV_BUFFER_STATUS_SUCCESS: Final = 0
@@ -228,3 +237,228 @@ def load_library(path: str = "") -> ctypes.CDLL:
             f"libaravis-0.8-0 (apt install libaravis-0.8-0)",
             fault=DeviceFault.COMMUNICATION,
         ) from exc
+
+
+_FAULTS: Final = {
+    ARV_DEVICE_ERROR_WRONG_FEATURE: DeviceFault.UNSUPPORTED,
+    ARV_DEVICE_ERROR_FEATURE_NOT_FOUND: DeviceFault.UNSUPPORTED,
+    ARV_DEVICE_ERROR_NOT_CONNECTED: DeviceFault.COMMUNICATION,
+    ARV_DEVICE_ERROR_PROTOCOL_ERROR: DeviceFault.COMMUNICATION,
+    ARV_DEVICE_ERROR_TRANSFER_ERROR: DeviceFault.COMMUNICATION,
+    ARV_DEVICE_ERROR_TIMEOUT: DeviceFault.TIMEOUT,
+    ARV_DEVICE_ERROR_NOT_FOUND: DeviceFault.COMMUNICATION,
+    ARV_DEVICE_ERROR_INVALID_PARAMETER: DeviceFault.PARAMETER,
+    ARV_DEVICE_ERROR_GENICAM_NOT_FOUND: DeviceFault.UNSUPPORTED,
+    ARV_DEVICE_ERROR_NO_STREAM_CHANNEL: DeviceFault.UNSUPPORTED,
+    ARV_DEVICE_ERROR_NOT_CONTROLLER: DeviceFault.OVERRIDDEN,
+    ARV_DEVICE_ERROR_PROTOCOL_ERROR_NOT_IMPLEMENTED: DeviceFault.UNSUPPORTED,
+    ARV_DEVICE_ERROR_PROTOCOL_ERROR_INVALID_PARAMETER: DeviceFault.PARAMETER,
+    ARV_DEVICE_ERROR_PROTOCOL_ERROR_INVALID_ADDRESS: DeviceFault.PARAMETER,
+    ARV_DEVICE_ERROR_PROTOCOL_ERROR_WRITE_PROTECT: DeviceFault.PARAMETER,
+    ARV_DEVICE_ERROR_PROTOCOL_ERROR_BAD_ALIGNMENT: DeviceFault.PARAMETER,
+    ARV_DEVICE_ERROR_PROTOCOL_ERROR_ACCESS_DENIED: DeviceFault.OVERRIDDEN,
+    ARV_DEVICE_ERROR_PROTOCOL_ERROR_BUSY: DeviceFault.BUSY,
+}
+
+
+class AravisCalls:
+    """The functions of one Aravis library; any thread as far as Aravis allows.
+
+    Parameters
+    ----------
+    library : ctypes.CDLL or object
+        The loaded library, or an object with the same functions.
+    """
+
+    def __init__(self, library: object) -> None:
+        self._functions = bind(library)
+
+    def plain(self, name: str, *args: object) -> Any:
+        """Call what cannot fail."""
+        return self._functions[name](*args)
+
+    def checked(self, whom: str, name: str, *args: object) -> Any:
+        """Call what can fail; `whom` names the camera in the text.
+
+        Raises
+        ------
+        DeviceError
+            What Aravis said.
+        """
+        error: Any = POINTER(GError)()
+        answer = self._functions[name](*args, byref(error))
+        if logger.isEnabledFor(logging.DEBUG):
+            logger.debug("%s: %s%s = %s", whom, name, args[1:], answer)
+        if error:
+            raise self._exception(error, f"{whom}: {name}")
+        return answer
+
+    def pair(self, whom: str, name: str, handle: int, kind: type = c_int) -> tuple[Any, Any]:
+        """Return the two numbers that a function fills in."""
+        first, second = kind(), kind()
+        self.checked(whom, name, handle, byref(first), byref(second))
+        return first.value, second.value
+
+    def strings(self, whom: str, name: str, handle: int) -> tuple[str, ...]:
+        """Return the texts of a function that gives an array to be freed."""
+        count = c_uint()
+        found = self.checked(whom, name, handle, byref(count))
+        if not found:
+            return ()
+        try:
+            return tuple(found[index].decode() for index in range(count.value))
+        finally:
+            self.plain("g_free", ctypes.cast(found, c_void_p))
+
+    def owned_text(self, name: str, handle: int) -> str:
+        """Return the text of a function that cannot fail and gives one to be freed."""
+        address = self.plain(name, handle)
+        if not address:
+            return ""
+        try:
+            return (ctypes.cast(address, c_char_p).value or b"").decode(errors="replace")
+        finally:
+            self.plain("g_free", address)
+
+    def set_int_property(self, handle: int, name: str, value: int) -> None:
+        """Set an integer or enumerated property of a GObject."""
+        holder = GValue()
+        self.plain("g_value_init", byref(holder), G_TYPE_INT)
+        self.plain("g_value_set_int", byref(holder), value)
+        self.plain("g_object_set_property", handle, name.encode(), byref(holder))
+
+    def release(self, handle: int, *, gone: bool = False) -> None:
+        """Give an object back; without waiting for it where its camera is gone.
+
+        Aravis says goodbye to a camera that no longer answers for up to five seconds an object.
+        """
+        if not gone:
+            self.plain("g_object_unref", handle)
+            return
+        unref = ctypes.cast(self._functions["g_object_unref"], c_void_p)
+        self.plain("g_thread_unref", self.plain("g_thread_new", b"aravis-release", unref, handle))
+
+    def _exception(self, error: Any, where: str) -> DeviceError:
+        domain = self.plain("g_quark_to_string", error.contents.domain) or b"?"
+        code = int(error.contents.code)
+        text = (error.contents.message or b"no text").decode(errors="replace")
+        self.plain("g_error_free", error)
+        fault = DeviceFault.PARAMETER  # of the description that the camera gives of itself
+        if domain.decode() == ARV_DEVICE_ERROR:
+            fault = _FAULTS.get(code, DeviceFault.OTHER)
+        kind = DeviceTimeout if fault is DeviceFault.TIMEOUT else DeviceError
+        said = f"{where}: {text} ({domain.decode()}, {code})"
+        return kind(said, fault=fault, code=code)
+
+
+class AravisStream:
+    """An ArvStream with its pool of buffers; one thread at a time.
+
+    Parameters
+    ----------
+    camera : int
+        Address of the ArvCamera; the caller keeps it alive.
+
+    Raises
+    ------
+    DeviceError
+        The camera fails, or another program controls it.
+    """
+
+    def __init__(self, calls: AravisCalls, camera: int, whom: str, rate_hz: float) -> None:
+        self._calls = calls
+        self._gige = bool(calls.plain("arv_camera_is_gv_device", camera))
+        payload = int(calls.checked(whom, "arv_camera_get_payload", camera))
+        self._stream = calls.checked(whom, "arv_camera_create_stream", camera, None, None)
+        if not self._stream:
+            raise DeviceError(f"{whom}: Aravis made no stream", fault=DeviceFault.COMMUNICATION)
+        if self._gige:
+            fixed = ARV_GV_STREAM_SOCKET_BUFFER_FIXED
+            calls.set_int_property(self._stream, "socket-buffer", fixed)
+            calls.set_int_property(self._stream, "socket-buffer-size", _SOCKET_BUFFER_BYTES)
+        for _ in range(buffers_for(rate_hz, payload)):
+            self.push(calls.plain("arv_buffer_new_allocate", payload))
+
+    def pop(self, timeout_s: float) -> int | None:
+        """Return the next buffer that was filled, to be pushed back; None after a while."""
+        found = self._calls.plain(
+            "arv_stream_timeout_pop_buffer", self._stream, round(timeout_s * 1e6)
+        )
+        return None if found is None else int(found)
+
+    def push(self, buffer: int) -> None:
+        """Give a buffer to be filled; it belongs to the stream from now on."""
+        self._calls.plain("arv_stream_push_buffer", self._stream, buffer)
+
+    def underruns(self) -> int:
+        """Return how often no buffer was free."""
+        numbers = [c_uint64() for _ in range(3)]
+        self._calls.plain(
+            "arv_stream_get_statistics", self._stream, *(byref(each) for each in numbers)
+        )
+        return numbers[2].value
+
+    def packets(self) -> tuple[int, int]:
+        """Return how many packets were asked for again, and how many never came; GigE only."""
+        resent, missing = c_uint64(), c_uint64()
+        if self._gige:
+            self._calls.plain(
+                "arv_gv_stream_get_statistics", self._stream, byref(resent), byref(missing)
+            )
+        return resent.value, missing.value
+
+    def close(self, *, gone: bool = False) -> None:
+        """End its thread and free its buffers; `gone`: the camera is."""
+        self._calls.release(self._stream, gone=gone)
+
+
+class AravisBuffer:
+    """What is in a buffer that was filled; valid until it is pushed back."""
+
+    def __init__(self, calls: AravisCalls, buffer: int) -> None:
+        self._calls = calls
+        self._buffer = buffer
+
+    @property
+    def whole(self) -> bool:
+        """Nothing of it is missing."""
+        return bool(self._get("status") == ARV_BUFFER_STATUS_SUCCESS)
+
+    @property
+    def number(self) -> int:
+        """The frame's number on the wire; a stranger's where the first packet is missing."""
+        return int(self._get("frame_id"))
+
+    @property
+    def device_ns(self) -> int:
+        """The camera's clock."""
+        return int(self._get("timestamp"))
+
+    @property
+    def system_ns(self) -> int:
+        """Time on the clock of this computer (`g_get_real_time`) when its first packet was seen."""
+        return int(self._get("system_timestamp"))
+
+    def pixels(self, settings: CameraSettings) -> Pixels | None:
+        """Return a copy of the picture, None where it is not of the size in force."""
+        picture = empty_pixels(settings)
+        height, width = picture.shape[:2]
+        gap = 0
+        if self.whole:  # else Aravis does not tell
+            if (self._get("image_width"), self._get("image_height")) != (width, height):
+                return None
+            across, down = c_int(), c_int()
+            name = "arv_buffer_get_image_padding"
+            self._calls.plain(name, self._buffer, byref(across), byref(down))
+            gap = across.value
+        line = picture.nbytes // height + gap
+        size = c_size_t()
+        start = self._calls.plain("arv_buffer_get_data", self._buffer, byref(size))
+        if not start or size.value < line * height - gap:
+            return None
+        copy_rows(start, line, picture)
+        picture.flags.writeable = False
+        return picture
+
+    def _get(self, what: str) -> int:
+        return int(self._calls.plain(f"arv_buffer_get_{what}", self._buffer))

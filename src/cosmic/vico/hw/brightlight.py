@@ -6,8 +6,7 @@ from typing import Final
 from typing_extensions import override
 
 from cosmic.frame.errors import ConfigError, ProtocolError
-from cosmic.vico.hw.navitar_protocol import Register
-from cosmic.vico.hw.navitar_registers import Registers
+from cosmic.vico.hw.navitar_protocol import Register, Registers
 from cosmic.vico.hw.peripherals import Light
 
 logger = logging.getLogger(__name__)

@@ -1,12 +1,15 @@
-"""The C interface of libdc1394, one to one: structures, constants, prototypes.
+"""The C interface of libdc1394: its functions one to one, its errors as exceptions, its ring.
 
-Names, numbers and the layout of the structures are those of the headers of libdc1394 2.2.6.
-Nothing is converted and nothing raises on a status here; that is one floor up in `dc1394_calls`.
+Names, numbers and the layout of the structures are those of the headers of libdc1394 2.2.6. What
+a camera makes of them is one floor up in `dc1394`.
 """
 
 import ctypes
+import logging
+import select
 from ctypes import (
     POINTER,
+    byref,
     c_char_p,
     c_float,
     c_int,
@@ -16,9 +19,14 @@ from ctypes import (
     c_uint64,
     c_void_p,
 )
+from dataclasses import dataclass
 from typing import Any, Final
 
-from cosmic.frame.errors import DeviceFault, NotConnectedError
+from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
+from cosmic.vico.hw.camera_frames import buffers_for, copy_rows, empty_pixels
+from cosmic.vico.hw.interface import CameraSettings, Pixels
+
+logger = logging.getLogger(__name__)
 
 LIBRARY_NAME: Final = "libdc1394.so.25"
 
@@ -275,3 +283,172 @@ def load_library(path: str = "") -> ctypes.CDLL:
             f"libdc1394-25 (apt install libdc1394-25); there is none for Windows",
             fault=DeviceFault.COMMUNICATION,
         ) from exc
+
+
+_FAULTS: Final = {
+    DC1394_FAILURE: DeviceFault.COMMUNICATION,
+    DC1394_IOCTL_FAILURE: DeviceFault.COMMUNICATION,
+    DC1394_FUNCTION_NOT_SUPPORTED: DeviceFault.UNSUPPORTED,
+    DC1394_NO_ISO_CHANNEL: DeviceFault.STATE,
+    DC1394_NO_BANDWIDTH: DeviceFault.STATE,
+    DC1394_FORMAT7_ERROR_FLAG_1: DeviceFault.PARAMETER,
+    DC1394_FORMAT7_ERROR_FLAG_2: DeviceFault.PARAMETER,
+    DC1394_INVALID_ARGUMENT_VALUE: DeviceFault.PARAMETER,
+    DC1394_REQ_VALUE_OUTSIDE_RANGE: DeviceFault.PARAMETER,
+    DC1394_INVALID_FEATURE: DeviceFault.UNSUPPORTED,
+    DC1394_INVALID_FRAMERATE: DeviceFault.PARAMETER,
+    DC1394_INVALID_COLOR_CODING: DeviceFault.PARAMETER,
+}
+_ADVICE: Final = {
+    DC1394_NO_ISO_CHANNEL: "another program may have it; a reset of the bus frees channels",
+    DC1394_NO_BANDWIDTH: "the bus is full: lower the rate or the size, or stop another camera",
+}
+
+
+class Dc1394Calls:
+    """The functions of one libdc1394.
+
+    Parameters
+    ----------
+    library : ctypes.CDLL or object
+        The loaded library, or an object with the same functions.
+    """
+
+    def __init__(self, library: object) -> None:
+        self._functions = bind(library)
+
+    def plain(self, name: str, *args: object) -> Any:
+        """Call what answers with something other than a status."""
+        return self._functions[name](*args)
+
+    def checked(self, whom: str, name: str, *args: object) -> None:
+        """Call what answers with a status; `whom` names the camera in the text.
+
+        Raises
+        ------
+        DeviceError
+            What the library said.
+        """
+        status = int(self._functions[name](*args))
+        if logger.isEnabledFor(logging.DEBUG):
+            logger.debug("%s: %s%s = %d", whom, name, args[1:], status)
+        if status != DC1394_SUCCESS:
+            raise self.error(f"{whom}: {name}", status)
+
+    def error(self, where: str, status: int) -> DeviceError:
+        """Return the exception for a status other than success."""
+        text = (self.plain("dc1394_error_get_string", status) or b"no text").decode()
+        advice = f"; {_ADVICE[status]}" if status in _ADVICE else ""
+        fault = _FAULTS.get(status, DeviceFault.OTHER)
+        return DeviceError(f"{where}: {text} ({status}){advice}", fault=fault, code=status)
+
+
+class Dc1394Handle:
+    """One open dc1394camera_t: calls with the camera filled in, numbers instead of pointers."""
+
+    def __init__(self, calls: Dc1394Calls, pointer: Any, whom: str) -> None:
+        self.calls = calls
+        self.pointer = pointer
+        self.whom = whom
+
+    def call(self, name: str, *args: object) -> None:
+        """Call what answers with a status; raises `DeviceError`."""
+        self.calls.checked(self.whom, name, self.pointer, *args)
+
+    def integer(self, name: str, *args: object) -> int:
+        """Return the one signed number, switch or enumeration that a function fills in."""
+        answer = c_int()
+        self.call(name, *args, byref(answer))
+        return answer.value
+
+    def numbers(self, name: str, *args: object, count: int = 1) -> tuple[int, ...]:
+        """Return the unsigned numbers that a function fills in."""
+        answers = [c_uint32() for _ in range(count)]
+        self.call(name, *args, *(byref(each) for each in answers))
+        return tuple(each.value for each in answers)
+
+    def floats(self, name: str, *args: object, count: int = 1) -> tuple[float, ...]:
+        """Return the numbers with a fraction that a function fills in."""
+        answers = [c_float() for _ in range(count)]
+        self.call(name, *args, *(byref(each) for each in answers))
+        return tuple(each.value for each in answers)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Taken:
+    """A frame copied from the ring.
+
+    Attributes
+    ----------
+    received_us : int
+        Time of day (unix) at which the kernel had it.
+    ring_full : bool
+        All buffers waited to be read, so that the kernel had none for the next frame.
+    """
+
+    data: Pixels
+    received_us: int
+    corrupt: bool
+    ring_full: bool
+
+
+class Dc1394Ring:
+    """Makes the ring, and takes frames from it; one thread at a time.
+
+    Raises
+    ------
+    DeviceError
+        No channel or no bandwidth is left on the bus, or no memory.
+    """
+
+    def __init__(self, handle: Dc1394Handle, settings: CameraSettings) -> None:
+        self._handle = handle
+        self._settings = settings
+        self._buffers = buffers_for(settings.rate_hz, 0)
+        flags = DC1394_CAPTURE_FLAGS_DEFAULT
+        handle.call("dc1394_capture_setup", self._buffers, flags)
+        self._poll = select.poll()
+        file = handle.calls.plain("dc1394_capture_get_fileno", handle.pointer)
+        self._poll.register(file, select.POLLIN)
+
+    def take(self, timeout_s: float) -> Taken | None:
+        """Return the next frame, None after a while; raises `DeviceError`."""
+        frame = self._dequeued()
+        if frame is None and self._poll.poll(timeout_s * 1000.0):
+            frame = self._dequeued()
+        if frame is None:
+            return None
+        try:
+            return self._copied(frame)
+        finally:
+            self._handle.call("dc1394_capture_enqueue", frame)
+
+    def close(self) -> None:
+        """Give the ring, the channel and the bandwidth back."""
+        # The answer says nothing of use: it fails for a camera that is gone.
+        self._handle.calls.plain("dc1394_capture_stop", self._handle.pointer)
+
+    def _dequeued(self) -> Any:
+        frame: Any = POINTER(dc1394video_frame_t)()
+        self._handle.call("dc1394_capture_dequeue", DC1394_CAPTURE_POLICY_POLL, byref(frame))
+        return frame or None
+
+    def _copied(self, frame: Any) -> Taken:
+        found = frame.contents
+        data = empty_pixels(self._settings)
+        height, width = data.shape
+        stride = found.stride or width * data.itemsize
+        fits = tuple(found.size) == (width, height) and stride * height <= found.total_bytes
+        if fits:
+            copy_rows(found.image, stride, data)
+        if data.itemsize > 1 and not found.little_endian:
+            data.byteswap(inplace=True)  # IIDC sends the high byte first
+        data.flags.writeable = False
+        name = "dc1394_capture_is_frame_corrupt"
+        corrupt = self._handle.calls.plain(name, self._handle.pointer, frame)
+        return Taken(
+            data=data,
+            received_us=int(found.timestamp),
+            corrupt=bool(corrupt) or not fits,
+            ring_full=found.frames_behind >= self._buffers - 1,
+        )

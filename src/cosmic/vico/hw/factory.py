@@ -1,18 +1,31 @@
-"""Makes the cameras that the configuration names."""
+"""Makes the cameras, the lens and the lamp that the configuration names."""
 
-from collections.abc import Sequence
+import logging
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Final, Literal, get_args
 
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errors import ConfigError
+from cosmic.frame.errors import ConfigError, CosmicError, DeviceFault, NotConnectedError
+from cosmic.vico.hw.brightlight import BrightLight
 from cosmic.vico.hw.interface import CameraLibrary
+from cosmic.vico.hw.navitar import NavitarLens, counts_anew
+from cosmic.vico.hw.navitar_protocol import Found, Product, probe
+from cosmic.vico.hw.peripherals import Lens, LensAxis, Light
+from cosmic.vico.hw.serial_port import SerialPort, open_serial_port
 
 if TYPE_CHECKING:
     from cosmic.twin.scene import Scene
     from cosmic.vico.hw.opencv_source import VideoSource
+    from cosmic.vico.hw.sim_line import SimLine
+    from cosmic.vico.hw.sim_peripherals import SimPeripherals
+
+logger = logging.getLogger(__name__)
 
 Backend = Literal["simulated", "aravis", "opencv", "dc1394", "harvesters"]
+LensBackend = Literal["simulated", "navitar", "none"]
+LightBackend = Literal["simulated", "brightlight", "none"]
+_BACKENDS: Final = get_args(Backend)
 
 
 def make_camera_library(
@@ -30,9 +43,10 @@ def make_camera_library(
     Parameters
     ----------
     backend : str
-        "simulated" (views of the twin), "aravis" (GigE Vision and USB3 Vision on Linux),
-        "opencv" (USB cameras, films, folders of pictures, addresses), "dc1394" (FireWire on
-        Linux), "harvesters" (GenTL producers of the vendors, extra ``gentl``).
+        "simulated" (views of the twin), "harvesters" (GenTL producers of the vendors, extra
+        ``gentl``: the usual way to GigE Vision and USB3 Vision), "aravis" (the same two on
+        Linux, without anything of the vendor's), "opencv" (USB cameras, films, folders of
+        pictures, addresses), "dc1394" (FireWire on Linux).
     clock : Clock or None
         The platform's, which stamps frames and paces simulated cameras; None is the wall's.
     scene : Scene or None
@@ -40,7 +54,7 @@ def make_camera_library(
     sources : sequence of VideoSource, str or Path
         For "opencv": what it plays, besides the USB cameras that Linux lists.
     producers : sequence of Path or str
-        For "harvesters": the ``.cti`` files.
+        For "harvesters": the ``.cti`` files; empty: those that are installed.
     packet_bytes : int
         For "aravis": size of the packets of a GigE camera; 0 leaves it alone.
     seed : int
@@ -61,30 +75,145 @@ def make_camera_library(
     if backend == "simulated":
         return _simulated(scene, clock or WALL, seed)
     if backend == "aravis":
-        from cosmic.vico.hw.aravis_library import AravisLibrary
+        from cosmic.vico.hw.aravis import AravisLibrary
 
         return AravisLibrary(clock or WALL, packet_bytes=packet_bytes)
     if backend == "opencv":
-        from cosmic.vico.hw.opencv_library import OpenCvLibrary
+        from cosmic.vico.hw.opencv import OpenCvLibrary
 
         return OpenCvLibrary(clock or WALL, sources=sources)
     if backend == "dc1394":
-        from cosmic.vico.hw.dc1394_library import Dc1394Library
+        from cosmic.vico.hw.dc1394 import Dc1394Library
 
         return Dc1394Library(clock or WALL)
-    if not producers:
-        raise ConfigError("cameras: harvesters: name the .cti file of a GenTL producer at least")
-    from cosmic.vico.hw.harvesters_library import HarvestersLibrary
+    from cosmic.vico.hw.harvesters import HarvestersLibrary, installed_producers
 
+    producers = producers or installed_producers()
+    if not producers:
+        raise ConfigError(
+            "cameras: harvesters: no GenTL producer is installed (GENICAM_GENTL64_PATH names "
+            "none): install the vendor's driver, or name its .cti file under producers"
+        )
     return HarvestersLibrary(clock or WALL, producers=producers)
 
 
-_BACKENDS = ("simulated", "aravis", "opencv", "dc1394", "harvesters")
-
-
 def _simulated(scene: "Scene | None", clock: Clock, seed: int) -> CameraLibrary:
-    from cosmic.vico.hw.sim_camera_library import SimulatedCameraLibrary
+    from cosmic.vico.hw.sim_camera import SimulatedCameraLibrary
 
     if scene is None or scene.optics is None:
         raise ConfigError("cameras: simulated: a scene is needed, for there is nothing to see")
     return SimulatedCameraLibrary(scene, clock, seed)
+
+
+def make_lens(
+    backend: LensBackend,
+    *,
+    port: str = "",
+    homed: bool = False,
+    limits_counts: Mapping[LensAxis, int] | None = None,
+    simulation: "SimPeripherals | None" = None,
+) -> Lens | None:
+    """Open the lens of `backend`; nothing moves. None for "none".
+
+    Parameters
+    ----------
+    backend : str
+        "simulated", or "navitar" for a controller of either generation. Neither stands in for
+        the other.
+    port : str
+        For "navitar": the serial port, such as "/dev/ttyUSB0" or "COM3".
+    homed : bool
+        It has been homed and kept under power since; not believed when both motors count 0. A
+        simulated lens that was found warm has.
+    simulation : SimPeripherals or None
+        For "simulated": the platform's.
+
+    Raises
+    ------
+    NotConnectedError
+        The port is not there, or something else answers on it.
+    DeviceError, ProtocolError
+        The line failed right after it was opened.
+    ConfigError
+        No port, or no simulation, is given.
+    """
+    if backend == "none":
+        return None
+    if backend == "simulated":
+        line = _given(simulation).lens_line
+        # The simulated controller remembers nothing either; the morning after does.
+        homed = homed or not _given(simulation).lens.cold
+        found = probe(_line_to(line, "simulated lens"))
+    else:
+        found = probe(open_serial_port(_named(port, backend)))
+    _expect(found, "a lens controller", Product.MOTORS, Product.MOTORS_2)
+    kind = "simulated lens" if backend == "simulated" else "Navitar"
+    name = f"{kind}, generation {found.generation}"
+    homed = homed and _believable(found)
+    return NavitarLens(found.registers, name=name, homed=homed, limits_counts=limits_counts)
+
+
+def make_light(
+    backend: LightBackend, *, port: str = "", simulation: "SimPeripherals | None" = None
+) -> Light | None:
+    """Open the lamp of `backend`; it goes on shining as it does. None for "none".
+
+    Raises
+    ------
+    NotConnectedError
+        The port is not there, or something else answers on it.
+    ConfigError
+        No port, or no simulation, is given.
+    """
+    if backend == "none":
+        return None
+    if backend == "simulated":
+        found = probe(_line_to(_given(simulation).light_line, "simulated light"))
+    else:
+        found = probe(open_serial_port(_named(port, backend)))
+    _expect(found, "a BrightLight", Product.BRIGHTLIGHT)
+    name = "simulated BrightLight" if backend == "simulated" else "BrightLight"
+    return BrightLight(found.registers, name=name)
+
+
+def _line_to(line: "SimLine", name: str) -> SerialPort:
+    # Imported here, so that a real rig does not load the simulation.
+    from cosmic.vico.hw.sim_line import SimSerial
+
+    return SerialPort(SimSerial(line), name)
+
+
+def _given(simulation: "SimPeripherals | None") -> "SimPeripherals":
+    if simulation is None:
+        raise ConfigError("a simulated lens or light needs the twin of the platform")
+    return simulation
+
+
+def _named(port: str, backend: str) -> str:
+    if not port:
+        raise ConfigError(f"backend {backend!r} needs a port, such as /dev/ttyUSB0 or COM3")
+    return port
+
+
+def _believable(found: Found) -> bool:
+    """Whether the counters can be those of a lens that was homed."""
+    try:
+        anew = counts_anew(found.registers)
+    except CosmicError:
+        found.registers.close()
+        raise
+    if anew:
+        logger.warning(
+            "%s: both motors count 0, as after switching on; home the lens", found.registers.name
+        )
+    return not anew
+
+
+def _expect(found: Found, what: str, *products: Product) -> None:
+    if found.product not in products:
+        found.registers.close()
+        raise NotConnectedError(
+            f"{found.registers.name}: {what} was expected, a {found.product.name} answers "
+            f"({found.product:#x}); are the ports of lens and light exchanged?",
+            fault=DeviceFault.COMMUNICATION,
+        )

@@ -153,6 +153,14 @@ class Frame:
     status: FrameStatus = FrameStatus.COMPLETE
     pixel_format: PixelFormat = PixelFormat.MONO8
 
+    @property
+    def ready(self) -> bool:
+        """True when `data` need not wait; only a simulated camera's frame may not be."""
+        return True
+
+    def prepare(self) -> None:
+        """Have `data` made ready, without waiting for it."""
+
 
 class Camera(Protocol):
     """One open camera.
@@ -205,7 +213,8 @@ class Camera(Protocol):
         Raises
         ------
         DeviceError
-            The camera is gone or taken by another program.
+            The camera is gone or taken by another program, or `DeviceFault.STATE`: it takes
+            pictures already.
         """
 
     @abstractmethod

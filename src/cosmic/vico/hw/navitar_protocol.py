@@ -1,20 +1,43 @@
-"""Frames of seven bytes that Navitar's first generation and BrightLight speak; pure functions.
+"""How Navitar's controllers and BrightLight speak: numbered registers behind a serial line.
 
-``FF, register (+ 80h to write), value as int32 little-endian, checksum``: all seven bytes add up
-to a multiple of 256. The answer has the same form with bit 7 of the register clear, after a
-write as well.
+The first generation, and BrightLight, speak in frames of seven bytes: ``FF, register (+ 80h to
+write), value as int32 little-endian, checksum``; all seven add up to a multiple of 256. The answer
+has the same form with bit 7 of the register clear, after a write as well. The second generation
+has the same registers and speaks in lines of text: ``read 16``, ``write 16 1000``, an echo, the
+value, a prompt.
 """
 
+import logging
+import re
 import struct
+from abc import abstractmethod
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final
+from typing import Final, Protocol
 
-from cosmic.frame.errors import ProtocolError
+from typing_extensions import override
+
+from cosmic.frame.errors import (
+    DeviceFault,
+    DeviceTimeout,
+    NotConnectedError,
+    ProtocolError,
+)
+from cosmic.vico.hw.serial_port import MOST_BYTES, Deadline, SerialPort
+
+logger = logging.getLogger(__name__)
 
 START: Final = 0xFF
 WRITE: Final = 0x80
 FRAME_BYTES: Final = 7
+TRIES: Final = 3
+"""So often is a question asked before the line is given up."""
+
+INTERRUPT: Final = b"\x03"
+"""Ctrl-C: ends whatever was begun, and brings the prompt."""
+
+PROMPT: Final = b"$ "
+_VALUE: Final = re.compile(r"[-+]?(0[xX][0-9a-fA-F]{1,8}|\d{1,10})")
 
 
 class Register(IntEnum):
@@ -102,3 +125,252 @@ def motor_status(value: int) -> MotorStatus:
 def _frame(head: int, value: int) -> bytes:
     body = struct.pack("<BBi", START, head, value)
     return body + bytes([-sum(body) % 256])
+
+
+class Registers(Protocol):
+    """A controller as numbered registers, whatever its bytes; one thread at a time.
+
+    Every call is one exchange, repeated at most `TRIES` times. All raise `ProtocolError` for
+    answers that make no sense, `DeviceTimeout` for none, and `DeviceError` when the port is gone.
+    """
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """The line, for texts."""
+
+    @abstractmethod
+    def read(self, register: int) -> int:
+        """Return the value of a register, signed."""
+
+    @abstractmethod
+    def write(self, register: int, value: int) -> None:
+        """Write a register."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Give the line back; harmless the second time."""
+
+
+class FrameRegisters(Registers):
+    """Asks in frames, and finds the answer among noise.
+
+    Parameters
+    ----------
+    port : SerialPort
+        Closed with this object.
+    tries : int
+        How often a question is asked before it fails.
+    """
+
+    def __init__(self, port: SerialPort, *, tries: int = TRIES) -> None:
+        self._port = port
+        self._tries = tries
+
+    @property
+    @override
+    def name(self) -> str:
+        return self._port.name
+
+    @override
+    def read(self, register: int) -> int:
+        return self._ask(read_frame(register), register)
+
+    @override
+    def write(self, register: int, value: int) -> None:
+        self._ask(write_frame(register, value), register)
+
+    @override
+    def close(self) -> None:
+        self._port.close()
+
+    def _ask(self, question: bytes, register: int) -> int:
+        received = b""
+        for _ in range(self._tries):
+            self._port.send(question)
+            heard, value = self._listen(register)
+            if value is not None:
+                return value
+            received += heard
+        asked = f"{self.name}: asked {question.hex(' ')} {self._tries} times"
+        if not received:
+            raise DeviceTimeout(
+                f"{asked}, no answer came; is the controller switched on, and is it this port?",
+                fault=DeviceFault.TIMEOUT,
+            )
+        raise ProtocolError(f"{asked}, received {received[-32:].hex(' ')}, which is no answer")
+
+    def _listen(self, register: int) -> tuple[bytes, int | None]:
+        """Return what was received, and the answer in it."""
+        received = self._port.read(FRAME_BYTES)
+        value = find_answer(received, register)
+        if value is not None or len(received) < FRAME_BYTES:
+            return received, value  # fewer: the time-out is over
+        # Noise came in front: the rest of the answer is still under way.
+        deadline = Deadline()
+        while value is None and len(received) < MOST_BYTES and not deadline.passed:
+            more = self._port.read(1)
+            if not more:
+                break
+            received += more
+            value = find_answer(received, register)
+        return received, value
+
+
+class AsciiRegisters(Registers):
+    """Asks in text; an answer counts only when the echo shows that the question came over whole.
+
+    A value is asked for twice, and a third time when the two differ.
+
+    Parameters
+    ----------
+    port : SerialPort
+        Closed with this object.
+    tries : int
+        How often a question is asked before it fails.
+    """
+
+    def __init__(self, port: SerialPort, *, tries: int = TRIES) -> None:
+        self._port = port
+        self._tries = tries
+        self._in_step = False
+
+    @property
+    @override
+    def name(self) -> str:
+        return self._port.name
+
+    @override
+    def read(self, register: int) -> int:
+        # Answers carry no checksum: a number that lost a digit is a number still. Of two that
+        # agree, or of three the middle one, at least one is right even while a motor moves.
+        first, second = self._value(register), self._value(register)
+        if first == second:
+            return first
+        return sorted((first, second, self._value(register)))[1]
+
+    @override
+    def write(self, register: int, value: int) -> None:
+        self._ask(f"write {register} {value}", wants_value=False)
+
+    @override
+    def close(self) -> None:
+        self._port.close()
+
+    def _value(self, register: int) -> int:
+        return self._ask(f"read {register}", wants_value=True)
+
+    def _ask(self, command: str, *, wants_value: bool) -> int:
+        received = b""
+        for _ in range(self._tries):
+            if not self._in_step and not self._interrupt():
+                continue
+            self._port.send(f"{command}\r".encode("ascii"))
+            heard = self._listen()
+            value = _answer(heard, command, wants_value=wants_value)
+            self._in_step = value is not None
+            if value is not None:
+                return value
+            received += heard
+        asked = f"{self.name}: asked {command!r} {self._tries} times"
+        if not received:
+            raise DeviceTimeout(
+                f"{asked}, no answer came; is the controller switched on, and is it this port?",
+                fault=DeviceFault.TIMEOUT,
+            )
+        raise ProtocolError(f"{asked}, received {received[-64:].hex(' ')}, which is no answer")
+
+    def _interrupt(self) -> bool:
+        """Bring the prompt; False when nobody is there."""
+        self._port.send(INTERRUPT)
+        return bool(self._listen())
+
+    def _listen(self) -> bytes:
+        """Return what is received up to the prompt."""
+        received = b""
+        deadline = Deadline()
+        while not received.endswith(PROMPT) and len(received) < MOST_BYTES and not deadline.passed:
+            byte = self._port.read(1)
+            if not byte:
+                break
+            received += byte
+        return received
+
+
+def _answer(received: bytes, command: str, *, wants_value: bool) -> int | None:
+    """Return the value that answers `command` (0 where none is wanted), or None."""
+    if not received.endswith(PROMPT):
+        return None
+    text = received[: -len(PROMPT)].decode("ascii", "replace")
+    lines = [line.strip() for line in re.split(r"[\r\n]+", text) if line.strip()]
+    # Noise may stand in front of the echo; had the controller heard it, it would complain.
+    echoes = [number for number, line in enumerate(lines) if line.endswith(command)]
+    if not echoes:
+        return None
+    said = lines[echoes[-1] + 1 :]
+    if not said:
+        return None if wants_value else 0
+    # After a write some firmware says the value again; anything but a number is a complaint.
+    if len(said) != 1 or not _VALUE.fullmatch(said[0]):
+        return None
+    value = int(said[0], 0)
+    return value - 2**32 if value >= 2**31 else value
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What answered.
+
+    Attributes
+    ----------
+    product : Product
+        What it is.
+    generation : int
+        1 when it speaks in frames, 2 in text.
+    """
+
+    registers: Registers
+    product: Product
+    generation: int
+
+
+def probe(port: SerialPort) -> Found:
+    """Ask a line who is there, in frames, in text, and in frames again; nothing moves.
+
+    Raises
+    ------
+    NotConnectedError
+        Nobody answers, or something that is not known; the port is closed then.
+    DeviceError
+        The port is gone; it is closed then.
+    """
+    answers: list[str] = []
+    ways: tuple[tuple[int, Registers], ...] = (
+        (1, FrameRegisters(port, tries=1)),
+        (2, AsciiRegisters(port, tries=2)),
+        (1, FrameRegisters(port, tries=2)),
+    )
+    try:
+        for generation, registers in ways:
+            try:
+                product = registers.read(Register.PRODUCT)
+            except (DeviceTimeout, ProtocolError) as exc:
+                answers.append(str(exc))
+                continue
+            if product in set(Product):
+                logger.info("%s: product %#x, generation %d", port.name, product, generation)
+                return _found(port, Product(product), generation)
+            answers.append(f"product {product:#x}, which is not known")
+        raise NotConnectedError(
+            f"{port.name}: neither a Navitar controller nor a BrightLight answers: "
+            f"{'; '.join(answers)}",
+            fault=DeviceFault.COMMUNICATION,
+        )
+    except BaseException:
+        port.close()
+        raise
+
+
+def _found(port: SerialPort, product: Product, generation: int) -> Found:
+    registers = FrameRegisters(port) if generation == 1 else AsciiRegisters(port)
+    return Found(registers, product, generation)

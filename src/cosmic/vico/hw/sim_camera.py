@@ -1,19 +1,23 @@
-"""A simulated camera: a view of the twin, paced by the platform's clock, drawn when received."""
+"""Simulated cameras: views of the twin, paced by the platform's clock, drawn when looked at."""
 
-import logging
+import math
+from collections import deque
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from threading import Lock
 from typing import Final
 
+import numpy as np
 from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errors import DeviceError, DeviceFault, NotAvailable, NotConnectedError
+from cosmic.frame.errors import DeviceFault, NotConnectedError
+from cosmic.twin.optics.drawing import Drawing
 from cosmic.twin.optics.optics import Optics
-from cosmic.vico.hw.camera_checks import check_settings
-from cosmic.vico.hw.drawn_frame import DrawnFrame
+from cosmic.twin.optics.settings import SensorSettings
+from cosmic.twin.scene import Scene
+from cosmic.vico.hw.base_camera import BaseCamera, BaseCameraLibrary, Sensor, check_values
 from cosmic.vico.hw.interface import (
-    Camera,
     CameraCounters,
     CameraInfo,
     CameraRanges,
@@ -22,14 +26,17 @@ from cosmic.vico.hw.interface import (
     FrameStatus,
     PixelFormat,
     Pixels,
+    Range,
     Roi,
     Trigger,
 )
 from cosmic.vico.hw.sim_camera_faults import CameraFaults
-from cosmic.vico.hw.sim_camera_features import ranges_of, sensor_of, slowed
-from cosmic.vico.hw.sim_camera_run import BUFFERS, CameraRun, Exposure
 
-logger = logging.getLogger(__name__)
+XCD_U100: Final = CameraInfo(
+    key="Sim", vendor="Sony", model="XCD-U100", serial="1806000", simulated=True
+)
+BUFFERS: Final = 16
+"""So many frames wait for a receiver that is late."""
 
 SLOW_S: Final = 0.5
 """How late frames come with the fault `slow`."""
@@ -37,16 +44,165 @@ SLOW_S: Final = 0.5
 MISSING_FROM: Final = 0.6
 """Part of the rows after which an incomplete frame is empty."""
 
+# Guesses after the data sheet of the XCD-U100.
+_HIGHEST_RATE_HZ: Final = 120.0
+_BINNINGS: Final = (1, 2)
+_X_STEP_PX: Final = 8
+_Y_STEP_PX: Final = 2
+_SMALLEST_PX: Final = 16
 
-class SimulatedCamera(Camera):
+
+@dataclass(frozen=True, slots=True)
+class Exposure:
+    """One frame on its way: with the settings that were in force when its exposure began."""
+
+    frame_id: int
+    exposed_s: float
+    settings: CameraSettings
+
+
+class CameraRun:
+    """The frames from `start` to `stop`; its owner holds a lock.
+
+    Parameters
+    ----------
+    buffers : int
+        How many frames may wait or be under way.
+
+    Attributes
+    ----------
+    underrun : int
+        Frames that found no buffer free when their exposure began.
+    """
+
+    def __init__(self, settings: CameraSettings, now_s: float, buffers: int) -> None:
+        self.settings = settings
+        self.underrun = 0
+        self._buffers = buffers
+        self._waiting: deque[Exposure] = deque()
+        self._next_id = 0
+        self._next_s = now_s if settings.trigger is Trigger.FREE_RUN else math.inf
+
+    def first(self, now_s: float) -> Exposure | None:
+        """Return the frame that is next to be received, or None before its exposure began."""
+        self._advance(now_s)
+        return self._waiting[0] if self._waiting else None
+
+    @property
+    def next_exposed_s(self) -> float:
+        """When the next exposure begins that is not under way."""
+        return self._next_s
+
+    def take(self) -> None:
+        """Give the buffer of the first frame free."""
+        self._waiting.popleft()
+
+    def change(self, settings: CameraSettings, now_s: float) -> None:
+        """Go on with other settings from the next exposure on."""
+        self._advance(now_s)
+        before = self._next_s - 1.0 / self.settings.rate_hz
+        if math.isfinite(self._next_s):
+            self._next_s = max(before + 1.0 / settings.rate_hz, now_s)
+        self.settings = settings
+
+    def expose(self, now_s: float, busy_s: float) -> None:
+        """Take one picture, when the one before is out of the way.
+
+        Parameters
+        ----------
+        busy_s : float
+            From one exposure's begin to the earliest begin of the next.
+        """
+        last_s = self._waiting[-1].exposed_s if self._waiting else -math.inf
+        self._begin(max(now_s, last_s + busy_s))
+
+    def _advance(self, now_s: float) -> None:
+        while self._next_s <= now_s:
+            if len(self._waiting) >= self._buffers:
+                # Nobody receives: nothing but the count changes.
+                missed = int((now_s - self._next_s) * self.settings.rate_hz) + 1
+                self.underrun += missed
+                self._next_id += missed
+                self._next_s += missed / self.settings.rate_hz
+            else:
+                self._begin(self._next_s)
+                self._next_s += 1.0 / self.settings.rate_hz
+
+    def _begin(self, exposed_s: float) -> None:
+        if len(self._waiting) < self._buffers:
+            self._waiting.append(Exposure(self._next_id, exposed_s, self.settings))
+        else:
+            self.underrun += 1
+        self._next_id += 1
+
+
+class DrawnFrame(Frame):
+    """A frame whose pixels are drawn when they are first wanted; any thread.
+
+    Parameters
+    ----------
+    data : callable
+        Draws the pixels, read-only, or begins to; is called once.
+    """
+
+    def __init__(
+        self,
+        data: Callable[[], Drawing | Pixels],
+        frame_id: int,
+        time_s: float,
+        exposed_s: float,
+        device_ns: int | None = None,
+        status: FrameStatus = FrameStatus.COMPLETE,
+        pixel_format: PixelFormat = PixelFormat.MONO8,
+    ) -> None:
+        values = (frame_id, time_s, exposed_s, device_ns, status, pixel_format)
+        names = ("frame_id", "time_s", "exposed_s", "device_ns", "status", "pixel_format")
+        for name, value in zip(names, values, strict=True):
+            object.__setattr__(self, name, value)  # the base is frozen
+        object.__setattr__(self, "_source", data)
+        object.__setattr__(self, "_drawing", Lock())
+
+    _source: Callable[[], Drawing | Pixels] | Drawing | Pixels
+    _drawing: Lock
+
+    @property
+    @override
+    def ready(self) -> bool:
+        source = self._source
+        return isinstance(source, np.ndarray) or (not callable(source) and source.ready)
+
+    @override
+    def prepare(self) -> None:
+        if callable(self._source):
+            with self._drawing:
+                self._begin()
+
+    @property
+    @override
+    def data(self) -> Pixels:
+        """The pixels; see `Frame.data`."""
+        with self._drawing:
+            source = self._begin()
+            if not isinstance(source, np.ndarray):
+                source = source.pixels()
+                object.__setattr__(self, "_source", source)
+            return source
+
+    def _begin(self) -> Drawing | Pixels:
+        source = self._source
+        if callable(source):
+            source = source()
+            object.__setattr__(self, "_source", source)
+        return source
+
+
+class SimulatedCamera(BaseCamera):
     """One simulated camera; made by its library.
 
     Parameters
     ----------
     view : str
         What it sees, by the name that `Optics` has for it.
-    released : callable
-        Called once at `close`.
 
     Notes
     -----
@@ -62,43 +218,24 @@ class SimulatedCamera(Camera):
         clock: Clock,
         faults: CameraFaults,
         *,
-        released: Callable[[], None],
+        closed: Callable[[BaseCamera], None],
     ) -> None:
-        self._info = info
+        super().__init__(info, clock, closed=closed)
         self._optics = optics
         self._view = view
-        self._clock = clock
         self._faults = faults
-        self._released = released
         self._pulled = faults.times_pulled(info.key)
-        self._closed = False
         self._run: CameraRun | None = None
-        self._underrun = 0
-        self._counters = CameraCounters()
         self._last: Frame | None = None
         self._receiver = clock.worker()
         width, height = info.sensor_px
-        self._settings = CameraSettings(
+        self._in_force = CameraSettings(
             exposure_s=optics.settings.picture.full_exposure_s,
             gain_db=0.0,
             rate_hz=optics.settings.camera.rate_hz,
             roi=Roi(0, 0, width, height),
         )
-
-    @property
-    @override
-    def info(self) -> CameraInfo:
-        return self._info
-
-    @property
-    @override
-    def ranges(self) -> CameraRanges:
-        return ranges_of(self._optics.settings.camera, self._settings)
-
-    @property
-    @override
-    def settings(self) -> CameraSettings:
-        return self._settings
+        self._opened(info.sensor_px)
 
     @property
     @override
@@ -110,105 +247,113 @@ class SimulatedCamera(Camera):
             return replace(self._counters, underrun=self._underrun)
 
     @override
-    def configure(self, settings: CameraSettings) -> CameraSettings:
-        with self._faults.changed:
-            self._check_there("configure")
-            camera = self._optics.settings.camera
-            settings = slowed(camera, settings, self._settings)
-            check_settings(
-                self._info.key,
-                settings,
-                self._settings,
-                ranges_of(camera, settings),
-                sensor_of(camera, settings.binning),
-                running=self._run is not None,
-            )
-            if self._run is not None:
-                self._run.change(settings, self._clock.now_s())
-                self._faults.changed.notify_all()
-            self._settings = settings
-        logger.debug("%s: %s", self._info.key, settings)
-        return settings
+    def _read(self) -> CameraSettings:
+        return self._in_force
 
     @override
-    def start(self) -> None:
+    def _read_ranges(self) -> CameraRanges:
+        return ranges_of(self._optics.settings.camera, self._settings)
+
+    @override
+    def _sensor(self, binning: int) -> Sensor:
+        return sensor_of(self._optics.settings.camera, binning)
+
+    @override
+    def _fitted(self, asked: CameraSettings) -> CameraSettings:
+        return slowed(self._optics.settings.camera, asked, self._settings)
+
+    @override
+    def _check_values(self, asked: CameraSettings) -> None:
+        ranges = ranges_of(self._optics.settings.camera, asked)
+        check_values(self._whom, asked, self._settings, ranges)
+
+    @override
+    def _write(self, asked: CameraSettings, present: CameraSettings | None) -> None:
         with self._faults.changed:
-            self._check_there("start")
             if self._run is not None:
-                raise self._error("start: it takes pictures already", DeviceFault.STATE)
-            self._counters = CameraCounters()
-            self._underrun, self._last = 0, None
+                self._run.change(asked, self._clock.now_s())
+            self._in_force = asked
+            self._faults.changed.notify_all()
+
+    @override
+    def _begin(self) -> None:
+        with self._faults.changed:
+            self._last = None
             # The receiver is late by the wall: on a fast clock more frames come meanwhile.
             buffers = round(BUFFERS * max(1.0, self._clock.rate))
             self._run = CameraRun(self._settings, self._clock.now_s(), buffers)
 
     @override
-    def receive(self, timeout_s: float) -> Frame | None:
-        end_s = WALL.now_s() + timeout_s
+    def _fetch(self, wait_s: float) -> Frame | None:
+        end_s = WALL.now_s() + wait_s
         while True:
-            run, exposure = self._wait(end_s)
-            if run is None or exposure is None:
+            exposure = self._wait(end_s)
+            if exposure is None:
                 return None
-            if self._faults.strikes("lost", self._info.key, exposure.frame_id):
-                continue
-            return self._counted(run, self._frame(exposure))
+            if not self._faults.strikes("lost", self._info.key, exposure.frame_id):
+                return self._frame(exposure)
 
     @override
-    def trigger(self) -> None:
+    def _fire(self) -> None:
         with self._faults.changed:
-            self._check_there("trigger")
-            if self._settings.trigger is not Trigger.SOFTWARE:
-                raise NotAvailable(
-                    f"{self._info.key}: trigger: {self._settings.trigger} is in force; "
-                    f"configure the camera for the software trigger first"
-                )
             if self._run is None:
-                raise self._error("trigger: it takes no pictures; start it", DeviceFault.STATE)
+                raise self._error("trigger: it takes no images; start it", DeviceFault.STATE)
             settings = self._settings
             busy_s = max(settings.exposure_s, self._readout_s(settings.roi))
             self._run.expose(self._clock.now_s(), busy_s)
             self._faults.changed.notify_all()
 
     @override
-    def stop(self) -> None:
+    def _wake(self) -> None:
         with self._faults.changed:
-            self._run = None
-            self._receiver.idle()
             self._faults.changed.notify_all()
 
     @override
-    def close(self) -> None:
-        self.stop()
+    def _end(self) -> None:
         with self._faults.changed:
-            closed, self._closed = self._closed, True
-        if not closed:
-            self._released()
+            self._run = None
+            self._receiver.idle()
 
-    # ------------------------------------------------------------------ frames
+    @override
+    def _release(self) -> None:
+        """Nothing is held."""
 
-    def _wait(self, end_s: float) -> tuple[CameraRun | None, Exposure | None]:
+    @override
+    def _silence(self) -> str:
+        key = self._info.key
+        pulled = self._faults.hit("unplugged", key) or self._faults.times_pulled(key) > self._pulled
+        return "it was unplugged" if pulled else ""
+
+    def _wait(self, end_s: float) -> Exposure | None:
         """Return the next frame once it has arrived, its buffer given free; None after `end_s`."""
         changed = self._faults.changed
         with changed:
-            run = self._run
-            while run is not None and self._run is run:
+            while self._run is not None and not self._stopping.is_set():
                 self._check_going()
-                now_s = self._clock.now_s()
+                run, now_s = self._run, self._clock.now_s()
                 exposure = run.first(now_s)
                 due_s = run.next_exposed_s if exposure is None else self._arrives_s(exposure)
                 if exposure is not None and due_s <= now_s:
                     run.take()
                     self._underrun = run.underrun
                     self._receiver.busy()  # until it has handed the frame on, and comes again
-                    return run, exposure
+                    return exposure
                 self._receiver.idle()
                 left_s = end_s - WALL.now_s()
                 if left_s <= 0.0:
-                    return None, None
+                    return None
                 # A clock that a test moves has no rate: it looks up every now and then.
                 rate = self._clock.rate
                 self._clock.wait(changed, min(due_s, now_s + left_s * rate) if rate else due_s)
-        return None, None
+        return None
+
+    def _check_going(self) -> None:
+        """Raise when the camera is gone; the lock of the faults is held."""
+        gone = self._silence()
+        if gone:
+            self._run = None
+            self._receiver.idle()
+            self._fail(gone)
 
     def _arrives_s(self, exposure: Exposure) -> float:
         late_s = SLOW_S if self._faults.hit("slow", self._info.key) else 0.0
@@ -238,58 +383,157 @@ class SimulatedCamera(Camera):
         self._last = before or frame
         return frame
 
-    def _draw(self, exposure: Exposure, before: Frame | None, *, whole: bool) -> Pixels:
+    def _draw(self, exposure: Exposure, before: Frame | None, *, whole: bool) -> Drawing | Pixels:
         settings = exposure.settings
         if before is not None:
-            data = before.data
-        else:
-            with self._clock.at_work():
-                data = self._optics.render(
-                    exposure.exposed_s + 0.5 * settings.exposure_s,
-                    exposure_s=settings.exposure_s,
-                    gain_db=settings.gain_db,
-                    roi=settings.roi,
-                    binning=settings.binning,
-                    bits=8 if settings.pixel_format is PixelFormat.MONO8 else 16,
-                    view=self._view,
-                )
-        if not whole:
+            return before.data
+        with self._clock.at_work():
+            drawing = self._optics.expose(
+                exposure.exposed_s + 0.5 * settings.exposure_s,
+                exposure_s=settings.exposure_s,
+                gain_db=settings.gain_db,
+                roi=settings.roi,
+                binning=settings.binning,
+                bits=8 if settings.pixel_format is PixelFormat.MONO8 else 16,
+                view=self._view,
+            )
+        missing_from = None if whole else round(MISSING_FROM * settings.roi.height_px)
+        return _Arrived(drawing, self._clock, missing_from)
+
+
+class SimulatedCameraLibrary(BaseCameraLibrary[SimulatedCamera]):
+    """Simulated cameras `Sim1` (the microscope), `Sim2` (the overview), ...; any thread.
+
+    Parameters
+    ----------
+    scene : Scene or Optics
+        What they see.
+    clock : Clock
+        Paces the frames: the platform's.
+    seed : int
+        Of the faults.
+
+    Attributes
+    ----------
+    faults : CameraFaults
+        Trouble to inject by name.
+
+    Raises
+    ------
+    ValueError
+        The scene is one of bare stages, without optics.
+    """
+
+    def __init__(self, scene: Scene | Optics, clock: Clock, seed: int = 0) -> None:
+        optics = scene.optics if isinstance(scene, Scene) else scene
+        if optics is None:
+            raise ValueError("a scene of bare stages has nothing for cameras to see")
+        self._optics = optics
+        super().__init__(clock)
+        self.faults = CameraFaults(seed)
+        self._views = {f"Sim{number}": view for number, view in enumerate(optics.views, start=1)}
+
+    @property
+    @override
+    def name(self) -> str:
+        return "Simulated cameras"
+
+    @override
+    def cameras(self) -> tuple[CameraInfo, ...]:
+        self._require_open("list the cameras")
+        return tuple(
+            self._info(key) for key in self._views if not self.faults.hit("unplugged", key)
+        )
+
+    @override
+    def _open(self, key: str) -> SimulatedCamera:
+        there = [info.key for info in self.cameras()]
+        if key not in there:
+            raise self._not_there(key, there, "Plug it in")
+        if self.faults.hit("taken", key) or any(key == each.info.key for each in self._cameras):
+            raise NotConnectedError(
+                f"{key}: another program has the camera; close it there, then try again "
+                f"(there are: {', '.join(there)})",
+                fault=DeviceFault.BUSY,
+            )
+        return SimulatedCamera(
+            self._info(key),
+            self._optics,
+            self._views[key],
+            self._clock,
+            self.faults,
+            closed=self._forget,
+        )
+
+    @override
+    def _shut(self) -> None:
+        """Nothing is held."""
+
+    def _info(self, key: str) -> CameraInfo:
+        return replace(
+            XCD_U100,
+            key=key,
+            serial=f"{XCD_U100.serial}{key.removeprefix('Sim')}",
+            sensor_px=self._optics.sensor_px,
+        )
+
+
+def sensor_of(camera: SensorSettings, binning: int) -> Sensor:
+    """Return where a ROI may lie."""
+    known = binning if binning in _BINNINGS else 1
+    return Sensor(camera.width_px // known, camera.height_px // known, _X_STEP_PX, _Y_STEP_PX)
+
+
+def slowed(
+    camera: SensorSettings, asked: CameraSettings, in_force: CameraSettings
+) -> CameraSettings:
+    """Return settings at a rate that a larger ROI allows, unless another rate was asked for."""
+    if asked.rate_hz != in_force.rate_hz or asked.roi == in_force.roi:
+        return asked
+    if not _SMALLEST_PX <= asked.roi.height_px <= camera.height_px:
+        return asked
+    return replace(asked, rate_hz=min(asked.rate_hz, _highest_hz(camera, asked)))
+
+
+def _highest_hz(camera: SensorSettings, settings: CameraSettings) -> float:
+    rows = max(settings.roi.height_px, _SMALLEST_PX)
+    return min(camera.rate_hz * camera.height_px / rows, _HIGHEST_RATE_HZ)
+
+
+def ranges_of(camera: SensorSettings, settings: CameraSettings) -> CameraRanges:
+    """Return what it accepts with the ROI and binning of `settings`: fewer rows are read faster."""
+    sensor = sensor_of(camera, settings.binning)
+    return CameraRanges(
+        exposure_s=Range(20e-6, 10.0),
+        gain_db=Range(0.0, 18.0),
+        rate_hz=Range(0.1, _highest_hz(camera, settings)),
+        width_px=Range(_SMALLEST_PX, sensor.width_px, _X_STEP_PX),
+        height_px=Range(_SMALLEST_PX, sensor.height_px, _Y_STEP_PX),
+        binnings=_BINNINGS,
+        pixel_formats=(PixelFormat.MONO8, PixelFormat.MONO16),
+        triggers=(Trigger.FREE_RUN, Trigger.SOFTWARE),
+    )
+
+
+class _Arrived(Drawing):
+    """An image as it arrives in the computer, perhaps with its last rows missing."""
+
+    def __init__(self, drawing: Drawing, clock: Clock, missing_from: int | None) -> None:
+        self._drawing = drawing
+        self._clock = clock
+        self._missing_from = missing_from
+
+    @property
+    @override
+    def ready(self) -> bool:
+        return self._drawing.ready
+
+    @override
+    def pixels(self) -> Pixels:
+        with self._clock.at_work():
+            data = self._drawing.pixels()
+        if self._missing_from is not None:
             data = data.copy()
-            data[round(MISSING_FROM * settings.roi.height_px) :] = 0
+            data[self._missing_from :] = 0
         data.flags.writeable = False
         return data
-
-    def _counted(self, run: CameraRun, frame: Frame) -> Frame | None:
-        with self._faults.changed:
-            if self._run is not run:
-                return None
-            good = frame.status is FrameStatus.COMPLETE
-            completed = self._counters.completed + good
-            failed = self._counters.failed + (not good)
-            lost = frame.frame_id + 1 - completed - failed
-            self._counters = CameraCounters(completed, failed, lost)
-        return frame
-
-    # ------------------------------------------------------------------ troubles
-
-    def _check_going(self) -> None:
-        try:
-            self._check_there("receive")
-        except DeviceError:
-            self._run = None
-            self._receiver.idle()
-            raise
-
-    def _check_there(self, call: str) -> None:
-        """Raise unless the camera is there; the lock is held."""
-        key = self._info.key
-        if self._closed:
-            raise self._error(f"{call}: it was closed; open it again", DeviceFault.STATE)
-        if self._faults.hit("unplugged", key) or self._faults.times_pulled(key) > self._pulled:
-            raise NotConnectedError(
-                f"{key}: {call}: the camera is gone; check its cable and power, then open it again",
-                fault=DeviceFault.COMMUNICATION,
-            )
-
-    def _error(self, text: str, fault: DeviceFault) -> DeviceError:
-        return DeviceError(f"{self._info.key}: {text}", fault=fault)

@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 
-from cosmic.autonomy.calibrating.book import CalibrationEntry
 from cosmic.autonomy.calibrating.drift import DRIFT, CheckDrift, follow
+from cosmic.autonomy.calibrating.registry import CalibrationEntry
 from cosmic.autonomy.calibrations import Calibrations
-from cosmic.autonomy.handling.in_hand import Calibration, Measured
+from cosmic.autonomy.handling.context import Calibration, Measured
 from cosmic.autonomy.handling.plate import PlateFrame
 from cosmic.autonomy.handling.prepare import HELD, PLATE, PROBE
 from cosmic.autonomy.handling.settings import HandlingSettings
@@ -28,18 +28,19 @@ class Work:
         self.calibration = Calibration(frame=PlateFrame((10.0, -5.0)))
         self.calibration.probe_off_um = self.calibration.seen_off_um = 1.0, 2.0
         self.gripper: Any = type("Tool", (), {"name": "left"})
+        self.shared = self
         self.finished: list[object] = []
         self.vision = self
         self.first_camera = "top"
         self.places = PlatformPlaces.__new__(PlatformPlaces)
         self.places.calibrations = Calibrations(["top"], ["left"], None)
         self.places.calibrations.add_plane("top", "left", plane(0.0, 12.0))
-        book = self.calibration.book
+        registry = self.calibration.registry
         for name in (PLATE, HELD, PROBE):
             values = {"off_x_um": 1.0, "off_y_um": 2.0} if name == PROBE else {}
-            book.put(
+            registry.put(
                 CalibrationEntry(
-                    name, "left", values, 0.1, "px", 0.5, book.now(), 0.0, book.session
+                    name, "left", values, 0.1, "px", 0.5, registry.now(), 0.0, registry.session
                 )
             )
             self.calibration.made[name] = Measured(0.0, 0.1, "px")
@@ -69,7 +70,7 @@ def test_the_probe_is_followed_from_where_a_touch_has_it() -> None:
     followed(work, (0.0, 0.0), (1.0, 4.0))
     assert work.calibration.probe_off_um == pytest.approx((1.0, 6.5))
     assert work.calibration.seen_off_um == (1.0, 4.0)
-    entry = work.calibration.book.get(PROBE, "left")
+    entry = work.calibration.registry.get(PROBE, "left")
     assert entry is not None
     assert entry.values["off_y_um"] == pytest.approx(6.5)
 
@@ -80,7 +81,7 @@ def test_what_may_be_noise_is_left_alone() -> None:
     followed(work, (0.5, 0.6), (1.7, 2.9))
     assert work.place_um() == before
     assert work.calibration.probe_off_um == (1.0, 2.0)
-    entry = work.calibration.book.get(DRIFT, "left")
+    entry = work.calibration.registry.get(DRIFT, "left")
     assert entry is not None
     assert entry.values["followed_from_um"] == 1.0
     unsure = Work()
@@ -92,7 +93,7 @@ def test_what_may_be_noise_is_left_alone() -> None:
 def test_what_moved_far_or_nowhere_is_measured_anew(probe: tuple[float, float]) -> None:
     work = followed(Work(), (0.0, 0.0), probe)
     assert work.calibration.made == {}
-    assert work.calibration.book.get(PLATE, "left") is None
+    assert work.calibration.registry.get(PLATE, "left") is None
 
 
 def test_it_is_looked_at_only_after_so_many_fibres() -> None:

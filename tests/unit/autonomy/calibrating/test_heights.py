@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from typing_extensions import override
 
-from cosmic.autonomy.calibrating.book import CalibrationBook, CalibrationStanding
 from cosmic.autonomy.calibrating.calibrated import POOR
 from cosmic.autonomy.calibrating.heights import HEIGHTS, HeightByFocus
+from cosmic.autonomy.calibrating.registry import CalibrationRegistry, CalibrationStanding
+from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.settings import HandlingSettings
-from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.frame.clock import ManualClock
 from cosmic.vico.api.lens import LensHandle
@@ -52,7 +52,7 @@ class Lens(LensHandle):
         return Moved()
 
 
-class Bench(FibreWork):
+class Bench(HandlingContext):
     """A plate with a fibre, tips that are higher than their stages say, and a lens."""
 
     def __init__(self, *, up_um: float = 0.0, probe_up_um: float = 0.0, fibre: bool = True) -> None:
@@ -124,7 +124,7 @@ def test_a_tip_that_is_not_where_the_file_has_it_is_found_in_height(up_um: float
     assert bench.up_um(GRIPPER) == pytest.approx(up_um, abs=5.0)
     assert bench.up_um(PROBE) == pytest.approx(6.0, abs=6.0)
     assert bench.lowest_um > 250.0, "it is looked at far from the plate"
-    entry = bench.calibration.book.get(HEIGHTS, "left")
+    entry = bench.calibration.registry.get(HEIGHTS, "left")
     assert entry is not None
     assert entry.values["counts_um"] == pytest.approx(1.0 / UM_COUNT, rel=0.02)
     assert 0.0 < entry.residual < 12.0
@@ -144,26 +144,26 @@ def test_on_a_bare_plate_no_height_is_found_and_none_is_put_in_force() -> None:
         carried_out(bench)
     assert e.value.cause == POOR
     assert bench.calibration.up_um == {}
-    (entry,) = bench.calibration.book.entries
-    assert bench.calibration.book.standing(entry) is CalibrationStanding.POOR
+    (entry,) = bench.calibration.registry.entries
+    assert bench.calibration.registry.standing(entry) is CalibrationStanding.POOR
 
 
 def test_one_of_an_earlier_start_is_looked_at_and_taken_where_it_holds() -> None:
     first = Bench(up_um=40.0)
     carried_out(first)
     again = Bench(up_um=41.0)
-    again.calibration.book = later(first.calibration.book)
+    again.calibration.registry = later(first.calibration.registry)
     carried_out(again)
-    assert again.up_um(GRIPPER) == first.up_um(GRIPPER), "taken from the book"
+    assert again.up_um(GRIPPER) == first.up_um(GRIPPER), "taken from the registry"
     moved = Bench(up_um=70.0)
-    moved.calibration.book = later(first.calibration.book)
+    moved.calibration.registry = later(first.calibration.registry)
     carried_out(moved)
     assert moved.up_um(GRIPPER) == pytest.approx(70.0, abs=5.0), "measured anew"
 
 
-def later(book: CalibrationBook) -> CalibrationBook:
-    """Return the same book after a restart."""
-    again = CalibrationBook()
-    for entry in book.entries:
+def later(registry: CalibrationRegistry) -> CalibrationRegistry:
+    """Return the same registry after a restart."""
+    again = CalibrationRegistry()
+    for entry in registry.entries:
         again._known[entry.key] = entry
     return again

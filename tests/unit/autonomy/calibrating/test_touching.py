@@ -12,11 +12,10 @@ from typing_extensions import override
 
 from cosmic.autonomy.calibrating.calibrated import POOR
 from cosmic.autonomy.calibrating.touching import TOUCH, TouchJaw
+from cosmic.autonomy.handling.context import HandlingContext, Measured
 from cosmic.autonomy.handling.force import ForceMean
-from cosmic.autonomy.handling.in_hand import Measured
 from cosmic.autonomy.handling.prepare import PROBE
 from cosmic.autonomy.handling.settings import HandlingSettings
-from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.frame.clock import ManualClock
 from cosmic.vico.core.tool_settings import ToolSettings
@@ -54,7 +53,7 @@ class Moved(Done):
         """Nothing went wrong."""
 
 
-class Bench(FibreWork):
+class Bench(HandlingContext):
     """Closed jaws, a probe whose tip is off, and the force of one on the other; no platform."""
 
     def __init__(self, *, off_um: float = 1.7, seen_um: float = 1.0, step_um: float = 0.08) -> None:
@@ -124,7 +123,7 @@ def test_touch_tells_where_the_probe_is_and_presses_lightly() -> None:
     assert off_x == 0.5, "it feels in one direction only"
     assert off_y == pytest.approx(bench.off_um, abs=0.1)
     assert bench.peak_un < 0.8 * 180.0
-    entry = bench.calibration.book.get(TOUCH, "left")
+    entry = bench.calibration.registry.get(TOUCH, "left")
     assert entry is not None
     assert entry.residual <= 0.1
     assert entry.values["apart_um"] == pytest.approx(0.7, abs=0.1)
@@ -144,13 +143,13 @@ def test_what_is_far_from_where_the_picture_shows_it_is_refused_with_numbers() -
     with pytest.raises(OperationFailed, match=r"disagree by 12\.\d um, at most 10 um") as failed:
         carried_out(bench)
     assert failed.value.cause == POOR
-    assert bench.calibration.book.get(TOUCH, "left") is None
+    assert bench.calibration.registry.get(TOUCH, "left") is None
     assert bench.peak_un < 0.8 * 180.0
 
 
 def test_what_is_felt_too_early_ends_it_before_any_further_step() -> None:
     bench = Bench(off_um=-19.05)
-    with pytest.raises(OperationFailed, match="felt before the jaw"):
+    with pytest.raises(OperationFailed, match="contact force before the expected jaw position"):
         carried_out(bench)
     assert bench.peak_un < 0.8 * 180.0
 

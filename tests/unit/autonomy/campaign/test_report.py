@@ -11,10 +11,10 @@ import pytest
 
 from cosmic.autonomy.campaign.records import CalibrationNote, CampaignError, Outcome
 from cosmic.autonomy.campaign.report import write_report
-from cosmic.autonomy.campaign.report_svg import Axis
 from cosmic.autonomy.campaign.report_table import COLUMNS, read_campaign, write_table
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.autonomy.campaign.svg_plot import Axis
 from unit.autonomy.campaign.sample_records import INFO, failed, good
 
 STIFFNESSES = (3e-11, 5e-11, 9e-11)
@@ -122,7 +122,7 @@ def test_a_lost_file_costs_its_fibre_the_figures_and_no_more(tmp_path: Path) -> 
         write_report(store, tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "00001.h5 cannot be read" in text
-    assert "00002-00.png is no picture any more" in text
+    assert "00002-00.png is not a readable image" in text
     assert "2: 2 good" in text
 
 

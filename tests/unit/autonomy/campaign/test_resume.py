@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosmic.autonomy.campaign.journal import FELL
-from cosmic.autonomy.campaign.keeper import skip_known
+from cosmic.autonomy.campaign.recorder import skip_known
 from cosmic.autonomy.campaign.records import Outcome, Pose
-from cosmic.autonomy.campaign.resume import Fallen, resume
+from cosmic.autonomy.campaign.resume import FELL, DroppedFibre, resume
 from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.handling.context import SharedWorkspace
 from cosmic.autonomy.handling.plate import Candidate
-from cosmic.autonomy.handling.survey import MEASURED, leave_spilled
+from cosmic.autonomy.handling.survey import MEASURED, leave_dropped
 from unit.autonomy.campaign.sample_records import INFO, failed, good
 
 LEFT_THERE = Pose(1000.0, -500.0, 20.0)
@@ -100,7 +100,7 @@ def test_a_measured_fibre_that_fell_is_known_by_its_looks(store: CampaignStore) 
     number = store.begin_fibre(LEFT_THERE, time_s=0.0)
     store.note("carry to the bin", FELL, LOOKS, time_s=9.0, fibre=number)
     store.finish_fibre(good(number))
-    assert resume(store).fallen == (Fallen(number, 1510.0, 31.0, 0.012),)
+    assert resume(store).fallen == (DroppedFibre(number, 1510.0, 31.0, 0.012),)
 
 
 def test_one_that_fell_before_its_record_was_written_may_be_measured_again(
@@ -127,9 +127,9 @@ def test_what_looks_like_one_that_fell_is_not_taken_after_the_restart(
     number = store.begin_fibre(LEFT_THERE, time_s=0.0)
     store.note("carry to the bin", FELL, LOOKS, time_s=9.0, fibre=number)
     store.finish_fibre(good(number))
-    work: Any = SimpleNamespace(distrusted=False, given_up=[], spilled=[])
+    work: Any = SimpleNamespace(shared=SharedWorkspace())
     skip_known(work, resume(store))
     line = np.array([[0.0, 0.0], [1511.0, 0.0]])
     alike, other = (Candidate(line, length, 31.2, 0.013, 60.0) for length in (1511.0, 1200.0))
-    left = leave_spilled([other, alike], work.spilled)
+    left = leave_dropped([other, alike], work.shared.dropped)
     assert [each.problem for each in left] == ["", MEASURED]

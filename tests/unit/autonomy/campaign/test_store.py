@@ -13,7 +13,7 @@ from threading import Event
 import numpy as np
 import pytest
 
-from cosmic.autonomy.campaign.journal import Journal
+from cosmic.autonomy.campaign.recorder import Journal
 from cosmic.autonomy.campaign.records import (
     CalibrationNote,
     CampaignError,
@@ -72,11 +72,11 @@ def test_a_failed_fibre_keeps_its_cause_and_its_tries(store: CampaignStore) -> N
 def test_a_fibre_has_one_end(store: CampaignStore) -> None:
     number = store.begin_fibre(time_s=0.0)
     store.finish_fibre(failed(number))
-    with pytest.raises(CampaignError, match="has its end already: failed"):
+    with pytest.raises(CampaignError, match="is already completed: failed"):
         store.finish_fibre(good(number))
-    with pytest.raises(CampaignError, match="fibre 99 was not begun"):
+    with pytest.raises(CampaignError, match="fibre 99 was not started"):
         store.finish_fibre(failed(99))
-    with pytest.raises(CampaignError, match="which is no end"):
+    with pytest.raises(CampaignError, match="which is not final"):
         store.finish_fibre(FibreRecord(number, Outcome.RUNNING, 0.0, 1.0))
     assert [each.cause for each in store.reader.finished()] == ["missed grasp"]
     assert store.reader.fibre(number).spans == (), "its files are those of the first end"
@@ -113,7 +113,7 @@ def test_the_journal_tells_what_was_about_to_happen(store: CampaignStore) -> Non
 
 
 def test_no_campaign_is_begun_over_another(store: CampaignStore) -> None:
-    with pytest.raises(CampaignError, match="holds a campaign already"):
+    with pytest.raises(CampaignError, match="already holds a campaign"):
         CampaignStore.create(store.folder, INFO)
 
 
@@ -127,7 +127,7 @@ def test_a_folder_without_a_campaign_is_told(tmp_path: Path) -> None:
 
 def test_a_begin_that_was_cut_off_can_be_begun_again(tmp_path: Path) -> None:
     (tmp_path / "campaign.sqlite").touch()
-    with pytest.raises(CampaignError, match="its begin was cut off"):
+    with pytest.raises(CampaignError, match="its creation was interrupted"):
         CampaignStore.open(tmp_path)
     with CampaignStore.create(tmp_path, INFO) as store:
         assert store.reader.info().name == "quick"
@@ -160,7 +160,7 @@ def test_a_folder_that_cannot_be_written_can_still_be_read(
 
 
 def test_a_second_writer_is_refused_while_readers_are_not(store: CampaignStore) -> None:
-    with pytest.raises(CampaignError, match="being written there already"):
+    with pytest.raises(CampaignError, match="already being written there"):
         CampaignStore.open(store.folder)
     assert CampaignReader(store.folder).finished() == ()
 
@@ -188,7 +188,7 @@ def test_a_full_disk_is_told_and_the_fibre_can_be_written_later(
 
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", full)
-        with pytest.raises(CampaignError, match=r"No space left.*is kept: make room"):
+        with pytest.raises(CampaignError, match=r"No space left.*are saved: make room"):
             store.finish_fibre(good(second))
     assert not list((store.folder / "fibres").glob("*.part"))
     assert [each.number for each in store.reader.finished()] == [first]
@@ -296,7 +296,7 @@ def test_another_process_is_refused_until_the_first_is_gone(
     CampaignStore.create(tmp_path, INFO).close()
     process = writers.start(tmp_path)
     assert writers.line() == "open"
-    with pytest.raises(CampaignError, match="being written there already"):
+    with pytest.raises(CampaignError, match="already being written there"):
         CampaignStore.open(tmp_path)
     os.kill(process, signal.SIGKILL)
     writers.to_the_end()

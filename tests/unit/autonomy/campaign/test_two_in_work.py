@@ -9,15 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosmic.autonomy.campaign.keeper import Keeper
+from cosmic.autonomy.campaign.recorder import FibreRecorder
 from cosmic.autonomy.campaign.records import Outcome
 from cosmic.autonomy.campaign.resume import resume
 from cosmic.autonomy.campaign.store import CampaignStore
-from cosmic.autonomy.handling.in_hand import Calibration, FibreInHand
+from cosmic.autonomy.handling.context import Calibration, HandlingContext
+from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Reach
-from cosmic.autonomy.handling.settings import HandlingSettings
-from cosmic.autonomy.handling.sides import of_hand
-from cosmic.autonomy.handling.work import FibreWork
+from cosmic.autonomy.handling.settings import HandlingSettings, of_arm
 from cosmic.autonomy.procedures.tree import OPERATION, NodeEvent, NodeState
 from cosmic.frame.clock import ManualClock
 from unit.autonomy.campaign.sample_records import INFO
@@ -41,45 +40,45 @@ class Force:
 
 
 class Desk:
-    """A campaign's keeper, and two hands of which nothing moves."""
+    """A recorder of fibres, and two arms of which nothing moves."""
 
     def __init__(self, folder: Path) -> None:
         none: Any = None
         self.clock, self.force = ManualClock(), Force()
         axes: Any = []
         force: Any = self.force
-        self.work = FibreWork(axes, force, none, HandlingSettings(), self.clock, none)
+        self.work = HandlingContext(axes, force, none, HandlingSettings(), self.clock, none)
         for name in ("left", "right"):
-            self.work.bench.hands[name] = replace(
+            self.work.shared.arms[name] = replace(
                 self.work,
-                settings=of_hand(self.work.settings, name),
+                settings=of_arm(self.work.settings, name),
                 calibration=Calibration(),
                 failures=[],
             )
         self.store = CampaignStore.create(folder, INFO, time_s=0.0)
-        self.keeper = Keeper(self.work, self.store, measures=False, pictures=False)
+        self.recorder = FibreRecorder(self.work, self.store, measures=False, pictures=False)
 
-    def take(self, hand: str, number: int) -> FibreInHand:
+    def take(self, arm: str, number: int) -> HeldFibre:
         way = np.linspace(-600.0, 600.0, 20)
         line = np.column_stack([way + 3000.0 * number, way * 0.0])
         candidate = Candidate(line, 1200.0, 30.0, 0.0, 60.0)
-        fibre = FibreInHand(number, Reach(candidate, 0.0, line, (0.0, 0.0)), hand=hand)
+        fibre = HeldFibre(number, Reach(candidate, 0.0, line, (0.0, 0.0)), arm=arm)
         fibre.found_s = self.clock.now_s()
-        self.work.bench.hands[hand].fibre = fibre
+        self.work.shared.arms[arm].fibre = fibre
         return fibre
 
-    def does(self, hand: str, operation: str, seconds: float = 1.0) -> None:
+    def does(self, arm: str, operation: str, seconds: float = 1.0) -> None:
         begun_s = self.clock.now_s()
-        event = NodeEvent((), operation, OPERATION, NodeState.RUNNING, role=hand)
+        event = NodeEvent((), operation, OPERATION, NodeState.RUNNING, role=arm)
         event = replace(event, started_s=begun_s)
-        self.keeper.note(event)
+        self.recorder.note(event)
         self.clock.advance(seconds)
-        self.keeper.note(replace(event, state=NodeState.DONE, ended_s=self.clock.now_s()))
+        self.recorder.note(replace(event, state=NodeState.DONE, ended_s=self.clock.now_s()))
 
-    def finish(self, fibre: FibreInHand) -> None:
+    def finish(self, fibre: HeldFibre) -> None:
         fibre.done_s = self.clock.now_s()
-        self.work.bench.hands[fibre.hand].fibre = None
-        self.keeper.keep(fibre)
+        self.work.shared.arms[fibre.arm].fibre = None
+        self.recorder.record(fibre)
 
 
 @pytest.fixture
@@ -155,18 +154,18 @@ def test_both_that_were_in_work_when_the_program_was_killed_are_interrupted(desk
 
 def test_the_time_of_a_campaign_that_is_over_stands_still(desk: Desk) -> None:
     desk.does("left", "close the gripper", seconds=90.0)
-    desk.keeper.close("enough")
+    desk.recorder.close("enough")
     desk.clock.advance(3600.0)
-    assert desk.keeper.progress().elapsed_s == 90.0
+    assert desk.recorder.progress().elapsed_s == 90.0
     assert desk.store.reader.elapsed_s() == 90.0
 
 
 def test_a_fibre_is_kept_once(desk: Desk) -> None:
     fibre = desk.take("left", 1)
     desk.does("left", "release")
-    assert desk.keeper.in_work == (fibre,)
+    assert desk.recorder.in_work == (fibre,)
     desk.finish(fibre)
     desk.finish(fibre)
     desk.does("left", "choose a fibre")
-    assert desk.keeper.in_work == ()
+    assert desk.recorder.in_work == ()
     assert len(desk.store.reader.fibres()) == 1

@@ -5,9 +5,9 @@ from typing import Any, cast
 
 import pytest
 
+from cosmic.autonomy.handling.context import Calibration
 from cosmic.autonomy.handling.force import ForceMean
-from cosmic.autonomy.handling.force_ready import APART_S, LOOKS, SeeForce
-from cosmic.autonomy.handling.in_hand import Calibration
+from cosmic.autonomy.handling.push import APART_S, LOOKS, SeeForce
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed
 from cosmic.frame.errors import DeviceError, NotAvailable

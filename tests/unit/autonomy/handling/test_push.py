@@ -9,13 +9,12 @@ import pytest
 from typing_extensions import override
 
 from cosmic.autonomy.bending.fit import fit_bending
+from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
-from cosmic.autonomy.handling.in_hand import FibreInHand
-from cosmic.autonomy.handling.one_span import NO_CONTACT
+from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Reach
-from cosmic.autonomy.handling.push import PushSpans
+from cosmic.autonomy.handling.push import NO_CONTACT, PushSpans
 from cosmic.autonomy.handling.settings import HandlingSettings, PushSettings
-from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps
 from cosmic.daqco.core.settings import LimitSettings
 from cosmic.frame.clock import ManualClock
@@ -82,7 +81,7 @@ class Daqco:
         self.limits = [SimpleNamespace(settings=limit)]
 
 
-class Bench(FibreWork):
+class Bench(HandlingContext):
     """A fibre in the jaws, a probe, and the force of one on the other; no platform."""
 
     def __init__(self, ei_n_m2: float, *, off_um: float = 0.0, there: bool = True) -> None:
@@ -102,7 +101,7 @@ class Bench(FibreWork):
         self.peak_un, self.random = 0.0, np.random.default_rng(3)
         line = np.column_stack([np.linspace(0.0, 1200.0, 61), np.zeros(61)])
         reach = Reach(Candidate(line, 1200.0, WIDTH_UM, 0.0, 60.0), 0.0, line, (250.0, 0.0))
-        self.fibre = FibreInHand(1, reach, inside_um=250.0, free_um=950.0, held=True)
+        self.fibre = HeldFibre(1, reach, inside_um=250.0, free_um=950.0, held=True)
 
     def __getitem__(self, name: str) -> Axis:
         return Axis(self, name)
@@ -154,7 +153,7 @@ def carried_out(steps: Steps) -> None:
 def test_the_stiffness_is_found_and_the_sensor_spared(ei_n_m2: float, off_um: float):
     bench = Bench(ei_n_m2, off_um=off_um)
     carried_out(PushSpans().run(bench))
-    fibre = bench.in_hand()
+    fibre = bench.held_fibre()
     assert len(fibre.spans) == 3
     assert bench.peak_un <= 0.8 * 180.0
     fit = bench.settings.push.fit.model_copy(update={"fibre_width_um": 0.0, "edge_radius_um": 0.0})
@@ -167,7 +166,7 @@ def test_a_fibre_nearer_than_foreseen_is_come_up_to_again_from_further_back():
     bench = Bench(5e-11, off_um=60.0)
     carried_out(PushSpans().run(bench))
     assert bench.peak_un <= 0.8 * 180.0
-    for span in bench.in_hand().spans:
+    for span in bench.held_fibre().spans:
         assert span.force_un[0] == pytest.approx(ZERO_UN, abs=0.6), "each begins without contact"
 
 
@@ -199,7 +198,7 @@ def test_an_abort_in_the_middle_of_a_push_disarms_it_too():
 def test_a_soft_fibre_gets_shorter_spans_once_the_first_has_shown_it():
     bench = Bench(1e-12)
     carried_out(PushSpans().run(bench))
-    nominal = [span.nominal_um for span in bench.in_hand().spans]
+    nominal = [span.nominal_um for span in bench.held_fibre().spans]
     assert nominal[0] > 1.5 * nominal[1]
 
 

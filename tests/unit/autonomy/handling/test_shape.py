@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from cosmic.autonomy.handling.shape import held_shape
+from cosmic.autonomy.handling.grasp import held_shape
 
 
 def arc(radius_um: float, length_um: float, turned_deg: float) -> np.ndarray:

@@ -8,17 +8,17 @@ import pytest
 from typing_extensions import override
 
 from cosmic.autonomy.handling import survey
+from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.plate import Jaws
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.survey import Choose, look
-from cosmic.autonomy.handling.work import FibreWork
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.frame.clock import ManualClock
 
 SCALE_UM_PX = 7.6
 
 
-class Bench(FibreWork):
+class Bench(HandlingContext):
     """A plate to look at; nothing that could move."""
 
     def __init__(self) -> None:
@@ -84,33 +84,35 @@ def looked(*seen: Seen) -> Bench:
 )
 def test_what_is_not_taken_is_counted_by_its_reason(seen: Seen, problem: str):
     bench = looked(seen)
-    assert bench.candidates == []
-    assert bench.skipped == {problem: 1}
+    assert bench.shared.candidates == []
+    assert bench.shared.skip_reasons == {problem: 1}
 
 
 def test_two_that_lie_close_together_are_both_left():
     bench = looked(Seen(0.0, 0.0), Seen(40.0, 0.0), Seen(2000.0, 500.0))
-    assert [each.place_um for each in bench.candidates] == [pytest.approx((2000.0, 500.0))]
-    assert bench.skipped == {survey.TOO_NEAR: 2}
+    assert [each.place_um for each in bench.shared.candidates] == [pytest.approx((2000.0, 500.0))]
+    assert bench.shared.skip_reasons == {survey.TOO_NEAR: 2}
 
 
 def test_one_that_was_given_up_is_not_chosen_again():
     bench = looked(Seen(0.0, 0.0))
-    bench.given_up = list(bench.candidates)
+    bench.shared.skipped = list(bench.shared.candidates)
     look(bench, [Seen(20.0, -15.0), Seen(-1500.0, 900.0)])  # type: ignore[list-item]
-    assert len(bench.candidates) == 1
-    assert bench.skipped == {survey.GIVEN_UP: 1}
+    assert len(bench.shared.candidates) == 1
+    assert bench.shared.skip_reasons == {survey.GIVEN_UP: 1}
 
 
 def test_one_that_was_measured_and_fell_is_known_again_wherever_it_lies():
     bench = looked(Seen(0.0, 0.0))
     for _ in Choose().run(bench):
         pass
-    bench.spilled.append(bench.in_hand())
+    bench.shared.dropped.append(bench.held_fibre())
     there = Seen(3000.0, 1000.0, angle_deg=5.0)
     look(bench, [Seen(-1500.0, 0.0, length_um=1202.0), there])  # type: ignore[list-item]
-    assert [each.length_um for each in bench.candidates] == [1202.0], "the most alike is left"
-    assert bench.skipped == {survey.MEASURED: 1}
+    assert [each.length_um for each in bench.shared.candidates] == [1202.0], (
+        "the most alike is left"
+    )
+    assert bench.shared.skip_reasons == {survey.MEASURED: 1}
 
 
 @pytest.mark.parametrize(
@@ -120,13 +122,13 @@ def test_one_that_clung_and_fell_unseen_is_not_measured_again(length_um: float, 
     bench = looked(Seen(0.0, 0.0), Seen(-2500.0, 800.0, length_um=1500.0))
     for _ in Choose().run(bench):
         pass
-    done = bench.in_hand()
+    done = bench.held_fibre()
     done.bending = object()  # type: ignore[assignment]
-    bench.finished.append(done)
+    bench.shared.finished.append(done)
     lies = Seen(-2500.0, 800.0, length_um=1500.0)
     for _ in range(2):
         look(bench, [lies, Seen(-3000.0, -3000.0, length_um=length_um)])  # type: ignore[list-item]
-        lengths = [each.length_um for each in bench.candidates]
+        lengths = [each.length_um for each in bench.shared.candidates]
         assert lengths == ([1500.0, length_um] if taken else [1500.0])
 
 
@@ -136,7 +138,7 @@ def test_each_is_chosen_once_and_the_last_choice_says_to_look_again():
     for _ in range(2):
         for _ in Choose().run(bench):
             pass
-        places.add(bench.in_hand().reach.candidate.place_um)
+        places.add(bench.held_fibre().reach.candidate.place_um)
     assert len(places) == 2
     with pytest.raises(OperationFailed) as told:
         next(Choose().run(bench))

@@ -14,10 +14,9 @@ from cosmic.autonomy.procedures.operation import (
     Steps,
     UnitOperation,
 )
-from cosmic.autonomy.procedures.procedure import Procedure
+from cosmic.autonomy.procedures.procedure import Part, Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun
 from cosmic.autonomy.procedures.tree import NodeEvent, NodeState
-from cosmic.autonomy.procedures.walk import Part
 from cosmic.frame.clock import Clock, ManualClock
 from cosmic.frame.errors import DeviceTimeout, MoveCancelled, StoppedError
 from cosmic.frame.failure import FailurePolicy

@@ -14,9 +14,8 @@ from cosmic.autonomy.procedures.combinators import (
 )
 from cosmic.autonomy.procedures.failures import ProcedureAborted
 from cosmic.autonomy.procedures.operation import SAFE_POINT, Steps
-from cosmic.autonomy.procedures.procedure import Procedure
+from cosmic.autonomy.procedures.procedure import Part, Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun
-from cosmic.autonomy.procedures.walk import Part
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from unit.autonomy.procedures.parts import MOVE, Op, Work, done, run_of
@@ -105,9 +104,9 @@ def test_an_abort_before_the_begin_begins_nothing() -> None:
     assert run.state == "aborted"
     with pytest.raises(ProcedureAborted, match="changed my mind"):
         run.wait()
-    with pytest.raises(NotAvailable, match="begun already"):
+    with pytest.raises(NotAvailable, match="already started"):
         run.start()
-    with pytest.raises(NotAvailable, match="over"):
+    with pytest.raises(NotAvailable, match="has ended"):
         run.step()
     assert not run.work.log
 

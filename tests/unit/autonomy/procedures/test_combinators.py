@@ -144,7 +144,7 @@ def test_a_guard_lets_its_part_go_on_while_the_condition_holds() -> None:
 
 def test_a_guard_whose_condition_does_not_hold_begins_nothing() -> None:
     run = run_of(Guard(Op("lift"), lambda _work: False, "dropped"))
-    with pytest.raises(OperationFailed, match="dropped: it was so before the part began"):
+    with pytest.raises(OperationFailed, match="dropped: it was true before the part started"):
         run.run_here()
     assert done(run) == ["safe"]
 
@@ -154,7 +154,9 @@ def test_a_guard_ends_its_part_in_the_middle_of_a_wait_and_undoes_it(step: str |
     work = Work()
     part = Sequence("away", Op("lift"), Op("carry", steps=(step,)), Op("put down"))
     run = run_of(Guard(part, lambda _: work.clock.now_s() < 1.5, "dropped"), work)
-    with pytest.raises(OperationFailed, match="dropped: it became so on the way") as caught:
+    with pytest.raises(
+        OperationFailed, match="dropped: it became true while the part ran"
+    ) as caught:
         run.run_here()
     assert caught.value.cause == "dropped"
     cancelled = ["cancel carry"] if step == MOVE else []
@@ -177,7 +179,7 @@ def test_a_condition_that_cannot_answer_counts_as_broken() -> None:
         raise broken()
 
     run = run_of(Guard(Op("lift"), answer, "dropped"))
-    with pytest.raises(OperationFailed, match="could not be told: camera 0") as caught:
+    with pytest.raises(OperationFailed, match="could not be evaluated: camera 0") as caught:
         run.run_here()
     assert caught.value.cause == "dropped"
     assert isinstance(caught.value.__cause__, DeviceError)

@@ -10,17 +10,18 @@ from hypothesis import strategies as st
 from cosmic.autonomy.procedures.combinators import (
     Fallback,
     Guard,
+    Holding,
     Parallel,
     Repeat,
     Retry,
+    Role,
     Sequence,
 )
 from cosmic.autonomy.procedures.failures import ProcedureAborted, ProcedureStopped
 from cosmic.autonomy.procedures.operation import SAFE_POINT
-from cosmic.autonomy.procedures.resources import Resource
-from cosmic.autonomy.procedures.sharing import Holding, Role
+from cosmic.autonomy.procedures.procedure import Part
 from cosmic.autonomy.procedures.tree import ENDS, NodeEvent, NodeState
-from cosmic.autonomy.procedures.walk import Part
+from cosmic.autonomy.procedures.waits import Resource
 from cosmic.frame.errors import CosmicError
 from unit.autonomy.procedures.parts import MOVE, Op, Work, missed, run_of, stop
 

@@ -9,10 +9,9 @@ import pytest
 from cosmic.autonomy.procedures.combinators import Guard, Parallel, Repeat, Retry, Sequence
 from cosmic.autonomy.procedures.failures import ProcedureAborted
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed
-from cosmic.autonomy.procedures.procedure import Procedure
+from cosmic.autonomy.procedures.procedure import Part, Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun
 from cosmic.autonomy.procedures.tree import NodeEvent
-from cosmic.autonomy.procedures.walk import Part
 from cosmic.frame.clock import ManualClock, RatedClock
 from cosmic.frame.errors import DeviceTimeout, NotAvailable, WrongThreadError
 from cosmic.frame.failure import FailurePolicy
@@ -241,7 +240,7 @@ def test_what_makes_no_sense_now_is_harmless() -> None:
     run.pause()
     run.resume()
     assert run.state == "done"
-    with pytest.raises(NotAvailable, match="begun already"):
+    with pytest.raises(NotAvailable, match="already started"):
         run.run_here()
 
 
@@ -394,7 +393,7 @@ def test_a_listener_that_fails_harms_nobody(caplog: pytest.LogCaptureFixture) ->
     run.subscribe(bad)
     run.run_here()
     assert run.state == "done"
-    assert "a listener failed" in caplog.text
+    assert "a subscriber failed" in caplog.text
 
 
 def test_the_tree_shows_every_part_before_the_begin() -> None:

@@ -4,14 +4,20 @@ from collections.abc import Callable
 
 import pytest
 
-from cosmic.autonomy.procedures.combinators import Fallback, Parallel, Repeat, Sequence
+from cosmic.autonomy.procedures.combinators import (
+    Fallback,
+    Holding,
+    Parallel,
+    Repeat,
+    Role,
+    Sequence,
+)
 from cosmic.autonomy.procedures.failures import ProcedureStopped
 from cosmic.autonomy.procedures.operation import OperationFailed
-from cosmic.autonomy.procedures.resources import Resource
+from cosmic.autonomy.procedures.procedure import Part
 from cosmic.autonomy.procedures.run import ProcedureRun
-from cosmic.autonomy.procedures.sharing import Holding, Role
 from cosmic.autonomy.procedures.tree import NodeEvent, NodeState
-from cosmic.autonomy.procedures.walk import Part
+from cosmic.autonomy.procedures.waits import Resource
 from unit.autonomy.procedures.parts import MOVE, Op, Work, done, run_of, stop
 
 

@@ -192,7 +192,7 @@ def test_the_fields_of_a_dataclass_are_checked_on_arrival() -> None:
 def test_two_classes_of_one_name_cannot_both_travel() -> None:
     with pytest.raises(TypeError, match="another class"):
         transferable(dataclass(type("MoveVerdict", (), {})))
-    with pytest.raises(TypeError, match="only enumerations and dataclasses"):
+    with pytest.raises(TypeError, match="only enumerations, dataclasses and settings"):
         transferable(int)
 
 

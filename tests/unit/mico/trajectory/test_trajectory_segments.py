@@ -1,7 +1,7 @@
 """What becomes of movements that are recorded."""
 
-from cosmic.mico.core.messages import MovementBegun
-from cosmic.mico.core.orders import Jog, Motion, MoveTo, Reference, Step
+from cosmic.mico.core.motion.messages import MovementBegun
+from cosmic.mico.core.motion.orders import Jog, Motion, MoveTo, Reference, Step
 from cosmic.mico.core.trajectory.model import Place, Statement
 from cosmic.mico.core.trajectory.segments import SegmentBuilder
 from cosmic.mico.core.trajectory.writer import statement_lines

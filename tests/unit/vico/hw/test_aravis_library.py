@@ -15,10 +15,10 @@ from cosmic.frame.errors import (
     NotConnectedError,
 )
 from cosmic.vico.hw import aravis_ctypes as arv
-from cosmic.vico.hw.aravis_calls import AravisCalls, as_refusal
-from cosmic.vico.hw.aravis_library import AravisLibrary
-from cosmic.vico.hw.aravis_stream import buffers_for
-from cosmic.vico.hw.interface import CameraSettings, PixelFormat, Roi
+from cosmic.vico.hw.aravis import AravisLibrary
+from cosmic.vico.hw.base_camera import as_refusal
+from cosmic.vico.hw.camera_frames import buffers_for
+from cosmic.vico.hw.interface import PixelFormat
 
 
 def installed() -> bool:
@@ -85,7 +85,7 @@ def test_an_error_says_who_what_and_why_and_is_freed_once(
 ) -> None:
     stub = StubAravis(domain, code)
     with pytest.raises(kind) as caught:
-        AravisCalls(stub).checked("camera K", "arv_camera_new", b"K")
+        arv.AravisCalls(stub).checked("camera K", "arv_camera_new", b"K")
     assert caught.value.fault is fault
     assert caught.value.code == code
     for part in ("camera K", "arv_camera_new", "said so"):
@@ -101,11 +101,10 @@ def test_a_value_refused_by_the_camera_is_an_error_of_the_settings() -> None:
 
 
 def test_the_pool_holds_half_a_second_within_reason() -> None:
-    settings = CameraSettings(0.01, 0.0, 60.0, Roi(0, 0, 1600, 1200))
-    assert buffers_for(settings, 1_920_000) == 30
-    assert buffers_for(replace(settings, rate_hz=1.0), 1_920_000) == 8
-    assert buffers_for(replace(settings, rate_hz=1000.0), 1000) == 64
-    assert buffers_for(replace(settings, rate_hz=1000.0), 50_000_000) == 5
+    assert buffers_for(60.0, 1_920_000) == 30
+    assert buffers_for(1.0, 1_920_000) == 8
+    assert buffers_for(1000.0, 1000) == 64
+    assert buffers_for(1000.0, 50_000_000) == 5
 
 
 @pytest.fixture

@@ -1,7 +1,9 @@
 """Cameras by the name of their backend."""
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -28,7 +30,21 @@ def test_gentl_is_made_from_its_producers() -> None:
     library.close()
 
 
-def test_what_a_backend_needs_is_named() -> None:
+def test_gentl_takes_the_installed_producers_where_none_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    producer = virtual_producer()
+    if HarvestersRig.missing() or producer is None:
+        pytest.skip(HarvestersRig.missing())
+    folders = (str(tmp_path / "not there"), "", str(producer.parent))
+    monkeypatch.setenv("GENICAM_GENTL64_PATH", os.pathsep.join(folders))
+    library = make_camera_library("harvesters")
+    assert "viky.cti" in library.name
+    library.close()
+
+
+def test_what_a_backend_needs_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("GENICAM_GENTL64_PATH", raising=False)
     with pytest.raises(ConfigError, match=r"\.cti"):
         make_camera_library("harvesters")
     with pytest.raises(ConfigError, match="scene"):
@@ -41,7 +57,7 @@ def test_importing_the_factory_loads_no_backend() -> None:
     code = (
         "import sys, cosmic.vico.hw.factory as f; f.make_camera_library('opencv').close();"
         "print(*(each for each in ('harvesters', 'genicam', 'cosmic.twin.scene', "
-        "'cosmic.vico.hw.aravis_library') if each in sys.modules))"
+        "'cosmic.vico.hw.aravis') if each in sys.modules))"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60

@@ -12,11 +12,16 @@ from cosmic.frame.errors import (
     ProtocolError,
 )
 from cosmic.vico.hw.brightlight import BrightLight
-from cosmic.vico.hw.navitar import FrameRegisters
-from cosmic.vico.hw.navitar_ascii import AsciiRegisters
-from cosmic.vico.hw.navitar_lens import NavitarLens
-from cosmic.vico.hw.navitar_probe import probe
-from cosmic.vico.hw.navitar_protocol import Product, find_answer, motor_status, write_frame
+from cosmic.vico.hw.navitar import NavitarLens
+from cosmic.vico.hw.navitar_protocol import (
+    AsciiRegisters,
+    FrameRegisters,
+    Product,
+    find_answer,
+    motor_status,
+    probe,
+    write_frame,
+)
 from cosmic.vico.hw.peripherals import LensAxis
 from unit.vico.hw.byte_dialogue import hexed, port
 

@@ -12,8 +12,7 @@ from contract.cameras.opencv import HEIGHT, WIDTH, pattern, write_film, write_pi
 from cosmic.frame.clock import ManualClock, RatedClock
 from cosmic.frame.errors import DeviceError, NotConnectedError
 from cosmic.vico.hw.interface import Frame, PixelFormat, Roi
-from cosmic.vico.hw.opencv_camera import OpenCvCamera
-from cosmic.vico.hw.opencv_library import OpenCvLibrary
+from cosmic.vico.hw.opencv import OpenCvCamera, OpenCvLibrary
 from cosmic.vico.hw.opencv_source import VideoSource
 
 
@@ -137,7 +136,7 @@ def test_what_is_no_film_is_named_with_the_reason(tmp_path: Path) -> None:
         ("film.mkv", "no pictures"),
         ("empty", "holds no pictures"),
         ("broken", "no picture of 8 or 16 bits"),
-        ("gone.mkv", "there is no camera"),
+        ("gone.mkv", "cannot open a camera"),
     ):
         with pytest.raises(NotConnectedError, match=reason):
             opened(VideoSource(str(tmp_path / name)))
@@ -149,9 +148,9 @@ def test_a_picture_of_another_size_ends_the_reception(tmp_path: Path) -> None:
     camera = opened(VideoSource(str(tmp_path), paced=False))
     camera.start()
     camera.receive(0.0)
-    with pytest.raises(DeviceError, match="160 x 50 px came"):
-        camera.receive(0.0)
-    assert camera.receive(0.0) is None
+    for _ in range(2):  # nothing more comes from it
+        with pytest.raises(DeviceError, match="160 x 50 px came"):
+            camera.receive(0.0)
     camera.close()
 
 

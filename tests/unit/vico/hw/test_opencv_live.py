@@ -11,7 +11,7 @@ import pytest
 from cosmic.frame.clock import RatedClock
 from cosmic.frame.errors import ConfigError, DeviceError, NotConnectedError
 from cosmic.vico.hw.interface import Camera, PixelFormat
-from cosmic.vico.hw.opencv_library import OpenCvLibrary
+from cosmic.vico.hw.opencv import OpenCvLibrary
 from cosmic.vico.hw.opencv_source import VideoSource
 from unit.vico.hw.fake_capture import FakeDevice
 
@@ -95,9 +95,9 @@ def test_a_stop_ends_the_wait_for_a_device(camera: Camera) -> None:
 def test_an_unplugged_device_ends_the_reception(camera: Camera, device: FakeDevice) -> None:
     camera.start()
     device.unplug()
-    with pytest.raises(DeviceError, match=r"video2: receive: .*cable"):
-        camera.receive(5.0)
-    assert camera.receive(0.0) is None
+    for _ in range(2):  # nothing more comes from it
+        with pytest.raises(DeviceError, match="video2 is gone"):
+            camera.receive(5.0)
 
 
 def test_exposure_is_taken_over_and_read_back(camera: Camera, device: FakeDevice) -> None:

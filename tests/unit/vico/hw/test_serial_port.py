@@ -7,7 +7,7 @@ import pytest
 from contract.peripheral_rig import PeripheralRig, Terminal, terminal
 from cosmic.frame.errors import ConfigError, DeviceError, DeviceFault, NotConnectedError
 from cosmic.vico.hw import serial_port
-from cosmic.vico.hw.peripheral_factory import make_lens, make_light
+from cosmic.vico.hw.factory import make_lens, make_light
 from cosmic.vico.hw.peripherals import LensAxis
 from cosmic.vico.hw.sim_line import LineFaults
 

@@ -20,9 +20,7 @@ from cosmic.vico.hw.interface import (
     Roi,
     Trigger,
 )
-from cosmic.vico.hw.sim_camera import SimulatedCamera
-from cosmic.vico.hw.sim_camera_library import SimulatedCameraLibrary
-from cosmic.vico.hw.sim_camera_run import BUFFERS
+from cosmic.vico.hw.sim_camera import BUFFERS, SimulatedCamera, SimulatedCameraLibrary
 
 SMALL = Roi(640, 500, 160, 120)
 PERIOD_S = 1.0 / 15.0
@@ -336,13 +334,13 @@ def test_a_picture_that_nobody_looks_at_is_not_drawn(
     camera = stand.open()
     camera.start()
     drawn: list[object] = []
-    draw = stand.scene.optics.render
+    draw = stand.scene.optics.expose
 
     def counted(*args: Any, **how: Any) -> Any:
         drawn.append(args)
         return draw(*args, **how)
 
-    monkeypatch.setattr(stand.scene.optics, "render", counted)
+    monkeypatch.setattr(stand.scene.optics, "expose", counted)
     frames = stand.after(camera, 0.3)
     assert frames
     assert not drawn

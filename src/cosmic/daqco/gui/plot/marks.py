@@ -7,10 +7,10 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QObject, Qt, Signal
 
+from cosmic.daqco.api.daqco import DaqLimit
 from cosmic.daqco.gui.colours import readable
 from cosmic.daqco.gui.plot.chart import Chart
 from cosmic.daqco.gui.plot.units import AxisRange, display_unit
-from cosmic.daqco.gui.ports import LimitState
 from cosmic.frame.gui.palette import INK, OKABE_ITO
 from cosmic.frame.gui.theme import current_palette
 
@@ -97,7 +97,7 @@ class LimitLines:
         self._chart = chart
         self.lines: list[pg.InfiniteLine] = []
 
-    def show(self, limits: Sequence[LimitState], ranges: dict[str, AxisRange]) -> None:
+    def show(self, limits: Sequence[DaqLimit], ranges: dict[str, AxisRange]) -> None:
         """Draw the limits of the channels that are in the picture."""
         for line in self.lines:
             self._chart.box.removeItem(line)
@@ -114,7 +114,7 @@ class LimitLines:
                     text = f"{trace.name} {side} {value:g} {display_unit(trace.unit)}"
                     self._add(limit, text, float(share), trace.colour)
 
-    def _add(self, limit: LimitState, text: str, share: float, colour: str) -> None:
+    def _add(self, limit: DaqLimit, text: str, share: float, colour: str) -> None:
         armed = limit.settings.armed
         shown = OKABE_ITO["vermillion"] if limit.crossed else readable(colour)
         line = pg.InfiniteLine(

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from threading import Lock
 
 from cosmic.frame.errors import NotAvailable, UnknownAxisError
-from cosmic.frame.listeners import tell
+from cosmic.frame.events import Event, Unsubscribe
 from cosmic.mico.core.collision.model import BodyPair, Contact, pair_of
 
 logger = logging.getLogger(__name__)
@@ -35,7 +35,7 @@ class Exemptions:
         self._allowed: frozenset[str] = frozenset()
         self._uses: dict[str, list[object]] = {contact.name: [] for contact in contacts}
         self._ignored: frozenset[BodyPair] = frozenset()
-        self._listeners: tuple[Callable[[], object], ...] = ()
+        self._changed: Event[[]] = Event()
         self.on_watched_again: Callable[[Set[str], Set[BodyPair]], None] = _nobody
         """Told which axes, and which pairs of bodies, are watched again, in that thread."""
         self.revision = 0
@@ -68,7 +68,7 @@ class Exemptions:
                 axis,
                 source,
             )
-            tell(self._listeners)
+            self._changed.emit()
 
     def take_in(self, axis: str, *, source: str = "script") -> None:
         """Check movements of `axis` again.
@@ -81,7 +81,7 @@ class Exemptions:
         if self._set_taken_out(axis, out=False):
             self.watch_again({axis}, frozenset())
             logger.info("%s was taken into collision detection again by %s", axis, source)
-            tell(self._listeners)
+            self._changed.emit()
 
     def _set_taken_out(self, axis: str, *, out: bool) -> bool:
         if axis not in self._axes:
@@ -147,7 +147,7 @@ class Exemptions:
             changed = self._renew_allowed()
         if changed:
             logger.info("the contact %r was allowed by %s", name, source)
-            tell(self._listeners)
+            self._changed.emit()
 
     def _end_uses(self, name: str, use: object | None, source: str) -> None:
         with self._guard:
@@ -160,7 +160,7 @@ class Exemptions:
             self.watch_again(frozenset(), watched)
         if changed:
             logger.info("the contact %r was forbidden again by %s", name, source)
-            tell(self._listeners)
+            self._changed.emit()
 
     def _uses_of(self, name: str) -> list[object]:
         if name not in self._uses:
@@ -181,16 +181,9 @@ class Exemptions:
 
     # Who is told
 
-    def subscribe(self, callback: Callable[[], object]) -> Callable[[], None]:
+    def subscribe(self, callback: Callable[[], object]) -> Unsubscribe:
         """Call `callback` when axes are taken out or in, or contacts allowed or forbidden.
 
         Called in the thread of the change. Returns the function that ends it.
         """
-        with self._guard:
-            self._listeners = (*self._listeners, callback)
-
-        def unsubscribe() -> None:
-            with self._guard:
-                self._listeners = tuple(each for each in self._listeners if each != callback)
-
-        return unsubscribe
+        return self._changed.subscribe(callback)

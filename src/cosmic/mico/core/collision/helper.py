@@ -14,9 +14,10 @@ from importlib import import_module
 from typing import Any, Final
 
 from cosmic.frame.garbage import freeze_what_is_loaded
+from cosmic.frame.helper_process import READY, End, encode
 from cosmic.mico.core.collision.answer import Approach, SweepAnswer
 from cosmic.mico.core.collision.free_way import free_way
-from cosmic.mico.core.collision.helper_wire import READY, End, encode, unpack_spans
+from cosmic.mico.core.collision.helper_wire import unpack_spans
 from cosmic.mico.core.collision.sweep import Sweep
 
 Handler = Callable[[Sweep, Any], object]
@@ -94,7 +95,8 @@ def main(arguments: Sequence[str]) -> int:
     except (EOFError, BrokenPipeError, ConnectionResetError):
         return 0
     except Exception as exc:
-        pipe.send_bytes(encode((READY, False, f"{type(exc).__name__}: {exc}")))
+        text = f"it could not load the scene: {type(exc).__name__}: {exc}"
+        pipe.send_bytes(encode((READY, False, text)))
         raise
     return 0
 

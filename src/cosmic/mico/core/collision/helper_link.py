@@ -1,28 +1,31 @@
 """`GateProcess`: asks the gate's own process, and replaces it when it fails."""
 
 import logging
+import pickle
 from collections import deque
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
+from dataclasses import replace
 from threading import Lock
 from types import NoneType
 from typing import Final, TypeVar
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError
-from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
-from cosmic.mico.core.collision.helper_spawn import (
+from cosmic.frame.helper_process import (
+    PROTOCOL,
     HelperFaultError,
     HelperLateError,
     HelperProcess,
     HelperRefusalError,
-    pickle_scene,
 )
+from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
 from cosmic.mico.core.collision.helper_wire import pack_spans
 from cosmic.mico.core.collision.model import BodyPair, SceneModel
 
 logger = logging.getLogger(__name__)
 
+MODULE: Final = "cosmic.mico.core.collision.helper"
 MOST_FAILURES: Final = 5
 FAILURES_WITHIN_S: Final = 10.0
 _LOOK_S: Final = 0.02
@@ -69,10 +72,10 @@ class GateProcess:
         start_s: float = 15.0,
         handlers: Mapping[str, str] | None = None,
     ) -> None:
-        self._scene = pickle_scene(model)
+        self._scene = pickle.dumps(replace(model, views=()), protocol=PROTOCOL)  # views: only drawn
         self._answer_s = answer_s
         self._start_s = start_s
-        self._handlers = dict(handlers or {})
+        self._handlers = [f"{kind}={place}" for kind, place in (handlers or {}).items()]
         self._lock = Lock()
         self._helper: HelperProcess | None = None
         self._down = "it was not started"
@@ -241,7 +244,7 @@ class GateProcess:
 
     def _launch(self) -> None:
         try:
-            self._helper = HelperProcess(self._scene, self._handlers)
+            self._helper = HelperProcess(MODULE, self._scene, self._handlers)
         except OSError as exc:
             self._helper = None
             logger.error("the collision gate's process cannot be started: %s", exc)

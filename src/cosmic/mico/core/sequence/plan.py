@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from cosmic.mico.core.orders import Calibrate, Motion, MoveTo, Reference, Step, ToEndStop
-from cosmic.mico.core.positioner import Confidence, PositionerState
+from cosmic.mico.core.motion.orders import Calibrate, Motion, MoveTo, Reference, Step, ToEndStop
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.core.sequence.settings import StepKind, StepSettings
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Direction, PositionerKind, ReferenceKind

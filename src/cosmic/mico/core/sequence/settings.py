@@ -5,7 +5,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cosmic.frame.config import StrictModel
+from cosmic.frame.config import StrictModel, not_there
 
 
 class StepKind(StrEnum):
@@ -125,9 +125,11 @@ def misfits(
     for number, step in enumerate(steps):
         where = f"initialisation.step[{number}]"
         if step.group and step.group not in groups:
-            wrong.append(f"{where}: there is no group {step.group!r}")
+            wrong.append(f"{where}: {not_there('group', step.group, groups)}")
         wrong += [
-            f"{where}: there is no positioner {name!r}" for name in step.names if name not in kinds
+            f"{where}: {not_there('positioner', name, kinds)}"
+            for name in step.names
+            if name not in kinds
         ]
         wrong += [f"{where}: {text}" for text in _wrong_kinds(step, kinds)]
     return wrong

@@ -5,9 +5,9 @@ from typing import Final
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, MoveCancelled
-from cosmic.mico.core.device_commander import DeviceCommander
-from cosmic.mico.core.orders import Order
-from cosmic.mico.core.steer import HandLostError
+from cosmic.mico.core.motion.device_commander import DeviceCommander
+from cosmic.mico.core.motion.jog import HandLostError
+from cosmic.mico.core.motion.orders import Order
 from cosmic.mico.core.teleoperation.settings import TeleoperationSettings
 from cosmic.mico.core.teleoperation.state import RateMeter
 

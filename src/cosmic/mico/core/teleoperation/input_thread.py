@@ -13,7 +13,7 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.threads import WorkerThread
-from cosmic.mico.core.stop_latch import StopLatch
+from cosmic.mico.core.motion.stop_latch import StopLatch
 from cosmic.mico.core.teleoperation.driver import AxisDriver
 from cosmic.mico.core.teleoperation.mapping import Converter, ProfileMapping
 from cosmic.mico.core.teleoperation.settings import TeleoperationSettings

@@ -67,6 +67,17 @@ class ProfileBook:
             raise NotAvailable(f"there is no teleoperation profile {name!r}; there are: {known}")
         return found
 
+    def misfits(self, kinds: Mapping[str, str]) -> list[str]:
+        """Return what of the changed profiles does not fit the positioners there are.
+
+        Parameters
+        ----------
+        kinds : mapping of str
+            "linear", "rotary" or "open-loop" of every positioner, by name.
+        """
+        changed = [each for each in self.profiles if each != self._given.get(each.name)]
+        return [text for each in changed for text in each.mistakes(kinds)]
+
     def given(self, name: str) -> TeleoperationProfileSettings:
         """Return a profile as the platform file has it.
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cosmic.frame.config import StrictModel
+from cosmic.frame.config import StrictModel, not_there
 
 Text = Annotated[str, Field(min_length=1)]
 Above0 = Annotated[float, Field(gt=0)]
@@ -53,7 +53,7 @@ class TeleoperationAxisSettings(StrictModel):
         """Return what does not fit the positioners there are, whose kinds are given by name."""
         kind = kinds.get(self.positioner)
         if kind is None:
-            return [f"there is no positioner {self.positioner!r}"]
+            return [not_there("positioner", self.positioner, kinds)]
         allowed = {SPEED_KEYS[kind], TRAVEL_KEYS.get(kind, "")}
         return [
             f"{self.positioner}: {key} does not fit, the axis is {kind}"

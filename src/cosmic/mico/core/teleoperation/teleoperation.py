@@ -10,10 +10,10 @@ from cosmic.frame.arguments import checked_class
 from cosmic.frame.config import user_file
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
-from cosmic.mico.core.device_commander import DeviceCommander
+from cosmic.mico.core.motion.device_commander import DeviceCommander
+from cosmic.mico.core.motion.positioner import class_for
+from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.mico.core.ports import ManagerPort
-from cosmic.mico.core.positioner import class_for
-from cosmic.mico.core.stop_latch import StopState
 from cosmic.mico.core.teleoperation.coupling import ForceCoupling
 from cosmic.mico.core.teleoperation.driver import AxisDriver
 from cosmic.mico.core.teleoperation.input_thread import InputThread, Steering
@@ -53,6 +53,8 @@ class Teleoperation:
         self.sources = sources or InputSources(simulated=manager.controller.simulated)
         self.coupling: ForceCoupling | None = None
         self._book = ProfileBook(self.settings, user_file(self.settings.profiles, folder))
+        for text in self._book.misfits(manager.settings.kinds):
+            logger.warning("%s: %s", self._book.path, text)
         self._lock = RLock()
         self._thread: InputThread | None = None
         self._device: InputDevice | None = None
@@ -112,7 +114,7 @@ class Teleoperation:
         ConfigError
             It does not fit the positioners there are, or moves others while it steers.
         """
-        wrong = profile.mistakes(self._kinds())
+        wrong = profile.mistakes(self._manager.settings.kinds)
         if wrong:
             raise ConfigError("\n".join(wrong))
         with self._lock:
@@ -151,9 +153,6 @@ class Teleoperation:
     def _use(self, profile: TeleoperationProfileSettings) -> TeleoperationProfileSettings:
         self.set_profile(profile)
         return profile
-
-    def _kinds(self) -> dict[str, str]:
-        return {each.name: each.kind for each in self._manager.settings.positioner}
 
     # Running
 
@@ -238,7 +237,7 @@ class Teleoperation:
             "rotary": jog.speed_deg_s,
             "open-loop": float(jog.frequency_hz),
         }
-        speeds = {name: usual[kind] for name, kind in self._kinds().items()}
+        speeds = {name: usual[kind] for name, kind in self._manager.settings.kinds.items()}
         return ProfileMapping(profile, speeds, lambda name: self._manager.state(name).position)
 
     def _converter(self, mapping: ProfileMapping) -> Converter:

@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from cosmic.frame.units import AxisUnit, format_quantity
-from cosmic.mico.core.orders import (
+from cosmic.mico.core.motion.checks import ROUNDING
+from cosmic.mico.core.motion.orders import (
     AMPLITUDE_V,
     FREQUENCY_HZ,
     LARGEST_STEPS,
@@ -15,7 +16,6 @@ from cosmic.mico.core.orders import (
     Step,
 )
 from cosmic.mico.core.poses import Pose
-from cosmic.mico.core.rules import ROUNDING
 from cosmic.mico.core.settings import MotionDefaults
 from cosmic.mico.core.trajectory.model import (
     Leg,

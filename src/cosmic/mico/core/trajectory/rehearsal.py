@@ -7,10 +7,9 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.errors import MoveCancelled
 from cosmic.frame.verdict import ALLOWED, MoveVerdict
 from cosmic.mico.core.collision.checker import CollisionChecker
-from cosmic.mico.core.judgement import Picture, Request, judge
-from cosmic.mico.core.orders import Motion, MoveBy, MoveTo, Step
-from cosmic.mico.core.positioner import PositionerState
-from cosmic.mico.core.rules import Limits
+from cosmic.mico.core.motion.checks import Limits, PlatformSnapshot, Request, judge
+from cosmic.mico.core.motion.orders import Motion, MoveBy, MoveTo, Step
+from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.core.trajectory.binding import Bound, BoundLeg, BoundSpeed, PlatformFacts
 from cosmic.mico.core.trajectory.clearance import ClearanceSearch
 from cosmic.mico.core.trajectory.model import Wait
@@ -166,7 +165,7 @@ class _Play:
 
     def _leg(self, leg: BoundLeg) -> MoveVerdict:
         requests = [Request(axis, motion, _TOKEN) for axis, motion in leg.motions.items()]
-        picture = Picture(
+        picture = PlatformSnapshot(
             stop_reason=None,
             token=_TOKEN,
             states=self._states,

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from cosmic.frame.units import AxisUnit
-from cosmic.mico.core.messages import MovementBegun
-from cosmic.mico.core.orders import MOTION_WORDS, Jog, MoveBy, MoveTo, Step
+from cosmic.mico.core.motion.messages import MovementBegun
+from cosmic.mico.core.motion.orders import MOTION_WORDS, Jog, MoveBy, MoveTo, Step
 from cosmic.mico.core.trajectory.model import Leg, Move, Place, Speed, Statement, Steps
 
 STILL: Final[dict[str, float]] = {"um": 0.5, "deg": 0.0005}

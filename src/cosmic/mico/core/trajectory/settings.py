@@ -1,11 +1,12 @@
 """What platform.toml says about trajectories."""
 
 from collections import Counter
+from collections.abc import Collection
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cosmic.frame.config import StrictModel
+from cosmic.frame.config import StrictModel, not_there
 
 Pair = Annotated[tuple[str, str], Field(strict=False)]
 
@@ -22,6 +23,15 @@ class MirrorSettings(StrictModel):
     def partners(self) -> dict[str, str]:
         """Return the counterpart of each axis."""
         return dict(self.pairs) | {second: first for first, second in self.pairs}
+
+    def misfits(self, names: Collection[str]) -> list[str]:
+        """Return a line for each axis that is none of the positioners of those names."""
+        return [
+            f"mirror.pairs[{index}]: {not_there('positioner', name, names)}"
+            for index, pair in enumerate(self.pairs)
+            for name in dict.fromkeys(pair)
+            if name not in names
+        ]
 
     @model_validator(mode="after")
     def _once_each(self) -> Self:

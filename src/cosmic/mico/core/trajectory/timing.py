@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
-from cosmic.mico.core.orders import FREQUENCY_HZ, Motion, Step
+from cosmic.mico.core.motion.orders import FREQUENCY_HZ, Motion, Step
 from cosmic.mico.core.settings import MotionDefaults
 from cosmic.mico.core.trajectory.binding import AxisFacts, nominal_step
 

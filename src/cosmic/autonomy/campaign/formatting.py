@@ -1,0 +1,77 @@
+"""Numbers and their units as the report and the window show them."""
+
+import math
+from typing import Final
+
+from cosmic.autonomy.campaign.records import FibreRecord, Shape
+from cosmic.autonomy.campaign.statistics import MeanEi
+
+EI_UNIT: Final = 1e-12
+EI_LABEL: Final = "10⁻¹² N m²"
+NONE: Final = "–"
+TWO_SIDED: Final = 1.96
+"""Standard deviations in half of a 95 % interval."""
+
+
+def number(value: float, digits: int = 0) -> str:
+    """Return a number; a dash where there is none."""
+    # The sum turns a rounded -0 into 0.
+    return f"{round(value, digits) + 0.0:.{digits}f}" if math.isfinite(value) else NONE
+
+
+def with_interval(value: float, std: float, digits: int = 0) -> str:
+    """Return a number with half of its 95 % interval, as far as there are any."""
+    if not (math.isfinite(value) and math.isfinite(std)):
+        return number(value, digits)
+    return f"{number(value, digits)} ± {number(TWO_SIDED * std, digits)}"
+
+
+def width_words(shape: Shape) -> str:
+    """Return a width with its 95 % interval; one that was not resolved says so."""
+    told = with_interval(shape.width_um, shape.width_std_um, 1)
+    unknown = not math.isfinite(shape.width_std_um) or shape.width_resolved
+    return told if unknown else f"{told} (not resolved)"
+
+
+def stiffness(value_n_m2: float) -> str:
+    """Return a stiffness in the unit of the report with three digits."""
+    value = value_n_m2 / EI_UNIT
+    if not math.isfinite(value):
+        return NONE
+    return f"{value:#.3g}".removesuffix(".") if value < 999.5 else f"{value:.0f}"
+
+
+def interval(low_n_m2: float, high_n_m2: float) -> str:
+    """Return an interval of stiffnesses."""
+    if not (math.isfinite(low_n_m2) and math.isfinite(high_n_m2)):
+        return NONE
+    return f"{stiffness(low_n_m2)} to {stiffness(high_n_m2)}"
+
+
+def mean_words(mean: MeanEi) -> str:
+    """Return the mean with its interval, as far as there are any."""
+    if mean.count == 0:
+        return NONE
+    if mean.count == 1:
+        return f"{stiffness(mean.ei_n_m2)} (one fibre)"
+    return f"{stiffness(mean.ei_n_m2)} ({interval(mean.ei_low_n_m2, mean.ei_high_n_m2)})"
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words."""
+    if not math.isfinite(seconds):
+        return NONE
+    if seconds < 120.0:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60.0)
+    return f"{minutes} min" if minutes < 120 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def when(iso: str) -> str:
+    """Return a moment as a person reads it."""
+    return iso.replace("T", " ", 1)
+
+
+def outcome_words(record: FibreRecord) -> str:
+    """Return how a fibre ended, with the cause."""
+    return f"{record.outcome}: {record.cause}" if record.cause else str(record.outcome)

@@ -1,0 +1,380 @@
+"""How a campaign is stored: the tables of its database, and the HDF5 file of each fibre."""
+
+import io
+import math
+import sqlite3
+from collections.abc import Mapping, Sequence
+from pathlib import Path, PurePosixPath
+from typing import Final
+
+import h5py
+import numpy as np
+
+from cosmic.autonomy.bending.result import BendingResult, Quality, SpanFit
+from cosmic.autonomy.bending.span import Span
+from cosmic.autonomy.campaign.records import (
+    CampaignError,
+    FibreRecord,
+    Floats,
+    OperationRecord,
+    Outcome,
+    Picture,
+    Pose,
+    Series,
+    Shape,
+)
+
+DATABASE: Final = "campaign.sqlite"
+FIBRES: Final = "fibres"
+"""Folder with a file for each fibre."""
+
+SCHEMA_VERSION: Final = 2
+
+TABLES: Final = """
+CREATE TABLE campaign (
+    one INTEGER PRIMARY KEY CHECK (one = 1),
+    name TEXT NOT NULL, procedure TEXT NOT NULL, sample TEXT NOT NULL,
+    recipe_text TEXT NOT NULL, recipe_sha256 TEXT NOT NULL, started TEXT NOT NULL,
+    description TEXT NOT NULL, operator TEXT NOT NULL, hardware TEXT NOT NULL,
+    seed INTEGER NOT NULL, rate REAL NOT NULL, versions_json TEXT NOT NULL,
+    ended TEXT NOT NULL DEFAULT '', end_reason TEXT NOT NULL DEFAULT ''
+);
+CREATE TABLE run (
+    number INTEGER PRIMARY KEY, started TEXT NOT NULL, versions_json TEXT NOT NULL,
+    begin_s REAL NOT NULL, end_s REAL
+);
+CREATE TABLE calibration (
+    name TEXT NOT NULL, residual REAL, unit TEXT NOT NULL, made TEXT NOT NULL,
+    run INTEGER NOT NULL REFERENCES run
+);
+CREATE TABLE fibre (
+    number INTEGER PRIMARY KEY, run INTEGER NOT NULL REFERENCES run, outcome TEXT NOT NULL,
+    began_s REAL NOT NULL, ended_s REAL,
+    found_x_plate_um REAL, found_y_plate_um REAL, found_angle_deg REAL,
+    left_x_plate_um REAL, left_y_plate_um REAL, left_angle_deg REAL,
+    length_um REAL, length_std_um REAL, width_um REAL, width_std_um REAL,
+    curl REAL, curl_std REAL,
+    cause TEXT NOT NULL DEFAULT '', text TEXT NOT NULL DEFAULT '',
+    attempts INTEGER, peak_force_un REAL,
+    ei_n_m2 REAL, ei_low_n_m2 REAL, ei_high_n_m2 REAL,
+    clamp_offset_um REAL, clamp_offset_std_um REAL, chi2 REAL, freedom INTEGER,
+    trusted INTEGER, flags TEXT NOT NULL DEFAULT '', reasons TEXT NOT NULL DEFAULT '',
+    used_spans TEXT NOT NULL DEFAULT '', file TEXT NOT NULL DEFAULT ''
+);
+CREATE TABLE span (
+    fibre INTEGER NOT NULL REFERENCES fibre, number INTEGER NOT NULL,
+    place_um REAL, k_un_um REAL, k_std_un_um REAL, k_loading_un_um REAL, k_unloading_un_um REAL,
+    hinge_um REAL, hinge_back_um REAL, baseline_un REAL, drift_un_s REAL,
+    hysteresis_percent REAL, peak_un REAL, chi2 REAL, freedom INTEGER,
+    flags TEXT NOT NULL DEFAULT '', PRIMARY KEY (fibre, number)
+);
+CREATE TABLE picture (
+    fibre INTEGER NOT NULL REFERENCES fibre, number INTEGER NOT NULL, name TEXT NOT NULL,
+    file TEXT NOT NULL, sha256 TEXT NOT NULL, taken_s REAL NOT NULL,
+    scale_um_px REAL, zoom REAL, focus_um REAL, light_percent REAL,
+    region_left_px INTEGER, region_top_px INTEGER,
+    region_width_px INTEGER, region_height_px INTEGER,
+    PRIMARY KEY (fibre, number)
+);
+CREATE TABLE operation (
+    fibre INTEGER NOT NULL REFERENCES fibre, number INTEGER NOT NULL, name TEXT NOT NULL,
+    began_s REAL NOT NULL, ended_s REAL NOT NULL, attempt INTEGER NOT NULL,
+    cause TEXT NOT NULL, text TEXT NOT NULL, PRIMARY KEY (fibre, number)
+);
+CREATE TABLE journal (
+    number INTEGER PRIMARY KEY, fibre INTEGER, time_s REAL NOT NULL, operation TEXT NOT NULL,
+    phase TEXT NOT NULL, payload_json TEXT NOT NULL
+);
+"""
+
+
+Cell = str | int | float | bytes | None
+Row = Mapping[str, Cell]
+
+RESULT_NUMBERS: Final = (
+    "ei_n_m2",
+    "ei_low_n_m2",
+    "ei_high_n_m2",
+    "clamp_offset_um",
+    "clamp_offset_std_um",
+    "chi2",
+)
+SPAN_NUMBERS: Final = (
+    "place_um",
+    "k_un_um",
+    "k_std_un_um",
+    "k_loading_un_um",
+    "k_unloading_un_um",
+    "hinge_um",
+    "hinge_back_um",
+    "baseline_un",
+    "drift_un_s",
+    "hysteresis_percent",
+    "peak_un",
+    "chi2",
+)
+SHAPE_NUMBERS: Final = (
+    "length_um",
+    "length_std_um",
+    "width_um",
+    "width_std_um",
+    "curl",
+    "curl_std",
+)
+REGION_NUMBERS: Final = (
+    "region_left_px",
+    "region_top_px",
+    "region_width_px",
+    "region_height_px",
+)
+SEPARATOR: Final = "\n"
+
+
+def number(value: Cell) -> float:
+    """Return a cell as a number; nan for an empty one."""
+    return float(value) if isinstance(value, int | float) else math.nan
+
+
+def cell(value: float) -> float | None:
+    """Return a number as a cell, which is empty where there is none."""
+    return float(value) if math.isfinite(value) else None
+
+
+def fibre_row(record: FibreRecord, file: str) -> dict[str, Cell]:
+    """Return the row of a fibre's record."""
+    row: dict[str, Cell] = {
+        "outcome": record.outcome.value,
+        "began_s": record.began_s,
+        "ended_s": record.ended_s,
+        "cause": record.cause,
+        "text": record.text,
+        "attempts": record.attempts,
+        "peak_force_un": cell(record.peak_force_un),
+        "file": file,
+    }
+    row |= {name: cell(getattr(record.shape, name)) for name in SHAPE_NUMBERS}
+    row |= _pose_row("found", record.found) | _pose_row("left", record.left)
+    result = record.bending
+    if result is not None:
+        row |= {name: cell(getattr(result, name)) for name in RESULT_NUMBERS}
+        row["freedom"] = result.freedom
+        row["trusted"] = int(result.trusted)
+        row["flags"] = SEPARATOR.join(sorted(result.flags))
+        row["reasons"] = SEPARATOR.join(result.reasons)
+        row["used_spans"] = " ".join(map(str, result.used))
+    return row
+
+
+def _pose_row(which: str, pose: Pose | None) -> dict[str, Cell]:
+    if pose is None:
+        return {}
+    return {
+        f"{which}_x_plate_um": pose.x_plate_um,
+        f"{which}_y_plate_um": pose.y_plate_um,
+        f"{which}_angle_deg": pose.angle_deg,
+    }
+
+
+def span_row(fit: SpanFit) -> dict[str, Cell]:
+    """Return the row of a span."""
+    row: dict[str, Cell] = {name: cell(getattr(fit, name)) for name in SPAN_NUMBERS}
+    return row | {"freedom": fit.freedom, "flags": SEPARATOR.join(sorted(fit.flags))}
+
+
+def picture_row(picture: Picture, file: PurePosixPath, sha256: str) -> dict[str, Cell]:
+    """Return the row of a picture."""
+    region = picture.region_px or (None, None, None, None)
+    return {
+        "name": picture.name,
+        "file": str(file),
+        "sha256": sha256,
+        "taken_s": picture.taken_s,
+        "scale_um_px": cell(picture.scale_um_px),
+        "zoom": cell(picture.zoom),
+        "focus_um": cell(picture.focus_um),
+        "light_percent": cell(picture.light_percent),
+        **dict(zip(REGION_NUMBERS, region, strict=True)),
+    }
+
+
+def region_px(row: Row) -> tuple[int, int, int, int] | None:
+    """Return the region of a picture, if it has one."""
+    # A table of a campaign begun before there were regions does not have the columns.
+    left, top, width, height = (row.get(name) for name in REGION_NUMBERS)
+    if left is None or top is None or width is None or height is None:
+        return None
+    return int(left), int(top), int(width), int(height)
+
+
+def operation_row(operation: OperationRecord) -> dict[str, Cell]:
+    """Return the row of a try of an operation."""
+    return {
+        "name": operation.name,
+        "began_s": operation.began_s,
+        "ended_s": operation.ended_s,
+        "attempt": operation.attempt,
+        "cause": operation.cause,
+        "text": operation.text,
+    }
+
+
+def fibre_record(row: Row, spans: Sequence[Row], operations: Sequence[Row]) -> FibreRecord:
+    """Return a record without curves and pictures."""
+    return FibreRecord(
+        number=int(number(row["number"])),
+        outcome=Outcome(str(row["outcome"])),
+        began_s=number(row["began_s"]),
+        ended_s=number(row["ended_s"]),
+        found=_pose(row, "found"),
+        left=_pose(row, "left"),
+        shape=Shape(**{name: number(row[name]) for name in SHAPE_NUMBERS}),
+        cause=str(row["cause"]),
+        text=str(row["text"]),
+        attempts=int(row["attempts"] or 0),
+        peak_force_un=number(row["peak_force_un"]),
+        bending=None if row["trusted"] is None else _result(row, spans),
+        operations=tuple(_operation(each) for each in operations),
+    )
+
+
+def _pose(row: Row, which: str) -> Pose | None:
+    if row[f"{which}_x_plate_um"] is None:
+        return None
+    columns = ("x_plate_um", "y_plate_um", "angle_deg")
+    return Pose(*(number(row[f"{which}_{name}"]) for name in columns))
+
+
+def _flags(text: Cell) -> frozenset[Quality]:
+    return frozenset(Quality(each) for each in str(text).split(SEPARATOR) if each)
+
+
+def _result(row: Row, spans: Sequence[Row]) -> BendingResult:
+    numbers = {name: number(row[name]) for name in RESULT_NUMBERS}
+    return BendingResult(
+        **numbers,
+        spans=tuple(_span_fit(each, np.empty(0)) for each in spans),
+        used=tuple(int(each) for each in str(row["used_spans"]).split()),
+        freedom=int(row["freedom"] or 0),
+        flags=_flags(row["flags"]),
+        trusted=bool(row["trusted"]),
+        reasons=tuple(each for each in str(row["reasons"]).split(SEPARATOR) if each),
+    )
+
+
+def _span_fit(row: Row, fitted_un: Floats) -> SpanFit:
+    numbers = {name: number(row[name]) for name in SPAN_NUMBERS}
+    return SpanFit(
+        **numbers,
+        freedom=int(row["freedom"] or 0),
+        fitted_un=fitted_un,
+        flags=_flags(row["flags"]),
+    )
+
+
+def _operation(row: Row) -> OperationRecord:
+    return OperationRecord(
+        name=str(row["name"]),
+        began_s=number(row["began_s"]),
+        ended_s=number(row["ended_s"]),
+        attempt=int(row["attempt"] or 1),
+        cause=str(row["cause"]),
+        text=str(row["text"]),
+    )
+
+
+def insert(connection: sqlite3.Connection, table: str, row: Row) -> None:
+    """Add a row."""
+    names = ", ".join(row)
+    places = ", ".join("?" for _ in row)
+    connection.execute(f"INSERT INTO {table} ({names}) VALUES ({places})", tuple(row.values()))
+
+
+def update(connection: sqlite3.Connection, table: str, row: Row, *, key: int) -> None:
+    """Change the row with a number."""
+    pairs = ", ".join(f"{name} = ?" for name in row)
+    connection.execute(f"UPDATE {table} SET {pairs} WHERE number = ?", (*row.values(), key))
+
+
+FORMAT = "cosmic fibre"
+FORMAT_VERSION = 1
+COLUMNS = ("way_um", "force_un", "force_std_un", "time_s")
+
+
+def curves_file(record: FibreRecord) -> bytes:
+    """Return the file of a record."""
+    memory = io.BytesIO()
+    with h5py.File(memory, "w") as file:
+        file.attrs.update(
+            {"format": FORMAT, "format_version": FORMAT_VERSION, "fibre": record.number}
+        )
+        for number, span in enumerate(record.spans):
+            group = file.create_group(f"spans/{number:02d}")
+            _put_span(group, span)
+            if record.bending is not None and number < len(record.bending.spans):
+                group["fitted_un"] = record.bending.spans[number].fitted_un
+        for series in record.series:
+            group = file.create_group(f"series/{series.name}")
+            group.attrs["unit"] = series.unit
+            group["time_s"], group["values"] = series.time_s, series.values
+    return memory.getvalue()
+
+
+def _put_span(group: h5py.Group, span: Span) -> None:
+    group.attrs.update(
+        {
+            "nominal_um": span.nominal_um,
+            "probe_x_um": span.probe_x_um,
+            "hold_x_um": span.hold_x_um,
+        }
+    )
+    for name in COLUMNS:
+        group[name] = getattr(span, name)
+    group["loading"] = span.loading
+
+
+def read_curves(path: Path) -> tuple[tuple[Span, ...], tuple[Floats, ...], tuple[Series, ...]]:
+    """Return the spans, the fitted force of each, and the series.
+
+    Raises
+    ------
+    CampaignError
+        The file is not there, or not whole.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            groups = [file["spans"][name] for name in sorted(file.get("spans", ()))]
+            spans = tuple(_measured_span(group) for group in groups)
+            fitted = tuple(_fitted(group) for group in groups)
+            held = file.get("series", {})
+            series = tuple(
+                Series(
+                    name,
+                    str(held[name].attrs["unit"]),
+                    np.asarray(held[name]["time_s"]),
+                    np.asarray(held[name]["values"]),
+                )
+                for name in sorted(held)
+            )
+    except (OSError, KeyError) as exc:
+        raise CampaignError(f"{path} cannot be read: {exc}") from exc
+    return spans, fitted, series
+
+
+def _measured_span(group: h5py.Group) -> Span:
+    columns = {name: np.asarray(group[name]) for name in COLUMNS}
+    return Span(
+        nominal_um=float(group.attrs["nominal_um"]),
+        probe_x_um=float(group.attrs["probe_x_um"]),
+        hold_x_um=float(group.attrs["hold_x_um"]),
+        way_um=columns["way_um"],
+        force_un=columns["force_un"],
+        force_std_un=columns["force_std_un"],
+        time_s=columns["time_s"],
+        loading=np.asarray(group["loading"], dtype=np.bool_),
+    )
+
+
+def _fitted(group: h5py.Group) -> Floats:
+    if "fitted_un" in group:
+        return np.asarray(group["fitted_un"], dtype=np.float64)
+    return np.full(len(group["way_um"]), np.nan)

@@ -1,0 +1,392 @@
+"""`HandlingContext`: what the operations of one gripper share, and what grippers share."""
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+from typing_extensions import override
+
+from cosmic.autonomy.calibrating.registry import CalibrationRegistry
+from cosmic.autonomy.handling.force import ForceWatch
+from cosmic.autonomy.handling.held_fibre import HeldFibre
+from cosmic.autonomy.handling.plate import Candidate, Jaws, PlateFrame
+from cosmic.autonomy.handling.retrying_move import RetryingMove, way_back
+from cosmic.autonomy.handling.settings import HandlingSettings, of_arm
+from cosmic.autonomy.handling.sight import LastSeen, LivePicture, map_at
+from cosmic.autonomy.places import PlatformPlaces
+from cosmic.autonomy.procedures.failures import failure_of
+from cosmic.autonomy.procedures.operation import OperationFailed, Steps, UnitOperation
+from cosmic.autonomy.procedures.waits import Resource
+from cosmic.autonomy.tools import axis_targets
+from cosmic.daqco.api.daqco import Daqco
+from cosmic.frame.clock import Clock
+from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
+from cosmic.mico.api.mico import Mico
+from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.api.vico import Vico
+from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.pixel_map import Floats, PixelMap
+from cosmic.vico.core.tool_settings import ToolSettings
+
+
+def _never() -> bool:
+    return False
+
+
+@dataclass(slots=True, eq=False)
+class SharedWorkspace:
+    """What all arms share; belongs to the thread of the run.
+
+    Attributes
+    ----------
+    candidates : list of Candidate
+        Of the last survey, less those that were taken; on the plate.
+    skipped : list of Candidate
+        Those on which grasping failed: they are not tried a second time.
+    dropped : list of HeldFibre
+        Those that were measured, and fell on the way to the bin: they lie on the plate again.
+    skip_reasons : Counter of str
+        Why fibres of the last survey are not taken, and how many.
+    finished : list of HeldFibre
+        Those that were put away.
+    needs_initialisation : bool
+        Positions are not to be believed before the platform was initialised again.
+    seen : LastSeen
+        By which a frozen camera is known.
+    plate, probe : Resource
+        The plate with table and view of it, and the place in front of the probe: where several
+        arms work, each is used by one at a time.
+    arms : dict of str to HandlingContext
+        Where several work, each by its gripper's name.
+    enough : callable
+        Says whether no further fibre is to be begun, for a procedure that treats many.
+    """
+
+    candidates: list[Candidate] = field(default_factory=list)
+    lines_um: list[Floats] = field(default_factory=list)
+    skipped: list[Candidate] = field(default_factory=list)
+    dropped: list[HeldFibre] = field(default_factory=list)
+    skip_reasons: Counter[str] = field(default_factory=Counter)
+    zoomed: float | None = None
+    surveyed: bool = False
+    since_survey: int = 0
+    survey_deg: float = 0.0
+    finished: list[HeldFibre] = field(default_factory=list)
+    numbers: int = 0
+    needs_initialisation: bool = False
+    seen: LastSeen = field(default_factory=LastSeen)
+    plate: Resource = field(default_factory=lambda: Resource("the plate", 0))
+    probe: Resource = field(default_factory=lambda: Resource("the probe", 1))
+    arms: "dict[str, HandlingContext]" = field(default_factory=dict)
+    enough: Callable[[], bool] = _never
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """One calibration: when it was made, on the platform's clock, and how well it fits.
+
+    Attributes
+    ----------
+    residual : float
+        RMS, in `unit`.
+    """
+
+    time_s: float
+    residual: float
+    unit: str
+
+
+@dataclass(slots=True)
+class Calibration:
+    """What was measured before fibres are handled, by name, with when and how well.
+
+    Attributes
+    ----------
+    frame : PlateFrame
+        About which place the plate turns.
+    probe_off_um : (float, float)
+        How far the probe's tip is from where its stages say, in the frame of the gripper.
+    seen_off_um : (float, float)
+        The same as a picture showed it last: a touch tells it better, drift is told from this.
+    drift_looked_at : int
+        How many fibres were done with when drift was looked at last.
+    touching : bool
+        The probe has gone to a jaw, and not come back yet.
+    up_um : dict of str to float
+        How much higher above the plate the tip of each tool is than its stages say.
+    registry : CalibrationRegistry
+        Where it is kept beyond this work.
+    """
+
+    made: dict[str, Measured] = field(default_factory=dict)
+    frame: PlateFrame = field(default_factory=PlateFrame)
+    probe_off_um: tuple[float, float] = (0.0, 0.0)
+    seen_off_um: tuple[float, float] = (0.0, 0.0)
+    drift_looked_at: int = 0
+    touching: bool = False
+    up_um: dict[str, float] = field(default_factory=dict)
+    registry: CalibrationRegistry = field(default_factory=CalibrationRegistry)
+
+    def fresh(self, name: str, now_s: float, age_s: float) -> bool:
+        """Return whether a calibration is there and not too old."""
+        found = self.made.get(name)
+        return found is not None and now_s - found.time_s <= age_s
+
+
+class Applications(Protocol):
+    """A rig, as `cosmic.connect()` returns it."""
+
+    @property
+    def mico(self) -> Mico:
+        """Micromanipulation."""
+        ...
+
+    @property
+    def daqco(self) -> Daqco:
+        """Data acquisition."""
+        ...
+
+    @property
+    def vico(self) -> Vico:
+        """Vision."""
+        ...
+
+
+@dataclass(slots=True, eq=False)
+class HandlingContext:
+    """What one arm works with, and what it shares with others; belongs to the run's thread.
+
+    Attributes
+    ----------
+    shared : SharedWorkspace
+        What grippers share.
+    fibre : HeldFibre or None
+        The one held.
+    gap_um : float or None
+        Opening of the jaws, as steps since they were closed say; None before.
+    stray_um : float
+        How much higher than at first grasps are made now.
+    failures : list of (str, OperationFailed)
+        Every failure of an operation by its name, those included that a further try mended.
+    """
+
+    mico: Mico
+    daqco: Daqco
+    vico: Vico
+    settings: HandlingSettings
+    clock: Clock
+    forces: ForceWatch
+    calibration: Calibration = field(default_factory=Calibration)
+    shared: SharedWorkspace = field(default_factory=SharedWorkspace)
+    ready: bool = False
+    fibre: HeldFibre | None = None
+    gap_um: float | None = None
+    stray_um: float = 0.0
+    failures: list[tuple[str, OperationFailed]] = field(default_factory=list)
+
+    @classmethod
+    def on(cls, rig: Applications, settings: HandlingSettings | None = None) -> "HandlingContext":
+        """Return the work on a platform; close it at the end.
+
+        Raises
+        ------
+        ConfigError
+            The platform has no such tool, camera or force channel.
+        NotAvailable
+            An application is not hosted.
+        """
+        settings = settings or HandlingSettings()
+        clock = vision_of(rig.vico).clock
+        forces = ForceWatch(rig.daqco, settings.push.channel, clock)
+        work = cls(rig.mico, rig.daqco, rig.vico, settings, clock, forces)
+        for name in (settings.gripper, settings.probe, *filter(None, [settings.other])):
+            work.tool(name)
+        rig.vico.camera(settings.camera)
+        if isinstance(places := work.vision.places, PlatformPlaces):
+            work.calibration.registry = places.registry
+        forces.open()
+        return work
+
+    def close(self) -> None:
+        """Let go of the force channel."""
+        self.forces.close()
+
+    # Several arms
+
+    def arm(self, name: str) -> "HandlingContext":
+        """Return the work of one of two arms, each of which stays on its own side."""
+        arms = self.shared.arms
+        if name not in arms:
+            self.tool(name)
+            arms[name] = replace(
+                self,
+                settings=of_arm(self.settings, name),
+                calibration=Calibration(registry=self.calibration.registry),
+                fibre=None,
+                failures=[],
+            )
+        return arms[name]
+
+    @property
+    def arms(self) -> "tuple[HandlingContext, ...]":
+        """All that work: this one, where it is alone."""
+        return tuple(self.shared.arms.values()) or (self,)
+
+    @property
+    def beside_another(self) -> bool:
+        """True where another arm may be at work at the same time."""
+        return len(self.shared.arms) > 1
+
+    # What the platform has
+
+    @property
+    def vision(self) -> VicoApplication:
+        """The application behind cameras and places."""
+        return vision_of(self.vico)
+
+    def tool(self, name: str) -> ToolSettings:
+        """Return a tool of the platform file."""
+        tools = {each.name: each for each in self.vision.settings.tool}
+        if name not in tools:
+            known = ", ".join(tools) or "none"
+            raise ConfigError(f"there is no tool {name!r}; the platform has: {known}")
+        return tools[name]
+
+    @property
+    def gripper(self) -> ToolSettings:
+        """The tool that takes fibres up."""
+        return self.tool(self.settings.gripper)
+
+    @property
+    def probe(self) -> ToolSettings:
+        """The tool that pushes."""
+        return self.tool(self.settings.probe)
+
+    @property
+    def jaws(self) -> Jaws:
+        """The gripper as the choice of a fibre must know it."""
+        half_um = self.gripper.width_um + self.settings.grasp.gap_um / 2.0
+        return Jaws(forward=1.0 if self.gripper.forward[0] > 0.0 else -1.0, half_um=half_um)
+
+    @property
+    def table(self) -> str:
+        """Name of the axis that turns the plate."""
+        return self.vision.settings.table_axis
+
+    @property
+    def table_deg(self) -> float:
+        """Where the table stands."""
+        angle = self.mico[self.table].angle_deg
+        if angle is None:
+            raise NotAvailable(f"{self.table}: its angle is unknown: initialise the platform")
+        return angle
+
+    @property
+    def hold_tip_um(self) -> float:
+        """Height of the jaws' lower edge when a fibre is held in front of the probe."""
+        tip_um = self.probe.tip_um[2] + self.up_um(self.probe)
+        return tip_um - self.settings.places.hold_above_tip_um
+
+    def up_um(self, tool: ToolSettings) -> float:
+        """Return how much higher above the plate a tip is than its stages say."""
+        return self.calibration.up_um.get(tool.name, 0.0)
+
+    # Moving; places are those of a tool's tip
+
+    def at(
+        self, tool: ToolSettings, x_um: float, y_um: float, z_um: float | None = None
+    ) -> dict[str, float]:
+        """Return where the axes of a tool stand with its tip at a place."""
+        targets = axis_targets(tool, x_um, y_um)
+        if z_um is not None:
+            targets[tool.z_axis] = z_um - tool.tip_um[2] - self.up_um(tool)
+        return targets
+
+    def go(self, targets: Mapping[str, float]) -> RetryingMove:
+        """Begin to move; to be yielded."""
+        return RetryingMove(
+            lambda: self.mico.move(dict(targets), wait=False),
+            to_a_place=True,
+            back=way_back(self.mico, targets),
+        )
+
+    def go_up(self, z_um: float) -> RetryingMove:
+        """Begin to move the gripper to a height; to be yielded."""
+        tool = self.gripper
+        return self.go({tool.z_axis: z_um - tool.tip_um[2] - self.up_um(tool)})
+
+    def tip_now(self, tool: ToolSettings) -> tuple[float, float]:
+        """Return where a tool's tip is, as its stages say."""
+        x, y = self.mico[tool.x_axis].position_um, self.mico[tool.y_axis].position_um
+        if x is None or y is None:
+            raise NotAvailable(f"{tool.name}: its position is unknown: initialise it")
+        return tool.tip_um[0] + x, tool.tip_um[1] + y
+
+    def height_now(self) -> float:
+        """Return the height of the gripper's tip above the plate."""
+        z = self.mico[self.gripper.z_axis].position_um
+        if z is None:
+            raise NotAvailable(f"{self.gripper.name}: its height is unknown: initialise it")
+        return self.gripper.tip_um[2] + z + self.up_um(self.gripper)
+
+    @property
+    def grasp_um(self) -> float:
+        """Height of the jaws' lower edge when they close around a fibre."""
+        return self.settings.places.grasp_um + self.stray_um
+
+    def learn_height(self, *, held: bool) -> None:
+        """Make grasps a little higher after one that held, and lower after one that missed."""
+        places = self.settings.places
+        stray = self.stray_um + (places.raise_um if held else -places.lower_um)
+        self.stray_um = min(max(stray, -places.stray_um), places.stray_um)
+
+    # Looking
+
+    def picture(self) -> LivePicture:
+        """Return the next picture to be exposed; to be yielded."""
+        return LivePicture(self.vico.camera(self.settings.camera), self.clock, self.shared.seen)
+
+    def mapped(self, picture: Picture, height_um: float = 0.0) -> PixelMap:
+        """Return the map of a picture for things at a height above the plate."""
+        plate_um = self.vision.settings.plate_um
+        tool = self.settings.gripper if self.beside_another else None
+        return map_at(self.vision.places, picture, plate_um + height_um, tool)
+
+    def mapped_near(self, picture: Picture, height_um: float) -> PixelMap:
+        """Return the map of whichever of the two heights measured is nearer."""
+        held = height_um > 0.5 * self.hold_tip_um
+        return self.mapped(picture, self.hold_tip_um if held else 0.0)
+
+    def held_fibre(self) -> HeldFibre:
+        """Return the held fibre."""
+        if self.fibre is None:
+            raise NotAvailable("no fibre was chosen: choose one first")
+        return self.fibre
+
+
+def vision_of(vico: Vico) -> VicoApplication:
+    """Return the application behind the cameras; raises `NotAvailable` at another station."""
+    application = vico.application
+    if not isinstance(application, VicoApplication):
+        raise NotAvailable("the cameras belong to another station: handle fibres there")
+    return application
+
+
+class FibreOperation(UnitOperation[HandlingContext]):
+    """An operation that leaves word in the work of what it failed with.
+
+    Subclasses override `steps` instead of `run`.
+    """
+
+    @override
+    def run(self, work: HandlingContext) -> Steps:
+        try:
+            yield from self.steps(work)
+        except CosmicError as exc:
+            work.failures.append((self.name, failure_of(exc)))
+            raise
+
+    def steps(self, work: HandlingContext) -> Steps:
+        """Carry it out."""
+        raise NotImplementedError

@@ -1,0 +1,57 @@
+"""The one filter on all events of the program, which asks only those who wait for an event."""
+
+from collections.abc import Callable
+from typing import Final
+
+from PySide6.QtCore import QEvent, QObject
+from PySide6.QtWidgets import QApplication
+
+from cosmic.frame.overrides import override
+
+Handler = Callable[[QObject, QEvent], bool]
+"""Looks at an event before its receiver does; True keeps it from there."""
+
+_NAME: Final = "applicationEvents"
+
+
+class ApplicationEvents(QObject):
+    """Hands events of some classes to who wants them, before their receivers get them.
+
+    Every event of every widget comes by here, and each costs a wait for the interpreter where
+    other threads work; so there is one such filter, and it does no more than look up the class.
+    GUI thread.
+    """
+
+    def __init__(self, app: QApplication) -> None:
+        super().__init__(app)
+        self.setObjectName(_NAME)
+        self._handlers: dict[type[QEvent], tuple[tuple[QObject, Handler], ...]] = {}
+        app.installEventFilter(self)
+
+    @staticmethod
+    def of(app: QApplication) -> "ApplicationEvents":
+        """Return that of the program."""
+        return app.findChild(ApplicationEvents, _NAME) or ApplicationEvents(app)
+
+    def add(self, owner: QObject, handler: Handler, *kinds: type[QEvent]) -> None:
+        """Ask `handler` about events of just these classes, before those added earlier.
+
+        It is asked no more once its owner is deleted.
+        """
+        for kind in kinds:
+            self._handlers[kind] = ((owner, handler), *self._handlers.get(kind, ()))
+        owner.destroyed.connect(lambda: self.remove(owner))
+
+    def remove(self, owner: QObject, *kinds: type[QEvent]) -> None:
+        """Ask `owner` no more; without classes about nothing."""
+        for kind in kinds or tuple(self._handlers):
+            left = tuple(each for each in self._handlers.get(kind, ()) if each[0] is not owner)
+            if left:
+                self._handlers[kind] = left
+            else:
+                self._handlers.pop(kind, None)
+
+    @override
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        handlers = self._handlers.get(type(event))
+        return handlers is not None and any(ask(watched, event) for _, ask in handlers)

@@ -1,0 +1,1 @@
+"""What moves: the gate, the devices and their channels, groups, jogs."""

@@ -1,0 +1,265 @@
+"""`DeviceDataContainer`: the thread-safe state of one device's positioners (thesis 6.1.1)."""
+
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from threading import Condition
+from typing import Final
+
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import DeviceFault, NotAvailable
+from cosmic.mico.core.motion.positioner import (
+    Confidence,
+    CountedTravel,
+    PositionerBase,
+    PositionerState,
+    check_estimate,
+    class_for,
+)
+from cosmic.mico.core.settings import PositionerSettings
+from cosmic.mico.hw.interface import (
+    ActivityRead,
+    Channel,
+    Event,
+    Failed,
+    PositionerKind,
+    PositionerType,
+    PositionKnownRead,
+    PositionRead,
+    SafeDirectionRead,
+    SensorPresentRead,
+    TypeRead,
+)
+
+logger = logging.getLogger(__name__)
+
+Observer = Callable[[Event, PositionerState | None], None]
+
+NO_DEVICE: Final = "no device"
+_LOST_POSITION: Final = (DeviceFault.NO_SENSOR,)
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """What was set or counted on an axis, and must not be lost when devices are searched again."""
+
+    zero: float
+    frequency_hz: int | None
+    counted: float | None
+    std: float = 0.0
+
+
+class DeviceDataContainer:
+    """Keeps what is known of the positioners of one device; any thread.
+
+    `DeviceListener` writes through `apply`, `Device` reads and observes; neither knows the
+    other. Observers are called in the thread that wrote, after the state has changed, and must
+    return at once.
+
+    Parameters
+    ----------
+    device : int
+        Number of the device in the configuration.
+    configured : mapping of PositionerSettings
+        The positioners that the configuration expects here, by channel.
+    hold_s : float
+        How long closed-loop positions are held; inf for ever.
+    library_index : int
+        Index under which the library knows the device, which depends on what else is connected.
+    """
+
+    def __init__(
+        self,
+        device: int,
+        configured: Mapping[int, PositionerSettings],
+        hold_s: float,
+        library_index: int,
+    ) -> None:
+        self.device = device
+        self.library_index = library_index
+        self._configured = dict(configured)
+        self._hold_s = hold_s
+        self._changed = Condition()
+        self._positioners: dict[int, PositionerBase] = {}
+        self._unclear: set[int] = set()
+        self._observers: tuple[Observer, ...] = ()
+        self._memories: dict[str, Memory] = {}
+
+    def observe(self, observer: Observer) -> None:
+        """Call `observer(event, state)` after each event."""
+        self._observers = (*self._observers, observer)
+
+    def remember(self, memories: Mapping[str, Memory]) -> None:
+        """Take over what was set on axes of an earlier search, by name."""
+        self._memories = dict(memories)
+
+    def memories(self) -> dict[str, Memory]:
+        """Return what is to be taken over to a later search, by name."""
+        kept = dict(self._memories)
+        for each in self._positioners.values():
+            counted = None if each.has_sensor else each.state.position
+            kept[each.state.name] = Memory(
+                each.state.zero, each.frequency_hz, counted, each.state.std
+            )
+        return kept
+
+    # What is there
+
+    def expect(self, channel: int) -> None:
+        """Say that an answer about `channel` is awaited."""
+        with self._changed:
+            self._unclear.add(channel)
+
+    def settle(self, channel: int, kind: PositionerKind | None, reason: str = "") -> None:
+        """Say what `channel` has: a kind, or nothing (None)."""
+        with self._changed:
+            self._settle(channel, kind, None, reason)
+            self._changed.notify_all()
+
+    def wait_until_clear(self, timeout_s: float) -> bool:
+        """Wait until every expected channel has answered; False after `timeout_s` of wall time."""
+        with self._changed:
+            return self._changed.wait_for(lambda: not self._unclear, timeout_s)
+
+    @property
+    def clear(self) -> bool:
+        """True when every expected channel has answered."""
+        return not self._unclear
+
+    def _settle(
+        self, channel: int, kind: PositionerKind | None, found: PositionerType | None, reason: str
+    ) -> None:
+        self._unclear.discard(channel)
+        settings = self._configured.get(channel) or self._unconfigured(channel, kind)
+        if settings is None:
+            return
+        wanted = settings.positioner_kind
+        positioner = class_for(wanted, found)(settings, self.address(channel), found, self._hold_s)
+        memory = self._memories.get(settings.name)
+        if memory is not None:
+            positioner.frequency_hz = memory.frequency_hz
+            positioner.update(zero=memory.zero)
+            if memory.counted is not None and not positioner.has_sensor:
+                positioner.update(position=memory.counted, std=memory.std)
+        if channel not in self._configured:
+            text = "not in the configuration; add it there, then start again"
+            positioner.update(present=False, error=text)
+        elif kind is not wanted:
+            seen = kind.value if kind else reason or "nothing"
+            text = f"configured as {wanted}, but the controller finds {seen}; correct one of them"
+            if reason == NO_DEVICE:
+                text = f"device {self.device} was not found; connect it, then rescan"
+            positioner.update(present=False, error=text)
+            log = logger.debug if reason == NO_DEVICE else logger.error
+            log("%s: %s", settings.name, text)
+        self._positioners[channel] = positioner
+
+    def _unconfigured(self, channel: int, kind: PositionerKind | None) -> PositionerSettings | None:
+        """Make up settings for a sensor nobody configured; a channel without one is empty."""
+        if kind is None or kind is PositionerKind.OPEN_LOOP:
+            return None
+        name = f"device{self.device}.channel{channel}"
+        unit = "deg" if kind is PositionerKind.ROTARY else "um"
+        return PositionerSettings.model_validate(
+            {
+                "name": name,
+                "device": self.device,
+                "channel": channel,
+                "kind": kind.value,
+                f"limits_{unit}": (-1e-6, 1e-6),
+            }
+        )
+
+    # Reading
+
+    def positioner(self, channel: int) -> PositionerBase | None:
+        """Return the positioner on `channel`, or None where there is none."""
+        return self._positioners.get(channel)
+
+    def state(self, channel: int) -> PositionerState | None:
+        """Return the state of the positioner on `channel`, or None where there is none."""
+        positioner = self._positioners.get(channel)
+        return positioner.state if positioner else None
+
+    def channels(self) -> list[int]:
+        """Return the channels that have a positioner."""
+        return sorted(self._positioners)
+
+    def states(self) -> list[PositionerState]:
+        """Return the state of every positioner, by channel."""
+        return [self._positioners[channel].state for channel in self.channels()]
+
+    # Writing
+
+    def update(self, channel: int, **changes: object) -> PositionerState | None:
+        """Change fields of one positioner's state and return it."""
+        with self._changed:
+            positioner = self._positioners.get(channel)
+            return positioner.update(**changes) if positioner else None
+
+    def set_estimate(
+        self, channel: int, travel: CountedTravel | None, position: float, std: float
+    ) -> None:
+        """Say where an axis without sensor stands; raises as `check_estimate`."""
+        with self._changed:
+            positioner = self._positioners.get(channel)
+            if positioner is None:
+                raise NotAvailable(f"device {self.device} channel {channel} has no axis")
+            check_estimate(positioner.state, travel, position, std)
+            positioner.update(position=position, std=std)
+
+    def lose(self, reason: str) -> list[PositionerState]:
+        """Say that the whole device is gone; positions are worth nothing from now on."""
+        with self._changed:
+            return [
+                each.update(
+                    present=False,
+                    error=reason,
+                    confidence=Confidence.UNKNOWN if each.has_sensor else each.state.confidence,
+                    in_motion=False,
+                )
+                for each in self._positioners.values()
+            ]
+
+    def apply(self, event: Event) -> None:
+        """Take in one event of the controller; listener thread."""
+        with self._changed:
+            state = self._apply(event)
+            self._changed.notify_all()
+        for observer in self._observers:
+            observer(event, state)
+
+    def _apply(self, event: Event) -> PositionerState | None:
+        match event:
+            case SensorPresentRead():
+                if not event.present:
+                    self._settle(event.channel.channel, PositionerKind.OPEN_LOOP, None, "")
+            case TypeRead():
+                reason = f"the unknown type {event.positioner.name}"
+                self._settle(event.channel.channel, event.positioner.kind, event.positioner, reason)
+        if event.channel is None:
+            return None
+        positioner = self._positioners.get(event.channel.channel)
+        return None if positioner is None else _reflect(event, positioner)
+
+    def address(self, channel: int) -> Channel:
+        """Return the address of `channel` for calls to the controller."""
+        return Channel(self.library_index, channel)
+
+
+def _reflect(event: Event, positioner: PositionerBase) -> PositionerState:
+    """Write `event` into `positioner`."""
+    match event:
+        case PositionRead() if event.unit == positioner.state.unit:
+            return positioner.update(position=event.value, read_wall_s=WALL.now_s())
+        case ActivityRead():
+            return positioner.update(activity=event.activity)
+        case PositionKnownRead():
+            known = Confidence.KNOWN if event.known else Confidence.UNKNOWN
+            return positioner.update(confidence=known)
+        case SafeDirectionRead():
+            return positioner.update(safe_direction=event.direction)
+        case Failed() if event.error.fault in _LOST_POSITION and positioner.has_sensor:
+            return positioner.update(confidence=Confidence.UNKNOWN)
+        case _:
+            return positioner.state

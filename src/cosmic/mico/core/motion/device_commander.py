@@ -1,0 +1,236 @@
+"""`DeviceCommander`: the run-time API of one device, decoupled by signals (thesis 6.1.2)."""
+
+from abc import abstractmethod
+from collections.abc import Callable
+from enum import Flag, auto
+from typing import Protocol
+
+from PySide6.QtCore import QMetaObject, QObject, Qt, Signal, SignalInstance
+
+from cosmic.frame.errors import NotConnectedError
+from cosmic.frame.units import AxisUnit
+from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.core.motion.orders import (
+    Calibrate,
+    Jog,
+    Motion,
+    MoveBy,
+    MoveTo,
+    Order,
+    Reference,
+    Steer,
+    Step,
+    ToEndStop,
+)
+from cosmic.mico.hw.interface import Direction
+
+
+class CommanderType(Flag):
+    """What a commander is connected for (thesis program 6.2)."""
+
+    INPUT = auto()
+    """It commands movements."""
+    OUTPUT = auto()
+    """It hears what became of them."""
+    INPUT_OUTPUT = INPUT | OUTPUT
+
+
+class Commanded(Protocol):
+    """What a commander is joined to: a `Device`, or its counterpart of another process."""
+
+    @property
+    @abstractmethod
+    def position_changed(self) -> SignalInstance:
+        """See `Device`, as the other signals."""
+
+    @property
+    @abstractmethod
+    def state_changed(self) -> SignalInstance:
+        """The state of a positioner changed."""
+
+    @property
+    @abstractmethod
+    def movement_ended(self) -> SignalInstance:
+        """A movement ended."""
+
+    @property
+    @abstractmethod
+    def movement_refused(self) -> SignalInstance:
+        """The gate refused a movement."""
+
+    @abstractmethod
+    def submit(self, order: Order) -> None:
+        """Queue `order`."""
+
+    @abstractmethod
+    def renew_jog(self, order: Order) -> None:
+        """Keep the jog started by `order` alive."""
+
+    @abstractmethod
+    def steer_jog(self, order: Order, velocity: float) -> None:
+        """Keep the movement started by `order` alive at a signed speed."""
+
+    @abstractmethod
+    def halt(self, channel: int, why: str) -> None:
+        """Stop one channel past every queue."""
+
+    @abstractmethod
+    def set_frequency(self, channel: int, frequency_hz: int) -> None:
+        """Limit the closed-loop speed of one channel."""
+
+
+class DeviceCommander(QObject):
+    """Commands the channels of whatever device it is connected to, and hears from it.
+
+    It knows nothing of the device: `DeviceManager.connect_device_commander` joins the two. Each
+    command emits `order_issued` and returns at once with the `Movement`; any thread. Positions
+    are in gate coordinates.
+
+    Parameters
+    ----------
+    token : str
+        Proof of the lease.
+    source : str
+        Where its commands come from, for the log.
+
+    Signals
+    -------
+    order_issued(Order)
+        To the device.
+    position_changed(PositionChanged), state_changed(PositionerState),
+    movement_ended(MovementEnded), movement_refused(MoveVerdict)
+        From the device, in its thread.
+    """
+
+    order_issued = Signal(object)
+    jog_renewed = Signal(object)
+    jog_steered = Signal(object, float)
+    halt_requested = Signal(int, str)
+    position_changed = Signal(object)
+    state_changed = Signal(object)
+    movement_ended = Signal(object)
+    movement_refused = Signal(object)
+
+    def __init__(self, token: str, source: str = "script", parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._token = token
+        self.source = source
+        self._may_command = False
+        self._connections: list[QMetaObject.Connection] = []
+
+    def attach(self, connections: list[QMetaObject.Connection], kind: CommanderType) -> None:
+        """Take note of the connections to a device; for `connect_device_commander`."""
+        self.detach()
+        self._connections = connections
+        self._may_command = CommanderType.INPUT in kind
+
+    def detach(self) -> None:
+        """Part from the device."""
+        connections, self._connections = self._connections, []
+        for connection in connections:
+            QObject.disconnect(connection)
+        self._may_command = False
+
+    def move_absolute(
+        self, channel: int, target: float, unit: AxisUnit, *, consent: bool = False
+    ) -> Movement:
+        """Move to `target`."""
+        return self.send(channel, MoveTo(target, unit), consent=consent)
+
+    def move_relative(
+        self, channel: int, distance: float, unit: AxisUnit, *, consent: bool = False
+    ) -> Movement:
+        """Move by `distance`."""
+        return self.send(channel, MoveBy(distance, unit), consent=consent)
+
+    def move_steps(
+        self,
+        channel: int,
+        steps: int,
+        *,
+        amplitude_v: float,
+        frequency_hz: int,
+        consent: bool = False,
+    ) -> Movement:
+        """Make steps without looking at a sensor."""
+        return self.send(channel, Step(steps, amplitude_v, frequency_hz), consent=consent)
+
+    def calibrate(self, channel: int, *, consent: bool = False) -> Movement:
+        """Calibrate the sensor."""
+        return self.send(channel, Calibrate(), consent=consent)
+
+    def reference(self, channel: int, *, consent: bool = False) -> Movement:
+        """Find the reference."""
+        return self.send(channel, Reference(), consent=consent)
+
+    def move_to_end_stop(
+        self, channel: int, direction: Direction, *, consent: bool = False
+    ) -> Movement:
+        """Drive until the travel ends."""
+        return self.send(channel, ToEndStop(direction), consent=consent)
+
+    def jog(self, channel: int, direction: int, speed: float, *, consent: bool = False) -> Order:
+        """Begin to move continuously; call `renew_jog` several times within the dead-man time."""
+        return self._issue(channel, Jog(direction, speed), consent=consent)
+
+    def renew_jog(self, order: Order) -> None:
+        """Keep the jog begun by `order` alive."""
+        self.jog_renewed.emit(order)
+
+    def steer(self, channel: int, velocity: float, *, dead_man_s: float) -> Order:
+        """Begin to move at a signed speed that `steer_on` changes; it ends when that stays away."""
+        direction = 1 if velocity > 0.0 else -1
+        return self._issue(channel, Steer(direction, abs(velocity), dead_man_s), consent=False)
+
+    def steer_on(self, order: Order, velocity: float) -> None:
+        """Keep the movement begun by `steer` alive at `velocity`; only the newest counts."""
+        self.jog_steered.emit(order, velocity)
+
+    def stop(self, channel: int, why: str = "stopped") -> None:
+        """Stop one channel; nothing is latched."""
+        self.halt_requested.emit(channel, why)
+
+    def send(
+        self,
+        channel: int,
+        motion: Motion,
+        *,
+        consent: bool = False,
+        follows: Movement | None = None,
+    ) -> Movement:
+        """Send any motion; with `follows`, only if that is still the newest on its channel."""
+        return self._issue(channel, motion, consent=consent, follows=follows).movement
+
+    def _issue(
+        self, channel: int, motion: Motion, *, consent: bool, follows: Movement | None = None
+    ) -> Order:
+        if not self._may_command:
+            raise NotConnectedError("this commander is connected to no device, or only listens")
+        order = Order(channel, motion, self._token, self.source, consent, follows=follows)
+        self.order_issued.emit(order)
+        return order
+
+
+def join(device: Commanded, commander: DeviceCommander, kind: CommanderType) -> None:
+    """Connect a commander to a device, parting it from any other.
+
+    The connections are direct: a command goes into the device's queue in the caller's thread, so
+    that no event loop is needed to make a move.
+    """
+    pairs: list[tuple[SignalInstance, Callable[..., object] | SignalInstance]] = []
+    if CommanderType.INPUT in kind:
+        pairs += [
+            (commander.order_issued, device.submit),
+            (commander.jog_renewed, device.renew_jog),
+            (commander.jog_steered, device.steer_jog),
+            (commander.halt_requested, device.halt),
+        ]
+    if CommanderType.OUTPUT in kind:
+        pairs += [
+            (device.position_changed, commander.position_changed),
+            (device.state_changed, commander.state_changed),
+            (device.movement_ended, commander.movement_ended),
+            (device.movement_refused, commander.movement_refused),
+        ]
+    direct = Qt.ConnectionType.DirectConnection
+    commander.attach([signal.connect(slot, direct) for signal, slot in pairs], kind)

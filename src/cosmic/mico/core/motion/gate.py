@@ -1,0 +1,358 @@
+"""The one gate in front of the vendor library: every movement from anywhere is decided here."""
+
+from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import dataclass, replace
+from functools import reduce
+from itertools import count
+from threading import Lock
+from typing import Final
+
+from cosmic.frame.clock import WALL
+from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.mico.core.collision import words
+from cosmic.mico.core.collision.answer import AxisSpan
+from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
+from cosmic.mico.core.motion.checks import (
+    Decision,
+    Limits,
+    PlatformSnapshot,
+    Request,
+    judge,
+    origin,
+    span_of,
+    still_true,
+)
+from cosmic.mico.core.motion.lease import Lease, LeaseHolder
+from cosmic.mico.core.motion.orders import Grant, Interval, Motion
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState
+from cosmic.mico.core.motion.stop_latch import StopLatch, StopState
+
+SOON_S: Final = 0.05
+"""An answer that took no longer is as new as the positions, which are asked for so often."""
+MOST_JUDGED: Final = 3
+"""How often movements are judged because the platform changed meanwhile."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Hold:
+    grant: Grant
+    interval: Interval
+    target: float | None
+    begun_at: float | None
+    heading: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Unused:
+    """A reservation that was given and not used yet."""
+
+    grant: Grant
+    motion: Motion
+
+
+@dataclass(slots=True)
+class Question:
+    """What the gate is asked by one thread for another, which may take it back at any time."""
+
+    taken_back: bool = False
+    grants: tuple[Grant, ...] = ()
+
+
+class Gate:
+    """Keeps what is in flight and asks `judge`; any thread.
+
+    A reservation (`Grant`) covers one motion of one axis and is used once, with `claim`, at the
+    moment at which the motion is sent. Only the object that the gate gave counts, no copy of it.
+
+    Parameters
+    ----------
+    states : callable
+        Returns the state of every positioner by name.
+    regions : mapping of Interval
+        Where each axis may stand at power-up; anywhere, where it has none.
+    links : callable
+        Returns, by axis, those that must move with it.
+    """
+
+    def __init__(
+        self,
+        *,
+        latch: StopLatch,
+        lease: Lease,
+        checker: CollisionChecker,
+        rules: Limits,
+        states: Callable[[], Mapping[str, PositionerState]],
+        regions: Mapping[str, Interval] | None = None,
+        links: Callable[[], Mapping[str, frozenset[str]]] = dict,
+    ) -> None:
+        self._latch = latch
+        self._lease = lease
+        self._checker = checker
+        self._rules = rules
+        self._states = states
+        self._judging = Lock()  # one decision at a time; what has ended is released meanwhile
+        self._lock = Lock()  # of the reservations; never held while somebody waits for an answer
+        self._links = links
+        self._numbers = count(1)
+        self._holds: dict[str, dict[int, _Hold]] = {}
+        self._given = 0
+        self._sent: dict[str, int] = {}
+        # By identity; each read and written in one step, for `claim` takes no lock.
+        self._unused: dict[int, _Unused] = {}
+        self._power_up = dict(regions or {})
+        self._regions = dict(self._power_up)
+
+    @property
+    def checker(self) -> CollisionChecker:
+        """The collision model, or the stand-in that says there is none."""
+        return self._checker
+
+    @property
+    def prompt(self) -> bool:
+        """True where nothing is asked that may be long in answering."""
+        return isinstance(self._checker, NoCollisionModel)
+
+    def check(self, requests: Sequence[Request], *, advice: bool = True) -> MoveVerdict:
+        """Say whether `requests` would be allowed now, without reserving anything.
+
+        `advice` is that of `CollisionChecker.check`.
+        """
+        holder = self._lease.holder
+        return judge(requests, self._snapshot(holder), self._checker, advice=advice).verdict
+
+    def decide(
+        self, requests: Sequence[Request], question: Question | None = None
+    ) -> tuple[MoveVerdict, dict[str, Grant]]:
+        """Decide `requests` together; when allowed, hold their intervals and grant each axis.
+
+        Nothing is held, or granted, for a `question` that was taken back meanwhile.
+        """
+        for _ in range(MOST_JUDGED):
+            holder = self._lease.holder  # first, for it may tell listeners that it has lapsed
+            before = holder.token, self._revision
+            verdict, grants = self._decide(requests, holder, question)
+            # Looked at when the intervals are held: who changes it later finds them.
+            if before == (self._lease.holder.token, self._revision):
+                return verdict, grants
+            for grant in grants.values():
+                self.release(grant)
+        return words.changed(), {}
+
+    @property
+    def _revision(self) -> object:
+        return getattr(self._checker, "revision", None)
+
+    def _decide(
+        self, requests: Sequence[Request], holder: LeaseHolder, question: Question | None
+    ) -> tuple[MoveVerdict, dict[str, Grant]]:
+        with self._judging:
+            epoch = self._latch.state.epoch
+            snapshot, decision = self._judge(requests, holder)
+            with self._lock:
+                if question is not None and question.taken_back:
+                    return decision.verdict, {}
+                grants = self._hold(requests, snapshot, decision, epoch)
+                if question is not None:
+                    question.grants = tuple(grants.values())
+                return decision.verdict, grants
+
+    def _hold(
+        self,
+        requests: Sequence[Request],
+        snapshot: PlatformSnapshot,
+        decision: Decision,
+        epoch: int,
+    ) -> dict[str, Grant]:
+        """Reserve what was decided; under both locks."""
+        grants: dict[str, Grant] = {}
+        asked = {request.axis: request.motion for request in requests}
+        for axis, interval in decision.intervals.items():
+            target = decision.targets.get(axis)
+            grant = Grant(axis, next(self._numbers), epoch, target)
+            state = snapshot.states[axis]
+            if state.confidence is Confidence.UNKNOWN:
+                self._regions[axis] = interval  # wherever that ends, it is somewhere there
+            way = decision.headings.get(axis)
+            hold = _Hold(grant, interval, target, origin(state, snapshot.begun_at), way)
+            self._holds.setdefault(axis, {})[grant.number] = hold
+            self._given = grant.number
+            self._unused[id(grant)] = _Unused(grant, asked[axis])
+            grants[axis] = grant
+        return grants
+
+    def _judge(
+        self, requests: Sequence[Request], holder: LeaseHolder
+    ) -> tuple[PlatformSnapshot, Decision]:
+        """Judge `requests` by the platform as it still is when the answer comes.
+
+        Meanwhile reservations may be released, and none is added: only who decides adds any.
+        """
+        snapshot = self._snapshot(holder)
+        for _ in range(MOST_JUDGED):
+            decision = judge(requests, snapshot, self._checker)
+            soon = WALL.now_s() - snapshot.now_wall_s <= SOON_S
+            if soon or not decision.verdict.allowed:
+                return snapshot, decision
+            now = self._snapshot(holder)
+            if still_true(requests, snapshot, now):
+                return snapshot, decision
+            snapshot = now
+        return snapshot, Decision(words.changed(), {}, {}, {})
+
+    def spans(self) -> dict[str, AxisSpan]:
+        """Return where every axis may be as things are now."""
+        holder = self._lease.holder
+        snapshot = self._snapshot(holder)
+        return {name: span_of(state, None, snapshot) for name, state in snapshot.states.items()}
+
+    def still_valid(self, grant: Grant) -> bool:
+        """Return False when a stop came after `grant`; takes no lock."""
+        state = self._latch.state
+        return not state.latched and state.epoch == grant.epoch
+
+    # Reservations
+
+    def objection(self, grant: Grant, axis: str, motion: Motion) -> MoveVerdict | None:
+        """Return why `grant` does not cover sending `motion` to `axis` now; takes no lock."""
+        given = self._unused.get(id(grant))
+        if given is None:
+            known = type(grant) is Grant and grant.number in range(1, self._given + 1)
+            why = "was used or released before" if known else "was not given by the gate"
+        elif given.grant.axis != axis:
+            why = f"is for {given.grant.axis}"
+        elif given.motion is not motion:
+            why = "is for another motion"
+        elif not self.still_valid(grant):
+            text = f"{axis}: stopped before it was sent; give the order again after the reset"
+            return refuse(Reason.STOPPED, text, axis=axis)
+        else:
+            return None
+        text = f"{axis}: its reservation {why}; nothing was sent. Give the order anew"
+        return refuse(Reason.NO_LEASE, text, axis=axis)
+
+    def claim(self, grant: Grant, axis: str, motion: Motion) -> MoveVerdict | None:
+        """Use `grant` up at the moment at which `motion` is sent to `axis`; takes no lock.
+
+        Returns why it must not be sent, or None, which it does once for each reservation.
+        """
+        refused = self.objection(grant, axis, motion)
+        if refused is None and self._unused.pop(id(grant), None) is None:
+            refused = self.objection(grant, axis, motion)  # another thread came first
+        if refused is None:
+            self._sent[axis] = grant.number
+        return refused
+
+    def expire(self, axes: Set[str]) -> frozenset[str]:
+        """End the unused reservations of `axes`; returns those that hold any. Takes no lock."""
+        for key, given in list(self._unused.items()):
+            if given.grant.axis in axes:
+                self._unused.pop(key, None)
+        return frozenset(axis for axis, holds in list(self._holds.items()) if holds) & axes
+
+    def superseded(self, grant: Grant) -> bool:
+        """Return True when a movement decided later was sent to the axis; takes no lock."""
+        return self._sent.get(grant.axis, 0) > grant.number
+
+    def withdraw(self, grant: Grant | None) -> None:
+        """Release a reservation of an order that is not sent; harmless for any other.
+
+        One in use keeps its interval, for orders come from anybody.
+        """
+        if self._unused.pop(id(grant), None) is not None and grant is not None:
+            self.release(grant)
+
+    def take_back(self, question: Question) -> None:
+        """Give back what was granted to a question, or have it granted nothing."""
+        with self._lock:
+            question.taken_back = True
+            grants = question.grants
+        for grant in grants:
+            self.withdraw(grant)
+
+    def release(self, grant: Grant) -> None:
+        """Give back the interval of a movement that has ended, its position read; or replaced.
+
+        The interval of a movement that replaces another holds the other's as well.
+        """
+        with self._lock:
+            self._unused.pop(id(grant), None)
+            holds = self._holds.get(grant.axis, {})
+            hold = holds.get(grant.number)
+            if hold is not None and hold.grant is grant:
+                del holds[grant.number]
+
+    def abandon(self, grant: Grant) -> None:
+        """Keep the interval, but no longer count on the target: the movement will not get there."""
+        with self._lock:
+            hold = self._holds.get(grant.axis, {}).get(grant.number)
+            if hold is not None and hold.grant is grant:
+                self._holds[grant.axis][grant.number] = replace(hold, target=None)
+
+    def release_axis(self, axis: str) -> None:
+        """Give back all of an axis that stands and whose position has just been read."""
+        with self._lock:
+            for hold in self._holds.pop(axis, {}).values():
+                self._unused.pop(id(hold.grant), None)
+
+    @property
+    def stop_state(self) -> StopState:
+        """State of the stop latch; takes no lock."""
+        return self._latch.state
+
+    def held(self) -> dict[str, Interval]:
+        """Return the intervals in flight by axis."""
+        with self._lock:
+            return self._held()
+
+    def targets(self) -> dict[str, float]:
+        """Return where the axes in flight go, by axis."""
+        with self._lock:
+            return self._targets()
+
+    def _held(self) -> dict[str, Interval]:
+        return {
+            axis: reduce(Interval.hull, (hold.interval for hold in holds.values()))
+            for axis, holds in self._holds.items()
+            if holds
+        }
+
+    def _headings(self) -> dict[str, int]:
+        newest = {axis: holds[max(holds)] for axis, holds in self._holds.items() if holds}
+        return {axis: hold.heading for axis, hold in newest.items() if hold.heading is not None}
+
+    def _targets(self) -> dict[str, float]:
+        newest = {axis: holds[max(holds)] for axis, holds in self._holds.items() if holds}
+        return {axis: hold.target for axis, hold in newest.items() if hold.target is not None}
+
+    def _begun_at(self) -> dict[str, float | None]:
+        return {axis: holds[min(holds)].begun_at for axis, holds in self._holds.items() if holds}
+
+    def _regions_now(self, states: Mapping[str, PositionerState]) -> dict[str, Interval]:
+        """Return where axes may be that nobody knows, or would be, were their position lost."""
+        for name, state in states.items():
+            known = state.present and state.confidence is not Confidence.UNKNOWN
+            if known and state.position is not None and name in self._power_up:
+                here = Interval(state.position, state.position)
+                self._regions[name] = self._power_up[name].hull(here)
+        return dict(self._regions)
+
+    def _snapshot(self, holder: LeaseHolder) -> PlatformSnapshot:
+        with self._lock:
+            return self._snapshot_now(holder)
+
+    def _snapshot_now(self, holder: LeaseHolder) -> PlatformSnapshot:
+        states = self._states()
+        return PlatformSnapshot(
+            stop_reason=self._latch.state.reason,
+            token=holder.token,
+            holder=holder.name,
+            states=states,
+            held=self._held(),
+            begun_at=self._begun_at(),
+            headings=self._headings(),
+            regions=self._regions_now(states),
+            links=self._links(),
+            targets=self._targets(),
+            now_wall_s=WALL.now_s(),
+            rules=self._rules,
+        )

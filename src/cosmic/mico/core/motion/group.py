@@ -1,0 +1,251 @@
+"""Several axes ordered at once: links, speeds that match, and one start for all."""
+
+import logging
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from cosmic.frame.errors import refusal
+from cosmic.frame.verdict import MoveVerdict
+from cosmic.mico.core.motion.checks import Request
+from cosmic.mico.core.motion.gate import Gate
+from cosmic.mico.core.motion.group_start import GroupStart, GroupStarted
+from cosmic.mico.core.motion.lease import Lease
+from cosmic.mico.core.motion.links import LinkTable
+from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.core.motion.orders import FREQUENCY_HZ, Grant, Motion, Order
+from cosmic.mico.core.motion.positioner import PositionerState, class_for
+from cosmic.mico.core.settings import MicoSettings, MotionDefaults
+from cosmic.mico.hw.interface import Channel
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """What one axis has before it.
+
+    Attributes
+    ----------
+    way : float
+        How far it goes, without sign, in its unit.
+    step : float
+        How far it goes with one step, in its unit.
+    approach : float
+        What its slow end costs, as a way in its unit gone at full speed.
+    top_hz : int
+        The most steps per second that it may make.
+    """
+
+    way: float
+    step: float
+    approach: float
+    top_hz: int
+
+    @property
+    def steps(self) -> float:
+        """How many steps its way is worth."""
+        return (self.way + self.approach) / self.step
+
+
+def matched_frequencies(legs: Mapping[str, Leg]) -> dict[str, int]:
+    """Return the steps per second of every axis that has a way to go.
+
+    The axis that takes longest keeps the speed that it has; the others are slowed down to it.
+    """
+    moving = {name: leg for name, leg in legs.items() if leg.way > 0.0}
+    longest_s = max((leg.steps / leg.top_hz for leg in moving.values()), default=0.0)
+    low, _ = FREQUENCY_HZ
+    return {
+        name: max(low, min(leg.top_hz, math.ceil(leg.steps / longest_s - 1e-9)))
+        for name, leg in moving.items()
+    }
+
+
+class _Device(Protocol):
+    def submit(self, order: Order) -> None:
+        """Queue an order."""
+
+
+class Axes(Protocol):
+    """What is known of the axes of a platform, and the way to their devices."""
+
+    @property
+    def settings(self) -> MicoSettings:
+        """Settings of the platform."""
+
+    def address(self, name: str) -> Channel:
+        """Return where an axis is connected; raises `UnknownAxisError`."""
+
+    def states(self) -> dict[str, PositionerState]:
+        """Return the state of every axis by name."""
+
+    def usual_frequency_hz(self, name: str) -> int:
+        """Return the closed-loop frequency limit that is set on an axis."""
+
+    def device(self, name: str) -> _Device:
+        """Return the device that drives an axis."""
+
+
+class GroupOrders:
+    """Has movements of several axes decided together and started back to back; any thread.
+
+    Parameters
+    ----------
+    check_ready : callable
+        Raises `MoveRefused` while axes cannot be moved.
+    on_refused, on_started : callable
+        Told that the gate refused a group, and that one was started, by whoever found out.
+    """
+
+    def __init__(
+        self,
+        axes: Axes,
+        *,
+        gate: Gate,
+        links: LinkTable,
+        lease: Lease,
+        check_ready: Callable[[], None],
+        on_refused: Callable[[MoveVerdict], None],
+        on_started: Callable[[GroupStarted], None],
+    ) -> None:
+        self._axes = axes
+        self._gate = gate
+        self._links = links
+        self._lease = lease
+        self._check_ready = check_ready
+        self._on_refused = on_refused
+        self._on_started = on_started
+
+    def check(self, motions: Mapping[str, Motion], *, consent: bool) -> MoveVerdict:
+        """Return what the gate says to `motions`, and those linked to them, as they are now."""
+        self._check_names(motions)
+        return self._gate.check(self._requests(self._with_linked(motions), consent=consent))
+
+    def order(
+        self,
+        motions: Mapping[str, Motion],
+        *,
+        source: str,
+        consent: bool,
+        linked: bool,
+        match_arrival: bool,
+        follows: Mapping[str, Movement],
+        slow_hz: Mapping[str, int] | None = None,
+    ) -> dict[str, Order]:
+        """Start `motions` together, or none of them; see `ManagerPort.order_together`."""
+        self._check_names(motions)
+        if linked:
+            named = len(motions)
+            motions = self._with_linked(motions)
+            match_arrival = match_arrival or len(motions) > named
+        requests = self._requests(motions, consent=consent, alone=not linked)
+        self._check_ready()
+        grants = self._granted(requests, source)
+        speeds = self._matched_speeds(grants) if match_arrival else {}
+        speeds |= {name: hertz for name, hertz in (slow_hz or {}).items() if name in motions}
+        start = GroupStart(len(motions), self._on_started) if len(motions) > 1 else None
+        token, guard = self._lease.local_token, self._lease.guard()
+        orders = {
+            name: Order(
+                self._axes.address(name).channel,
+                motion,
+                token,
+                source,
+                consent,
+                grant=grants[name],
+                follows=follows.get(name),
+                start=start,
+                frequency_hz=speeds.get(name),
+                guard=guard,
+            )
+            for name, motion in motions.items()
+        }
+        self._submit(orders)
+        return orders
+
+    def _check_names(self, motions: Mapping[str, Motion]) -> None:
+        """Raise `UnknownAxisError` where one of the axes does not exist."""
+        for name in motions:
+            self._axes.address(name)
+
+    def _with_linked(self, motions: Mapping[str, Motion]) -> dict[str, Motion]:
+        """Return `motions` with those of the axes linked to them."""
+        if not self._links.links:
+            return dict(motions)
+        going = self._gate.targets()
+        stand = {
+            name: going.get(name, state.position)
+            for name, state in self._axes.states().items()
+            if state.position is not None
+        }
+        known = {name: where for name, where in stand.items() if where is not None}
+        return self._links.expanded(motions, known, self._axes.settings.watch.tolerance_um)
+
+    def _requests(
+        self, motions: Mapping[str, Motion], *, consent: bool, alone: bool = False
+    ) -> list[Request]:
+        token, guard = self._lease.local_token, self._lease.guard()
+        return [
+            Request(name, motion, token, consent, alone=alone, guard=guard)
+            for name, motion in motions.items()
+        ]
+
+    def _granted(self, requests: list[Request], source: str) -> dict[str, Grant]:
+        verdict, grants = self._gate.decide(requests)
+        if not verdict.allowed:
+            logger.warning("refused (%s): %s", source, verdict)
+            self._on_refused(verdict)
+            raise refusal(verdict)
+        self._links.sent(
+            {name: each.target for name, each in grants.items() if each.target is not None}
+        )
+        return grants
+
+    def _matched_speeds(self, grants: Mapping[str, Grant]) -> dict[str, int]:
+        axes = self._axes
+        return _frequencies(grants, axes.states(), axes.settings.defaults, axes.usual_frequency_hz)
+
+    def _submit(self, orders: Mapping[str, Order]) -> None:
+        _give_up_together(orders)
+        for name, order in orders.items():
+            self._axes.device(name).submit(order)
+
+
+def _frequencies(
+    grants: Mapping[str, Grant],
+    states: Mapping[str, PositionerState],
+    defaults: MotionDefaults,
+    usual_hz: Callable[[str], int],
+) -> dict[str, int]:
+    """Return the speed limit of every axis with which all arrive at the same time."""
+    legs: dict[str, Leg] = {}
+    for name, grant in grants.items():
+        state = states[name]
+        sensed = class_for(state.kind, state.positioner).has_sensor
+        if not sensed or grant.target is None or state.position is None:
+            continue
+        rotary = state.unit == "deg"
+        legs[name] = Leg(
+            way=abs(grant.target - state.position),
+            step=defaults.nominal_step_deg if rotary else defaults.nominal_step_um,
+            approach=defaults.approach_deg if rotary else defaults.approach_um,
+            top_hz=usual_hz(name),
+        )
+    return matched_frequencies(legs)
+
+
+def _give_up_together(orders: Mapping[str, Order]) -> None:
+    """Have the failure of one of `orders` before the common start withdraw the others."""
+
+    def on_end(ended: Movement) -> None:
+        if ended.success:
+            return
+        for order in orders.values():
+            start = order.start
+            if not order.movement.done and start is not None and start.skew_ms is None:
+                order.movement.cancel()
+
+    for order in orders.values():
+        order.movement.add_callback(on_end)

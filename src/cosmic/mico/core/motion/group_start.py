@@ -1,0 +1,97 @@
+"""The start of several axes at once: prepared by their devices, then sent back to back."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from threading import Lock
+from typing import Final, Protocol
+
+from cosmic.frame.clock import WALL
+
+logger = logging.getLogger(__name__)
+
+_TURN_S: Final = 1e-6
+"""A wait as short as this lets every thread that waits for the interpreter go first."""
+
+
+class Departure(Protocol):
+    """One axis that is ready to go; the methods may be called in any device's thread."""
+
+    @property
+    def name(self) -> str:
+        """Name of the axis."""
+
+    def go(self) -> bool:
+        """Send the movement to the controller; False where it was withdrawn before."""
+
+    def tell(self) -> None:
+        """Let its own device know that it was sent."""
+
+
+@dataclass(frozen=True, slots=True)
+class GroupStarted:
+    """Several axes were started back to back.
+
+    Attributes
+    ----------
+    skew_ms : float
+        From the call of the library for the first axis to that for the last, in wall time.
+    """
+
+    names: tuple[str, ...]
+    skew_ms: float
+
+
+class GroupStart:
+    """Collects the axes of a group as their devices get them ready; the last one starts all.
+
+    An SCU cannot start several channels by one command, so they are started by calls back to
+    back in one thread, past the devices' own (see "Stop and the simultaneous start of a group" in
+    the architecture). Whoever waits for the others holds no thread up: an axis that is halted
+    or replaced meanwhile is withdrawn.
+
+    Parameters
+    ----------
+    count : int
+        How many axes there are.
+    """
+
+    def __init__(self, count: int, on_started: Callable[[GroupStarted], None]) -> None:
+        self._count = count
+        self._on_started = on_started
+        self._lock = Lock()
+        self._ready: list[Departure] = []
+        self._skew_ms: float | None = None
+
+    @property
+    def skew_ms(self) -> float | None:
+        """From the first call to the last, in milliseconds; None before the start."""
+        return self._skew_ms
+
+    def arrive(self, departure: Departure) -> None:
+        """Say that an axis is ready; the last one starts them all. Device thread."""
+        with self._lock:
+            self._ready.append(departure)
+            complete = len(self._ready) == self._count
+        if complete:
+            self._start()
+
+    def _start(self) -> None:
+        stamps_s: list[float] = []
+        # With a fresh turn of the interpreter all calls are over before another thread may claim
+        # it. A shorter turn would hand it over between two of them.
+        WALL.sleep(_TURN_S)
+        for departure in self._ready:
+            now_s = WALL.now_s()
+            if departure.go():
+                stamps_s.append(now_s)
+        # Telling wakes the other devices' threads, which would only be in the way before.
+        for departure in self._ready:
+            departure.tell()
+        names = tuple(departure.name for departure in self._ready)
+        self._ready = []
+        if not stamps_s:
+            return
+        self._skew_ms = 1e3 * (stamps_s[-1] - stamps_s[0])
+        logger.info("%s started within %.2f ms", ", ".join(names), self._skew_ms)
+        self._on_started(GroupStarted(names, self._skew_ms))

@@ -1,0 +1,649 @@
+"""`DeviceManager`: finds the devices, owns their threads, and stops them all (thesis 6.1)."""
+
+import logging
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass
+from threading import RLock
+from typing import Final
+
+from PySide6.QtCore import QObject, Qt, Signal
+
+from cosmic.frame.clock import Clock
+from cosmic.frame.errors import (
+    CosmicError,
+    DeviceError,
+    NotAvailable,
+    NotConnectedError,
+    UnknownAxisError,
+    refusal,
+)
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.threads import urgent
+from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
+from cosmic.mico.core.collision.collision_manager import CollisionManager
+from cosmic.mico.core.collision.exemptions import Exemptions
+from cosmic.mico.core.collision.model import BodyPair
+from cosmic.mico.core.mode import Mode
+from cosmic.mico.core.motion.checks import Limits
+from cosmic.mico.core.motion.data_container import NO_DEVICE, DeviceDataContainer, Memory
+from cosmic.mico.core.motion.device import CHANNELS, Device
+from cosmic.mico.core.motion.device_commander import CommanderType, DeviceCommander, join
+from cosmic.mico.core.motion.device_listener import DeviceListener
+from cosmic.mico.core.motion.gate import Gate
+from cosmic.mico.core.motion.group import GroupOrders
+from cosmic.mico.core.motion.lease import Lease
+from cosmic.mico.core.motion.links import LinkTable
+from cosmic.mico.core.motion.messages import DeviceLost
+from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.core.motion.orders import Interval, Motion, Order
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState
+from cosmic.mico.core.motion.stop_latch import StopLatch
+from cosmic.mico.core.settings import MicoSettings, WatchSettings
+from cosmic.mico.hw.interface import Channel, Controller, DeviceIdentity
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Inventory:
+    """The devices by index, where each axis is connected, and what is not there, a line each."""
+
+    devices: dict[int, Device]
+    addresses: dict[str, Channel]
+    missing: tuple[str, ...]
+
+
+class DeviceMaker:
+    """Makes the devices with all that they need.
+
+    Parameters
+    ----------
+    on_lost : callable
+        Method of a QObject, called in the thread of a device that cannot be reached any more.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        *,
+        gate: Gate,
+        clock: Clock,
+        settings: MicoSettings,
+        policy: FailurePolicy,
+        on_lost: Callable[[DeviceLost], None],
+    ) -> None:
+        self._controller = controller
+        self._gate = gate
+        self._clock = clock
+        self._settings = settings
+        self._policy = policy
+        self._on_lost = on_lost
+
+    def inventory(
+        self,
+        library_index: Mapping[int, int],
+        memories: Mapping[str, Memory],
+        *,
+        searched: bool,
+    ) -> Inventory:
+        """Make containers and devices for what is present and for what is only configured.
+
+        Parameters
+        ----------
+        library_index : mapping of int
+            The library's index of each device that is present, by its number in the configuration.
+        memories : mapping of Memory
+            What the user has set on each axis, which outlives the search for devices.
+        searched : bool
+            The hardware was looked for, so that what is not present is missing.
+        """
+        positioners, hold_s = self._settings.positioner, self._settings.defaults.hold
+        devices: dict[int, Device] = {}
+        addresses: dict[str, Channel] = {}
+        missing: list[str] = []
+        for number in sorted({each.device for each in positioners} | set(library_index)):
+            here = {each.channel: each for each in positioners if each.device == number}
+            at = library_index.get(number, number)
+            container = DeviceDataContainer(number, here, hold_s, library_index=at)
+            container.remember(memories)
+            if number not in library_index:
+                for channel in here:
+                    container.settle(channel, None, NO_DEVICE)
+                if searched:
+                    names = ", ".join(each.name for each in here.values())
+                    missing.append(f"device {number} was not found ({names})")
+            devices[number] = self._make(container)
+            for positioner in here.values():
+                addresses[positioner.name] = positioner.address
+        return Inventory(devices, addresses, tuple(missing))
+
+    def _make(self, container: DeviceDataContainer) -> Device:
+        device = Device(
+            self._controller,
+            container,
+            gate=self._gate,
+            clock=self._clock,
+            settings=self._settings,
+            policy=self._policy,
+        )
+        device.lost.connect(self._on_lost, Qt.ConnectionType.DirectConnection)
+        return device
+
+
+def open_devices(controller: Controller, wanted: Sequence[int]) -> dict[int, int]:
+    """Open the devices with the serial numbers `wanted`, or all where none are.
+
+    Returns
+    -------
+    dict of int
+        The library's index of each device by its number in the configuration.
+    """
+    identities = controller.open(_serials_to_open(controller, wanted))
+    return _library_indices(controller, wanted, identities)
+
+
+def _serials_to_open(controller: Controller, wanted: Sequence[int]) -> tuple[int, ...]:
+    """Return those of the configured serial numbers that are connected; none wanted opens all.
+
+    Raises
+    ------
+    NotConnectedError
+        None of them is there; a foreign device is never opened instead.
+    """
+    if not wanted:
+        return ()
+    found = controller.find_devices()
+    present = tuple(serial for serial in wanted if serial in found)
+    if not present:
+        raise NotConnectedError(
+            f"none of the configured devices is connected (serial numbers {_listed(wanted)}; "
+            f"found {_listed(found)}); check power and USB, or the serials in the platform file"
+        )
+    return present
+
+
+def _library_indices(
+    controller: Controller, wanted: Sequence[int], identities: Sequence[DeviceIdentity]
+) -> dict[int, int]:
+    """Return the library's index of each device by its number in the configuration.
+
+    The library numbers whatever is connected, so that one device missing would shift the others
+    onto foreign axes: only the serial numbers tell which is which.
+    """
+    if wanted:
+        return {wanted.index(each.serial): each.index for each in identities}
+    if len(identities) > 1 and not controller.simulated:
+        logger.warning("no serials are configured: devices are numbered as the library does")
+    return {each.index: each.index for each in identities}
+
+
+def _listed(serials: Collection[int]) -> str:
+    return ", ".join(map(str, serials)) or "none"
+
+
+class DeviceThreads:
+    """Owns the `DeviceListener` of each device, and remembers threads that did not end.
+
+    `stop_channels` may be called from any thread, the rest by the one that starts and ends.
+    """
+
+    def __init__(self, controller: Controller, watch: WatchSettings, policy: FailurePolicy) -> None:
+        self._controller = controller
+        self._watch = watch
+        self._policy = policy
+        self._listeners: dict[int, DeviceListener] = {}
+        self._stuck: list[Device] = []
+
+    def check_none_hangs(self) -> None:
+        """Raise `NotConnectedError` while a thread of an earlier run still uses the library."""
+        stuck = [device.name for device in self._stuck if device.isRunning()]
+        if stuck:
+            raise NotConnectedError(
+                f"{', '.join(stuck)} still hangs in the library; start the program again"
+            )
+
+    def start(self, devices: Collection[Device]) -> None:
+        """Start a listener and the thread of each of `devices`."""
+        channels = len(devices) * len(CHANNELS)
+        for device in devices:
+            device.set_poll_period(
+                max(1 / self._watch.poll_hz, channels / self._watch.poll_total_hz)
+            )
+            listener = DeviceListener(
+                self._controller, device.container, self._policy, on_lost=device.lose
+            )
+            self._listeners[device.index] = listener
+            listener.start()
+            device.begin()
+
+    def stop_channels(self, device: Device) -> None:
+        """Stop every channel of a device, past its thread."""
+        for channel in device.container.channels():
+            try:
+                self._controller.stop(device.container.address(channel))
+            except DeviceError as exc:
+                logger.error("device %d channel %d: stop failed: %s", device.index, channel, exc)
+
+    def end(self, devices: Iterable[Device]) -> None:
+        """Stop every channel, end the threads that run, and stop every channel once more."""
+        running = [device for device in devices if device.isRunning()]
+        for device in running:  # past the threads, one of which may hang in the library
+            self.stop_channels(device)
+        for device in running:
+            device.request_end()
+        self._stuck = [device for device in running if not device.join()]
+        for device in self._stuck:
+            logger.error("%s hangs in the library and was left behind", device.name)
+        for device in running:
+            self.stop_channels(device)
+        for listener in self._listeners.values():
+            listener.request_end()
+        for listener in self._listeners.values():
+            listener.join()
+        self._listeners.clear()
+
+
+CLOSED: Final = "MiCo is closed"
+WATCHED_AGAIN: Final = (
+    "stopped: it is checked for collisions again, and this movement began without; give it anew"
+)
+
+
+class DeviceManager(QObject):
+    """Initialises the controller, makes a `Device` and a `DeviceListener` for each device.
+
+    Calls block for as long as the hardware takes and are made by the application's thread or by
+    tests; `stop` and `order` may be called from any thread and return at once.
+
+    Signals
+    -------
+    changed()
+        Mode, devices or the list of what is missing changed.
+    device_lost(DeviceLost)
+        A device cannot be reached any more.
+    group_refused(MoveVerdict)
+        Movements that were to begin together were refused; in the thread of who asked.
+    group_started(GroupStarted)
+        Several axes were started back to back; in the thread of a device.
+    links_changed()
+        Axes were linked, or are linked no more.
+    """
+
+    changed = Signal()
+    device_lost = Signal(object)
+    group_refused = Signal(object)
+    group_started = Signal(object)
+    links_changed = Signal()
+
+    def __init__(
+        self,
+        controller: Controller,
+        settings: MicoSettings,
+        *,
+        clock: Clock,
+        policy: FailurePolicy,
+        checker: CollisionChecker | None = None,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.settings = settings
+        self._devices: dict[int, Device] = {}
+        self._addresses: dict[str, Channel] = {}
+        self._missing: tuple[str, ...] = ()
+        self.controller = controller
+        self.clock = clock
+        self.latch = StopLatch()
+        self.lease = Lease()
+        self.links = LinkTable(settings.link)
+        self.links.subscribe(self.links_changed.emit)
+        self._policy = policy
+        self._busy = RLock()
+        self._mode = Mode.CLOSED
+        self._closed = False
+        self._threads = DeviceThreads(controller, settings.watch, policy)
+        self.gate = self._make_gate(checker or NoCollisionModel())
+        self._maker = DeviceMaker(
+            controller,
+            gate=self.gate,
+            clock=clock,
+            settings=settings,
+            policy=policy,
+            on_lost=self._on_device_lost,
+        )
+        self._groups = self._make_groups()
+        if self.exemptions is not None:
+            self.exemptions.on_watched_again = self._on_watched_again
+        self._arrange({})
+
+    def _make_gate(self, checker: CollisionChecker) -> Gate:
+        return Gate(
+            latch=self.latch,
+            lease=self.lease,
+            checker=checker,
+            rules=Limits.of(self.settings),
+            states=self.states,
+            regions={name: Interval(*at) for name, at in self.settings.start_regions.items()},
+            links=self.links.partners,
+        )
+
+    def _make_groups(self) -> GroupOrders:
+        return GroupOrders(
+            self,
+            gate=self.gate,
+            links=self.links,
+            lease=self.lease,
+            check_ready=self._check_ready,
+            on_refused=self.group_refused.emit,
+            on_started=self.group_started.emit,
+        )
+
+    # What there is
+
+    @property
+    def mode(self) -> Mode:
+        """What the manager is at."""
+        return self._mode
+
+    @property
+    def ready(self) -> bool:
+        """True while axes can be moved."""
+        return self._mode is Mode.RUN_TIME
+
+    @property
+    def exemptions(self) -> Exemptions | None:
+        """What is left out of the collision check; None without a collision model."""
+        checker = self.gate.checker
+        return checker if isinstance(checker, Exemptions) else None
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """What was configured and not found, or was lost, a line each."""
+        return self._missing
+
+    @property
+    def devices(self) -> Mapping[int, Device]:
+        """The devices by index, also those configured and not found."""
+        return dict(self._devices)
+
+    def names(self) -> list[str]:
+        """Return the names of all axes: those configured, in their order, then any others."""
+        configured = [each.name for each in self.settings.positioner]
+        return [*configured, *(name for name in self._addresses if name not in configured)]
+
+    def address(self, name: str) -> Channel:
+        """Return where an axis is connected.
+
+        Raises
+        ------
+        UnknownAxisError
+            There is none of that name.
+        """
+        try:
+            return self._addresses[name]
+        except (KeyError, TypeError):
+            raise UnknownAxisError(name, self.names()) from None
+
+    def state(self, name: str) -> PositionerState:
+        """Return the state of an axis; raises `UnknownAxisError`."""
+        address = self.address(name)
+        state = self._devices[address.device].container.state(address.channel)
+        return state if state is not None else self._looked_for(name)
+
+    def _looked_for(self, name: str) -> PositionerState:
+        """Return the state of a configured axis that has not answered yet."""
+        for settings in self.settings.positioner:
+            if settings.name == name:
+                return PositionerState(
+                    name=name,
+                    address=settings.address,
+                    kind=settings.positioner_kind,
+                    unit=settings.unit,
+                    limits=settings.limits,
+                    error="it is being looked for",
+                    present=False,
+                )
+        raise UnknownAxisError(name, self.names())
+
+    def states(self) -> dict[str, PositionerState]:
+        """Return the state of every axis by name."""
+        return {
+            state.name: state
+            for device in list(self._devices.values())
+            for state in device.container.states()
+        }
+
+    def positions(self) -> dict[str, float] | None:
+        """Return the position of every axis in gate coordinates; None while one is unknown."""
+        positions: dict[str, float] = {}
+        for state in self.states().values():
+            if state.position is None or state.confidence is Confidence.UNKNOWN:
+                return None
+            positions[state.name] = state.position
+        return positions
+
+    def device(self, name: str) -> Device:
+        """Return the device that drives an axis; raises `UnknownAxisError`."""
+        return self._devices[self.address(name).device]
+
+    def connect_device_commander(
+        self,
+        index: int,
+        commander: DeviceCommander,
+        kind: CommanderType = CommanderType.INPUT_OUTPUT,
+    ) -> None:
+        """Join a commander to the device `index`, parting it from any other (Fig. 6.4).
+
+        The connections are direct: a command goes into the device's queue in the caller's
+        thread, so that no event loop is needed to make a move.
+
+        Raises
+        ------
+        NotAvailable
+            There is no such device.
+        """
+        device = self._devices.get(index)
+        if device is None:
+            raise NotAvailable(f"there is no device {index}")
+        join(device, commander, kind)
+
+    def usual_frequency_hz(self, name: str) -> int:
+        """Return the closed-loop frequency limit that is set on an axis."""
+        found = self.device(name).container.positioner(self.address(name).channel)
+        own_hz = None if found is None else found.frequency_hz
+        return own_hz or self.settings.defaults.closed_loop_frequency_hz
+
+    def _memories(self) -> dict[str, Memory]:
+        """Return what the user has set on each axis, which outlives the search for devices."""
+        return {
+            name: memory
+            for device in self._devices.values()
+            for name, memory in device.container.memories().items()
+        }
+
+    def _exchange(self, found: Inventory) -> None:
+        # Exchanged whole, for other threads look things up meanwhile.
+        self._devices, self._addresses = found.devices, found.addresses
+        self._missing = found.missing
+
+    def _note_missing(self, reason: str) -> None:
+        self._missing = (*self._missing, reason)
+
+    def _note_channels(self, device: Device) -> None:
+        """Take in the axes that were found on a device and are not configured."""
+        for channel in device.container.channels():
+            state = device.container.state(channel)
+            if state is not None:
+                self._addresses.setdefault(state.name, Channel(device.index, channel))
+
+    # Starting and ending
+
+    def initialize_devices(self) -> None:
+        """Find and open the hardware, start the threads, wait until every channel is known.
+
+        Raises
+        ------
+        DeviceError
+            No device at all, or the library failed; nothing is left open.
+        """
+        with self._busy:
+            if self._closed:
+                raise NotConnectedError(CLOSED)
+            self._threads.check_none_hangs()
+            self._set_mode(Mode.INITIALISATION)
+            self.gate.checker.start()
+            try:
+                library_index = open_devices(self.controller, self.settings.serials)
+            except DeviceError:
+                self.controller.close()
+                self._arrange({})
+                self._set_mode(Mode.FAILED)
+                raise
+            self._arrange(library_index)
+            self.changed.emit()  # commanders join the new devices before anybody may use them
+            self._start(library_index)
+            self._set_mode(Mode.RUN_TIME)
+
+    def _arrange(self, library_index: Mapping[int, int]) -> None:
+        """Take what is present, and what is only configured, in place of what was there."""
+        searched = self._mode is not Mode.CLOSED
+        self._exchange(self._maker.inventory(library_index, self._memories(), searched=searched))
+
+    def _start(self, numbers: Collection[int]) -> None:
+        devices = [self._devices[number] for number in numbers]
+        self._threads.start(devices)
+        for device in devices:
+            self._await_discovery(device)
+        for device in devices:
+            for state in device.container.states():
+                if state.present and state.position is not None:
+                    self.gate.release_axis(state.name)  # it stands, and was read just now
+
+    def _await_discovery(self, device: Device) -> None:
+        if not device.wait_until_discovered(self.settings.watch.answer_s):
+            reason = f"device {device.index} did not tell what is connected to it"
+            logger.error("%s", reason)
+            self._note_missing(reason)
+        self._note_channels(device)
+
+    def shut_down(self) -> None:
+        """Stop everything, release the hold, end the threads, close the library; any mode."""
+        with self._busy:
+            self.latch.void_grants()
+            self._threads.end(self._devices.values())
+            for device in self._devices.values():
+                device.container.lose(CLOSED)
+            self.controller.close()
+            self._set_mode(Mode.CLOSED)
+
+    def close(self) -> None:
+        """Shut down for good: nothing opens the hardware again; any mode."""
+        self._closed = True
+        self.shut_down()
+        self.gate.checker.close()
+
+    def rescan(self) -> None:
+        """Close everything and look again for the hardware; raises as `initialize_devices`.
+
+        Raises
+        ------
+        NotAvailable
+            An axis is moving.
+        """
+        with self._busy:
+            moving = [state.name for state in self.states().values() if state.in_motion]
+            if moving:
+                raise NotAvailable(f"{', '.join(moving)} is moving; stop it before a rescan")
+            self.shut_down()
+            self.initialize_devices()
+
+    def _set_mode(self, mode: Mode) -> None:
+        self._mode = mode
+        self.changed.emit()
+
+    # Run time
+
+    def check(self, motions: Mapping[str, Motion], *, consent: bool = False) -> MoveVerdict:
+        """Return what the gate says to all of `motions` together, without moving anything."""
+        return self._groups.check(motions, consent=consent)
+
+    def order_together(
+        self,
+        motions: Mapping[str, Motion],
+        *,
+        source: str,
+        consent: bool = False,
+        linked: bool = True,
+        match_arrival: bool = False,
+        follows: Mapping[str, Movement] | None = None,
+        slow_hz: Mapping[str, int] | None = None,
+    ) -> dict[str, Order]:
+        """Decide `motions` together and start them back to back, or none; see `ManagerPort`.
+
+        `slow_hz` limits the steps per second of single axes for this movement.
+        """
+        return self._groups.order(
+            motions,
+            source=source,
+            consent=consent,
+            linked=linked,
+            match_arrival=match_arrival,
+            follows=follows or {},
+            slow_hz=slow_hz,
+        )
+
+    def _check_ready(self) -> None:
+        if self._mode is not Mode.RUN_TIME:
+            raise refusal(
+                refuse(Reason.DEVICE, f"MiCo is not ready ({self._mode}); wait, or rescan")
+            )
+
+    # Stopping
+
+    def stop(self, reason: str = "stop") -> None:
+        """Stop every channel now and stay stopped until `reset_stop`; any thread.
+
+        It overtakes every queue and takes no lock that a hardware call can hold. The device
+        threads repeat it after the call they may be in.
+        """
+        self.latch.set(reason)
+        error = refusal(refuse(Reason.STOPPED, f"stopped: {reason}"))
+        devices = list(self._devices.values())
+        for device in devices:
+            device.stop_later(error)
+        with urgent():
+            for device in devices:
+                if device.isRunning():
+                    self._threads.stop_channels(device)
+        logger.warning("stop: %s", reason)
+        self.latch.announce()
+
+    def reset_stop(self) -> None:
+        """Allow motion again."""
+        self.latch.reset()
+        logger.info("stop reset")
+
+    def _on_watched_again(self, axes: Set[str], pairs: Set[BodyPair]) -> None:
+        """Stop what moves only by leave of an exemption that has ended; any thread.
+
+        What is under way, or reserved, is judged without it.
+        """
+        checker = self.gate.checker
+        movers = checker.movers(pairs) if isinstance(checker, CollisionManager) and pairs else set()
+        affected = self.gate.held().keys() & {*axes, *movers}
+        if not affected or checker.check(self.gate.spans(), advice=False).allowed:
+            return
+        for name in sorted(self.gate.expire(affected)):
+            self.device(name).halt(self.address(name).channel, WATCHED_AGAIN)
+
+    def _on_device_lost(self, lost: DeviceLost) -> None:
+        self._note_missing(lost.reason)
+        if lost.in_motion:
+            self.stop(f"{lost.reason}; it was moving")
+        self._policy.report(_LostError(lost.reason), f"device {lost.index}")
+        self.device_lost.emit(lost)
+        self.changed.emit()
+
+
+class _LostError(CosmicError):
+    """Carries the loss of a device to the failure policy."""

@@ -1,0 +1,20 @@
+"""A movement under way, as seen by whoever asked for it."""
+
+from cosmic.frame.operation import Operation
+
+
+class Movement(Operation[float | None]):
+    """The operation that one movement is; its result is the position reached, if it is known.
+
+    Besides what `Operation.wait` raises: `MoveRefused` where the gate refused it or a stop ended it
+    (`StoppedError`), `MoveCancelled` where it was cancelled or replaced by a newer command, and
+    `DeviceError` where it failed at the hardware.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("the movement")
+
+    @property
+    def cancelled(self) -> bool:
+        """True once `cancel` was called."""
+        return self.cancel_requested

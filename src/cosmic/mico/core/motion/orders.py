@@ -1,0 +1,165 @@
+"""What can be asked of an axis, as frozen data."""
+
+from dataclasses import dataclass, field
+from itertools import count
+from typing import Final
+
+from cosmic.frame.units import AxisUnit
+from cosmic.mico.core.motion.group_start import GroupStart
+from cosmic.mico.core.motion.lease import Guard
+from cosmic.mico.core.motion.movement import Movement
+from cosmic.mico.hw.interface import Direction
+
+_numbers: Final = count(1)
+
+LARGEST_STEPS: Final = 29999
+FREQUENCY_HZ: Final = (1, 18500)
+AMPLITUDE_V: Final = (15.0, 100.0)
+
+
+@dataclass(frozen=True, slots=True)
+class MoveTo:
+    """Go to a position in gate coordinates."""
+
+    target: float
+    unit: AxisUnit
+
+
+@dataclass(frozen=True, slots=True)
+class MoveBy:
+    """Go a distance from where the axis stands, or from where it is going."""
+
+    distance: float
+    unit: AxisUnit
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Make steps without looking at a sensor; the sign is the direction."""
+
+    steps: int
+    amplitude_v: float
+    frequency_hz: int
+
+
+@dataclass(frozen=True, slots=True)
+class Jog:
+    """Keep moving while somebody renews it; `speed` in um/s, deg/s, or Hz for open loop."""
+
+    direction: int
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class Steer(Jog):
+    """A jog whose speed and direction follow somebody's hand; ends `dead_man_s` after it is lost.
+
+    The dead-man time counts on the wall clock.
+    """
+
+    dead_man_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Calibrate:
+    """Calibrate the sensor; sweeps several millimetres both ways."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """Find the reference; may sweep the whole travel."""
+
+
+@dataclass(frozen=True, slots=True)
+class ToEndStop:
+    """Drive until the travel ends."""
+
+    direction: Direction
+
+
+MOTION_WORDS: Final[dict[type, str]] = {
+    MoveTo: "a position to go to",
+    MoveBy: "a distance to go",
+    Step: "making steps",
+    Jog: "jogging",
+    Steer: "steering",
+    Calibrate: "calibrating a sensor",
+    Reference: "finding a reference",
+    ToEndStop: "driving to an end stop",
+}
+"""What each motion is called before the operator."""
+
+Motion = MoveTo | MoveBy | Step | Jog | Calibrate | Reference | ToEndStop
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """All places of one axis that a movement can take it to, in the axis' unit."""
+
+    low: float
+    high: float
+
+    def hull(self, other: "Interval") -> "Interval":
+        """Return the smallest interval that holds both."""
+        return Interval(min(self.low, other.low), max(self.high, other.high))
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """A reservation: the gate's leave to make one movement once, void after the next stop.
+
+    It holds the interval that the movement may sweep until it is given back (`Gate.release`).
+    Only the object that the gate gave is worth anything; it is used up with `Gate.claim`.
+    """
+
+    axis: str
+    number: int
+    epoch: int
+    target: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """One command on its way to a `Device`.
+
+    Attributes
+    ----------
+    channel : int
+        Channel of the device it is sent to.
+    motion : Motion
+        What to do.
+    token : str
+        Who sends it (see `Lease`).
+    source : str
+        Where it came from, for the log: "window", "key", "script" ...
+    consent : bool
+        The operator agreed to move an axis whose position is unknown.
+    movement : Movement
+        Completed when the movement ends.
+    grant : Grant or None
+        Set where the gate has already decided, together with others.
+    epoch : int or None
+        Number of stops so far when it was submitted; a stop since then makes it void.
+    follows : Movement or None
+        The order is void unless this was the newest on its channel, and nothing was halted since.
+    start : GroupStart or None
+        Others that it starts together with.
+    frequency_hz : int or None
+        Limit of the closed-loop speed for this movement only.
+    guard : Guard or None
+        Ends the movement when it expires; None for what this process commands.
+    """
+
+    channel: int
+    motion: Motion
+    token: str
+    source: str = "script"
+    consent: bool = False
+    movement: Movement = field(default_factory=Movement)
+    grant: Grant | None = None
+    follows: Movement | None = None
+    epoch: int | None = None
+    start: GroupStart | None = None
+    frequency_hz: int | None = None
+    guard: Guard | None = None
+    number: int = field(default_factory=lambda: next(_numbers))

@@ -1,0 +1,276 @@
+"""Where a camera's handle gets its pictures: from the camera here, or from another station."""
+
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final, Protocol
+
+from typing_extensions import override
+
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import CosmicError, DeviceTimeout, NotAvailable
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.job_queue import JobQueue
+from cosmic.frame.threads import forbid_waiting_here, may_wait_here
+from cosmic.vico.api.camera_shown import Seen
+from cosmic.vico.api.places import Places
+from cosmic.vico.api.sent_picture import ReceivedPicture, SentPicture, SentSeen
+from cosmic.vico.core.camera_unit import CameraUnit
+from cosmic.vico.core.picture import Picture
+
+if TYPE_CHECKING:
+    from cosmic.vico.api.application import VicoApplication
+    from cosmic.vico.api.camera import CameraHandle
+
+IDLE_S: Final = 3.0
+"""Wall time after the last look when pictures of another station need not come any more."""
+MISSED_S: Final = 0.3
+"""Silence after which a picture that the station has did not come."""
+CLOSE_S: Final = 30.0
+"""How long the end of a recording may make no progress."""
+LOOK_S: Final = 0.05
+
+
+class CameraPictures(Protocol):
+    """What differs between a camera here and one elsewhere; any thread."""
+
+    @property
+    @abstractmethod
+    def jobs(self) -> JobQueue:
+        """Takes the pictures of plans."""
+
+    @property
+    @abstractmethod
+    def places(self) -> Places | None:
+        """What joins pixels and platform."""
+
+    @property
+    @abstractmethod
+    def newest(self) -> Picture | None:
+        """The newest picture as it came."""
+
+    @property
+    @abstractmethod
+    def analysis(self) -> Seen | None:
+        """The newest result of machine vision."""
+
+    @abstractmethod
+    def latest(self) -> Picture | None:
+        """Return the newest whole picture as a view shows it."""
+
+    @abstractmethod
+    def since(self, since_s: float) -> Picture | None:
+        """Return the newest whole picture if it was exposed then or later."""
+
+    @abstractmethod
+    def next(self, timeout_s: float, since_s: float | None) -> Picture:
+        """Wait for a whole picture exposed from then on."""
+
+    @abstractmethod
+    def on_picture(self, listener: Callable[[], object]) -> Callable[[], None]:
+        """Call `listener()` at each whole picture."""
+
+    @abstractmethod
+    def wait_closed(self) -> None:
+        """Wait until the recording is closed."""
+
+
+class PicturesHere(CameraPictures):
+    """Of a camera of this process."""
+
+    def __init__(self, application: "VicoApplication", unit: CameraUnit) -> None:
+        self._application, self._unit = application, unit
+
+    @property
+    @override
+    def jobs(self) -> JobQueue:
+        return self._unit.jobs
+
+    @property
+    @override
+    def places(self) -> Places | None:
+        return self._application.places
+
+    @property
+    @override
+    def newest(self) -> Picture | None:
+        return self._unit.thread.newest
+
+    @property
+    @override
+    def analysis(self) -> Seen | None:
+        newest = self._unit.vision.newest
+        return Seen.of(newest) if newest is not None else None
+
+    @override
+    def latest(self) -> Picture | None:
+        return self._unit.shown()
+
+    @override
+    def since(self, since_s: float) -> Picture | None:
+        last = self._unit.thread.last
+        if last is None or not last.frame.exposed_s >= since_s:
+            return None
+        return self._unit.corrected(last)
+
+    @override
+    def next(self, timeout_s: float, since_s: float | None) -> Picture:
+        since = self._application.clock.now_s() if since_s is None else since_s
+        return self._unit.thread.next_picture(since, timeout_s)
+
+    @override
+    def on_picture(self, listener: Callable[[], object]) -> Callable[[], None]:
+        return self._unit.thread.on_newest(listener)
+
+    @override
+    def wait_closed(self) -> None:
+        self._unit.recordings.stop()
+
+
+def always() -> bool:
+    """Return True: somebody wants it."""
+    return True
+
+
+class PicturesElsewhere(CameraPictures):
+    """Of a camera of another station; they come while somebody looks.
+
+    Parameters
+    ----------
+    camera : CameraHandle
+        The proxy of the camera.
+    """
+
+    def __init__(self, camera: "CameraHandle", policy: FailurePolicy) -> None:
+        self._camera = camera
+        self._jobs = JobQueue(f"pictures of {camera.name}", policy)
+        self._places: Places | None = None
+        self._shown: ReceivedPicture | None = None
+        self._seen: Seen | None = None
+        self._looked: dict[str, float] = {}
+        self._ends: dict[str, Callable[[], None]] = {}
+        self._came_s = -float("inf")
+        self._asked_for: int | None = None
+
+    @property
+    def live(self) -> bool:
+        """Pictures are being sent, because somebody looks, and have come."""
+        return "shown" in self._ends and self._came_s > 0.0
+
+    def join_places(self, places: Places) -> None:
+        """Say what joins pixels and platform."""
+        self._places = places
+
+    # What a handle asks
+
+    @property
+    @override
+    def jobs(self) -> JobQueue:
+        return self._jobs
+
+    @property
+    @override
+    def places(self) -> Places | None:
+        return self._places
+
+    @property
+    @override
+    def newest(self) -> Picture | None:
+        return self.latest() if may_wait_here() else self._shown
+
+    @property
+    @override
+    def analysis(self) -> Seen | None:
+        self._look("seen", self._camera.watch_seen, self._take_seen)
+        return self._seen
+
+    @override
+    def latest(self) -> Picture | None:
+        self._look("shown", self._camera.watch_shown, self._take_shown)
+        if "shown" in self._ends and self._came_s > 0.0:
+            return self._shown
+        if self._camera.away or not may_wait_here():
+            return self._shown
+        sent = self._camera.sent_latest()
+        return sent.received() if sent is not None else None
+
+    @override
+    def since(self, since_s: float) -> Picture | None:
+        newest = self.latest()
+        return newest if newest is not None and newest.frame.exposed_s >= since_s else None
+
+    @override
+    def next(self, timeout_s: float, since_s: float | None) -> Picture:
+        forbid_waiting_here("waiting for a picture")
+        wait = self._camera.await_picture(since_s)
+        try:
+            return wait.wait(timeout_s).received()
+        except DeviceTimeout:
+            self._camera.carry_out(wait.cancel, lambda *_: None)
+            camera = self._camera
+            reason = camera.problem or ("none arrived" if camera.running else "it is stopped")
+            text = f"no picture of {camera.name} in {timeout_s:g} s: {reason}"
+            raise NotAvailable(text) from None
+
+    @override
+    def on_picture(self, listener: Callable[[], object]) -> Callable[[], None]:
+        return lambda: None  # over a line, who waits for a picture looks again and again
+
+    @override
+    def wait_closed(self) -> None:
+        forbid_waiting_here("waiting for a recording to end")
+        until_s, before = WALL.now_s() + CLOSE_S, self._camera.recording
+        while (now := self._camera.recording).active:
+            if now != before:  # what waits is being written
+                until_s, before = WALL.now_s() + CLOSE_S, now
+            if WALL.now_s() > until_s:
+                text = f"{self._camera.name}: the recording does not end; {now.waiting} wait"
+                raise DeviceTimeout(text)
+            WALL.sleep(LOOK_S)
+
+    # For whoever follows the station
+
+    def tidy(self) -> None:
+        """End what nobody looks at, and ask for a picture that did not come; again and again."""
+        now_s = WALL.now_s()
+        for name, looked_s in list(self._looked.items()):
+            if now_s - looked_s > IDLE_S and name in self._ends:
+                self._ends.pop(name)()
+                if name == "shown":
+                    self._came_s = -float("inf")
+        newest_id = self._camera.newest_id
+        if "shown" not in self._ends or newest_id in (None, self._asked_for):
+            return
+        last = self._shown
+        if now_s - self._came_s < MISSED_S or (
+            last is not None and last.frame.frame_id == newest_id
+        ):
+            return
+        self._asked_for = newest_id
+        try:
+            sent = self._camera.sent_latest()
+        except CosmicError:
+            return
+        if sent is not None:
+            self._take_shown(sent)
+
+    def close(self) -> None:
+        """Take no more pictures; any state."""
+        self._jobs.request_end()
+        self._jobs.join()
+
+    def _look(
+        self,
+        name: str,
+        watch: Callable[[Callable[..., object]], Callable[[], None]],
+        take: Callable[..., object],
+    ) -> None:
+        """Have something sent, from now on for a while."""
+        self._looked[name] = WALL.now_s()
+        if name not in self._ends:
+            self._ends[name] = watch(take)
+
+    def _take_shown(self, sent: SentPicture) -> None:
+        self._shown, self._came_s = sent.received(), WALL.now_s()
+
+    def _take_seen(self, sent: SentSeen) -> None:
+        self._seen = sent.received()

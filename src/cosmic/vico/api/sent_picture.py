@@ -1,0 +1,211 @@
+"""Pictures, and what machine vision found on them, as they travel between stations."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosmic.frame.errors import NotAvailable
+from cosmic.vico.api.camera_shown import Seen
+from cosmic.vico.api.places import Pixel, Places
+from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.core.vision.fibre import Fibre
+from cosmic.vico.core.vision.tool_tips import TipSeen
+from cosmic.vico.hw.interface import Frame, FrameStatus, PixelFormat
+
+NOT_HOSTED = "micromanipulation is not hosted there"
+
+
+@dataclass(frozen=True, slots=True)
+class PlateMap:
+    """Where the pixels of one picture lie on the plate: an affine map.
+
+    Attributes
+    ----------
+    corner_um : (float, float)
+        Of pixel (0, 0).
+    right_um, down_um : (float, float)
+        By one pixel to the right, and down.
+    """
+
+    corner_um: Pixel
+    right_um: Pixel
+    down_um: Pixel
+
+    @classmethod
+    def of(cls, picture: Picture, places: Places) -> "PlateMap":
+        """Return the map of a picture; raises `NotAvailable` where it was not calibrated."""
+        height, width = picture.data.shape[:2]
+        corner = places.platform_um(picture, (0.0, 0.0))
+        right = places.platform_um(picture, (float(width), 0.0))
+        down = places.platform_um(picture, (0.0, float(height)))
+        return cls(corner, _step(corner, right, width), _step(corner, down, height))
+
+    def to_um(self, place_px: Pixel) -> Pixel:
+        """Return x and y on the platform."""
+        (x, y), (x0, y0) = place_px, self.corner_um
+        (xr, yr), (xd, yd) = self.right_um, self.down_um
+        return x0 + x * xr + y * xd, y0 + x * yr + y * yd
+
+
+def _step(start: Pixel, end: Pixel, count: int) -> Pixel:
+    return (end[0] - start[0]) / count, (end[1] - start[1]) / count
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReceivedPicture(Picture):
+    """A picture that came from another station.
+
+    Attributes
+    ----------
+    plate : PlateMap or None
+        Where its pixels lie on the platform; None where nobody knows, and `plate_problem` says why.
+    """
+
+    plate: PlateMap | None = None
+    plate_problem: str = NOT_HOSTED
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SentPicture:
+    """A picture on its way; see `Picture`, `Frame` and `Circumstances`."""
+
+    camera: str
+    data: NDArray[Any]
+    frame_id: int
+    time_s: float
+    exposed_s: float
+    device_ns: int | None
+    status: FrameStatus
+    pixel_format: PixelFormat
+    lost_before: int
+    exposure_s: float | None
+    gain_db: float | None
+    zoom_counts: float | None
+    focus_counts: float | None
+    light_percent: float | None
+    scale_um_px: float | None
+    positions: dict[str, float]
+    plate: PlateMap | None
+    plate_problem: str
+
+    @property
+    def nbytes(self) -> int:
+        """Size by which backlogs are limited."""
+        return int(self.data.nbytes)
+
+    @classmethod
+    def of(cls, picture: Picture, places: Places | None) -> "SentPicture":
+        """Return what is sent of a picture; a simulated camera draws it here."""
+        plate, problem = _plate(picture, places)
+        frame, known = picture.frame, picture.circumstances
+        return cls(
+            picture.camera,
+            frame.data,
+            int(frame.frame_id),
+            frame.time_s,
+            frame.exposed_s,
+            frame.device_ns,
+            frame.status,
+            frame.pixel_format,
+            int(picture.lost_before),
+            known.exposure_s,
+            known.gain_db,
+            known.zoom_counts,
+            known.focus_counts,
+            known.light_percent,
+            known.scale_um_px,
+            dict(known.positions),
+            plate,
+            problem,
+        )
+
+    def received(self) -> ReceivedPicture:
+        """Return the picture as handles give it."""
+        frame = Frame(
+            self.data,
+            self.frame_id,
+            self.time_s,
+            self.exposed_s,
+            self.device_ns,
+            self.status,
+            self.pixel_format,
+        )
+        known = Circumstances(
+            self.exposure_s,
+            self.gain_db,
+            self.zoom_counts,
+            self.focus_counts,
+            self.light_percent,
+            self.scale_um_px,
+            self.positions,
+        )
+        return ReceivedPicture(
+            self.camera, frame, known, self.lost_before, self.plate, self.plate_problem
+        )
+
+
+def _plate(picture: Picture, places: Places | None) -> tuple[PlateMap | None, str]:
+    if places is None:
+        return None, NOT_HOSTED
+    problem = places.problem(picture)
+    if problem:
+        return None, problem
+    try:
+        return PlateMap.of(picture, places), ""
+    except NotAvailable as exc:
+        return None, str(exc)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SentSeen:
+    """What machine vision found, with the picture's circumstances but not its pixels."""
+
+    picture: SentPicture
+    shape: tuple[int, ...]
+    fibres: tuple[Fibre, ...]
+    tips: tuple[TipSeen, ...]
+
+    @classmethod
+    def of(cls, seen: Seen) -> "SentSeen":
+        """Return what is sent."""
+        data = seen.picture.data
+        bare = replace(seen.picture.frame, data=np.zeros((0,), np.uint8))
+        return cls(
+            SentPicture.of(replace(seen.picture, frame=bare), None),
+            tuple(data.shape),
+            tuple(_plain(each) for each in seen.fibres),
+            tuple(_plain_tip(each) for each in seen.tips),
+        )
+
+    def received(self) -> Seen:
+        """Return what a view shows; its picture is empty."""
+        bare = self.picture.received()
+        nothing = np.broadcast_to(np.zeros((), np.uint8), self.shape)
+        return Seen(replace(bare, frame=replace(bare.frame, data=nothing)), self.fibres, self.tips)
+
+
+def _plain(fibre: Fibre) -> Fibre:
+    return replace(fibre, uncertainties=dict(fibre.uncertainties))
+
+
+def _plain_tip(tip: TipSeen) -> TipSeen:
+    x, y = tip.place_px
+    return TipSeen(tip.name, (float(x), float(y)), tip.certain)
+
+
+def received(sent: object) -> ReceivedPicture | None:
+    """Return a picture that came, where it is one."""
+    return sent.received() if isinstance(sent, SentPicture) else None
+
+
+def received_seen(sent: object) -> Seen | None:
+    """Return what was seen, where it is that."""
+    return sent.received() if isinstance(sent, SentSeen) else None
+
+
+def same_place(one_um: Sequence[float], other_um: Sequence[float], within_um: float) -> bool:
+    """Return whether two places are the same but for `within_um`."""
+    return all(abs(a - b) <= within_um for a, b in zip(one_um, other_um, strict=True))

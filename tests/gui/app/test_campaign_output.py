@@ -1,0 +1,31 @@
+"""The report of a campaign on paper."""
+
+from pathlib import Path
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from cosmic.app.campaign_output import write_pdf
+from cosmic.autonomy.campaign.records import CampaignError
+from cosmic.autonomy.campaign.store import CampaignStore
+from cosmic.autonomy.campaign.store_read import CampaignReader
+from unit.autonomy.campaign.sample_records import INFO, failed, good
+
+
+def test_a_campaign_is_printed_with_its_figures(tmp_path: Path, qtbot: QtBot) -> None:
+    with CampaignStore.create(tmp_path / "run", INFO) as store:
+        write_pdf(store, tmp_path / "empty.pdf")
+        store.finish_fibre(good(store.begin_fibre(time_s=0.0)))
+        store.finish_fibre(failed(store.begin_fibre(time_s=30.0), began_s=30.0))
+        write_pdf(store, tmp_path / "report.pdf")
+    empty, whole = ((tmp_path / name).read_bytes() for name in ("empty.pdf", "report.pdf"))
+    assert whole.startswith(b"%PDF-")
+    assert b"bend test" in whole or "bend test".encode("utf-16-be") in whole
+    assert whole.count(b"/Type /Page\n") > empty.count(b"/Type /Page\n") >= 1
+    assert whole.count(b"/Subtype /Image") > empty.count(b"/Subtype /Image")
+
+
+def test_a_place_that_cannot_be_written_is_told(tmp_path: Path, qtbot: QtBot) -> None:
+    CampaignStore.create(tmp_path / "run", INFO).close()
+    with pytest.raises(CampaignError, match="cannot be written"):
+        write_pdf(CampaignReader(tmp_path / "run"), tmp_path / "nowhere" / "report.pdf")

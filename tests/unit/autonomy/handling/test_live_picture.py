@@ -1,0 +1,133 @@
+"""A picture that comes again and again is not taken for a new one."""
+
+from collections.abc import Callable
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from cosmic.autonomy.handling import sight
+from cosmic.autonomy.handling.sight import RESTARTS, LastSeen, LivePicture
+from cosmic.frame.clock import ManualClock
+from cosmic.frame.errors import NotAvailable
+from cosmic.frame.operation import Task
+from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.hw.interface import Frame, FrameStatus, PixelFormat
+
+
+class FakeCamera:
+    """Shows a noisy picture each time; frozen, the same one with a new time."""
+
+    name = "microscope"
+    problem = ""
+
+    def __init__(self, clock: ManualClock) -> None:
+        self._clock = clock
+        self._count = 0
+        self.frozen = False
+        self.thaws = True
+        self.dark = False
+        self.told: list[str] = []
+        self._data = self._noise()
+
+    def _noise(self) -> Any:
+        self._count += 1
+        return np.random.default_rng(self._count).integers(90, 160, (64, 64), dtype=np.uint8)
+
+    def picture_since(self, since_s: float) -> Picture:
+        if not self.frozen:
+            self._data = np.zeros((64, 64), np.uint8) if self.dark else self._noise()
+        now_s = self._clock.now_s()
+        data = self._data.copy()
+        frame = Frame(data, 1, now_s, now_s, None, FrameStatus.COMPLETE, PixelFormat.MONO8)
+        return Picture("microscope", frame, Circumstances())
+
+    def latest(self) -> Picture:
+        return self.picture_since(0.0)
+
+    def on_picture(self, listener: Callable[[], object]) -> Callable[[], None]:
+        return lambda: None
+
+    def stop(self) -> Task:
+        return self._done("stop")
+
+    def start(self) -> Task:
+        self.frozen = self.frozen and not self.thaws
+        return self._done("start")
+
+    def _done(self, what: str) -> Task:
+        self.told.append(what)
+        task = Task(what)
+        task.finish()
+        return task
+
+
+@pytest.fixture(autouse=True)
+def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sight, "APART_WALL_S", 0.0)
+
+
+@pytest.fixture
+def clock() -> ManualClock:
+    return ManualClock()
+
+
+@pytest.fixture
+def camera(clock: ManualClock) -> FakeCamera:
+    return FakeCamera(clock)
+
+
+def wanted(camera: FakeCamera, clock: ManualClock, last: LastSeen) -> LivePicture:
+    clock.advance(0.1)
+    return LivePicture(cast("Any", camera), clock, last)
+
+
+def test_a_camera_that_works_is_left_alone(camera: FakeCamera, clock: ManualClock):
+    last = LastSeen()
+    assert wanted(camera, clock, last).wait(5.0) is not wanted(camera, clock, last).wait(5.0)
+    assert camera.told == []
+
+
+def test_a_frozen_camera_is_begun_anew_and_gives_a_new_picture(
+    camera: FakeCamera, clock: ManualClock
+):
+    last = LastSeen()
+    before = wanted(camera, clock, last).wait(5.0)
+    camera.frozen = True
+    after = wanted(camera, clock, last).wait(5.0)
+    assert camera.told == ["stop", "start"]
+    assert not np.array_equal(before.data, after.data)
+
+
+def test_one_that_stays_frozen_is_given_up_and_says_what_to_look_at(
+    camera: FakeCamera, clock: ManualClock
+):
+    last = LastSeen()
+    wanted(camera, clock, last).wait(5.0)
+    camera.frozen, camera.thaws = True, False
+    with pytest.raises(NotAvailable, match=r"same picture again and again.*cable"):
+        wanted(camera, clock, last).wait(5.0)
+    assert camera.told == ["stop", "start"] * RESTARTS
+
+
+def test_pictures_without_any_light_are_not_taken_for_a_frozen_camera(
+    camera: FakeCamera, clock: ManualClock
+):
+    last, camera.dark = LastSeen(), True
+    wanted(camera, clock, last).wait(5.0)
+    wanted(camera, clock, last).wait(5.0)
+    assert camera.told == []
+
+
+def test_a_picture_that_is_no_longer_wanted_leaves_the_camera_running(
+    camera: FakeCamera, clock: ManualClock
+):
+    last = LastSeen()
+    wanted(camera, clock, last).wait(5.0)
+    camera.frozen, camera.thaws = True, False
+    picture = wanted(camera, clock, last)
+    while "stop" not in camera.told:
+        assert not picture.done
+    picture.cancel()
+    assert picture.done
+    assert camera.told[-1] == "start"

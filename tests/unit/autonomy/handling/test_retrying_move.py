@@ -1,0 +1,163 @@
+"""Movements that are ordered again where the gate had no answer."""
+
+from collections.abc import Callable
+
+import pytest
+
+from cosmic.autonomy.handling import retrying_move
+from cosmic.autonomy.handling.retrying_move import BUMPS, TRIES, UNANSWERED, RetryingMove
+from cosmic.frame.errors import (
+    CosmicError,
+    DeviceError,
+    DeviceFault,
+    DeviceTimeout,
+    MoveRefused,
+)
+from cosmic.frame.verdict import MoveVerdict, Reason
+
+
+class Moved:
+    """A movement that has arrived."""
+
+    done = True
+
+    def __init__(self, error: CosmicError | None = None) -> None:
+        self.error = error
+
+    def wait(self, timeout_s: float | None = None) -> str:
+        if self.error is not None:
+            raise self.error
+        return "there"
+
+    def exception(self, timeout: float | None = 0.0) -> CosmicError | None:
+        return self.error
+
+    def cancel(self) -> None:
+        """It has arrived already."""
+
+
+def refusing(reason: Reason, times: int) -> tuple[Callable[[], Moved], list[int]]:
+    orders: list[int] = []
+
+    def order() -> Moved:
+        orders.append(1)
+        if len(orders) <= times:
+            raise MoveRefused(MoveVerdict(allowed=False, reason=reason, text="no"))
+        return Moved()
+
+    return order, orders
+
+
+@pytest.fixture(autouse=True)
+def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(retrying_move, "APART_WALL_S", 0.0)
+    monkeypatch.setattr(retrying_move, "BUMP_WALL_S", 0.0)
+
+
+def test_a_movement_without_an_answer_is_ordered_again_until_there_is_one():
+    order, orders = refusing(Reason.NO_ANSWER, 2)
+    assert RetryingMove(order).wait(20.0) == "there"
+    assert len(orders) == 3
+
+
+def test_a_no_is_a_no():
+    order, orders = refusing(Reason.COLLISION, 1)
+    with pytest.raises(MoveRefused):
+        RetryingMove(order)
+    assert len(orders) == 1
+
+
+def test_patience_ends():
+    order, orders = refusing(Reason.NO_ANSWER, 100)
+    with pytest.raises(MoveRefused):
+        RetryingMove(order).wait(20.0)
+    assert len(orders) == UNANSWERED
+
+
+def test_a_wait_ends_while_the_gate_has_not_answered(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(retrying_move, "APART_WALL_S", 60.0)
+    move = RetryingMove(refusing(Reason.NO_ANSWER, 1)[0])
+    assert not move.done
+    with pytest.raises(DeviceTimeout):
+        move.wait(0.01)
+
+
+def test_a_cancelled_movement_is_not_ordered_again():
+    order, orders = refusing(Reason.NO_ANSWER, 1)
+    move = RetryingMove(order)
+    move.cancel()
+    assert move.done
+    with pytest.raises(MoveRefused):
+        move.wait(20.0)
+    assert len(orders) == 1
+
+
+def test_a_way_to_a_place_is_ordered_again_where_an_axis_did_not_come_on():
+    moves = [Moved(DeviceTimeout("no progress")), Moved()]
+    assert RetryingMove(lambda: moves.pop(0), to_a_place=True).wait(20.0) == "there"
+
+
+def test_steps_are_not_for_some_of_them_may_have_been_made():
+    moves = [Moved(DeviceTimeout("no progress")), Moved()]
+    with pytest.raises(DeviceTimeout, match="no progress"):
+        RetryingMove(lambda: moves.pop(0)).wait(20.0)
+    assert len(moves) == 1
+
+
+def test_an_axis_that_never_comes_on_is_told_in_the_end():
+    orders: list[int] = []
+
+    def order() -> Moved:
+        orders.append(1)
+        return Moved(DeviceTimeout("no progress"))
+
+    with pytest.raises(DeviceTimeout, match="no progress"):
+        RetryingMove(order, to_a_place=True).wait(20.0)
+    assert len(orders) == TRIES
+
+
+def bumping(times: int) -> tuple[Callable[[], Moved], Callable[[], Moved], list[str]]:
+    """Return a way that ends at an obstacle so often, the way back, and the list of both."""
+    told: list[str] = []
+
+    def order() -> Moved:
+        told.append("on")
+        stopped = told.count("on") <= times
+        return Moved(DeviceError("ran into it", fault=DeviceFault.END_STOP) if stopped else None)
+
+    def back() -> Moved:
+        told.append("back")
+        return Moved()
+
+    return order, back, told
+
+
+def test_an_axis_that_runs_into_something_goes_back_a_little_and_tries_again():
+    order, back, told = bumping(2)
+    assert RetryingMove(order, to_a_place=True, back=back).wait(20.0) == "there"
+    assert told == ["on", "back", "on", "back", "on"]
+
+
+def test_an_obstacle_that_stays_is_told_after_some_tries():
+    order, back, told = bumping(100)
+    with pytest.raises(DeviceError, match="ran into it"):
+        RetryingMove(order, to_a_place=True, back=back).wait(20.0)
+    assert told.count("back") == BUMPS
+    assert told.count("on") == BUMPS + 1
+
+
+def test_a_way_back_that_is_refused_is_not_gone():
+    order, _, told = bumping(1)
+
+    def refused() -> Moved:
+        raise MoveRefused(MoveVerdict(allowed=False, reason=Reason.COLLISION, text="no"))
+
+    assert RetryingMove(order, to_a_place=True, back=refused).wait(20.0) == "there"
+    assert told == ["on", "on"]
+
+
+def test_a_way_on_which_nothing_leads_back_ends_at_an_obstacle():
+    order, _, told = bumping(1)
+    with pytest.raises(DeviceError, match="ran into it"):
+        RetryingMove(order, to_a_place=True).wait(20.0)
+    assert told == ["on"]
