@@ -24,7 +24,7 @@ from PySide6.QtWidgets import QApplication
 
 from benchmarks.figures import Figure, main, percentile
 from benchmarks.stand import Stand, stand, wait_until
-from cosmic.app.platform_file import load_platform
+from cosmic.app.configuration.platform_file import load_platform
 from cosmic.autonomy.interlocks import join_force_limits
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco

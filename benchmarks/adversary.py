@@ -37,11 +37,11 @@ from benchmarks.adversary_attacks import (
 )
 from benchmarks.adversary_watch import Findings, Watch
 from benchmarks.figures import Figure, table
-from cosmic.app.network_settings import serving
+from cosmic.app.configuration.network import serving
 from cosmic.app.platform import Platform, build_platform
 from cosmic.app.rig import Rig
 from cosmic.app.simulation import make_scene
-from cosmic.app.station_host import StationHost
+from cosmic.app.stations.host import StationHost
 from cosmic.twin.scene import Scene
 
 NAME = "adversary"

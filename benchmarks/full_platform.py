@@ -23,9 +23,9 @@ from typing_extensions import override
 import cosmic
 from benchmarks.stand import REPAINT_MS, Stand, application, wait_until
 from benchmarks.traced import TracedLibrary
-from cosmic.app.operator_window import OperatorWindow
 from cosmic.app.platform import Platform, build_platform
 from cosmic.app.rig import Rig
+from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.daqco.gui.main_widget import make_daqco_gui
 from cosmic.frame.log import RingBufferHandler, set_up_logging

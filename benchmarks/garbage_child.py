@@ -10,9 +10,9 @@ from pathlib import Path
 
 from PySide6.QtCore import QTimer
 
-from cosmic.app import run_window
 from cosmic.app.cli import main
-from cosmic.app.operator_window import OperatorWindow
+from cosmic.app.windows import run_window
+from cosmic.app.windows.operator_window import OperatorWindow
 
 SECONDS = float(sys.argv[1])
 TICK_S = 0.001

@@ -264,7 +264,7 @@ def gate() -> Ratios:
 def start() -> Ratios:
     """Return what importing the program costs, and starting it until its axes are painted."""
     bare = [sys.executable, "-c", "import numpy, PySide6.QtWidgets"]
-    imports = [sys.executable, "-c", "import cosmic.app.run_window"]
+    imports = [sys.executable, "-c", "import cosmic.app.windows.run_window"]
     opened = [sys.executable, "-m", "benchmarks.start_child"]
     offscreen = {"QT_QPA_PLATFORM": "offscreen"}
     for command in (bare, imports):

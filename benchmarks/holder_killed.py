@@ -22,9 +22,9 @@ from typing import Any
 from benchmarks.figures import Figure, main, percentile
 from benchmarks.network import free_ports
 from benchmarks.stand import wait_until
-from cosmic.app.network_settings import NetworkSettings, serving
+from cosmic.app.configuration.network import NetworkSettings, serving
 from cosmic.app.platform import Platform, build_platform
-from cosmic.app.station_host import StationHost
+from cosmic.app.stations.host import StationHost
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.mico import Mico
 

@@ -17,9 +17,9 @@ from PySide6.QtCore import QCoreApplication, QEvent, QMetaObject, QSettings, Qt,
 from PySide6.QtWidgets import QApplication
 
 from benchmarks.traced import TracedLibrary
-from cosmic.app.operator_window import OperatorWindow
+from cosmic.app.configuration.platform_file import PlatformFile, load_platform, load_twin
 from cosmic.app.platform import Platform
-from cosmic.app.platform_file import PlatformFile, load_platform, load_twin
+from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.frame.clock import RatedClock
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.log import RingBufferHandler, set_up_logging

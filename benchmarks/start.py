@@ -56,7 +56,7 @@ def bare_cpu_s() -> float:
 def heaviest_imports(count: int) -> list[tuple[str, float]]:
     """Return the packages whose import takes longest, with everything they import, in ms."""
     done = subprocess.run(
-        [sys.executable, "-X", "importtime", "-c", "import cosmic.app.run_window"],
+        [sys.executable, "-X", "importtime", "-c", "import cosmic.app.windows.run_window"],
         capture_output=True,
         text=True,
         timeout=120,

@@ -13,9 +13,9 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication
 from typing_extensions import override
 
-from cosmic.app import run_window
 from cosmic.app.cli import main
-from cosmic.app.operator_window import OperatorWindow
+from cosmic.app.windows import run_window
+from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.mico.core.motion.positioner import Status
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
 

@@ -28,8 +28,8 @@ from benchmarks.full_platform import (
     full_platform,
 )
 from benchmarks.stand import wait_until
-from cosmic.app.network_settings import serving
-from cosmic.app.station_host import StationHost
+from cosmic.app.configuration.network import serving
+from cosmic.app.stations.host import StationHost
 from cosmic.frame.errors import CosmicError, MoveRefused
 from cosmic.mico.api.trajectory_state import PlayState
 from cosmic.mico.core.trajectory.parser import parse

@@ -7,7 +7,7 @@ from typing import Any, Final
 from pydantic import BaseModel
 
 import cosmic
-from cosmic.app.remote_station import StationControl
+from cosmic.app.stations.remote_station import StationControl
 from cosmic.autonomy.bending.plan import PlannedSpan
 from cosmic.autonomy.bending.result import BendingError, BendingResult, Quality, SpanFit
 from cosmic.autonomy.bending.span import Span

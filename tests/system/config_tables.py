@@ -6,8 +6,8 @@ from typing import Any, Final
 
 from pydantic import BaseModel
 
-from cosmic.app.network_settings import NetworkSettings
-from cosmic.app.platform_file import PlatformFile, PlatformSettings
+from cosmic.app.configuration.network import NetworkSettings
+from cosmic.app.configuration.platform_file import PlatformFile, PlatformSettings
 from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.daqco.core.settings import (
     ChannelSettings,

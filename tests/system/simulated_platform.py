@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from cosmic.app.platform_file import load_platform, load_twin
+from cosmic.app.configuration.platform_file import load_platform, load_twin
 from cosmic.frame.clock import WALL, RatedClock
 from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.api.application import MicoApplication

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cosmic.app.campaign_output import write_output
+from cosmic.app.panels.campaign.output import write_output
 from cosmic.app.rig import Rig
 from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.recipe import OutputSettings

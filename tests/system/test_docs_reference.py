@@ -9,7 +9,7 @@ import pytest
 from pydantic import BaseModel
 
 import cosmic
-from cosmic.app.platform_file import load_platform
+from cosmic.app.configuration.platform_file import load_platform
 from cosmic.daqco.hw.sim_faults import NAMES as BOARD_FAULTS
 from cosmic.mico.core.motion.positioner import Confidence
 from cosmic.mico.hw.sim_scu3d_faults import NAMES as FAULTS

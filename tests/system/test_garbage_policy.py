@@ -10,7 +10,7 @@ import cosmic
 from cosmic.app import campaign_command
 from cosmic.app import serve as serving
 from cosmic.app.rig import Rig
-from cosmic.app.serve_options import ServeOptions
+from cosmic.app.stations.options import ServeOptions
 from cosmic.frame.garbage import GARBAGE, NEVER
 from unit.mico.rigs import wait_until
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from cosmic.app.check import find_mistakes
 from cosmic.app.cli import main
-from cosmic.app.names import kept_mistakes
-from cosmic.app.platform_file import load_platform
+from cosmic.app.configuration.check import find_mistakes
+from cosmic.app.configuration.platform_file import load_platform
+from cosmic.app.configuration.references import kept_mistakes
 from cosmic.autonomy.campaign.opening import read_recipe
 from cosmic.frame.config import load_model
 from cosmic.frame.errors import CosmicError

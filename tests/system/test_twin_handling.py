@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 import cosmic
-from cosmic.app.platform_file import load_platform
+from cosmic.app.configuration.platform_file import load_platform
 from cosmic.frame.clock import RatedClock
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from cosmic.app.cli_calibrate import add_calibrate_command
 from cosmic.app.cli_campaign import add_campaign_command
-from cosmic.app.cli_stations import (
+from cosmic.app.commands.stations import (
     add_station_commands,
     line_options,
     make_certificates,
@@ -25,7 +25,7 @@ from cosmic.frame.errors import CosmicError
 from cosmic.frame.log import set_up_logging
 
 if TYPE_CHECKING:
-    from cosmic.app.run_window import WindowOptions
+    from cosmic.app.windows.run_window import WindowOptions
 
 _WINDOW_SIZE: Final = (1600, 1000)
 _LOG_THEMSELVES: Final = (None, "mico", "daqco", "vico", "serve")
@@ -77,7 +77,7 @@ def _fail(text: str) -> int:
 
 
 def _check(platform: Path) -> int:
-    from cosmic.app.check import find_mistakes
+    from cosmic.app.configuration.check import find_mistakes
 
     mistakes = find_mistakes(platform)
     if mistakes:
@@ -87,7 +87,7 @@ def _check(platform: Path) -> int:
 
 
 def _scene(chosen: argparse.Namespace) -> int:
-    from cosmic.app.scene_command import check_scene, decompose
+    from cosmic.app.commands.scene import check_scene, decompose
 
     if chosen.task == "decompose":
         for line in decompose(chosen.mesh, chosen.folder):
@@ -122,13 +122,13 @@ def _export(chosen: argparse.Namespace) -> int:
 
 
 def _campaign(chosen: argparse.Namespace) -> int:
-    from cosmic.app.campaign_command import run_campaign
+    from cosmic.app.commands.campaign import run_campaign
 
     return run_campaign(chosen)
 
 
 def _calibrate(chosen: argparse.Namespace) -> int:
-    from cosmic.app.calibrate_command import run_calibrate
+    from cosmic.app.commands.calibrate import run_calibrate
 
     return run_calibrate(chosen)
 
@@ -166,13 +166,13 @@ def _window(chosen: argparse.Namespace, parser: argparse.ArgumentParser) -> int:
     if chosen.offscreen is None and not _display_there():
         return _fail("there is no display; --offscreen SECONDS runs without one")
     # Imported here: what needs no window starts without loading Qt's widgets.
-    from cosmic.app.run_window import run_window
+    from cosmic.app.windows.run_window import run_window
 
     return run_window(_options(chosen))
 
 
 def _options(chosen: argparse.Namespace) -> "WindowOptions":
-    from cosmic.app.run_window import WindowOptions
+    from cosmic.app.windows.run_window import WindowOptions
 
     size = chosen.size or (_WINDOW_SIZE if chosen.offscreen is not None else None)
     return WindowOptions(

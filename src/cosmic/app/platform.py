@@ -7,16 +7,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import Final
 
-from cosmic.app.elsewhere import Elsewhere, open_stations
+from cosmic.app.configuration.network import own_certificates
+from cosmic.app.configuration.platform_file import KNOWN_APPLICATIONS, PlatformFile, load_platform
+from cosmic.app.configuration.references import misnamed
 from cosmic.app.faults import SimulationFaults
 from cosmic.app.garbage_watch import GarbageWatch
-from cosmic.app.hosting import Site, build_applications
-from cosmic.app.joins import join_here, join_stations
-from cosmic.app.names import misnamed
-from cosmic.app.network_settings import own_certificates
-from cosmic.app.platform_file import KNOWN_APPLICATIONS, PlatformFile, load_platform
-from cosmic.app.serve_options import StationAddress
 from cosmic.app.simulation import make_scene
+from cosmic.app.stations.hosting import Site, build_applications
+from cosmic.app.stations.joins import join_here, join_stations
+from cosmic.app.stations.options import StationAddress
+from cosmic.app.stations.remote_applications import Elsewhere, open_stations
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.application import CosmicApplicationBase, GuiFactory

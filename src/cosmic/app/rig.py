@@ -12,7 +12,7 @@ from typing_extensions import override
 
 from cosmic.app.faults import SimulationFaults
 from cosmic.app.platform import Platform
-from cosmic.app.remote_station import RemoteStation, StationControl
+from cosmic.app.stations.remote_station import RemoteStation, StationControl
 from cosmic.app.stop_watch import stopped_since
 from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.procedures.procedure import Procedure

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from cosmic.app.platform_file import PlatformFile, load_twin
+from cosmic.app.configuration.platform_file import PlatformFile, load_twin
 from cosmic.frame.clock import Clock
 from cosmic.twin.sample import put_on
 from cosmic.twin.scene import Scene

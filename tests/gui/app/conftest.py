@@ -7,9 +7,9 @@ import pytest
 from PySide6.QtCore import QSettings
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.operator_window import OperatorWindow
 from cosmic.app.platform import Platform, build_platform
-from cosmic.app.station_host import StationHost
+from cosmic.app.stations.host import StationHost
+from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.daqco.gui.main_widget import make_daqco_gui
 from cosmic.frame.log import RingBufferHandler
 from cosmic.mico.gui.mico_widget import make_mico_gui

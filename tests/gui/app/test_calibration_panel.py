@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from cosmic.app.calibration_panel import AGE, HOW, RESIDUAL, STANDING, CalibrationPanel
+from cosmic.app.panels.calibrations import AGE, HOW, RESIDUAL, STANDING, CalibrationPanel
 from cosmic.autonomy.calibrating.registry import CalibrationEntry, CalibrationRegistry
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import NotAvailable

@@ -11,9 +11,9 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.campaign_board import CampaignBoard
-from cosmic.app.campaign_table import CAUSE, EI, INTERVAL, NUMBER, OUTCOME, TIME
-from cosmic.app.fibre_card import FibreCard, round_below
+from cosmic.app.panels.campaign.board import CampaignBoard
+from cosmic.app.panels.campaign.fibre_card import FibreCard, round_below
+from cosmic.app.panels.campaign.table import CAUSE, EI, INTERVAL, NUMBER, OUTCOME, TIME
 from cosmic.autonomy.campaign.records import FibreRecord, Outcome, Picture, Shape
 from cosmic.autonomy.campaign.snapshot import CampaignSnapshot, FibreRow, card_of, snapshot_of
 from cosmic.autonomy.campaign.statistics import progress

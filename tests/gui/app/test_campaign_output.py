@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.campaign_output import write_pdf
+from cosmic.app.panels.campaign.output import write_pdf
 from cosmic.autonomy.campaign.records import CampaignError
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.campaign.store_read import CampaignReader

@@ -6,10 +6,10 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.campaign_dock import CAMPAIGN
-from cosmic.app.campaign_panel import CampaignPanel
-from cosmic.app.operator_window import OperatorWindow
+from cosmic.app.panels.campaign.dock import CAMPAIGN
+from cosmic.app.panels.campaign.panel import CampaignPanel
 from cosmic.app.platform import Platform, build_platform
+from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.records import Outcome
 from cosmic.autonomy.campaign.store import CampaignStore

@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 import cosmic
-from cosmic.app.control_panel import ControlPanel, make_control_panel
+from cosmic.app.panels.control import ControlPanel, make_control_panel
 
 LEFT = Qt.MouseButton.LeftButton
 

@@ -9,10 +9,10 @@ from PySide6.QtCore import QSettings, Qt
 from PySide6.QtWidgets import QCheckBox, QPushButton, QToolButton
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.operator_window import OperatorWindow
-from cosmic.app.platform_file import load_platform
-from cosmic.app.way_bar import Stage, WayBar, way_text
-from cosmic.app.way_guide import poses_along
+from cosmic.app.configuration.platform_file import load_platform
+from cosmic.app.panels.path_guide import poses_along
+from cosmic.app.panels.path_preview import Stage, WayBar, way_text
+from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.frame.config import shipped_config_dir
 from cosmic.mico.api.ways import Way
 from gui.app.windows import Make, card, mico, scene

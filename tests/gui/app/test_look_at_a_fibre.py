@@ -6,7 +6,7 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtWidgets import QCheckBox
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.operator_window import OperatorWindow
+from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.vico.api.vico import Vico
 from cosmic.vico.gui.camera_view import CameraView
 from cosmic.vico.gui.lens_panel import LensPanel

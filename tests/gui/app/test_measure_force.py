@@ -7,8 +7,8 @@ from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 import cosmic
-from cosmic.app.instrument_panels import DAQCO
-from cosmic.app.operator_window import OperatorWindow
+from cosmic.app.panels.instruments import DAQCO
+from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.daqco.gui.main_widget import UDaqMainWidget
 from gui.app.windows import Make, card, drive, go_to, wait_until_ready
 

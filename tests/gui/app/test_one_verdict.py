@@ -7,8 +7,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.operator_window import OperatorWindow
 from cosmic.app.rig import Rig
+from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.frame.errors import MoveRefused
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.overrides import override

@@ -6,10 +6,10 @@ from PySide6.QtCore import QSettings, Qt
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.hint_bar import HintBar
-from cosmic.app.operator_window import OperatorWindow
+from cosmic.app.configuration.platform_file import load_platform
 from cosmic.app.platform import Platform
-from cosmic.app.platform_file import load_platform
+from cosmic.app.windows.hint_bar import HintBar
+from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.frame.clock import WALL, RatedClock
 from cosmic.frame.errors import DeviceError, DeviceFault, MoveCancelled, StoppedError
 from cosmic.frame.failure import FailurePolicy

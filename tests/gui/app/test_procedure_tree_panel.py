@@ -9,8 +9,8 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.procedure_tree import CAUSE, PART, STATE, TRY
-from cosmic.app.procedure_tree_panel import ChangeBridge, ProcedureTreePanel
+from cosmic.app.panels.procedure import ChangeBridge, ProcedureTreePanel
+from cosmic.app.panels.procedure_tree import CAUSE, PART, STATE, TRY
 from cosmic.autonomy.procedures.combinators import Fallback, Parallel, Repeat, Retry, Sequence
 from cosmic.autonomy.procedures.operation import SAFE_POINT
 from cosmic.autonomy.procedures.procedure import Part, Procedure

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.operator_window import OperatorWindow
+from cosmic.app.windows.operator_window import OperatorWindow
 from gui.app.windows import Make, card, go_to
 from gui.frame.wheel import turn
 from gui.mico.panels import part, position

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.operator_window import SCENE, OperatorWindow
-from cosmic.app.scene_panel import ScenePanel
+from cosmic.app.panels.scene import ScenePanel
+from cosmic.app.windows.operator_window import SCENE, OperatorWindow
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
 from cosmic.mico.gui.scene.scene_widget import SceneWidget

@@ -9,8 +9,8 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QAbstractButton, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
+from cosmic.app.configuration.platform_file import load_platform
 from cosmic.app.platform import build_platform
-from cosmic.app.platform_file import load_platform
 from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.gui.palette import OKABE_ITO
 from cosmic.mico.core.collision.collision_manager import CollisionManager

@@ -4,8 +4,8 @@ import sys
 
 import pytest
 
+from cosmic.app.configuration.platform_file import PlatformFile, load_platform
 from cosmic.app.platform import build_platform
-from cosmic.app.platform_file import PlatformFile, load_platform
 from cosmic.frame.clock import WALL
 
 

@@ -27,8 +27,8 @@ def test_building_the_shipped_platform_loads_no_heavy_library() -> None:
 WINDOW = f"""
 import sys
 from PySide6.QtCore import QTimer
-from cosmic.app import run_window
-from cosmic.app.operator_window import OperatorWindow
+from cosmic.app.windows import run_window
+from cosmic.app.windows.operator_window import OperatorWindow
 
 def looked(window):
     seen.update(each for each in {(*HEAVY, "av", "sdl2")} if each in sys.modules)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from cosmic.app.scene_command import check_scene, decompose
+from cosmic.app.commands.scene import check_scene, decompose
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.mico.core.collision.scene_decompose import decompose_mesh
 from cosmic.mico.core.collision.scene_loader import find_scene_mistakes

@@ -1,0 +1,137 @@
+"""``cosmic campaign``: a recipe without a window, with a bar that says how far it is."""
+
+import argparse
+import logging
+import math
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Final, TextIO
+
+from cosmic.app.connect import connect
+from cosmic.app.panels.campaign.output import gui_application, write_output
+from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
+from cosmic.autonomy.campaign.opening import read_recipe, recorded_seed
+from cosmic.autonomy.campaign.recipe import Recipe
+from cosmic.autonomy.campaign.records import TWIN
+from cosmic.frame.clock import WALL
+from cosmic.frame.log import set_up_logging
+
+logger = logging.getLogger(__name__)
+
+LOG: Final = "cosmic.log"
+_EVERY_S: Final = 0.5
+_BAR: Final = 24
+_CODES: Final = {CampaignPhase.ENDED: 0, CampaignPhase.FAILED: 1, CampaignPhase.STOPPED: 3}
+
+
+def run_campaign(chosen: argparse.Namespace) -> int:
+    """Run a campaign to its end, and return the exit code.
+
+    Raises
+    ------
+    CosmicError
+        The recipe, the configuration or the folder is wrong; nothing has moved.
+    """
+    recipe = read_recipe(chosen.recipe)
+    application = gui_application()  # noqa: F841 - Qt forgets one that nobody holds
+    twin = recipe.file.twin
+    rate = twin.rate if chosen.rate is None else chosen.rate
+    seed = chosen.seed
+    if seed is None:  # a campaign that is gone on with has the fibres of its own seed
+        known = recorded_seed(chosen.out)
+        seed = twin.seed if known is None else known
+    sample = chosen.sample or recipe.file.sample.name or None
+    with (
+        ExitStack() as at_end,
+        connect(
+            chosen.config, rate=rate, cold=chosen.cold, seed=seed, sample=sample, truth=chosen.truth
+        ) as rig,
+    ):
+        campaign = rig.campaign(recipe, chosen.out)
+        at_end.callback(_log_to(chosen.out / LOG))  # after this is known to be its own folder
+        if rig.simulated:
+            sys.stderr.write(f"{recipe.name}: {TWIN}, seed {seed}, {rate:g} times\n")
+        with _ended_by_signals(campaign):
+            campaign.start()
+            Bar(campaign, recipe, sys.stderr).follow()
+            campaign.join()
+    for path in write_output(chosen.out, recipe.file.output):
+        sys.stdout.write(f"{path}\n")
+    code = _CODES[campaign.phase]
+    text = f"{recipe.name}: {campaign.end_reason}\n"
+    (sys.stderr if code else sys.stdout).write(text)
+    return code
+
+
+def _log_to(file: Path) -> Callable[[], None]:
+    """Keep the log in `file`; where that cannot be written the campaign goes on without."""
+    try:
+        return set_up_logging(file=file)
+    except OSError as exc:
+        logger.warning("%s: no log is kept: %s", file, exc)
+        return lambda: None
+
+
+class Bar:
+    """One line that says how a campaign stands; lines of their own where that is no terminal."""
+
+    def __init__(self, campaign: Campaign, recipe: Recipe, told: TextIO) -> None:
+        self._campaign = campaign
+        self._name = recipe.name
+        self._told = told
+        self._length = 0
+        self._done = -1
+        self._share = 0.0
+
+    def follow(self) -> None:
+        """Write until the campaign is over."""
+        while not self._campaign.over:
+            self._write()
+            WALL.sleep(_EVERY_S)
+        self._write()
+        if self._told.isatty():
+            self._told.write("\n")
+
+    def _write(self) -> None:
+        now = self._campaign.progress
+        if self._told.isatty():
+            line = self._line()
+            self._told.write(f"\r{line.ljust(self._length)}")
+            self._length = len(line)
+        elif now.done != self._done:
+            self._told.write(f"{self._line()}\n")
+        self._done = now.done
+        self._told.flush()
+
+    def _line(self) -> str:
+        now, left_s = self._campaign.progress, self._campaign.left_s
+        whole_s = now.elapsed_s + left_s
+        if whole_s > 0.0:  # else it stays as it was: nothing can be told
+            self._share = now.elapsed_s / whole_s
+        full = round(_BAR * self._share)
+        parts = [f"{self._name} [{'#' * full}{'.' * (_BAR - full)}]"]
+        parts.append(f"{now.done} fibres, {now.good} good, {now.failed} failed")
+        if now.done:
+            parts.append(f"{now.good_per_hour:.0f} good an hour")
+        if not math.isnan(left_s):
+            parts.append(f"{left_s / 60.0:.0f} min left")
+        parts.append(self._campaign.operation or str(self._campaign.phase))
+        return ", ".join(parts)
+
+
+@contextmanager
+def _ended_by_signals(campaign: Campaign) -> Iterator[None]:
+    """End the campaign in order when the terminal or the system ends the program."""
+
+    def on_signal(number: int, _frame: object) -> None:
+        campaign.abort(f"ended by {signal.Signals(number).name}")
+
+    before = {each: signal.signal(each, on_signal) for each in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,96 @@
+"""``cosmic serve``: a station without a window."""
+
+import logging
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from threading import Event
+from typing import Final
+
+from cosmic.app.configuration.network import Serving, serving
+from cosmic.app.configuration.platform_file import check_applications, load_platform
+from cosmic.app.platform import Platform, Uses, build_platform
+from cosmic.app.stations.host import StationHost
+from cosmic.app.stations.options import ServeOptions
+from cosmic.frame.errors import ConfigError, NotConnectedError
+from cosmic.frame.hooks import install_hooks
+from cosmic.frame.log import set_up_logging
+
+logger = logging.getLogger(__name__)
+
+_ENDING: Final = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+
+
+def serve(options: ServeOptions) -> int:
+    """Serve until a signal ends it, and return the exit code.
+
+    Raises
+    ------
+    ConfigError
+        The configuration or an option is wrong; nothing was opened.
+    NotConnectedError
+        The vendor library is not there, or no device answers.
+    NotAvailable
+        What stations need is not installed, or it cannot listen there.
+    """
+    file, path = load_platform(options.config)
+    check_applications(options.applications, "--applications")
+    how = serving(
+        file.network,
+        file.platform.name,
+        path.parent,
+        listen=options.listen,
+        name=options.name,
+        certificates=options.certificates,
+    )
+    with ExitStack() as at_end:
+        at_end.callback(set_up_logging(console=True))
+        ended = at_end.enter_context(_ending_signals())
+        platform = _build(options, how, options.applications or file.platform.applications)
+        at_end.callback(platform.shut_down)
+        at_end.callback(install_hooks(platform.policy))
+        platform.initialize()
+        if platform.failure:
+            raise NotConnectedError(platform.failure)
+        host = StationHost(platform, how)
+        at_end.callback(host.close)  # first of all, so that nobody is answered any more
+        sys.stdout.write(f"{host.address}\n")
+        sys.stdout.flush()
+        ended.wait()
+    return 0
+
+
+def _build(options: ServeOptions, how: Serving, hosted: tuple[str, ...]) -> Platform:
+    platform = build_platform(
+        options.config,
+        applications=hosted,
+        rate=options.rate,
+        cold=options.cold,
+        seed=options.seed,
+        sample=options.sample,
+        truth=options.truth,
+        uses=Uses(options.stations, how.name, options.certificates, every=True),
+    )
+    for name in options.applications:
+        if getattr(platform, name) is None:
+            raise ConfigError(f"{platform.path}: describes no {name}, so it cannot be served")
+    return platform
+
+
+@contextmanager
+def _ending_signals() -> Iterator[Event]:
+    """Give what is set when the terminal or the system ends the program."""
+    ended = Event()
+
+    def on_signal(number: int, _frame: object) -> None:
+        logger.info("ends: %s", signal.Signals(number).name)
+        ended.set()
+
+    known = [getattr(signal, name) for name in _ENDING if hasattr(signal, name)]
+    before = {each: signal.signal(each, on_signal) for each in known}
+    try:
+        yield ended
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

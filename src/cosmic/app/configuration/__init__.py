@@ -1,0 +1,1 @@
+"""What the files of a platform say, read and checked."""

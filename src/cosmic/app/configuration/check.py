@@ -1,0 +1,144 @@
+"""What `cosmic check` finds wrong in a platform file and in the twin it names."""
+
+from pathlib import Path
+
+from cosmic.app.configuration.network import serving
+from cosmic.app.configuration.platform_file import (
+    KNOWN_APPLICATIONS,
+    PlatformFile,
+    load_platform,
+    platform_path,
+)
+from cosmic.app.configuration.references import kept_mistakes, misnamed, recipe_mistakes
+from cosmic.app.configuration.scene_fit import misfits
+from cosmic.frame.config import load_model, read_toml
+from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.frame.units import format_quantity
+from cosmic.mico.core.settings import PositionerSettings
+from cosmic.twin.settings import StageKind, TwinSettings
+
+
+def find_mistakes(config: str | Path) -> list[str]:
+    """Return a line for every mistake, each with file, key and reason; empty when all is well."""
+    path = platform_path(config)
+    lines: list[str] = []
+    file: PlatformFile | None = None
+    try:
+        file, path = load_platform(config)
+    except ConfigError as exc:
+        lines += str(exc).splitlines()
+    twin_path = path.parent / (file.platform.twin if file else _named_twin(path))
+    twin: TwinSettings | None = None
+    if file is None or file.mico.backend == "simulated":
+        try:
+            twin = load_model(twin_path, TwinSettings)
+        except ConfigError as exc:
+            lines += str(exc).splitlines()
+    if file is not None:
+        lines += key_mistakes(file, path)
+        lines += misnamed(file, path, KNOWN_APPLICATIONS)
+        lines += kept_mistakes(file, path)
+        lines += recipe_mistakes(file, path)
+        lines += _network_mistakes(file, path)
+    if file is not None and twin is not None:
+        lines += _twin_mistakes(file, path, twin, twin_path)
+    if file is not None and file.platform.scene:
+        lines += _scene_mistakes(file, path)
+    return lines
+
+
+def _scene_mistakes(file: PlatformFile, path: Path) -> list[str]:
+    # Imported here: what reads meshes takes its time to load.
+    from cosmic.mico.core.collision.scene_loader import load_scene
+
+    try:
+        return misfits(file, path, load_scene(path.parent / file.platform.scene))
+    except ConfigError as exc:
+        return str(exc).splitlines()
+
+
+def _network_mistakes(file: PlatformFile, path: Path) -> list[str]:
+    try:
+        serving(file.network, file.platform.name, path.parent)
+    except ConfigError as exc:
+        return [f"{path}: network: {line}" for line in str(exc).splitlines()]
+    except NotAvailable as exc:
+        return [f"{path}: network.serve: {exc}"] if file.network.serve else []
+    return []
+
+
+def _named_twin(path: Path) -> str:
+    """Return the twin that a file with mistakes names, so that those of both are told at once."""
+    try:
+        section = read_toml(path).get("platform")
+    except ConfigError:
+        return "twin.toml"
+    name = section.get("twin") if isinstance(section, dict) else None
+    return name if isinstance(name, str) else "twin.toml"
+
+
+def key_mistakes(file: PlatformFile, path: Path) -> list[str]:
+    """Return what is wrong with the keys: no such key, or one used twice."""
+    # Imported here: only windows and `check` need to know Qt's names of keys.
+    from cosmic.mico.gui.key_names import key_text
+
+    used: dict[str, str] = {"Esc": "Escape, which stops"}
+    lines: list[str] = []
+    wanted = [("platform.stop_key", file.platform.stop_key)]
+    for index, each in enumerate(file.mico.positioner):
+        wanted.append((f"mico.positioner[{index}].forward_key", each.forward_key))
+        wanted.append((f"mico.positioner[{index}].backward_key", each.backward_key))
+    for where, name in wanted:
+        try:
+            key = key_text(name)
+        except ValueError as exc:
+            lines.append(f"{path}: {where}: {exc}")
+            continue
+        if key and key in used:
+            lines.append(f"{path}: {where}: the key {key!r} is taken by {used[key]}")
+        used.setdefault(key, where)
+    if not file.platform.stop_key:
+        lines.append(f"{path}: platform.stop_key: a platform needs a stop key")
+    return lines
+
+
+def _twin_mistakes(
+    file: PlatformFile, path: Path, twin: TwinSettings, twin_path: Path
+) -> list[str]:
+    lines: list[str] = []
+    for index, each in enumerate(file.mico.positioner):
+        stage = _stage_at(each, twin)
+        where = f"{path}: mico.positioner[{index}]"
+        if not stage:
+            lines.append(
+                f"{where}.device: {each.name} is on device {each.device} channel {each.channel}, "
+                f"where {twin_path.name} has no stage"
+            )
+            continue
+        lines += _kind_mistakes(each, twin.kinds[twin.stages[stage].kind], stage, where)
+    return lines
+
+
+def _stage_at(positioner: PositionerSettings, twin: TwinSettings) -> str:
+    if positioner.device >= len(twin.devices):
+        return ""
+    return twin.devices[positioner.device].channels[positioner.channel]
+
+
+def _kind_mistakes(
+    positioner: PositionerSettings, kind: StageKind, stage: str, where: str
+) -> list[str]:
+    is_kind = ("rotary" if kind.unit == "deg" else "linear") if kind.sensor else "open-loop"
+    if positioner.kind != is_kind:
+        return [f"{where}.kind: {positioner.kind}, but the twin's stage {stage} is {is_kind}"]
+    if positioner.limits is None:
+        return []
+    low, high = positioner.limits
+    if kind.low <= low and high <= kind.high:
+        return []
+    unit = positioner.unit
+    hard = f"{format_quantity(kind.low, unit)} to {format_quantity(kind.high, unit)}"
+    return [
+        f"{where}.limits_{unit}: {low:g} to {high:g} reaches beyond the hard stops of the "
+        f"twin's stage {stage}, {hard}"
+    ]

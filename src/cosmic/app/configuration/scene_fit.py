@@ -1,0 +1,57 @@
+"""Whether a scene and the positioners of a platform fit together."""
+
+from pathlib import Path
+
+from cosmic.app.configuration.platform_file import PlatformFile
+from cosmic.frame.errors import ConfigError
+from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
+from cosmic.mico.core.collision.collision_manager import CollisionManager
+from cosmic.mico.core.collision.model import SceneModel
+
+
+def load_checker(file: PlatformFile, path: Path) -> CollisionChecker:
+    """Return the collision model that a platform file names, or the stand-in where none is named.
+
+    Raises
+    ------
+    ConfigError
+        The scene is wrong, or does not fit the platform; a line for every mistake.
+    """
+    if not file.platform.scene:
+        return NoCollisionModel()
+    # Imported here: what reads meshes takes its time to load.
+    from cosmic.mico.core.collision.scene_loader import load_scene
+
+    scene = load_scene(path.parent / file.platform.scene)
+    mistakes = misfits(file, path, scene)
+    if mistakes:
+        raise ConfigError("\n".join(mistakes))
+    return CollisionManager(
+        scene,
+        answer_s=file.mico.watch.collision_answer_s,
+        axes=(each.name for each in file.mico.positioner),
+    )
+
+
+def misfits(file: PlatformFile, path: Path, scene: SceneModel) -> list[str]:
+    """Return where a scene and the positioners do not fit together, a line each."""
+    positioners = {each.name: each for each in file.mico.positioner}
+    lines = [
+        f"{path}: platform.scene: {file.platform.scene} drives {axis}, which is no positioner"
+        for axis in scene.axes
+        if axis not in positioners
+    ]
+    for index, each in enumerate(file.mico.positioner):
+        where = f"{path}: mico.positioner[{index}]"
+        if each.name not in scene.axes:
+            lines.append(
+                f"{where}.name: {each.name} moves nothing in {file.platform.scene}; add a drive"
+            )
+        elif each.limits is not None:
+            low, high = scene.travel(each.name)
+            if not low <= each.limits[0] <= each.limits[1] <= high:
+                lines.append(
+                    f"{where}.limits_{each.unit}: {each.limits[0]:g} to {each.limits[1]:g} reaches "
+                    f"beyond the hard stops of {file.platform.scene}, {low:g} to {high:g}"
+                )
+    return lines

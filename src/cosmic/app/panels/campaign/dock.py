@@ -1,0 +1,101 @@
+"""The panel of campaigns in the operator window, and what joins it to the scene."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from PySide6.QtCore import QObject, QStandardPaths, Signal
+
+from cosmic.app.panels.scene import ScenePanel
+from cosmic.app.platform import Platform
+from cosmic.app.rig import Rig
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.gui.late_panel import LatePanel
+from cosmic.frame.gui.server_gui import CosmicServerGui
+
+if TYPE_CHECKING:
+    from cosmic.app.panels.campaign.panel import CampaignPanel
+    from cosmic.autonomy.campaign.records import FibreRecord
+
+CAMPAIGN: Final = "Campaign"
+
+
+class CampaignDock(QObject):
+    """Hosts the panel beside another one; GUI thread.
+
+    The panel is made when it is first seen or asked for: statistics take a second to load.
+
+    Parameters
+    ----------
+    rig : Rig
+        Where campaigns run.
+    scene : ScenePanel
+        Where fibres are replayed.
+    policy : FailurePolicy
+        Told of defects.
+    beside : str
+        Title of the panel whose place it shares.
+
+    Signals
+    -------
+    replayed()
+        The scene shows movements of before from now on.
+    """
+
+    replayed = Signal()
+
+    def __init__(
+        self,
+        window: CosmicServerGui,
+        rig: Rig,
+        scene: ScenePanel,
+        policy: FailurePolicy,
+        beside: str,
+    ) -> None:
+        super().__init__(window)
+        self._rig = rig
+        self._scene = scene
+        self._policy = policy
+        self._late: LatePanel[CampaignPanel] = LatePanel(self._made)
+        window.add_panel(CAMPAIGN, self._late, scroll=False, beside=beside, tabbed=True)
+
+    @property
+    def panel(self) -> "CampaignPanel":
+        """The panel, made now if need be."""
+        return self._late.panel
+
+    def _made(self) -> "CampaignPanel":
+        from cosmic.app.panels.campaign.panel import CampaignPanel
+        from cosmic.app.panels.scene_replay import SceneReplay
+
+        panel = CampaignPanel(self._rig.campaign, campaigns_folder(), self._policy)
+        self._replay = SceneReplay(self._scene, self)
+        panel.replay_requested.connect(self._on_replay)
+        return panel
+
+    @property
+    def running(self) -> bool:
+        """True while a campaign that was begun here is under way."""
+        panel = self._late.made
+        campaign = panel.campaign if panel is not None else None
+        return campaign is not None and not campaign.over
+
+    def shut_down(self) -> None:
+        """End what runs; what it did is kept."""
+        if self._late.made is not None:
+            self._replay.stop()
+            self._late.made.shut_down()
+
+    def _on_replay(self, record: "FibreRecord") -> None:
+        self.replayed.emit()
+        self._replay.start(record.series, f"fibre {record.number}")
+
+
+def can_run(platform: Platform) -> bool:
+    """Return whether all that a campaign needs runs in this program."""
+    return {"mico", "daqco", "vico"} <= set(platform.own)
+
+
+def campaigns_folder() -> Path:
+    """Return where folders of campaigns are made unless the operator says otherwise."""
+    place = QStandardPaths.StandardLocation.DocumentsLocation
+    return Path(QStandardPaths.writableLocation(place)) / "CoSMic" / "campaigns"

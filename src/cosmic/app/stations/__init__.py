@@ -1,0 +1,1 @@
+"""The applications of a process, served to others and used from others."""

@@ -1,0 +1,127 @@
+"""Offers the applications of this process to others."""
+
+import logging
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+import cosmic
+from cosmic.app.configuration.network import Serving
+from cosmic.app.platform import Platform
+from cosmic.app.stations.facts import ITSELF, StationFacts, StationSide
+from cosmic.daqco.api.application import DaqcoApplication
+from cosmic.daqco.api.daqco import Daqco
+from cosmic.frame.errors import ConfigError
+from cosmic.frame.network.errors import StationAway
+from cosmic.frame.network.host import Host
+from cosmic.frame.network.lease import StationLease
+from cosmic.frame.network.station import Station
+from cosmic.mico.api.application import MicoApplication
+from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.api.vico import Vico
+
+if TYPE_CHECKING:
+    from cosmic.frame.network.wire import Wire
+
+logger = logging.getLogger(__name__)
+
+
+@runtime_checkable
+class _Closing(Protocol):
+    def close(self) -> None: ...
+
+
+class StationHost:
+    """A platform as a station that others reach; `close` it in every case.
+
+    Only what this process hosts is offered: what it reaches elsewhere is not passed on.
+
+    Raises
+    ------
+    ConfigError
+        There is nothing to offer.
+    StationAway
+        It cannot listen there.
+    """
+
+    def __init__(self, platform: Platform, how: Serving) -> None:
+        # Imported here: they need the extra `net`.
+        from cosmic.frame.network.server_listener import ServerListener
+
+        sides = _sides(platform)
+        if not sides:
+            raise ConfigError(f"{how.name}: no application runs here that could be served")
+        self._how = how
+        lease = StationLease(f"the operator at {how.name}")
+        self._station = Station(how.name, platform.policy, lease)
+        self._applications = tuple(sides)
+        with ExitStack() as undo:
+            for name, side in sides.items():
+                if isinstance(side, _Closing):
+                    undo.callback(side.close)
+                self._station.host(name, side)
+            facts = _facts(platform, self._applications)
+            self._station.host(ITSELF, StationSide(facts, lease))
+            listener = ServerListener(self._station, _opened(how), how.allowed)
+            undo.callback(listener.shut_down)
+            listener.start()
+            self._undo = undo.pop_all()
+        logger.info("%s", self.address)
+
+    @property
+    def address(self) -> str:
+        """Its name, what it serves, and where: one line."""
+        served = ", ".join(self._applications)
+        return f"{self._how.name} serves {served} at {self._how.line.endpoint}"
+
+    @property
+    def name(self) -> str:
+        """How others call it."""
+        return self._how.name
+
+    @property
+    def lease(self) -> StationLease:
+        """Who may move."""
+        return self._station.lease
+
+    def close(self) -> None:
+        """Stop what clients have set in motion, send them away and answer no more; any state."""
+        self._undo.close()
+
+
+def _opened(how: Serving) -> "Wire":
+    from cosmic.frame.network.zenoh_wire import ZenohWire
+
+    try:
+        return ZenohWire(how.line)
+    except StationAway as exc:
+        logger.debug("%s", exc)
+        raise StationAway(
+            f"{how.name} cannot listen at {how.line.endpoint}: the address is not one of this "
+            "computer, or another program listens there already; choose another with --listen"
+        ) from exc
+
+
+def _sides(platform: Platform) -> dict[str, object]:
+    """Return what answers for each application that runs in this process."""
+    # Imported here: whoever serves nothing loads none of it.
+    from cosmic.mico.api.station_side import MicoStationSide
+
+    sides: dict[str, object] = {}
+    for name, application in platform.own.items():
+        if isinstance(application, MicoApplication):
+            sides[name] = MicoStationSide(application)
+        elif isinstance(application, DaqcoApplication):
+            sides[name] = Host(name, Daqco(application))
+        elif isinstance(application, VicoApplication):
+            sides[name] = Host(name, Vico(application))
+    return sides
+
+
+def _facts(platform: Platform, applications: tuple[str, ...]) -> StationFacts:
+    return StationFacts(
+        platform=platform.file.platform.name,
+        simulated=platform.simulated,
+        rate=platform.clock.rate,
+        applications=applications,
+        software=f"CoSMic {cosmic.__version__}",
+    )

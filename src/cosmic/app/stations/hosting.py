@@ -1,0 +1,170 @@
+"""Makes the applications of one process out of the platform file."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cosmic
+from cosmic.app.configuration.platform_file import PlatformFile
+from cosmic.app.configuration.scene_fit import load_checker
+from cosmic.app.faults import SimulationFaults
+from cosmic.app.left_open import close_left_open, open_recordings
+from cosmic.daqco.api.application import DaqcoApplication
+from cosmic.daqco.core.settings import DaqcoSettings
+from cosmic.daqco.hw.factory import make_library
+from cosmic.daqco.hw.sim_signal import Source
+from cosmic.frame.application import GuiFactory
+from cosmic.frame.clock import Clock
+from cosmic.frame.failure import FailurePolicy
+from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.hw.factory import make_controller, make_simulated
+from cosmic.mico.hw.interface import Controller
+from cosmic.twin.scene import Scene
+from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.core.settings import Backend, VicoSettings
+from cosmic.vico.hw.factory import make_camera_library, make_lens, make_light
+from cosmic.vico.hw.interface import CameraLibrary
+from cosmic.vico.hw.peripherals import Lens
+from cosmic.vico.hw.sim_peripherals import SimPeripherals
+
+
+@dataclass(frozen=True)
+class Site:
+    """What the applications of one process share while they are built."""
+
+    file: PlatformFile
+    path: Path
+    clock: Clock
+    policy: FailurePolicy
+    scene: Scene | None
+    seed: int
+
+
+@dataclass(frozen=True)
+class Hosted:
+    """The applications of one process, and what injects faults into what it simulates."""
+
+    mico: MicoApplication | None = None
+    daqco: DaqcoApplication | None = None
+    vico: VicoApplication | None = None
+    faults: SimulationFaults | None = None
+
+
+def build_applications(
+    site: Site, names: Sequence[str], guis: Mapping[str, GuiFactory | None]
+) -> Hosted:
+    """Make the applications of those names that the platform file describes."""
+    mico, daqco, vico = None, None, None
+    faults = SimulationFaults()
+    if site.scene is not None:
+        faults.join("scene", site.scene.faults)
+    if "mico" in names:
+        mico = _build_mico(site, faults, guis.get("mico"))
+    if "daqco" in names and site.file.daqco is not None:
+        daqco = _build_daqco(site, faults, site.file.daqco, guis.get("daqco"))
+    if "vico" in names and site.file.vico is not None:
+        vico = _build_vico(site, faults, site.file.vico, guis.get("vico"))
+    return Hosted(mico, daqco, vico, None if site.scene is None else faults)
+
+
+def _build_mico(
+    site: Site, faults: SimulationFaults, gui_factory: GuiFactory | None
+) -> MicoApplication:
+    settings = site.file.mico
+    controller: Controller
+    if site.scene is not None:
+        controller, injected = make_simulated(site.scene)
+        faults.join("controller", injected)
+    else:
+        controller = make_controller(settings.backend, library_path=settings.library)
+    return MicoApplication(
+        controller,
+        settings,
+        clock=site.clock,
+        policy=site.policy,
+        checker=load_checker(site.file, site.path),
+        platform=site.file.platform.name,
+        folder=site.path.parent,
+        gui_factory=gui_factory,
+    )
+
+
+def _build_daqco(
+    site: Site, faults: SimulationFaults, settings: DaqcoSettings, gui_factory: GuiFactory | None
+) -> DaqcoApplication:
+    library = make_library(
+        settings.backend,
+        clock=site.clock,
+        scene_sources=_sources(site.scene),
+        clock_sources=settings.clock_sources,
+        seed=site.seed,
+    )
+    faults.join_simulated("board", library)
+    notes = open_recordings()
+    application = DaqcoApplication(
+        library,
+        settings,
+        clock=site.clock,
+        policy=site.policy,
+        software=f"CoSMic {cosmic.__version__}",
+        configuration=site.path.read_text(encoding="utf-8"),
+        notes=notes,
+        gui_factory=gui_factory,
+    )
+    close_left_open(notes, (application.directory,))
+    return application
+
+
+def _build_vico(
+    site: Site, faults: SimulationFaults, settings: VicoSettings, gui_factory: GuiFactory | None
+) -> VicoApplication:
+    scene, simulation = site.scene, None
+    if scene is not None and scene.lens is not None and scene.light is not None:
+        simulation = SimPeripherals(scene.lens, scene.light, site.clock, site.seed)
+
+    if scene is not None:
+        faults.expect("camera")
+
+    def make_library(backend: Backend) -> CameraLibrary:
+        library = make_camera_library(
+            backend,
+            clock=site.clock,
+            scene=scene,
+            sources=settings.sources,
+            producers=settings.producers,
+            seed=site.seed,
+        )
+        faults.join_simulated("camera", library)
+        return library
+
+    def open_lens() -> Lens | None:
+        lens = settings.lens
+        return make_lens(
+            lens.backend,
+            port=lens.port,
+            homed=lens.homed,
+            limits_counts=lens.limits_counts,
+            simulation=simulation,
+        )
+
+    return VicoApplication(
+        make_library,
+        open_lens,
+        lambda: make_light(settings.light.backend, port=settings.light.port, simulation=simulation),
+        settings,
+        clock=site.clock,
+        policy=site.policy,
+        gui_factory=gui_factory,
+    )
+
+
+def _sources(scene: Scene | None) -> dict[tuple[str, str], Source]:
+    """Return what the twin connects to the inputs of the simulated boards."""
+    if scene is None or scene.force_side is None:
+        return {}
+    sensors = scene.force_side.sensors
+    sources: dict[tuple[str, str], Source] = {}
+    for place, name in scene.settings.sensor_wiring.items():
+        board, _, number = place.partition("/")
+        sources[board, number] = sensors[name]
+    return sources

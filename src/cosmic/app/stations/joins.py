@@ -1,0 +1,62 @@
+"""Joins what one application does to another, in this process or over a line."""
+
+import cosmic
+from cosmic.app.stations.hosting import Hosted, Site
+from cosmic.app.stations.remote_applications import Elsewhere
+from cosmic.autonomy.couplings import join_teleoperation
+from cosmic.autonomy.interlocks import (
+    join_force_cautions,
+    join_force_limits,
+    join_positions,
+    join_stage_positions,
+)
+from cosmic.autonomy.places import join_places
+from cosmic.daqco.api.application import DaqcoApplication
+from cosmic.daqco.api.daqco import Daqco, daqco_of
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.application import RemoteApplication
+from cosmic.mico.api.application_base import MicoApplicationBase
+
+
+def join_here(own: Hosted, site: Site) -> None:
+    """Join the applications of this process to each other."""
+    mico, daqco, vico = own.mico, own.daqco, own.vico
+    if daqco is not None and mico is not None:
+        join_force_limits(daqco, mico)
+        join_force_cautions(daqco, mico)
+        join_teleoperation(mico, daqco)
+        join_positions(daqco.recorder, mico, site.clock)
+    if vico is not None and mico is not None:
+        join_stage_positions(vico, mico)
+        kept_in = vico.settings.calibration
+        folder = site.path.parent / kept_in if kept_in else None
+        join_places(vico, mico, folder, cosmic.__version__)
+
+
+def join_stations(
+    mico: MicoApplicationBase | None,
+    daqco: DaqcoApplication | RemoteApplication[Daqco] | None,
+    elsewhere: Elsewhere,
+    policy: FailurePolicy,
+) -> None:
+    """Have a force limit stop motion where the two are in different processes.
+
+    What belongs to one station is joined there. A limit whose station fell silent counts as
+    crossed. This holds while this process runs and no longer.
+    """
+    there, boards_at = elsewhere.host_of.get("mico"), elsewhere.host_of.get("daqco")
+    if mico is None or daqco is None or there is boards_at:
+        return
+    guard = daqco_of(daqco).guard
+    if there is None:
+        guard.trip = mico.manager.stop
+        return
+
+    def trip(reason: str) -> None:
+        # Aside, for the thread that acquires must not wait for a line.
+        there.later(
+            lambda: mico.manager.stop(reason),
+            lambda exc: policy.report(exc, f"stop at {there.name} ({reason})"),
+        )
+
+    guard.trip = trip

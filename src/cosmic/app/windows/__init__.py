@@ -1,0 +1,1 @@
+"""The windows, and what joins them to a platform."""

@@ -1,0 +1,363 @@
+"""The operator's window: panels, stop, failures and the console around one platform."""
+
+import logging
+from typing import Final
+
+from PySide6.QtCore import QSettings, Qt, QTimer
+from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
+
+import cosmic
+from cosmic.app.panels.calibrations import CalibrationPanel, add_calibrations
+from cosmic.app.panels.campaign.dock import CAMPAIGN, CampaignDock, can_run
+from cosmic.app.panels.instruments import instruments_of
+from cosmic.app.panels.path_guide import WayGuide
+from cosmic.app.panels.path_preview import Stage, WayBar
+from cosmic.app.panels.procedures import TRAJECTORIES, ProcedurePanels
+from cosmic.app.panels.scene import ScenePanel
+from cosmic.app.platform import Platform
+from cosmic.app.rig import Rig
+from cosmic.app.stations.host import StationHost
+from cosmic.app.windows.bridge import WindowBridge
+from cosmic.app.windows.collision_bar import CollisionBar
+from cosmic.app.windows.control_mode import ACM, ECM, SCM, ControlMode, blocked_modes
+from cosmic.app.windows.hint_bar import HintBar, first_steps
+from cosmic.app.windows.stations import WindowStations
+from cosmic.daqco.api.daqco import daqco_of
+from cosmic.daqco.gui.limit_indicator import LimitIndicator
+from cosmic.frame.failure import Failure
+from cosmic.frame.gui.console_panel import ConsolePanel
+from cosmic.frame.gui.late_panel import LatePanel
+from cosmic.frame.gui.log_panel import LogPanel
+from cosmic.frame.gui.palette import ThemeName
+from cosmic.frame.gui.server_gui import LOG_TITLE, CosmicServerGui
+from cosmic.frame.gui.stop_key import StopKeyFilter
+from cosmic.frame.gui.theme import State
+from cosmic.frame.log import RingBufferHandler
+from cosmic.mico.core.motion.stop_latch import StopState
+from cosmic.mico.gui.mico_widget import MicoWidget
+
+logger = logging.getLogger(__name__)
+
+MICO: Final = "MiCo"
+CONSOLE: Final = "Console"
+SCENE: Final = "Scene"
+RATE_MS: Final = 1000
+
+_SHARES: Final = [3, 2]
+"""How log and console share the width at a first start."""
+
+
+class OperatorWindow(CosmicServerGui):
+    """Hosts the panels of all applications of a platform; closing it closes the platform.
+
+    The hardware is opened by `open_hardware`, after the window stands.
+
+    Parameters
+    ----------
+    platform : Platform
+        What it shows and commands, not yet initialised.
+    settings : QSettings
+        Where layout, theme and the dismissed hint are kept.
+    ring : RingBufferHandler
+        Where the log panel takes its records from.
+    console : bool
+        Have a Python console.
+    host : StationHost or None
+        What serves the platform to others; closed with the window.
+    """
+
+    def __init__(
+        self,
+        platform: Platform,
+        settings: QSettings,
+        ring: RingBufferHandler,
+        *,
+        console: bool = True,
+        theme: ThemeName = "dark",
+        host: StationHost | None = None,
+    ) -> None:
+        stop_key = platform.file.platform.stop_key
+        super().__init__(settings, stop_key=stop_key, theme=theme)
+        self.setWindowTitle(f"CoSMic: {platform.file.platform.name}")
+        self._platform = platform
+        self._host = host
+        self._rig = Rig(platform, source="console")
+        self._console: ConsolePanel | None = None
+        self._procedures: ProcedurePanels | None = None
+        self._mico_gui: MicoWidget | None = None
+        self._scene: ScenePanel | None = None
+        self._guide: WayGuide | None = None
+        self._bridge = WindowBridge()
+        self._forget_policy = platform.policy.subscribe(self._bridge.tell_failure)
+        self._add_mico(settings)
+        pictures = self._add_instruments()
+        if self._mico_gui is not None and self._scene is not None:
+            self._procedures = ProcedurePanels(
+                self, self._mico_gui, self._scene, self._rig.control, beside=SCENE
+            )
+        self._campaign: CampaignDock | None = None
+        self._calibrations: LatePanel[CalibrationPanel] | None = None
+        if self._scene is not None and can_run(platform):
+            self._campaign = CampaignDock(
+                self, self._rig, self._scene, platform.policy, beside=MICO
+            )
+            self._campaign.replayed.connect(self._raise_scene)
+            self._calibrations = add_calibrations(self, self._rig, beside=MICO)
+            self.dock(MICO).raise_()
+        if pictures:
+            self.dock(pictures).raise_()
+        self._stations = WindowStations(self, platform, host, self._instruments.panels)
+        model = self._mico_gui is not None and self._mico_gui.collision.has_model
+        blocked = blocked_modes(
+            mico=self._mico_gui is not None, model=model, campaigns=self._campaign is not None
+        )
+        self._mode = ControlMode(self.top_bar, settings, blocked, self)
+        self._mode.changed.connect(self._on_mode_changed)
+        self._mode.restore()
+        self._add_log(ring, console=console)
+        # Last, for it sees every event: some ten thousand while the panels are made.
+        self._stop_filter = StopKeyFilter(_application(), stop_key, self, moving=self._is_moving)
+        self._connect_all()
+        self._show_platform()
+
+    # Putting it together
+
+    def _add_mico(self, settings: QSettings) -> None:
+        application = self._platform.mico
+        gui = application.get_gui() if application is not None else None
+        if application is None or not isinstance(gui, MicoWidget):
+            return
+        stop_key = self._platform.file.platform.stop_key
+        panel = QWidget()
+        column = QVBoxLayout(panel)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(HintBar(first_steps(application.manager.settings, stop_key), settings))
+        column.addWidget(gui, 1)
+        self.add_panel(MICO, panel, Qt.DockWidgetArea.LeftDockWidgetArea, scroll=False)
+        self._mico_gui = gui
+        gui.failure_changed.connect(self._on_mico_failure)
+        application.manager.latch.subscribe(self._bridge.tell_latch)
+        self._scene = ScenePanel(gui, settings)
+        self.add_panel(SCENE, self._scene, Qt.DockWidgetArea.RightDockWidgetArea, scroll=False)
+        gui.undo_planned.connect(self._scene.set_planned)
+        self._collision_bar = CollisionBar(self.top_bar, gui, self)
+        way_bar = WayBar()
+        self._scene.set_bar(way_bar)
+        self._guide = WayGuide(gui, self._scene, way_bar, self)
+        self._guide.offered.connect(self._raise_scene)
+
+    def _add_instruments(self) -> str:
+        """Put picture and lens in the middle, force below the scene; return the picture's title."""
+        if self._platform.mico is None:
+            self.top_bar.set_collision_model(present=True)  # nothing moves that could collide
+        scene = SCENE if self._scene is not None else ""
+        self._instruments = instruments_of(self._platform)
+        if self._platform.daqco is not None:
+            self.top_bar.add_indicator(LimitIndicator(daqco_of(self._platform.daqco)))
+        return self._instruments.place(self, scene, MICO if scene else "")
+
+    def _add_log(self, ring: RingBufferHandler, *, console: bool) -> None:
+        below = Qt.DockWidgetArea.BottomDockWidgetArea
+        self.add_panel(LOG_TITLE, LogPanel(ring), below, scroll=False)
+        if console:
+            self._console = ConsolePanel(
+                self._platform.policy,
+                {"rig": self._rig, "cosmic": cosmic},
+                on_interrupt=self.halt_all,
+                banner='Python console: try rig.mico["left.x"].move_by("0.2 mm"). '
+                "Ctrl+C or Interrupt breaks what runs.\n",
+            )
+            self.add_panel(CONSOLE, self._console, scroll=False, beside=LOG_TITLE)
+            self.share_out((LOG_TITLE, CONSOLE), _SHARES, Qt.Orientation.Horizontal)
+
+    def _connect_all(self) -> None:
+        self.stop_requested.connect(self._on_stop_button)
+        self._stop_filter.stop_requested.connect(self._on_stop_key)
+        self._stop_filter.add_cancel(self._cancel_path)
+        self._stop_filter.add_cancel(self._cancel_tool)
+        self.top_bar.reset_requested.connect(self._on_reset)
+        self.top_bar.message_clicked.connect(self._on_message_read)
+        self.rescan_requested.connect(self._on_rescan)
+        self.closing.connect(self._on_closing)
+        self._bridge.failure_reported.connect(self._on_failure)
+        self._bridge.latch_changed.connect(self._on_latch)
+
+    def _show_platform(self) -> None:
+        bar, platform = self.top_bar, self._platform
+        bar.set_simulated(platform.simulated)
+        self._show_rate()
+        looks = QTimer(self, interval=RATE_MS)
+        looks.timeout.connect(self._show_rate)
+        looks.start()
+        stop_key = platform.file.platform.stop_key
+        keys = [
+            (stop_key, "stop every movement and keep it stopped, from anywhere"),
+            ("Esc", "cancel a menu, dialog, entry or tool; with none of them, stop what moves"),
+        ]
+        if self._mico_gui is not None:
+            keys += self._mico_gui.keys()
+        keys += [("F1", "this list"), ("Ctrl+Q", "close")]
+        self.set_keys(keys)
+        self.set_about(
+            f"CoSMic {cosmic.__version__}\nControl software for a microrobotic platform.\n"
+            f"Platform file: {platform.path}" + (f"\n{self._host.address}" if self._host else "")
+        )
+
+    def _show_rate(self) -> None:
+        clock = self._platform.clock
+        self.top_bar.set_rate(clock.rate, clock.rate_reached if self._platform.simulated else None)
+
+    @property
+    def platform(self) -> Platform:
+        """What it shows and commands."""
+        return self._platform
+
+    @property
+    def mico_gui(self) -> MicoWidget | None:
+        """The MiCo panel, where MiCo is hosted."""
+        return self._mico_gui
+
+    @property
+    def scene_panel(self) -> ScenePanel | None:
+        """The panel with the scene, where MiCo is hosted."""
+        return self._scene
+
+    @property
+    def procedures(self) -> ProcedurePanels | None:
+        """Trajectories, teleoperation and control loops, where MiCo is hosted."""
+        return self._procedures
+
+    @property
+    def mode(self) -> str:
+        """The control mode in force: MCM, SCM, ECM or ACM."""
+        return self._mode.mode
+
+    @property
+    def console(self) -> ConsolePanel | None:
+        """The console, where there is one."""
+        return self._console
+
+    # Running
+
+    def open_hardware(self) -> None:
+        """Begin to open the hardware; the panels show how it goes."""
+        self.setFocus()  # else the first button has it, and Space would press that
+        self._platform.initialize_later()
+
+    def stop(self, reason: str) -> None:
+        """Stop everything and keep it stopped."""
+        if self._platform.mico is not None:
+            self._platform.mico.manager.stop(reason)
+
+    def halt_all(self) -> None:
+        """Stop the axes that move, without latching; any thread."""
+        if self._mico_gui is None or self._platform.mico is None:
+            return
+        for name, state in self._platform.mico.manager.states().items():
+            if state.in_motion:
+                self._mico_gui.mico[name].halt()
+
+    def _is_moving(self) -> bool:
+        """Tell whether Escape has something to stop."""
+        campaign = self._campaign is not None and self._campaign.running
+        mico = self._platform.mico
+        if campaign or mico is None or not mico.manager.ready:
+            return campaign
+        task = mico.running_task
+        return (task is not None and not task.done) or any(
+            state.in_motion for state in mico.manager.states().values()
+        )
+
+    def _cancel_tool(self) -> bool:
+        """Put the tools on the pictures away, as Escape does first."""
+        pictures = self._instruments.pictures
+        views = list(pictures.cameras.values()) if pictures is not None else []
+        chosen = [each for each in views if each.isVisible() and each.view.tool is not None]
+        for each in chosen:
+            each.tools.put_away()
+        return bool(chosen)
+
+    def _cancel_path(self) -> bool:
+        """Leave a detour that is looked for or offered; one that is being driven is stopped."""
+        guide = self._guide
+        if guide is None or guide.stage not in (Stage.SEARCHING, Stage.FOUND):
+            return False
+        guide.cancel()
+        return True
+
+    def _on_stop_button(self) -> None:
+        self.stop("STOP button")
+
+    def _on_stop_key(self, key: str) -> None:
+        self.stop(f"key {key}")
+
+    def _on_reset(self) -> None:
+        if self._platform.mico is not None:
+            self._platform.mico.manager.reset_stop()
+
+    def _on_latch(self, state: StopState) -> None:
+        self.top_bar.set_latched(state.reason)
+        if self._mico_gui is not None:
+            self._mico_gui.release_keys()
+            self._mico_gui.show_stopped(state.reason)
+        if self._guide is not None and state.reason is not None:
+            self._guide.cancel()
+
+    def _on_mode_changed(self, mode: str) -> None:
+        if self._mico_gui is None or self._guide is None:
+            return
+        self._mico_gui.set_seeking_ways(mode == ECM)
+        panel = {SCM: TRAJECTORIES, ACM: CAMPAIGN}.get(mode)
+        if panel is not None:
+            self.raise_panel(panel)
+        if self._guide.stage is not Stage.GOING:
+            self._guide.cancel()
+
+    def _raise_scene(self) -> None:
+        self.raise_panel(SCENE)
+
+    def _on_failure(self, failure: Failure) -> None:
+        self.top_bar.set_message(f"{failure.where}: {failure.text}", State.ERROR)
+
+    def _on_mico_failure(self, reason: str) -> None:
+        if reason:
+            self.set_failed(MICO, reason)
+            self.top_bar.set_message(f"{MICO}: {reason}", State.ERROR)
+        elif self.dock(MICO).failure:
+            self.clear_failed(MICO)
+            self.top_bar.set_message("")
+
+    def _on_message_read(self) -> None:
+        self.top_bar.set_message("")
+
+    def _on_rescan(self, title: str) -> None:
+        if title == MICO and self._mico_gui is not None:
+            self._mico_gui.rescan()
+
+    def _on_closing(self) -> None:
+        """Leave everything safe; motion ends first, the console with what it waits for next."""
+        if self._host is not None:
+            self._host.close()
+        self._stations.end()
+        self._forget_policy()
+        if self._scene is not None:
+            self._scene.save()
+        if self._mico_gui is not None:
+            self._mico_gui.release_keys()
+        if self._campaign is not None:
+            self._campaign.shut_down()
+        if self._calibrations is not None and self._calibrations.made is not None:
+            self._calibrations.made.shut_down()
+        if self._procedures is not None:
+            self._procedures.shut_down()
+        self._rig.close()
+        if self._console is not None:
+            self._console.shut_down()
+
+
+def _application() -> QApplication:
+    app = QApplication.instance()
+    if not isinstance(app, QApplication):
+        raise TypeError("a window needs a QApplication")
+    return app
