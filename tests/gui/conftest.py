@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
-from cosmic.app import platform_file
+from cosmic.app.configuration import platform_file
 from cosmic.mico.core.collision import collision_manager, scene_loader
 from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
 from cosmic.mico.core.collision.collision_manager import Answering

@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 
 from contract.fake_nidaqmx import FakeNidaqmx
-from cosmic.app import campaign_command, hosting
 from cosmic.app.cli import main
+from cosmic.app.commands import campaign as campaign_command
+from cosmic.app.stations import hosting
 from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.daqco.api.daqco import Daqco

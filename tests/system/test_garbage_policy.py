@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import cosmic
-from cosmic.app import campaign_command
-from cosmic.app import serve as serving
+from cosmic.app.commands import campaign as campaign_command
+from cosmic.app.commands import serve as serving
 from cosmic.app.rig import Rig
 from cosmic.app.stations.options import ServeOptions
 from cosmic.frame.garbage import GARBAGE, NEVER

@@ -11,8 +11,8 @@ import numpy.typing as npt
 import pytest
 
 import cosmic
-from cosmic.app import hosting
 from cosmic.app.platform import build_platform
+from cosmic.app.stations import hosting
 from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.errors import MoveCancelled
 from cosmic.twin.scene import Scene

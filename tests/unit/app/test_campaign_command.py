@@ -11,8 +11,10 @@ from typing import Any
 
 import pytest
 
-from cosmic.app import calibrate_command, campaign_command, left_open
+from cosmic.app import left_open
 from cosmic.app.cli import main
+from cosmic.app.commands import calibrate as calibrate_command
+from cosmic.app.commands import campaign as campaign_command
 from cosmic.autonomy.campaign.campaign import CampaignPhase
 from cosmic.autonomy.campaign.records import CampaignInfo
 from cosmic.autonomy.campaign.statistics import progress
