@@ -15,12 +15,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from skimage.morphology import skeletonize
 
 from benchmarks import figures
 from benchmarks.fibre_images import ROWS, Recipe, Truth, draw
 from benchmarks.figures import Figure, percentile
 from cosmic.vico.api import Fibre, fibre_mask, find_fibres
+from cosmic.vico.core.vision.thinning import skeletonize
 
 NAME = "fibres"
 ORDINARY = (

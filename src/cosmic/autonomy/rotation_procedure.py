@@ -106,7 +106,7 @@ class RotationProcedure:
 
 
 def _fibres(picture: Picture) -> list[Fibre]:
-    # Imported here: it loads scikit-image and scipy.
+    # Imported here: it loads OpenCV and scipy.
     from cosmic.vico.core.vision.finding import find_fibres
 
     return find_fibres(grey(picture.data))

@@ -136,7 +136,7 @@ class SeenFibre:
 
 def find_seen(picture: Picture, mapped: PixelMap, box: Box | None = None) -> list[SeenFibre]:
     """Find fibres on a picture, or on a part of it: left, top, right, bottom in pixels."""
-    # Imported here: it loads scikit-image and scipy.
+    # Imported here: it loads OpenCV and scipy.
     from cosmic.vico.core.vision.finding import find_fibres
 
     height, width = picture.data.shape[:2]

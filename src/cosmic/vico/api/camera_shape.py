@@ -168,7 +168,7 @@ class CameraShape:
                 continue  # somebody else put it there meanwhile: never replaced
 
     def _measured(self, picture: Picture) -> dict[str, object]:
-        # Imported here: it loads scikit-image and scipy.
+        # Imported here: it loads OpenCV and scipy.
         from cosmic.vico.api.fibres import place_fibres
 
         found = place_fibres(picture, self._places)

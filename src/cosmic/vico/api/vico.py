@@ -171,7 +171,7 @@ class Vico(Declared):
         NotAvailable
             No picture came in time.
         """
-        # Imported here: it loads scikit-image and scipy.
+        # Imported here: it loads OpenCV and scipy.
         from cosmic.vico.api.fibres import place_fibres
 
         picture = self.camera(camera).next_picture(timeout_s)

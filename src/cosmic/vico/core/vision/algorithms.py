@@ -68,7 +68,7 @@ class FindFibres:
 
     def run(self, picture: Picture, results: Results) -> object:  # noqa: ARG002
         """Find them."""
-        # Not at the top: it loads scikit-image and scipy, which a window without it need not.
+        # Not at the top: it loads OpenCV and scipy, which a window without it need not.
         from cosmic.vico.core.vision.finding import find_fibres
 
         return tuple(find_fibres(grey(picture.data)))

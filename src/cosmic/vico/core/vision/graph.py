@@ -1,18 +1,16 @@
 """The skeleton of a mask as branches between nodes."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-from skimage.morphology import skeletonize
 
 from cosmic.vico.core.vision.grey import Floats, Floats32, Mask, middle
 from cosmic.vico.core.vision.smoothing import arc_lengths
+from cosmic.vico.core.vision.thinning import skeletonize
 
 FREE = -1
-THINNED: Callable[[Mask], Mask] = skeletonize
 NEIGHBOURS = ((-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1))
 
 
@@ -66,16 +64,11 @@ class Graph:
         return middle(self.half_widths[rows, columns])
 
 
-def skeleton_of(mask: Mask) -> Mask:
-    """Return the skeleton of a mask."""
-    return np.asarray(THINNED(mask), dtype=np.uint8)
-
-
 def build_graph(mask: Mask, most: int) -> Graph | None:
     """Return the graph of a mask, or None where it has more than `most` forks."""
     framed = cv2.copyMakeBorder(mask, 1, 1, 1, 1, cv2.BORDER_REPLICATE)
     half_widths = cv2.distanceTransform(framed, cv2.DIST_L2, 5)[1:-1, 1:-1]
-    skeleton = skeleton_of(mask)
+    skeleton = skeletonize(mask)
     around = cv2.filter2D(skeleton, -1, np.ones((3, 3)), borderType=cv2.BORDER_CONSTANT)
     forks = ((skeleton > 0) & (around > 3)).astype(np.uint8)
     count, found, _, centres = cv2.connectedComponentsWithStats(forks, connectivity=8)
