@@ -2,7 +2,7 @@
 
 Aravis' fake camera sends 1600 x 1200 pixels of 8 bit at 60 Hz over loopback, from a process of its
 own; the client is another, once with and once without the privilege to read raw packets
-(CAP_NET_RAW). True loss is told by the pictures: the fake camera's first pixel counts the frames
+(CAP_NET_RAW). True loss is told by the images: the fake camera's first pixel counts the frames
 sent, modulo 255. Both processes share this machine; the camera takes about half a core, and sends
 more slowly where it does not get it.
 """

@@ -43,7 +43,7 @@ name = "{sample}"
 [stop]
 {stop}
 [output]
-pictures = false
+images = false
 html = false
 pdf = false
 """

@@ -36,7 +36,7 @@ count = 3
 good = 2
 time_s = 900.0
 [output]
-pictures = false
+images = false
 html = false
 pdf = false
 table = false

@@ -1,4 +1,4 @@
-"""Pictures of fibres whose shape is known, drawn without any of CoSMic's own code.
+"""Images of fibres whose shape is known, drawn without any of CoSMic's own code.
 
 A fibre is a curve of given curvature with a constant width and flat ends. Each pixel's share of
 fibre follows from its distance to the curve; light, blur, dirt and noise come on top.
@@ -15,7 +15,7 @@ STEP_PX = 0.25
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """How a picture is drawn; ranges are drawn from evenly."""
+    """How an image is drawn; ranges are drawn from evenly."""
 
     shape: tuple[int, int] = (1200, 1600)
     length_px: tuple[float, float] = (450.0, 1300.0)
@@ -94,7 +94,7 @@ def curve(rng: np.random.Generator, recipe: Recipe, length: float, width: float)
 
 
 def placed(rng: np.random.Generator, recipe: Recipe, width: float) -> np.ndarray | None:
-    """Return one try at a curve within the picture, or None."""
+    """Return one try at a curve within the image, or None."""
     line = curve(rng, recipe, rng.uniform(*recipe.length_px), width)
     height, across = recipe.shape
     room = np.array([across, height]) - 2 * recipe.margin_px - np.ptp(line, axis=0)
@@ -123,7 +123,7 @@ def good_crossings(line: np.ndarray, crossings: list[tuple[int, int]], width: fl
 
 
 def truths(rng: np.random.Generator, recipe: Recipe) -> list[Truth]:
-    """Return the fibres of one picture; several keep apart unless asked to cross."""
+    """Return the fibres of one image; several keep apart unless asked to cross."""
     found: list[Truth] = []
     for _ in range(20_000):
         if len(found) == recipe.fibres:
@@ -186,7 +186,7 @@ def dirt(rng: np.random.Generator, recipe: Recipe) -> np.ndarray:
 
 
 def finished(rng: np.random.Generator, recipe: Recipe, share: np.ndarray) -> np.ndarray:
-    """Return a picture of what covers the ground: with light, blur and noise."""
+    """Return an image of what covers the ground: with light, blur and noise."""
     dark = np.maximum(share, dirt(rng, recipe))
     image = (recipe.ground - recipe.contrast * dark) * light(rng, recipe)
     if recipe.blur_px > 0:
@@ -199,7 +199,7 @@ def finished(rng: np.random.Generator, recipe: Recipe, share: np.ndarray) -> np.
 
 
 def draw(recipe: Recipe, seed: int) -> tuple[np.ndarray, list[Truth]]:
-    """Return one picture and the fibres in it."""
+    """Return one image and the fibres in it."""
     rng = np.random.default_rng(seed)
     found = truths(rng, recipe)
     share = np.zeros(recipe.shape, np.float32)
@@ -221,7 +221,7 @@ ROWS = {
     "thick": Recipe(width_px=(24.0, 40.0), length_px=(600.0, 1300.0)),
     "straight": Recipe(turns=0.1, length_px=(450.0, 1050.0)),
     "three fibres": Recipe(fibres=3, length_px=(300.0, 700.0)),
-    "small picture": Recipe(
+    "small image": Recipe(
         shape=(300, 400), length_px=(120.0, 320.0), width_px=(4.0, 9.0), specks=4, margin_px=14.0
     ),
     "contrast 20": Recipe(contrast=20.0),

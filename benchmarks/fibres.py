@@ -1,7 +1,7 @@
-"""Fibres on drawn pictures of known shape: errors, doubts and time; real ones with --images.
+"""Fibres on drawn images of known shape: errors, doubts and time; real ones with --images.
 
 The time is that of the processor in one thread, with OpenCV held to one; the textbook's way
-(threshold at full size and skeleton) is timed in turn with it. `--images FOLDER` takes pictures
+(threshold at full size and skeleton) is timed in turn with it. `--images FOLDER` takes images
 with masks beside them (`NAME.jpg` and `NAME_labels.npy`, 0 where there is ground).
 """
 
@@ -32,9 +32,9 @@ ORDINARY = (
     "thick",
     "straight",
     "three fibres",
-    "small picture",
+    "small image",
 )
-PLAIN_PICTURES, OTHER_PICTURES, CROSSINGS = 120, 12, 24
+PLAIN_IMAGES, OTHER_IMAGES, CROSSINGS = 120, 12, 24
 WRONG_PERCENT = 5.0
 
 
@@ -94,7 +94,7 @@ def textbook(image: np.ndarray) -> np.ndarray:
 
 
 def row(recipe: Recipe, seeds: range) -> tuple[list[Found], list[float], int]:
-    """Return what was found on the pictures of a row, the time of each, and false certain ones."""
+    """Return what was found on the images of a row, the time of each, and false certain ones."""
     found: list[Found] = []
     times: list[float] = []
     false = 0
@@ -131,13 +131,13 @@ def summary(name: str, found: list[Found], *, targets: bool) -> list[Figure]:
 def measure(quick: bool, images: Path | None = None) -> list[Figure]:
     """Measure everything."""
     cv2.setNumThreads(1)
-    find_fibres(draw(ROWS["small picture"], 1)[0])
+    find_fibres(draw(ROWS["small image"], 1)[0])
     result: list[Figure] = []
     ordinary: list[Found] = []
     times: list[float] = []
     wrong = 0
     for number, (name, recipe) in enumerate(ROWS.items()):
-        count = PLAIN_PICTURES if name == "plain" else OTHER_PICTURES
+        count = PLAIN_IMAGES if name == "plain" else OTHER_IMAGES
         count = CROSSINGS if recipe.crossing else count
         first = 1000 * number
         found, spent, false = row(recipe, range(first, first + (2 if quick else count)))
@@ -157,7 +157,7 @@ def measure(quick: bool, images: Path | None = None) -> list[Figure]:
 
 
 def timing(times: list[float], *, quick: bool) -> list[Figure]:
-    """Return the time of a picture, next to the textbook's way."""
+    """Return the time of an image, next to the textbook's way."""
     ratios = []
     for seed in range(2 if quick else 10):
         image = draw(ROWS["plain"], seed)[0]
@@ -180,21 +180,21 @@ def dice(fibres: list[Fibre], truth: np.ndarray) -> float:
 
 
 def real(folder: Path) -> list[Figure]:
-    """Return how real pictures fared."""
+    """Return how real images fared."""
     scores = []
     for labels in sorted(folder.glob("*_labels.npy")):
         stem = labels.name.removesuffix("_labels.npy")
-        picture = next(path for path in sorted(folder.glob(f"{stem}.*")) if path != labels)
-        image = cv2.imread(str(picture), cv2.IMREAD_COLOR)
-        if image is None:
+        file = next(path for path in sorted(folder.glob(f"{stem}.*")) if path != labels)
+        pixels = cv2.imread(str(file), cv2.IMREAD_COLOR)
+        if pixels is None:
             continue
-        scores.append(dice(find_fibres(image), np.load(labels) > 0))
+        scores.append(dice(find_fibres(pixels), np.load(labels) > 0))
     if not scores:
         return []
     poor = 100.0 * sum(score < 0.85 for score in scores) / len(scores)
     return [
-        Figure(NAME, "real pictures: Dice, median", statistics.median(scores), ""),
-        Figure(NAME, "real pictures: Dice below 0.85", poor, "%", 5.0),
+        Figure(NAME, "real images: Dice, median", statistics.median(scores), ""),
+        Figure(NAME, "real images: Dice below 0.85", poor, "%", 5.0),
     ]
 
 

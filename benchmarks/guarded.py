@@ -323,18 +323,16 @@ def network() -> Ratios:
 
 
 def fibres() -> Ratios:
-    """Return what finding the fibre on a picture costs."""
+    """Return what finding the fibre on an image costs."""
     import cv2
 
     from benchmarks.fibre_images import ROWS, draw
     from cosmic.vico.api import find_fibres
 
     cv2.setNumThreads(1)
-    pictures = iter([draw(ROWS["plain"], seed)[0] for seed in range(10)])
+    images = iter([draw(ROWS["plain"], seed)[0] for seed in range(10)])
     return {
-        "fibres of a picture": to_reference(
-            lambda: thread_s(partial(find_fibres, next(pictures))), 9
-        )
+        "fibres of an image": to_reference(lambda: thread_s(partial(find_fibres, next(images))), 9)
     }
 
 

@@ -1,4 +1,4 @@
-"""The process that `benchmarks.live_view` starts on a display: shows pictures, and times it."""
+"""The process that `benchmarks.live_view` starts on a display: shows images, and times it."""
 
 import json
 import sys
@@ -12,26 +12,26 @@ from PySide6.QtGui import QImage, QPixmap
 from PySide6.QtWidgets import QApplication, QLabel
 
 from cosmic.frame.gui.theme import apply_theme
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.gui.camera_view import CameraView
 from cosmic.vico.hw.interface import PixelFormat
 
 # The port that the tests of the widgets use; it stands in for the application and does nothing.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
-from gui.vico.fake_vico import FakeCamera, FakeVico, Found, Seen, fibre_picture
+from gui.vico.fake_vico import FakeCamera, FakeVico, Found, Seen, fibre_image
 
 WINDOW_PX: Final = (1100, 950)
-PICTURES: Final = 8
+IMAGES: Final = 8
 RATE_HZ: Final = 30.0
 
 
 class Stand:
-    """A view of a camera with pictures of a fibre, one after the other."""
+    """A view of a camera with images of a fibre, one after the other."""
 
     def __init__(self) -> None:
         port = FakeVico(Path())
         self.camera: FakeCamera = port.camera("top")
-        self.data = [fibre_picture(seed=seed) for seed in range(PICTURES)]
+        self.data = [fibre_image(seed=seed) for seed in range(IMAGES)]
         self.view = CameraView(port, "top")
         self.view.resize(*WINDOW_PX)
         self.view.show()
@@ -42,16 +42,16 @@ class Stand:
         self.view.look()
         QApplication.processEvents()
 
-    def push(self) -> Picture:
-        """Take a picture, with a fibre found in it."""
-        picture = self.camera.push(self.data[self._next % PICTURES], pixel_format=self.form)
-        self.camera.analysis = Found(picture, (Seen(),))
+    def push(self) -> CameraImage:
+        """Take an image, with a fibre found in it."""
+        image = self.camera.push(self.data[self._next % IMAGES], pixel_format=self.form)
+        self.camera.analysis = Found(image, (Seen(),))
         self._next += 1
-        return picture
+        return image
 
 
 def spent(begin: tuple[float, float], count: int) -> tuple[float, float]:
-    """Return processor time a picture: of this thread, and of all."""
+    """Return processor time an image: of this thread, and of all."""
     thread, process = begin
     return (time.thread_time() - thread) / count, (time.process_time() - process) / count
 
@@ -68,7 +68,7 @@ def label(stand: Stand, count: int) -> list[float]:
     QApplication.processEvents()
     found = []
     for number in range(count):
-        data = stand.data[number % PICTURES]
+        data = stand.data[number % IMAGES]
         began = time.process_time()
         image = QImage(data.data, width, height, width, QImage.Format.Format_Grayscale8)
         shown.setPixmap(QPixmap.fromImage(image))
@@ -79,7 +79,7 @@ def label(stand: Stand, count: int) -> list[float]:
 
 
 def view(stand: Stand, count: int) -> list[float]:
-    """Return the cost of a picture in the view, one after the other."""
+    """Return the cost of an image in the view, one after the other."""
     found = []
     for _ in range(count):
         stand.push()
@@ -92,7 +92,7 @@ def view(stand: Stand, count: int) -> list[float]:
 
 
 def live(stand: Stand, seconds: float) -> dict[str, float]:
-    """Let pictures come at 30 Hz; return the share of a core and how many were drawn."""
+    """Let images come at 30 Hz; return the share of a core and how many were drawn."""
     pushing = QTimer(interval=round(1000.0 / RATE_HZ))
     pushing.timeout.connect(stand.push)
     app = QApplication.instance()

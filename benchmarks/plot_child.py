@@ -65,7 +65,7 @@ def new_chart(span_s: float) -> Chart:
 
 
 def seen(chart: Chart, spikes: list[tuple[int, int, float]]) -> tuple[int, int]:
-    """Return how many spikes should be in the picture, and how many are."""
+    """Return how many spikes should be in the image, and how many are."""
     raster = chart.raster
     per_column = chart.span_s * RATE_HZ / raster.width
     oldest = raster.head - raster.width + 1
@@ -111,7 +111,7 @@ def ours(span_s: float, refreshes: int) -> dict[str, object]:
 
 
 def zooms(chart: Chart) -> list[float]:
-    """Return how long the picture takes after each step of a zoom, in and out again."""
+    """Return how long the image takes after each step of a zoom, in and out again."""
     found = []
     for factor in (0.5, 0.2, 0.2, 0.2, 5.0, 5.0, 5.0, 2.0):
         began_s = time.perf_counter()

@@ -1,6 +1,6 @@
 """Calibration, focus, tracking, tool tips and levels: how exact they are, and what they cost.
 
-Exactness on the twin's own pictures with its dirt, noise and uneven light, and on tools drawn by
+Exactness on the twin's own images with its dirt, noise and uneven light, and on tools drawn by
 formula. Costs are processor time of the thread that computes, one core.
 """
 
@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-from tests.unit.twin.optics.picture_bench import PictureBench
-from tests.unit.vico.tool_pictures import tool_picture
+from tests.unit.twin.optics.image_bench import ImageBench
+from tests.unit.vico.tool_images import tool_image
 
 from benchmarks.figures import Figure, main, percentile
 from cosmic.twin.settings import shipped_settings
@@ -55,9 +55,9 @@ def cpu_ms(function: Callable[[], object], runs: int) -> float:
 # ------------------------------------------------------------------ calibration on the twin
 
 
-def jaw_stage(magnification: float) -> PictureBench:
-    """Return the twin with the right gripper in the middle of the picture, in focus."""
-    bench = PictureBench(shipped_settings()).zoom(magnification).focus(60.0)
+def jaw_stage(magnification: float) -> ImageBench:
+    """Return the twin with the right gripper in the middle of the image, in focus."""
+    bench = ImageBench(shipped_settings()).zoom(magnification).focus(60.0)
     return bench.go(
         right_x=float(HOME_UM[0]), right_y=float(HOME_UM[1]), right_z=-1440.0, right_gripper=60.0
     )
@@ -128,7 +128,7 @@ def focus(magnification: float, runs: int) -> list[Figure]:
     """Focus on the fibres on the plate."""
     found, positions, failures = [], 0, 0
     rng = np.random.default_rng(3)
-    bench = PictureBench(shipped_settings()).zoom(magnification)
+    bench = ImageBench(shipped_settings()).zoom(magnification)
     heights = np.concatenate([line[:, 2] for line in bench.optics.centre_lines_um(bench.now_s)])
     truth = float(np.median(heights))
     reach = 1.2e3 / magnification**0.5
@@ -153,7 +153,7 @@ def focus(magnification: float, runs: int) -> list[Figure]:
     return [
         Figure(NAME, text + "error RMS", error, "um"),
         Figure(NAME, text + "not found", failures, "", 0.0),
-        Figure(NAME, text + "pictures a search", positions / runs, ""),
+        Figure(NAME, text + "images a search", positions / runs, ""),
     ]
 
 
@@ -165,15 +165,15 @@ def tools(name: str, changes: dict[str, float], count: int) -> list[Figure]:
     errors, spent, missed, wrong = [], [], 0, 0
     find = find_gripper if "gap" in changes else find_probe
     for seed in range(count):
-        picture = tool_picture(seed, **changes)
+        image = tool_image(seed, **changes)
         began = time.thread_time()
-        found = find(picture.image, picture.expected)
+        found = find(image.image, image.expected)
         spent.append(1e3 * (time.thread_time() - began))
         if isinstance(found, NotSeen):
             missed += 1
             continue
         place = found.hold_px if "gap" in changes else found.tip_px
-        errors.append(math.dist(place, picture.hold))
+        errors.append(math.dist(place, image.hold))
         wrong += found.certain and errors[-1] > 1.5
     return [
         Figure(NAME, f"{name}: tip, median", percentile(errors, 50), "px", 0.5),
@@ -186,7 +186,7 @@ def tools(name: str, changes: dict[str, float], count: int) -> list[Figure]:
 
 def twin_tools(count: int) -> list[Figure]:
     """Find the twin's grippers and probe at 2x, over its plate with fibres."""
-    bench = PictureBench(shipped_settings()).zoom(2.0).focus(60.0)
+    bench = ImageBench(shipped_settings()).zoom(2.0).focus(60.0)
     bench.go(left_z=-1440.0, right_z=-1440.0)
     px_um = bench.optics.projection(bench.now_s).px_um
     rng = np.random.default_rng(0)
@@ -232,13 +232,13 @@ def twin_tools(count: int) -> list[Figure]:
 def tracking(runs: int) -> list[Figure]:
     """Follow a probe that is drawn anew at each place."""
     errors = []
-    first = tool_picture(0, specks=0)
+    first = tool_image(0, specks=0)
     corner = [round(float(each)) - 48 for each in first.hold]
     region = Roi(corner[0], corner[1], 96, 96)
     rng = np.random.default_rng(1)
     for seed in range(runs):
         shift = rng.uniform(-20.0, 20.0, 2)
-        moved = tool_picture(0, specks=0, shift=shift, noise_seed=seed)
+        moved = tool_image(0, specks=0, shift=shift, noise_seed=seed)
         match = displacement(first.image, moved.image, region, 40.0)
         if match is not None:
             centre = np.array(corner) + 47.5
@@ -255,7 +255,7 @@ def tracking(runs: int) -> list[Figure]:
 
 
 def costs(runs: int) -> list[Figure]:
-    """Measure what runs on every picture, at 1600 x 1200."""
+    """Measure what runs on every image, at 1600 x 1200."""
     noise = np.random.default_rng(0).normal(120.0, 30.0, (1200, 1600))
     image = np.clip(cv2.GaussianBlur(noise, (0, 0), 1.0), 0, 255).astype(np.uint8)
     deep = image.astype(np.uint16) * 16
@@ -274,7 +274,7 @@ def costs(runs: int) -> list[Figure]:
             1.0,
         ),
         "flat field, 8 bit": (lambda: background.correct(frame), None),
-        "focus measure, whole picture": (lambda: sharpness(image), None),
+        "focus measure, whole image": (lambda: sharpness(image), None),
         "focus measure, 400 x 400 px": (lambda: sharpness(image, part), None),
     }
     return [

@@ -10,16 +10,16 @@ from cosmic.vico.api.fibres import PlacedFibre
 
 
 def look(rig: cosmic.Rig) -> None:
-    """Zoom to 2x and find the focus, on pictures exposed after each movement."""
+    """Zoom to 2x and find the focus, on images exposed after each movement."""
     vico = rig.vico
     assert vico.lens is not None
     vico.lens.zoom_to(2.0).wait()
     vico.lens.autofocus().wait()
-    print(f"zoom {vico.lens.zoom:.1f}x, picture of {vico.snap().shape}")
+    print(f"zoom {vico.lens.zoom:.1f}x, image of {vico.snap().shape}")
 
 
 def nearest(rig: cosmic.Rig) -> PlacedFibre:
-    """Return the fibre nearest to the middle of the picture."""
+    """Return the fibre nearest to the middle of the image."""
     return min(
         rig.vico.find_fibres(),
         key=lambda fibre: abs(fibre.centre_line_px.mean(axis=0) - (800.0, 600.0)).sum(),
@@ -34,7 +34,7 @@ def measure(rig: cosmic.Rig) -> None:
 
 
 def calibrate(rig: cosmic.Rig) -> None:
-    """Bring the right gripper into the picture, 50 um above the plate, and calibrate with it."""
+    """Bring the right gripper into the image, 50 um above the plate, and calibrate with it."""
     rig.mico["right.x"].move_to(-3000.0)
     rig.mico["right.z"].move_to(-1450.0)
     rig.vico.calibrate_stage("right").wait()
@@ -43,13 +43,13 @@ def calibrate(rig: cosmic.Rig) -> None:
 
 
 def move_by_click(rig: cosmic.Rig) -> None:
-    """Move the gripper's tip over a place of the picture, through the gate as every move."""
+    """Move the gripper's tip over a place of the image, through the gate as every move."""
     camera = rig.vico.camera()
     print(camera.click_to_move((1250.0, 600.0), "right"))
 
 
 def record(rig: cosmic.Rig, file: Path) -> None:
-    """Record some pictures without loss, and open them with a program that is not ours."""
+    """Record some images without loss, and open them with a program that is not ours."""
     with rig.vico.record(file):
         for _ in range(3):
             rig.vico.snap()

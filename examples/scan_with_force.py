@@ -1,4 +1,4 @@
-"""Scan the probe into a fibre with force and picture as a bluesky plan, save it, read it back."""
+"""Scan the probe into a fibre with force and image as a bluesky plan, save it, read it back."""
 
 import json
 import logging
@@ -25,7 +25,7 @@ def approach(rig: cosmic.Rig) -> None:
 
 
 def push(rig: cosmic.Rig) -> MsgGenerator:
-    """Return the plan: the probe goes step by step, at each force and picture are taken."""
+    """Return the plan: the probe goes step by step, at each force and image are taken."""
     detectors = [rig.daqco["force"], rig.vico.camera()]
     return scan(detectors, rig.mico["probe.y"].movable, FIRST_UM, LAST_UM, POINTS)
 
@@ -47,7 +47,7 @@ def rehearse(name: str, plan: MsgGenerator) -> None:
 def run(rig: cosmic.Rig, engine: RunEngine, folder: Path) -> Path:
     """Run the plan; every document of it goes into a file, a line each."""
     rig.daqco["force"].average_s = 0.2
-    rig.vico.camera().plan_pictures(folder)
+    rig.vico.camera().plan_images(folder)
     engine(push(rig), JSONLinesWriter(str(folder), "push.jsonl"))
     return folder / "push.jsonl"
 
@@ -59,16 +59,14 @@ def read_back(path: Path) -> pd.DataFrame:
 
 
 def tell(table: pd.DataFrame) -> None:
-    """Print the table, the stiffness where the probe touches, and how many pictures are there."""
+    """Print the table, the stiffness where the probe touches, and how many images are there."""
     columns = {"probe_y": "y_um", "force": "force_un", "force_std": "std_un"}
     print(table[list(columns)].rename(columns=columns).round(1).to_string(index=False))
     touching = table[table["force"] > 10.0]
     slope, _ = np.polyfit(touching["probe_y"], touching["force"], 1)
     print(f"stiffness: {-slope:.2f} uN/um from {len(touching)} points")
-    pictures = [
-        path for path in table.filter(like="_file").to_numpy().ravel() if Path(path).exists()
-    ]
-    print(f"pictures: {len(pictures)}")
+    images = [path for path in table.filter(like="_file").to_numpy().ravel() if Path(path).exists()]
+    print(f"images: {len(images)}")
 
 
 def be_refused(rig: cosmic.Rig, engine: RunEngine) -> None:

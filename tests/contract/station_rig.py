@@ -121,7 +121,7 @@ class Application:
         return 1 / 0
 
     @remote
-    def picture(self, rows: int) -> NDArray[np.uint8]:
+    def image(self, rows: int) -> NDArray[np.uint8]:
         return np.arange(rows * 4, dtype=np.uint8).reshape(rows, 4)
 
     def hidden(self) -> str:

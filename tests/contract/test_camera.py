@@ -95,7 +95,7 @@ def test_the_library_lists_its_camera_and_says_its_own_name(rig: CameraRig) -> N
         assert min(camera.info.sensor_px) > 0
 
 
-def test_listing_goes_on_while_a_camera_takes_pictures(rig: CameraRig, camera: Camera) -> None:
+def test_listing_goes_on_while_a_camera_takes_images(rig: CameraRig, camera: Camera) -> None:
     camera.start()
     taken(rig, camera, 1)
     assert rig.key in [info.key for info in rig.library.cameras()]
@@ -202,7 +202,7 @@ def test_a_new_start_counts_anew(rig: CameraRig, camera: Camera) -> None:
     assert 1 <= counters.completed < 10
 
 
-def test_a_camera_that_takes_pictures_cannot_be_started(rig: CameraRig, camera: Camera) -> None:
+def test_a_camera_that_takes_images_cannot_be_started(rig: CameraRig, camera: Camera) -> None:
     camera.start()
     number = taken(rig, camera, 2)[-1].frame_id
     with pytest.raises(DeviceError) as caught:

@@ -77,8 +77,8 @@ def test_arrays_arrive_with_their_type_and_shape(rig: StationRig) -> None:
         back: Any = rig.client.call("stage", "echo", {"value": sent})
         assert back.dtype == sent.dtype
         assert np.array_equal(back, sent)
-    picture: Any = rig.client.call("stage", "picture", {"rows": 300})
-    assert picture.shape == (300, 4)
+    image: Any = rig.client.call("stage", "image", {"rows": 300})
+    assert image.shape == (300, 4)
 
 
 REFUSED_CALLS: list[tuple[str, str, dict[Any, Any]]] = [
@@ -92,7 +92,7 @@ REFUSED_CALLS: list[tuple[str, str, dict[Any, Any]]] = [
     ("stage", "add", {"a": "1.0"}),
     ("stage", "add", {"a": True}),
     ("stage", "add", {"a": None}),
-    ("stage", "picture", {"rows": 1.0}),
+    ("stage", "image", {"rows": 1.0}),
 ]
 
 

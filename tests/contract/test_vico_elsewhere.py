@@ -37,13 +37,13 @@ from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Rule
 from cosmic.frame.threads import declare_gui_thread
 from cosmic.frame.verdict import Reason
-from cosmic.vico.api import camera_pictures
+from cosmic.vico.api import camera_images
 from cosmic.vico.api.camera import CameraHandle
-from cosmic.vico.api.camera_pictures import PicturesElsewhere
-from cosmic.vico.api.sent_picture import SentPicture
+from cosmic.vico.api.camera_images import RemoteImages
+from cosmic.vico.api.sent_image import SentImage
 from cosmic.vico.api.vico import Vico
-from cosmic.vico.core.picture import Picture
-from cosmic.vico.core.recording.reading import open_picture_recording
+from cosmic.vico.core.image import CameraImage
+from cosmic.vico.core.recording.reading import open_image_recording
 from cosmic.vico.hw.interface import Trigger
 from cosmic.vico.hw.peripherals import LensAxis
 from unit.vico.vision import drawn_fibres
@@ -52,8 +52,8 @@ TRANSPORTS = ["station"]
 STATE = "vico/state"
 
 
-def pictures_topic(camera: str) -> str:
-    return f"vico/camera_handles/{camera}/pictures"
+def images_topic(camera: str) -> str:
+    return f"vico/camera_handles/{camera}/images"
 
 
 def shown_topic(camera: str) -> str:
@@ -84,7 +84,7 @@ def noise(seed: int, shape: tuple[int, ...] = (48, 64), kind: Any = np.uint8) ->
 
 
 def while_waiting(rig: VicoRig, ask: Callable[[], Any], level: int) -> Any:
-    """Ask for the next picture, and give one as soon as somebody waits for it."""
+    """Ask for the next image, and give one as soon as somebody waits for it."""
     with ThreadPoolExecutor(1) as pool:
         answer = pool.submit(ask)
         assert soon(lambda: answer.done() or (rig.home.camera.keep_coming(noise(level)) or False))
@@ -155,7 +155,7 @@ def test_cameras_are_looked_for(rig: VicoRig) -> None:
     rig.vico.use("top", "P1").wait(LIMIT_S)
 
 
-# --- pictures ---------------------------------------------------------------------------------
+# --- images ---------------------------------------------------------------------------------
 
 
 def test_a_snap_is_exposed_after_the_call(rig: VicoRig) -> None:
@@ -165,16 +165,16 @@ def test_a_snap_is_exposed_after_the_call(rig: VicoRig) -> None:
     assert np.array_equal(image, noise(2))
 
 
-def test_no_picture_in_time_says_why(rig: VicoRig) -> None:
+def test_no_image_in_time_says_why(rig: VicoRig) -> None:
     camera = rig.vico.camera()
-    with pytest.raises(NotAvailable, match=r"no picture of top in 0\.1 s: none arrived"):
-        camera.next_picture(0.1)
+    with pytest.raises(NotAvailable, match=r"no image of top in 0\.1 s: none arrived"):
+        camera.next_image(0.1)
     camera.stop().wait(LIMIT_S)
     with pytest.raises(NotAvailable, match="it is stopped"):
-        camera.next_picture(0.1)
+        camera.next_image(0.1)
 
 
-def test_the_newest_picture_comes_with_all_that_is_known_of_it(rig: VicoRig) -> None:
+def test_the_newest_image_comes_with_all_that_is_known_of_it(rig: VicoRig) -> None:
     camera = rig.vico.camera()
     rig.home.camera.push(noise(4, kind=np.uint16))
     thread = rig.home.application.unit("top").thread
@@ -195,7 +195,7 @@ def test_the_newest_picture_comes_with_all_that_is_known_of_it(rig: VicoRig) -> 
 
 def test_fibres_are_found_and_placed_on_the_platform(tmp_path: Path) -> None:
     lines = [drawn_fibres.arc((60.0, 120.0), 0.2, 300.0, 0.6)]
-    image = drawn_fibres.picture(lines, [9.0], shape=(320, 480)).astype(np.uint8)
+    image = drawn_fibres.drawn_image(lines, [9.0], shape=(320, 480)).astype(np.uint8)
     with vico_rig("station", tmp_path, size_px=(480, 320)) as rig:
         found, there = [
             while_waiting_for_fibres(rig, vico, image)
@@ -216,7 +216,7 @@ def while_waiting_for_fibres(rig: VicoRig, vico: Vico, image: Any) -> Any:
 
 def test_what_machine_vision_sees_is_shown(away: VicoRig) -> None:
     lines = [drawn_fibres.arc((8.0, 20.0), 0.1, 40.0, 0.1)]
-    image = drawn_fibres.picture(lines, [5.0], shape=(48, 64)).astype(np.uint8)
+    image = drawn_fibres.drawn_image(lines, [5.0], shape=(48, 64)).astype(np.uint8)
     camera = away.vico.camera()
     camera.switch("fibres", on=True)
     assert camera.analysis is None  # from now on it is received
@@ -229,7 +229,7 @@ def test_what_machine_vision_sees_is_shown(away: VicoRig) -> None:
     newest = camera.analysis
     vision = away.home.application.unit("top").vision.newest
     assert newest is not None and vision is not None
-    assert newest.picture.data.shape == (48, 64)
+    assert newest.image.data.shape == (48, 64)
     there = vision.results["fibres"]
     assert isinstance(there, tuple)
     assert [each.length_px for each in newest.fibres] == [each.length_px for each in there]
@@ -240,7 +240,7 @@ def test_plans_trigger_it(rig: VicoRig, tmp_path: Path) -> None:
     now = camera.settings
     assert now is not None
     camera.configure(replace(now, trigger=Trigger.SOFTWARE)).wait(LIMIT_S)
-    camera.plan_pictures(tmp_path)
+    camera.plan_images(tmp_path)
     status = camera.trigger()
     status.wait(LIMIT_S)
     assert camera.read()["top_mean"]["value"] == 77.0
@@ -252,14 +252,14 @@ def test_plans_trigger_it(rig: VicoRig, tmp_path: Path) -> None:
 
 
 def test_every_frame_arrives_complete_and_in_order(away: VicoRig) -> None:
-    got: list[SentPicture] = []
+    got: list[SentImage] = []
 
     def receive(payload: object) -> None:
-        if isinstance(payload, SentPicture):
+        if isinstance(payload, SentImage):
             got.append(payload)
 
     assert away.client is not None
-    topic = pictures_topic("top")
+    topic = images_topic("top")
     subscription = away.client.subscribe(topic, Rule.ALL, receive)
     try:
         assert soon(lambda: away.station.wanted(topic))
@@ -276,8 +276,8 @@ def test_every_frame_arrives_complete_and_in_order(away: VicoRig) -> None:
 def test_nothing_is_drawn_while_nobody_looks(
     away: VicoRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(camera_pictures, "IDLE_S", 0.2)
-    taken: list[Picture] = []
+    monkeypatch.setattr(camera_images, "IDLE_S", 0.2)
+    taken: list[CameraImage] = []
     away.home.application.unit("top").thread.subscribe(taken.append)
     away.home.camera.push(*[noise(n) for n in range(20)])
     assert soon(lambda: len(taken) == 20)
@@ -293,11 +293,11 @@ def test_nothing_is_drawn_while_nobody_looks(
 
 
 def is_live(camera: CameraHandle) -> bool:
-    assert isinstance(camera.pictures, PicturesElsewhere)
-    return camera.pictures.live
+    assert isinstance(camera.images, RemoteImages)
+    return camera.images.live
 
 
-def test_a_picture_that_the_line_dropped_is_asked_for(
+def test_a_image_that_the_line_dropped_is_asked_for(
     away: VicoRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     camera = away.vico.camera()
@@ -361,7 +361,7 @@ def test_a_slow_view_delays_no_call(away: VicoRig) -> None:
     go_on, seen = Event(), []
 
     def slow(payload: object) -> None:
-        if isinstance(payload, SentPicture):
+        if isinstance(payload, SentImage):
             seen.append(payload.frame_id)
             go_on.wait(LIMIT_S)
 
@@ -406,7 +406,7 @@ def test_a_recording_holds_what_was_taken(rig: VicoRig, tmp_path: Path) -> None:
         assert soon(lambda: recordings.state.written == 12)
     assert not camera.recording.active
     assert (camera.recording.written, camera.recording.dropped) == (12, 0)
-    with open_picture_recording(path) as recording:
+    with open_image_recording(path) as recording:
         pairs = zip(recording, frames, strict=True)
         assert all(np.array_equal(each.data, sent) for each, sent in pairs)
     with pytest.raises(RecordingExistsError):
@@ -446,7 +446,7 @@ def test_who_may_only_look_sees_all_and_changes_nothing(tmp_path: Path) -> None:
             running.wait(LIMIT_S)
 
 
-def test_pictures_and_time_lapses_are_written(rig: VicoRig, tmp_path: Path) -> None:
+def test_images_and_time_lapses_are_written(rig: VicoRig, tmp_path: Path) -> None:
     camera = rig.vico.camera()
     rig.home.camera.push(noise(5))
     assert soon(lambda: camera.latest() is not None)
@@ -465,7 +465,7 @@ def test_pictures_and_time_lapses_are_written(rig: VicoRig, tmp_path: Path) -> N
     assert len(list((tmp_path / "lapse").glob("*.tif*"))) == 3
 
 
-def test_a_time_lapse_ends_where_no_picture_came_until_after_its_end(tmp_path: Path) -> None:
+def test_a_time_lapse_ends_where_no_image_came_until_after_its_end(tmp_path: Path) -> None:
     with vico_rig("home", tmp_path) as rig:
         camera, clock = rig.vico.camera(), rig.home.application.clock
         lapse = camera.time_lapse(tmp_path / "lapse", "tiff", interval_s=0.1, count=2)
@@ -573,16 +573,16 @@ def test_pixels_are_places_on_the_platform(rig: VicoRig) -> None:
     assert rig.vico.rotation_centre() is None
 
 
-def test_a_click_into_a_picture_that_has_changed_moves_nothing(away: VicoRig) -> None:
+def test_a_click_into_a_image_that_has_changed_moves_nothing(away: VicoRig) -> None:
     take_lease(away)
     camera, places = away.vico.camera(), away.home.places
     away.home.camera.push(noise(1))
     assert soon(lambda: camera.latest() is not None)
     shown = camera.latest()
-    assert shown is not None and camera.pictures.places is not None
+    assert shown is not None and camera.images.places is not None
     places.shift_um = 130.0
     with pytest.raises(NotAvailable, match="has changed since"):
-        camera.pictures.places.move_to(shown, (10.0, 5.0), "left")
+        camera.images.places.move_to(shown, (10.0, 5.0), "left")
     assert places.moved == []
 
 

@@ -25,8 +25,8 @@ from cosmic.frame.operation import Task
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.places import CalibrationShown, Pixel, Places, RotationShown
 from cosmic.vico.api.vico import Vico
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.peripheral_settings import LampSettings, MotorLensSettings, ZoomStepSettings
-from cosmic.vico.core.picture import Picture
 from cosmic.vico.core.settings import CameraPlace, VicoSettings
 from cosmic.vico.hw.factory import make_lens, make_light
 from cosmic.vico.hw.interface import (
@@ -81,10 +81,10 @@ class PushedCamera(Camera):
         self.plugged = True
         self.drawn = 0
 
-    def push(self, *pictures: Pixels) -> None:
+    def push(self, *images: Pixels) -> None:
         """Give frames, exposed now."""
         with self._there:
-            for data in pictures:
+            for data in images:
                 data.flags.writeable = False
                 now_s = self._clock.now_s()
                 fmt = PixelFormat.MONO8 if data.dtype == np.uint8 else PixelFormat.MONO16
@@ -107,7 +107,7 @@ class PushedCamera(Camera):
         return draw
 
     def grey(self, level: int) -> Pixels:
-        """Return an even picture of its size."""
+        """Return an even image of its size."""
         roi = self._settings.roi
         return np.full((roi.height_px, roi.width_px), level, np.uint8)
 
@@ -199,11 +199,11 @@ class FlatPlaces(Places):
         return 2.0
 
     @override
-    def problem(self, picture: Picture) -> str:
+    def problem(self, image: CameraImage) -> str:
         return ""
 
     @override
-    def platform_um(self, picture: Picture, place_px: Pixel) -> tuple[float, float]:
+    def platform_um(self, image: CameraImage, place_px: Pixel) -> tuple[float, float]:
         x, y = place_px
         return self.shift_um - 2.0 * y, 50.0 + 2.0 * x
 
@@ -213,7 +213,7 @@ class FlatPlaces(Places):
         return ("left", "right")
 
     @override
-    def move_to(self, picture: Picture, place_px: Pixel, what: str) -> str:
+    def move_to(self, image: CameraImage, place_px: Pixel, what: str) -> str:
         if what not in self.targets:
             raise ConfigError(f"there is no tool {what!r}")
         self.moved.append((place_px, what))

@@ -89,8 +89,8 @@ from cosmic.vico.api.fibres import PlacedFibre
 from cosmic.vico.api.lens import LensHandle, LightHandle
 from cosmic.vico.api.places import CalibrationShown, RotationShown
 from cosmic.vico.api.vico import Vico
-from cosmic.vico.core.camera_recordings import PictureRecordingState
-from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.core.camera_recordings import ImageRecordingState
+from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.core.vision.tool_tips import TipSeen
 from cosmic.vico.hw.interface import CameraCounters, CameraRanges, CameraSettings, Frame
 
@@ -148,7 +148,7 @@ CLASSES: Final[dict[str, type]] = {
     "LensHandle": LensHandle,
     "LightHandle": LightHandle,
     "PlacedFibre": PlacedFibre,
-    "Picture": Picture,
+    "CameraImage": CameraImage,
     "Circumstances": Circumstances,
     "Frame": Frame,
     "CameraSettings": CameraSettings,
@@ -158,7 +158,7 @@ CLASSES: Final[dict[str, type]] = {
     "TipSeen": TipSeen,
     "CalibrationShown": CalibrationShown,
     "RotationShown": RotationShown,
-    "PictureRecordingState": PictureRecordingState,
+    "ImageRecordingState": ImageRecordingState,
     "Control": Control,
     "ControlHandle": ControlHandle,
     "ControlReading": ControlReading,

@@ -43,8 +43,8 @@ from cosmic.twin.force_settings import (
 from cosmic.twin.handling_settings import HandlingSettings
 from cosmic.twin.lens_settings import LensMotorSettings, LensSettings, LightSettings
 from cosmic.twin.optics.settings import (
+    ImageSettings,
     OpticsSettings,
-    PictureSettings,
     SensorSettings,
     ViewSettings,
 )
@@ -111,7 +111,7 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[optics]": OpticsSettings,
     "[optics.camera]": SensorSettings,
     "[optics.views.NAME]": ViewSettings,
-    "[optics.picture]": PictureSettings,
+    "[optics.picture]": ImageSettings,
 }
 WHOLE_FILES: Final = (PlatformFile, TwinSettings)
 

@@ -238,6 +238,6 @@ def test_packets_lost_on_the_way_are_counted_and_never_shown_as_good(
 
 
 def is_the_pattern(data: Pixels) -> bool:
-    """Return whether it is the fake camera's picture at 10 ms: a ramp both ways, modulo 255."""
+    """Return whether it is the fake camera's image at 10 ms: a ramp both ways, modulo 255."""
     rows, columns = np.ogrid[: data.shape[0], : data.shape[1]]
     return bool(np.array_equal(data, (int(data[0, 0]) + rows + columns) % 255))

@@ -381,7 +381,7 @@ def test_a_plan_that_only_flies_gives_one_stream(
     assert streams == ["force"]
 
 
-def test_a_camera_in_a_scan_keeps_a_fresh_picture_of_every_place(
+def test_a_camera_in_a_scan_keeps_a_fresh_image_of_every_place(
     engine: RunEngine, documents: Documents, tmp_path: Path
 ) -> None:
     with cosmic.connect(rate=4.0) as rig:
@@ -389,9 +389,9 @@ def test_a_camera_in_a_scan_keeps_a_fresh_picture_of_every_place(
         assert isinstance(camera, protocols.Triggerable | protocols.Configurable)
         with pytest.raises(cosmic.NotAvailable):
             camera.read()
-        camera.plan_pictures(tmp_path, suffix=".png")
+        camera.plan_images(tmp_path, suffix=".png")
         (tmp_path / f"{camera.name}_00007.png").touch()
-        camera.plan_pictures(tmp_path, suffix=".png", fibres=True)
+        camera.plan_images(tmp_path, suffix=".png", fibres=True)
         engine(scan([camera], rig.mico["right.x"].movable, 0.0, 100.0, 2))
         assert camera.read().keys() == camera.describe().keys()
         assert set(camera.hints["fields"]) <= camera.read().keys()
@@ -403,8 +403,8 @@ def test_a_camera_in_a_scan_keeps_a_fresh_picture_of_every_place(
         assert first[f"{camera.name}_fibres"] > 0
         assert first[f"{camera.name}_fibre_length_um"] > 500.0
         with pytest.raises(cosmic.ConfigError):
-            camera.plan_pictures(tmp_path, suffix=".jpg")
-        camera.plan_pictures()
+            camera.plan_images(tmp_path, suffix=".jpg")
+        camera.plan_images()
         assert f"{camera.name}_file" not in camera.describe()
         status = camera.trigger()
     assert status.exception(5.0) is None or isinstance(status.exception(), cosmic.CosmicError)

@@ -77,7 +77,7 @@ def test_a_fibre_is_measured_and_its_record_agrees_with_the_truth(
     assert record.shape.length_um == pytest.approx(true.length_um, rel=0.02)
     assert record.peak_force_un < 0.8 * 180.0
     assert {each.name for each in record.series} >= {"left.x", "probe.y", "force"}
-    assert record.pictures
+    assert record.images
     assert any(each.name == "push the spans" for each in record.operations)
 
 

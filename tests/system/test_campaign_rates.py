@@ -15,7 +15,7 @@ name = "three-dry"
 [stop]
 count = 1
 [output]
-pictures = false
+images = false
 html = false
 pdf = false
 table = false

@@ -306,7 +306,7 @@ def test_a_stop_that_is_reset_at_once_ends_a_campaign_that_only_looks(make: Make
 
 @pytest.fixture
 def soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have a picture that does not come given up sooner; it is asked for six times."""
+    """Have an image that does not come given up sooner; it is asked for six times."""
     monkeypatch.setattr(sight, "LIMIT_WALL_S", 3.0)
 
 

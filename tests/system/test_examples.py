@@ -138,14 +138,14 @@ def test_a_cold_platform_is_initialised_step_by_step(said: str) -> None:
 
 
 @example("scan_with_force.py")
-def test_a_plan_scans_the_force_keeps_pictures_and_is_refused_a_collision(said: str) -> None:
+def test_a_plan_scans_the_force_keeps_images_and_is_refused_a_collision(said: str) -> None:
     lines = said.splitlines()
     assert lines[:2] == ["push: allowed", "into the probe: COLLISION, left_jaw_a and probe_tip"]
     forces_un = [float(line.split()[1]) for line in lines[3:12]]
     assert max(forces_un[:3]) < 3.0 and forces_un[3:] == sorted(forces_un[3:])
     assert 80.0 < forces_un[-1] < 178.0
     assert 1.0 < float(lines[12].split()[1]) < 4.0
-    assert "pictures: 9" in lines
+    assert "images: 9" in lines
     assert lines[-1].startswith("the plan failed: left.x: left_jaw_a would come within")
 
 

@@ -77,7 +77,7 @@ def test_a_fibre_is_found_taken_up_bent_and_put_away(tmp_path: Path):
     with sample("three-dry", truth) as bench:
         fibre = carried_out(bench.work, build_bend_test(SETTINGS))
         assert not bench.work.failures
-        assert {"geometry", "held"} <= set(fibre.pictures)
+        assert {"geometry", "held"} <= set(fibre.images)
         assert len(fibre.spans) == SETTINGS.push.spans.count
     record = read_truth(truth)
     check(record, fibre)

@@ -94,7 +94,7 @@ def test_both_hands_measure_rightly_and_the_probe_is_one_hands_at_a_time(plate: 
         assert began - 0.1 <= force.time_s.min() <= force.time_s.max() <= ended + 0.1
         x = {each.name: each for each in record.series}
         assert {"left.x", "right.x", "probe.y", "table.rotation"} <= set(x)
-        assert {"geometry", "held"} <= {each.name for each in record.pictures}
+        assert {"geometry", "held"} <= {each.name for each in record.images}
     journal = CampaignReader(plate.home / "both").journal()
     for record in found:
         noted = [each.operation for each in journal if each.fibre == record.number]

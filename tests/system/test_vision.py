@@ -17,8 +17,8 @@ from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.errors import MoveCancelled
 from cosmic.twin.scene import Scene
 from cosmic.vico.core.camera_thread import CameraThread
-from cosmic.vico.core.picture import Picture
-from cosmic.vico.core.recording.reading import open_picture_recording
+from cosmic.vico.core.image import CameraImage
+from cosmic.vico.core.recording.reading import open_image_recording
 from cosmic.vico.hw.interface import CameraLibrary, Roi
 from cosmic.vico.hw.sim_camera import SimulatedCameraLibrary
 from unit.mico.rigs import wait_until
@@ -42,12 +42,12 @@ class Lab:
         return self.scene.clock.now_s()
 
     def tip_px(self, what: str = "right", roi: Roi | None = None) -> Floats:
-        """Where the tip truly lies in the picture now."""
+        """Where the tip truly lies in the image now."""
         optics = self.scene.optics
         assert optics is not None
         tip = self.scene.tips(self.now_s)[f"{what}.hold"]
         low = (tip[0], tip[1], tip[2] - 10.0)  # the fibre is held above the jaws' lower edges
-        return optics.world_to_picture_px(low, self.now_s, roi)
+        return optics.world_to_image_px(low, self.now_s, roi)
 
     def fibre_um(self, length_um: float) -> Floats:
         """The true line of the fibre of that length."""
@@ -116,7 +116,7 @@ def put_right(lab: Lab, x_um: float, y_um: float = 0.0) -> None:
 
 
 def lift(lab: Lab) -> None:
-    """Lift the gripper and draw it out of the picture, past the clip of the plate."""
+    """Lift the gripper and draw it out of the image, past the clip of the plate."""
     lab.rig.mico["right.z"].move_to(0.0)
     put_right(lab, 0.0)
 
@@ -127,7 +127,7 @@ def lower(lab: Lab) -> None:
     lab.rig.mico["right.z"].move_to(HEIGHT_UM - 1500.0)
 
 
-# ------------------------------------------------------------------ what the picture says
+# ------------------------------------------------------------------ what the image says
 
 
 def test_a_fibre_is_as_long_and_lies_where_the_twin_has_it(lab: Lab) -> None:
@@ -148,26 +148,26 @@ def test_a_fibre_is_as_long_and_lies_where_the_twin_has_it(lab: Lab) -> None:
 
 def test_a_part_of_the_sensor_means_the_same_places(lab: Lab) -> None:
     camera = lab.rig.vico.camera()
-    whole = camera.next_picture()
+    whole = camera.next_image()
     there = camera.platform_um((700.0, 500.0))
     settings = camera.settings
     assert settings is not None
     camera.configure(replace(settings, roi=Roi(200, 100, 800, 600))).wait(10.0)
     try:
-        part = camera.next_picture()
+        part = camera.next_image()
         assert part.data.shape == (600, 800) != whole.data.shape
         assert not camera.calibration_problem
         assert camera.platform_um((500.0, 400.0)) == pytest.approx(there)
     finally:
         camera.configure(settings).wait(10.0)
-        camera.next_picture()
+        camera.next_image()
 
 
 def test_at_a_zoom_without_calibration_no_place_is_told(lab: Lab) -> None:
     zoom_to(lab.rig, 1.0)
     try:
         camera = lab.rig.vico.camera()
-        camera.next_picture()
+        camera.next_image()
         assert "zoom" in camera.calibration_problem
         assert camera.platform_um((700.0, 500.0)) is None
         stood = at_right(lab.rig)
@@ -184,9 +184,9 @@ def test_the_tips_are_seen_where_stages_and_calibration_expect_them(lab: Lab) ->
     camera = lab.rig.vico.camera()
     camera.switch("tips", on=True)
     try:
-        since = camera.next_picture().frame.frame_id
+        since = camera.next_image().frame.frame_id
         wait_until(
-            lambda: camera.analysis is not None and camera.analysis.picture.frame.frame_id > since
+            lambda: camera.analysis is not None and camera.analysis.image.frame.frame_id > since
         )
         assert camera.analysis is not None
         (tip,) = camera.analysis.tips
@@ -217,7 +217,7 @@ def test_a_calibration_is_found_again_at_the_next_start(lab: Lab, config: Path) 
     assert again.places.calibrated == lab.rig.vico.calibrated
 
 
-def test_a_tool_that_is_not_on_the_picture_calibrates_nothing_and_stands_where_it_was(
+def test_a_tool_that_is_not_on_the_image_calibrates_nothing_and_stands_where_it_was(
     lab: Lab,
 ) -> None:
     before, stood = lab.rig.vico.calibrated, lab.rig.mico["left.x"].position_um
@@ -281,7 +281,7 @@ def test_a_click_brings_the_tip_to_the_pixel_and_keeps_its_height(lab: Lab) -> N
     height = lab.rig.mico["right.z"].position_um
     pixel = (1210.0, 520.0)
     camera = lab.rig.vico.camera()
-    camera.next_picture()
+    camera.next_image()
     said = camera.click_to_move(pixel, "right")
     assert said.startswith("Right gripper moves to x")
     wait_until(lambda: 2.2 * float(np.linalg.norm(lab.tip_px() - pixel)) < NEAR_UM)
@@ -294,7 +294,7 @@ def test_a_click_that_the_gate_refuses_moves_nothing(lab: Lab) -> None:
     lower(lab)
     stood = at_right(lab.rig)
     camera = lab.rig.vico.camera()
-    camera.next_picture()
+    camera.next_image()
     lab.rig.stop("a test")
     try:
         with pytest.raises(cosmic.StoppedError) as refused:
@@ -312,7 +312,7 @@ def test_a_click_that_the_gate_refuses_moves_nothing(lab: Lab) -> None:
 # ------------------------------------------------------------------ trouble
 
 
-def test_autofocus_looks_at_no_picture_exposed_before_its_movement(
+def test_autofocus_looks_at_no_image_exposed_before_its_movement(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lift(lab)
@@ -322,18 +322,18 @@ def test_autofocus_looks_at_no_picture_exposed_before_its_movement(
     assert twin_lens is not None
     asked: list[float] = []
     moved: list[float] = []
-    real = CameraThread.next_picture
+    real = CameraThread.next_image
 
-    def watched(self: CameraThread, since_s: float, timeout_s: float) -> Picture:
-        picture = real(self, since_s, timeout_s)
-        exposed_s = picture.frame.exposed_s
+    def watched(self: CameraThread, since_s: float, timeout_s: float) -> CameraImage:
+        image = real(self, since_s, timeout_s)
+        exposed_s = image.frame.exposed_s
         asked.append(exposed_s)
         places = [twin_lens.position_counts("focus", exposed_s + part) for part in (0.0, 0.02)]
         if abs(places[1] - places[0]) > 0.5:
             moved.append(exposed_s)
-        return picture
+        return image
 
-    monkeypatch.setattr(CameraThread, "next_picture", watched)
+    monkeypatch.setattr(CameraThread, "next_image", watched)
     lens.seek_focus(4300).wait(10.0)
     lens.autofocus().wait(60.0)
     assert len(asked) > 20
@@ -358,9 +358,9 @@ def test_a_camera_unplugged_while_it_records_leaves_a_file_that_can_be_read(
     finally:
         lab.cameras.faults.clear()
     wait_until(lambda: camera.info is not None and camera.running)
-    camera.next_picture()
+    camera.next_image()
     camera.stop_recording(wait=True)
-    with open_picture_recording(file) as recording:
+    with open_image_recording(file) as recording:
         assert recording.complete
         assert len(recording) >= 3
         row = recording[0].row
@@ -373,7 +373,7 @@ def test_a_lens_that_was_not_homed_says_so_and_nothing_is_told_in_um() -> None:
     with cosmic.connect(None, ("mico", "vico"), rate=6.0, cold=True) as rig:
         camera, lens = rig.vico.camera(), rig.vico.lens
         assert lens is not None
-        assert camera.next_picture(10.0).circumstances.scale_um_px is None
+        assert camera.next_image(10.0).circumstances.scale_um_px is None
         assert "home the lens" in camera.calibration_problem
         for task in (lens.autofocus(), lens.zoom_to(2.0)):
             with pytest.raises(cosmic.CosmicError, match="home"):
@@ -382,7 +382,7 @@ def test_a_lens_that_was_not_homed_says_so_and_nothing_is_told_in_um() -> None:
             rig.vico.calibrate_stage("left").wait(10.0)
 
 
-def test_a_gripper_out_of_focus_across_the_picture_does_not_end_the_finding_of_fibres() -> None:
+def test_a_gripper_out_of_focus_across_the_image_does_not_end_the_finding_of_fibres() -> None:
     with cosmic.connect(rate=20.0, applications=("mico", "vico")) as rig:
         rig.mico["left.x"].move_to(3600.0)
         rig.mico["left.z"].move_to(-800.0)

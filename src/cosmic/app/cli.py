@@ -277,7 +277,7 @@ def _window_options(platform: argparse.ArgumentParser) -> argparse.ArgumentParse
     add = options.add_argument
     add("--serve", action="store_true", help="let other programs use what runs here")
     add("--offscreen", type=_seconds, metavar="SECONDS", help="show nothing, close after SECONDS")
-    add("--screenshot", type=Path, metavar="FILE", help="with --offscreen: save a picture")
+    add("--screenshot", type=Path, metavar="FILE", help="with --offscreen: save an image")
     add("--size", type=_size, metavar="WxH", help="size of the window, such as 1600x1000")
     add("--theme", choices=("dark", "light"), help="colours of the window")
     return options

@@ -18,7 +18,7 @@ NEAR_UM: Final = 150.0
 """How far in height a map is used from where it was measured.
 
 A lens 86 mm above the plate shows what lies 150 um higher larger by 0.2 %: 3 um at the edge of the
-picture at 2x.
+image at 2x.
 """
 
 

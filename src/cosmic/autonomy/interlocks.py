@@ -125,7 +125,7 @@ def join_positions(recorder: Recorder, mico: MicoApplicationBase, clock: Clock) 
 
 
 def join_stage_positions(vico: VicoApplication, mico: MicoApplicationBase) -> None:
-    """Have the positions of all axes stand beside every picture; gate coordinates."""
+    """Have the positions of all axes stand beside every image; gate coordinates."""
 
     def positions(_time_s: float) -> dict[str, float]:
         return {

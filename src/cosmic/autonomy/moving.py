@@ -35,7 +35,7 @@ class Mover:
         return dict(self._before)
 
     def go(self, targets: Mapping[str, float], task: Task, source: str) -> float:
-        """Move there and wait; returns the platform time from which pictures show it.
+        """Move there and wait; returns the platform time from which images show it.
 
         Raises
         ------

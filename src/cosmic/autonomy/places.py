@@ -18,7 +18,7 @@ from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.core.motion.orders import MoveTo
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.places import CalibrationShown, Pixel, Places, RotationShown
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import PixelMap
 from cosmic.vico.core.tool_settings import ToolSettings, tool_mistakes
 from cosmic.vico.core.vision.algorithms import FindTips, FindTools
@@ -43,7 +43,7 @@ class PlatformPlaces(Places):
     Attributes
     ----------
     calibrations : Calibrations
-        Maps from platform to picture, and the rotation centre.
+        Maps from platform to image, and the rotation centre.
     registry : CalibrationRegistry
         All that procedures measure, those maps among it.
 
@@ -83,41 +83,41 @@ class PlatformPlaces(Places):
         return found.map.scale_um_px
 
     @override
-    def problem(self, picture: Picture) -> str:
+    def problem(self, image: CameraImage) -> str:
         try:
-            self._plate_map(picture)
+            self._plate_map(image)
         except NotAvailable as exc:
             return str(exc)
         return ""
 
     @override
-    def platform_um(self, picture: Picture, place_px: Pixel) -> tuple[float, float]:
-        x, y = self._plate_map(picture).to_um(place_px)
+    def platform_um(self, image: CameraImage, place_px: Pixel) -> tuple[float, float]:
+        x, y = self._plate_map(image).to_um(place_px)
         return float(x), float(y)
 
-    def map_of(self, picture: Picture, height_um: float, tool: str | None = None) -> PixelMap:
-        """Return the map for the pixels of a picture, of things at a height.
+    def map_of(self, image: CameraImage, height_um: float, tool: str | None = None) -> PixelMap:
+        """Return the map for the pixels of an image, of things at a height.
 
         Raises
         ------
         NotAvailable
             Not calibrated there; the text says what to do.
         """
-        settings = self._vico.unit(picture.camera).thread.settings
-        zoom = self._zoom(picture.camera, picture.circumstances.zoom_counts)
+        settings = self._vico.unit(image.camera).thread.settings
+        zoom = self._zoom(image.camera, image.circumstances.zoom_counts)
         if zoom is None:
-            raise NotAvailable(f"{picture.camera}: the zoom is not known; home the lens")
+            raise NotAvailable(f"{image.camera}: the zoom is not known; home the lens")
         if (
             settings is None
-            or (settings.roi.height_px, settings.roi.width_px) != (picture.data.shape[:2])
+            or (settings.roi.height_px, settings.roi.width_px) != (image.data.shape[:2])
         ):
-            raise NotAvailable(f"{picture.camera}: the picture was taken with other settings")
-        found = self.calibrations.find(picture.camera, zoom, height_um, tool)
+            raise NotAvailable(f"{image.camera}: the image was taken with other settings")
+        found = self.calibrations.find(image.camera, zoom, height_um, tool)
         roi = settings.roi
         return found.map.for_window(x_px=roi.x_px, y_px=roi.y_px, binning=settings.binning)
 
-    def _plate_map(self, picture: Picture) -> PixelMap:
-        return self.map_of(picture, self._vico.settings.plate_um)
+    def _plate_map(self, image: CameraImage) -> PixelMap:
+        return self.map_of(image, self._vico.settings.plate_um)
 
     def _zoom(self, camera: str, zoom_counts: float | None) -> float | None:
         return zoom_counts if self._vico.unit(camera).place.behind_lens else 0.0
@@ -130,7 +130,7 @@ class PlatformPlaces(Places):
         return tuple(self._tools)
 
     @override
-    def move_to(self, picture: Picture, place_px: Pixel, what: str) -> str:
+    def move_to(self, image: CameraImage, place_px: Pixel, what: str) -> str:
         tool = self._tool(what)
         running = self._vico.running_task
         if running is not None and not running.done:
@@ -138,7 +138,7 @@ class PlatformPlaces(Places):
         tip = tip_um(tool, self.positions())
         if tip is None:
             raise NotAvailable(f"{what}: its position is unknown; initialise the platform")
-        x_um, y_um = self.map_of(picture, tip[2], what).to_um(place_px).tolist()
+        x_um, y_um = self.map_of(image, tip[2], what).to_um(place_px).tolist()
         motions = {
             axis: MoveTo(target, "um") for axis, target in axis_targets(tool, x_um, y_um).items()
         }
@@ -146,20 +146,20 @@ class PlatformPlaces(Places):
         logger.info("click: %s to %.1f, %.1f um", what, x_um, y_um)
         return f"{tool.shown} moves to x {x_um:.1f}, y {y_um:.1f} µm"
 
-    def expected_tools(self, picture: Picture) -> Mapping[str, ExpectedTool]:
-        """Return where the tips should be on a picture; those that cannot be told are missing."""
-        positions = picture.circumstances.positions
+    def expected_tools(self, image: CameraImage) -> Mapping[str, ExpectedTool]:
+        """Return where the tips should be on an image; those that cannot be told are missing."""
+        positions = image.circumstances.positions
         found: dict[str, ExpectedTool] = {}
         for tool in self._tools.values():
             tip = tip_um(tool, positions)
             if tip is None:
                 continue
             try:
-                mapped = self.map_of(picture, tip[2], tool.name)
+                mapped = self.map_of(image, tip[2], tool.name)
             except NotAvailable:
                 continue
             wanted = expected(tool, mapped, tip[:2], positions, REACH_PX)
-            height, width = picture.data.shape[:2]
+            height, width = image.data.shape[:2]
             if wanted is not None and _inside(wanted.tip_px, width, height):
                 found[tool.name] = wanted
         return found

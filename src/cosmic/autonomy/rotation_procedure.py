@@ -14,17 +14,17 @@ from cosmic.mico.core.ports import ManagerPort
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.core.calibration import RotationCentre
 from cosmic.vico.core.calibration_fit import CalibrationRefused, RotationFit, fit_rotation
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import Floats, PixelMap
 from cosmic.vico.core.vision.algorithms import grey
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.fibre_tracking import FibreTracker
 
-PICTURE_S: Final = 5.0
+IMAGE_S: Final = 5.0
 ANGLES_DEG: Final = (-24.0, -16.0, -8.0, 0.0, 8.0, 16.0, 24.0)
 """From where the table stands."""
 REACH_PART: Final = 0.12
-"""Of the picture's width: how far a fibre may go from one angle to the next."""
+"""Of the image's width: how far a fibre may go from one angle to the next."""
 MARGIN_PX: Final = 10.0
 
 
@@ -36,7 +36,7 @@ class RotationProcedure:
         vico: VicoApplication,
         manager: ManagerPort,
         calibrations: Calibrations,
-        plate_map: Callable[[Picture], PixelMap],
+        plate_map: Callable[[CameraImage], PixelMap],
         camera: str,
         axis: str,
     ) -> None:
@@ -70,18 +70,18 @@ class RotationProcedure:
 
     def _measure(self, task: Task, begun_deg: float) -> RotationFit:
         # Said before anything turns: without a map nothing could be told.
-        self._plate_map(self._picture(self._clock.now_s()))
+        self._plate_map(self._image(self._clock.now_s()))
         tracker: FibreTracker | None = None
         angles: list[float] = []
         places: list[Floats] = []
         for number, away_deg in enumerate(ANGLES_DEG):
             task.report(number / len(ANGLES_DEG), f"angle {number + 1} of {len(ANGLES_DEG)}")
             since_s = self._mover.go({self._axis: begun_deg + away_deg}, task, self._source)
-            picture = self._picture(since_s)
-            found = _fibres(picture)
+            image = self._image(since_s)
+            found = _fibres(image)
             if tracker is None:
-                tracker = FibreTracker(reach_px=REACH_PART * picture.data.shape[1])
-                fibre = _nearest(found, picture)
+                tracker = FibreTracker(reach_px=REACH_PART * image.data.shape[1])
+                fibre = _nearest(found, image)
                 tracker.start(fibre)
             else:
                 track = tracker.follow(found)
@@ -92,36 +92,36 @@ class RotationProcedure:
                         f"{track.reason}; choose a place with one clear fibre near the middle"
                     )
                 fibre = track.fibre
-            angles.append(self._angle(picture))
-            points = self._plate_map(picture).to_um(_points(fibre))
+            angles.append(self._angle(image))
+            points = self._plate_map(image).to_um(_points(fibre))
             places.append(_in_order(points, places[-1] if places else points))
         return _best(angles, places)
 
-    def _picture(self, since_s: float) -> Picture:
-        return self._unit.thread.next_picture(since_s, PICTURE_S)
+    def _image(self, since_s: float) -> CameraImage:
+        return self._unit.thread.next_image(since_s, IMAGE_S)
 
-    def _angle(self, picture: Picture) -> float:
-        seen = picture.circumstances.positions.get(self._axis)
+    def _angle(self, image: CameraImage) -> float:
+        seen = image.circumstances.positions.get(self._axis)
         return self._mover.positions()[self._axis] if seen is None else seen
 
 
-def _fibres(picture: Picture) -> list[Fibre]:
+def _fibres(image: CameraImage) -> list[Fibre]:
     # Imported here: it loads OpenCV and scipy.
     from cosmic.vico.core.vision.finding import find_fibres
 
-    return find_fibres(grey(picture.data))
+    return find_fibres(grey(image.data))
 
 
-def _nearest(fibres: list[Fibre], picture: Picture) -> Fibre:
+def _nearest(fibres: list[Fibre], image: CameraImage) -> Fibre:
     """Return the fibre nearest to the middle that is seen whole; clear ones first."""
-    height, width = picture.data.shape[:2]
+    height, width = image.data.shape[:2]
     far = np.array([width - 1.0, height - 1.0]) - MARGIN_PX
     whole = [
         each for each in fibres if (each.ends_px > MARGIN_PX).all() and (each.ends_px < far).all()
     ]
     if not whole:
         raise NotAvailable(
-            "rotation centre: there is no whole fibre on the picture; bring one near its middle, "
+            "rotation centre: there is no whole fibre on the image; bring one near its middle, "
             "and focus"
         )
     middle = 0.5 * np.array([width - 1.0, height - 1.0])

@@ -1,4 +1,4 @@
-"""Measuring the map from platform to picture: a tool goes to places, its tip is looked for."""
+"""Measuring the map from platform to image: a tool goes to places, its tip is looked for."""
 
 import math
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from cosmic.mico.core.ports import ManagerPort
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.core.calibration import Plane
 from cosmic.vico.core.calibration_fit import CalibrationRefused, MapFit, Sighting, fit_map
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.tool_settings import ToolSettings
 from cosmic.vico.core.vision.algorithms import grey
 from cosmic.vico.core.vision.tips import find_gripper, find_probe
@@ -62,13 +62,13 @@ def middle(mask: Mask) -> Floats | None:
     return np.asarray(large.mean(axis=0), dtype=np.float64)
 
 
-PICTURE_S: Final = 5.0
+IMAGE_S: Final = 5.0
 SEARCH_PART: Final = 0.8
 """Of the tool's width: how far it moves at once while it is looked for."""
 REACH_PX: Final = 40.0
 GRID: Final = 3
 LARGEST_PART: Final = 0.25
-"""Of the picture: how far the grid reaches to each side."""
+"""Of the image: how far the grid reaches to each side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +121,7 @@ class StageProcedure:
             task.fail(exc)
 
     def _measure(self, task: Task, begun: Floats) -> Plane:
-        first = self._picture(self._clock.now_s())
+        first = self._image(self._clock.now_s())
         guess = self._search(task, first, begun[:2])
         places = self._grid(guess, first)
         sightings = []
@@ -131,7 +131,7 @@ class StageProcedure:
             if seen is not None:
                 sightings.append(seen)
         zoom = self._zoom(first)
-        after = self._picture(self._clock.now_s())
+        after = self._image(self._clock.now_s())
         if abs(self._zoom(after) - zoom) > 0.5:
             raise CalibrationRefused(
                 "calibration: the zoom was moved meanwhile; leave it, and try again"
@@ -150,20 +150,20 @@ class StageProcedure:
             )
         return np.array(tip)
 
-    def _picture(self, since_s: float) -> Picture:
-        return self._unit.thread.next_picture(since_s, PICTURE_S)
+    def _image(self, since_s: float) -> CameraImage:
+        return self._unit.thread.next_image(since_s, IMAGE_S)
 
-    def _zoom(self, picture: Picture) -> float:
+    def _zoom(self, image: CameraImage) -> float:
         if not self._unit.place.behind_lens:
             return 0.0
-        zoom = picture.circumstances.zoom_counts
+        zoom = image.circumstances.zoom_counts
         if zoom is None:
             raise NotAvailable("the zoom is not known; home the lens, then try again")
         return zoom
 
     # The first idea
 
-    def _search(self, task: Task, first: Picture, place_um: Floats) -> _Guess:
+    def _search(self, task: Task, first: CameraImage, place_um: Floats) -> _Guess:
         """Find the tip by drawing it back twice, then what a step aside does."""
         self._zoom(first)
         scale = first.circumstances.scale_um_px
@@ -174,20 +174,20 @@ class StageProcedure:
         task.report(0.02, f"looking for {self._tool.shown}")
         ahead = np.array(self._tool.forward) / math.hypot(*self._tool.forward)
         step_um = SEARCH_PART * self._tool.width_um * ahead
-        pictures = [first]
+        images = [first]
         for times in (1, 2):
             since_s = self._go(task, place_um - times * step_um)
-            pictures.append(self._picture(since_s))
-        greys = [grey(each.data) for each in pictures]
+            images.append(self._image(since_s))
+        greys = [grey(each.data) for each in images]
         strips = [
             middle(uncovered(one, other, self._tool.width_um / scale))
             for one, other in pairwise(greys)
         ]
         if strips[0] is None or strips[1] is None:
-            raise NotAvailable(self._unseen("nothing like it moved on the picture"))
+            raise NotAvailable(self._unseen("nothing like it moved on the image"))
         back_px = strips[1] - strips[0]
         guess = self._similar(place_um - 2.0 * step_um, strips[1] + 0.5 * back_px, step_um, back_px)
-        seen = self._look(pictures[-1], guess, guess.place_um, REACH_PX)
+        seen = self._look(images[-1], guess, guess.place_um, REACH_PX)
         if isinstance(seen, NotSeen):
             raise NotAvailable(self._unseen(seen.reason))
         return self._aside(task, guess, seen, step_um)
@@ -196,10 +196,10 @@ class StageProcedure:
         """Learn what a step aside does: no idea of the camera's handedness is taken for granted."""
         aside_um = np.array([-step_um[1], step_um[0]])
         place = guess.place_um + aside_um
-        picture = self._picture(self._go(task, place))
+        image = self._image(self._go(task, place))
         moved_px = float(np.linalg.norm(guess.px_um @ step_um))
         at = _Guess(place, tip_px, guess.px_um)
-        seen = self._look(picture, at, place, moved_px + REACH_PX)
+        seen = self._look(image, at, place, moved_px + REACH_PX)
         if isinstance(seen, NotSeen):
             raise NotAvailable(self._unseen(seen.reason))
         both_um = np.column_stack([step_um, aside_um])
@@ -215,8 +215,8 @@ class StageProcedure:
 
     # Places
 
-    def _grid(self, guess: _Guess, first: Picture) -> Sequence[Floats]:
-        """Return places at which the tip and enough of the tool are on the picture, to and fro."""
+    def _grid(self, guess: _Guess, first: CameraImage) -> Sequence[Floats]:
+        """Return places at which the tip and enough of the tool are on the image, to and fro."""
         height, width = first.data.shape[:2]
         scale_px_um = math.sqrt(abs(float(np.linalg.det(guess.px_um))))
         jaw_px = self._tool.width_um * scale_px_um
@@ -232,7 +232,7 @@ class StageProcedure:
             low[axis] = behind * along + aside * across
             high[axis] = size - 1.0 - before * along - aside * across
         if not (high - low >= 4.0 * REACH_PX).all():
-            raise NotAvailable(f"{self._tool.shown} is too large on this picture; zoom out")
+            raise NotAvailable(f"{self._tool.shown} is too large on this image; zoom out")
         half = np.minimum(LARGEST_PART * np.array([width, height]), 0.5 * (high - low))
         centre = np.clip(guess.tip_px, low + half, high - half)
         steps = np.linspace(-1.0, 1.0, GRID)
@@ -243,22 +243,22 @@ class StageProcedure:
         return [place for row in rows for place in row]
 
     def _sight(self, task: Task, place_um: Floats, guess: _Guess) -> Sighting | None:
-        picture = self._picture(self._go(task, place_um))
-        stood = tip_um(self._tool, picture.circumstances.positions) or tuple(self._place())
-        seen = self._look(picture, guess, np.array(stood[:2]), REACH_PX)
+        image = self._image(self._go(task, place_um))
+        stood = tip_um(self._tool, image.circumstances.positions) or tuple(self._place())
+        seen = self._look(image, guess, np.array(stood[:2]), REACH_PX)
         if isinstance(seen, NotSeen):
             return None
-        sensor = self._on_sensor(seen, picture)
+        sensor = self._on_sensor(seen, image)
         return Sighting((stood[0], stood[1]), (float(sensor[0]), float(sensor[1])))
 
     def _look(
-        self, picture: Picture, guess: _Guess, place_um: Floats, reach_px: float
+        self, image: CameraImage, guess: _Guess, place_um: Floats, reach_px: float
     ) -> Floats | NotSeen:
-        """Return where the tip is seen, in the picture's pixels."""
+        """Return where the tip is seen, in the image's pixels."""
         tip = guess.px(place_um)
         forward = guess.px_um @ np.array(self._tool.forward)
         scale_px_um = math.sqrt(abs(float(np.linalg.det(guess.px_um))))
-        gap_um = max(0.0, picture.circumstances.positions.get(self._tool.gap_axis, 0.0))
+        gap_um = max(0.0, image.circumstances.positions.get(self._tool.gap_axis, 0.0))
         wanted = ExpectedTool(
             (float(tip[0]), float(tip[1])),
             (float(forward[0]), float(forward[1])),
@@ -267,16 +267,16 @@ class StageProcedure:
             reach_px,
         )
         find = find_gripper if self._tool.gap_axis else find_probe
-        found = find(grey(picture.data), wanted)
+        found = find(grey(image.data), wanted)
         if isinstance(found, NotSeen):
             return found
         return np.array(found.hold_px if isinstance(found, GripperTips) else found.tip_px)
 
-    def _on_sensor(self, place_px: Floats, picture: Picture) -> Floats:
+    def _on_sensor(self, place_px: Floats, image: CameraImage) -> Floats:
         """Return a place in unbinned pixels of the whole sensor."""
         settings = self._unit.thread.settings
         if settings is None:
-            raise NotAvailable(f"{picture.camera}: the camera was lost")
+            raise NotAvailable(f"{image.camera}: the camera was lost")
         return whole_sensor_px(place_px, settings)
 
     def _go(self, task: Task, place_um: Floats) -> float:
@@ -285,13 +285,13 @@ class StageProcedure:
 
     def _unseen(self, reason: str) -> str:
         return (
-            f"{self._tool.shown} was not found: {reason}; bring its tip into the picture, focus on "
+            f"{self._tool.shown} was not found: {reason}; bring its tip into the image, focus on "
             "it, and light it evenly"
         )
 
 
 def whole_sensor_px(place_px: Floats, settings: CameraSettings) -> Floats:
-    """Return a place of a picture in unbinned pixels of the whole sensor."""
+    """Return a place of an image in unbinned pixels of the whole sensor."""
     corner = np.array([settings.roi.x_px, settings.roi.y_px], dtype=np.float64)
     return np.asarray((place_px + corner) * settings.binning + 0.5 * (settings.binning - 1))
 

@@ -1,4 +1,4 @@
-"""Where tools are on the platform, and what they should look like in a picture."""
+"""Where tools are on the platform, and what they should look like in an image."""
 
 import math
 from collections.abc import Mapping
@@ -36,7 +36,7 @@ def expected(
     positions: Mapping[str, float],
     reach_px: float,
 ) -> ExpectedTool | None:
-    """Return what to look for in a picture of that map; None where it is too small there."""
+    """Return what to look for in an image of that map; None where it is too small there."""
     tip_px = mapped.to_px(tip_xy_um)
     length = math.hypot(*tool.forward)
     ahead = tip_xy_um[0] + tool.forward[0] / length, tip_xy_um[1] + tool.forward[1] / length

@@ -24,7 +24,7 @@ def notify(subscriber: Callable[P, object], *args: P.args, **kwargs: P.kwargs) -
 class Event(Generic[P]):
     """Something that happens again and again, of which others want to hear; any thread.
 
-    ``Event[Picture]`` hands on a picture, ``Event[[]]`` says only that something happened.
+    ``Event[CameraImage]`` hands on an image, ``Event[[]]`` says only that something happened.
 
     Subscribers are called one after the other, in the order in which they subscribed, in the
     thread that emits. They must return at once. One that raises is logged, and keeps nobody else

@@ -41,7 +41,7 @@ class ForceSide:
     ----------
     sensors : dict of str to ForceSensor
         As twin.toml names them. Reading one is all that an acquisition board may do here; the
-        rest is the truth, for pictures, logs and tests.
+        rest is the truth, for images, logs and tests.
     offsets : ToolOffsets
         How far tools are from where the drawing has them.
 

@@ -27,7 +27,7 @@ class ToolOffsets:
     Notes
     -----
     Drift begins at zero and goes to and fro on a tilted line, more slowly for one tool than for
-    another. What controls the platform sees it in the picture only: the stages do not.
+    another. What controls the platform sees it in the image only: the stages do not.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""A camera that sends its pictures over HTTP as JPEG after JPEG, on loopback."""
+"""A camera that sends its images over HTTP as JPEG after JPEG, on loopback."""
 
 import threading
 from collections.abc import Sequence
@@ -10,13 +10,13 @@ from typing_extensions import override
 
 
 class MjpegServer:
-    """Serves `pictures` again and again at `rate_hz` until it is closed."""
+    """Serves `images` again and again at `rate_hz` until it is closed."""
 
     def __init__(
-        self, pictures: Sequence[np.ndarray], *, rate_hz: float = 50.0, port: int = 0
+        self, images: Sequence[np.ndarray], *, rate_hz: float = 50.0, port: int = 0
     ) -> None:
         self._ended = threading.Event()
-        coded = [cv2.imencode(".jpg", each)[1].tobytes() for each in pictures]
+        coded = [cv2.imencode(".jpg", each)[1].tobytes() for each in images]
         server = self._make(coded, 1.0 / rate_hz, self._ended, port)
         self._server = server
         self.port = int(server.server_address[1])

@@ -1,4 +1,4 @@
-"""Cameras through OpenCV: a video file, a folder of pictures, an address on loopback."""
+"""Cameras through OpenCV: a video file, a folder of images, an address on loopback."""
 
 import tempfile
 from pathlib import Path
@@ -18,9 +18,9 @@ WIDTH, HEIGHT = 160, 120
 
 
 def pattern(number: int) -> np.ndarray:
-    """Return a grey picture that no other number has."""
-    picture = np.add.outer(np.arange(HEIGHT), np.arange(WIDTH)) + 7 * number
-    return (picture % 256).astype(np.uint8)
+    """Return a grey image that no other number has."""
+    image = np.add.outer(np.arange(HEIGHT), np.arange(WIDTH)) + 7 * number
+    return (image % 256).astype(np.uint8)
 
 
 def write_film(path: Path, count: int = 60, *, rate_hz: float = 100.0, codec: str = "FFV1") -> None:
@@ -33,7 +33,7 @@ def write_film(path: Path, count: int = 60, *, rate_hz: float = 100.0, codec: st
     writer.release()
 
 
-def write_pictures(folder: Path, count: int = 20) -> None:
+def write_images(folder: Path, count: int = 20) -> None:
     folder.mkdir()
     for number in range(count):
         assert cv2.imwrite(str(folder / f"{number:04d}.png"), pattern(number))
@@ -68,15 +68,15 @@ class FilmRig(CameraRig):
         return paths
 
 
-class PicturesRig(FilmRig):
-    name = "opencv-pictures"
+class ImagesRig(FilmRig):
+    name = "opencv-images"
     can = frozenset({Can.RATE, Can.ROI, Can.UNPLUG})
 
     @override
     def make(self) -> tuple[Path, Path]:
         paths = (self.place / "one", self.place / "other")
         for path in paths:
-            write_pictures(path)
+            write_images(path)
         return paths
 
     @override
@@ -96,8 +96,8 @@ class AddressRig(CameraRig):
 
     @override
     def __enter__(self) -> Self:
-        self._pictures = [pattern(number) for number in range(20)]
-        self._server = MjpegServer(self._pictures, rate_hz=self.rate_hz)
+        self._images = [pattern(number) for number in range(20)]
+        self._server = MjpegServer(self._images, rate_hz=self.rate_hz)
         self.key = self._server.address
         self.library = OpenCvLibrary(self.clock, sources=[self.key])
         return self
@@ -113,7 +113,7 @@ class AddressRig(CameraRig):
 
     @override
     def plug_in(self) -> None:
-        self._server = MjpegServer(self._pictures, rate_hz=self.rate_hz, port=self._server.port)
+        self._server = MjpegServer(self._images, rate_hz=self.rate_hz, port=self._server.port)
 
 
-RIGS = (FilmRig, PicturesRig, AddressRig)
+RIGS = (FilmRig, ImagesRig, AddressRig)

@@ -14,12 +14,12 @@ from pytestqt.qtbot import QtBot
 from cosmic.app.panels.campaign.board import CampaignBoard
 from cosmic.app.panels.campaign.fibre_card import FibreCard, round_below
 from cosmic.app.panels.campaign.table import CAUSE, EI, INTERVAL, NUMBER, OUTCOME, TIME
-from cosmic.autonomy.campaign.records import FibreRecord, Outcome, Picture, Shape
+from cosmic.autonomy.campaign.records import CameraImage, FibreRecord, Outcome, Shape
 from cosmic.autonomy.campaign.snapshot import CampaignSnapshot, FibreRow, card_of, snapshot_of
 from cosmic.autonomy.campaign.statistics import progress
 from cosmic.frame.gui.palette import LIGHT
 from cosmic.frame.gui.theme import State, apply_theme
-from unit.autonomy.campaign.sample_records import failed, good, picture
+from unit.autonomy.campaign.sample_records import failed, good, image
 
 LEFT = Qt.MouseButton.LeftButton
 FIBRES = [good(1), failed(2), good(3, ei_n_m2=2e-11, seed=1), failed(4, "slipped"), failed(5)]
@@ -168,15 +168,15 @@ def test_the_board_follows_the_theme(board: CampaignBoard, qapp: QApplication) -
         apply_theme(qapp, "dark")
 
 
-def test_a_card_shows_picture_curves_and_numbers(card: FibreCard, qtbot: QtBot) -> None:
+def test_a_card_shows_image_curves_and_numbers(card: FibreCard, qtbot: QtBot) -> None:
     record = good(12, seed=3)
-    record = replace(record, pictures=(picture(3), replace(picture(4, (60, 80)), name="held")))
+    record = replace(record, images=(image(3), replace(image(4, (60, 80)), name="held")))
     card.set_card(card_of(record))
     assert card.title.text() == "Fibre 12"
     assert card.indicator.state is State.OK
-    assert (card.picture.shown.width(), card.picture.shown.height()) == (320, 240)
-    card.pictures.setCurrentText("held")
-    assert (card.picture.shown.width(), card.picture.shown.height()) == (80, 60)
+    assert (card.image.shown.width(), card.image.shown.height()) == (320, 240)
+    card.images.setCurrentText("held")
+    assert (card.image.shown.width(), card.image.shown.height()) == (80, 60)
     assert len(card.curves.labels) == 3
     texts = _texts(card)
     assert any(" to " in text and "N m²" in text for text in texts)
@@ -222,23 +222,23 @@ def test_an_empty_card_shows_nothing_of_the_last_fibre(card: FibreCard) -> None:
     card.set_card(card_of(good(1)))
     card.clear()
     assert card.title.text() == "no fibre chosen"
-    assert card.picture.shown.isEmpty()
+    assert card.image.shown.isEmpty()
     assert not _texts(card)
     assert not card.replay.isEnabled()
 
 
-def test_a_narrow_card_has_its_curves_below_the_picture(card: FibreCard, qtbot: QtBot) -> None:
+def test_a_narrow_card_has_its_curves_below_the_image(card: FibreCard, qtbot: QtBot) -> None:
     card.set_card(card_of(good(1)))
-    assert card.curves.x() > card.picture.width() // 2
+    assert card.curves.x() > card.image.width() // 2
     card.resize(420, 640)
     qtbot.waitUntil(lambda: card.curves.x() < 50)
 
 
-def test_a_picture_of_16_bit_is_shown(card: FibreCard) -> None:
-    deep = Picture("deep", np.full((80, 100), 0x8012, dtype=np.uint16), 0.0)
-    card.set_card(card_of(replace(good(1), pictures=(deep,))))
-    assert (card.picture.shown.width(), card.picture.shown.height()) == (100, 80)
-    middle = card.picture.grab().toImage().pixelColor(card.picture.rect().center())
+def test_a_image_of_16_bit_is_shown(card: FibreCard) -> None:
+    deep = CameraImage("deep", np.full((80, 100), 0x8012, dtype=np.uint16), 0.0)
+    card.set_card(card_of(replace(good(1), images=(deep,))))
+    assert (card.image.shown.width(), card.image.shown.height()) == (100, 80)
+    middle = card.image.grab().toImage().pixelColor(card.image.rect().center())
     assert middle.value() == 0x80
 
 

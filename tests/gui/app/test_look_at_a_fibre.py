@@ -45,7 +45,7 @@ def test_a_fibre_is_measured_and_a_gripper_calibrated_and_sent_to_a_pixel(
     assert mico is not None
     api = Vico(vico)
     camera = api.camera()
-    qtbot.waitUntil(lambda: view.view.picture is not None, timeout=15_000)
+    qtbot.waitUntil(lambda: view.view.image is not None, timeout=15_000)
     assert not view.row.go.isEnabled(), "nothing is calibrated yet"
 
     qtbot.waitUntil(lambda: "2x" in lens.steps and lens.steps["2x"].isEnabled())

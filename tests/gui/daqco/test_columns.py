@@ -1,4 +1,4 @@
-"""What is in a column of the picture: every spike, whatever the chunks and the zoom."""
+"""What is in a column of the image: every spike, whatever the chunks and the zoom."""
 
 import numpy as np
 import pytest
@@ -42,33 +42,33 @@ def test_every_spike_of_one_sample_is_in_its_live_column(qapp, per_column):
     rng = np.random.default_rng(1)
     total = min(round(500 * per_column), 400_000)
     values, rows, at = spiky(rng, 3, total, 100)
-    live, picture = LiveColumns(per_column), raster(3)
+    live, image = LiveColumns(per_column), raster(3)
     done = 0
     for size in pieces(rng, total):
-        picture.put(*live.feed(done, values[:, done : done + size]))
+        image.put(*live.feed(done, values[:, done : done + size]))
         done += size
     for row, sample in zip(rows, at, strict=True):
         number = int(np.floor(sample / per_column + 1e-12))
-        assert picture.column(number)[1][row] == pytest.approx(8.0)
+        assert image.column(number)[1][row] == pytest.approx(8.0)
     for number in rng.integers(0, int(total / per_column) - 1, 50):
         begin, end = np.ceil(np.array([number, number + 1]) * per_column - 1e-9).astype(int)
-        assert picture.column(number)[1] == pytest.approx(values[:, begin:end].max(axis=1))
-        assert picture.column(number)[0] == pytest.approx(values[:, begin:end].min(axis=1))
+        assert image.column(number)[1] == pytest.approx(values[:, begin:end].max(axis=1))
+        assert image.column(number)[0] == pytest.approx(values[:, begin:end].min(axis=1))
 
 
-def test_every_spike_is_a_pixel_of_the_picture(qapp):
+def test_every_spike_is_a_pixel_of_the_image(qapp):
     rng = np.random.default_rng(2)
     values, _, at = spiky(rng, 1, 150_000, 60)
-    live, picture = LiveColumns(300.0), raster(1)
+    live, image = LiveColumns(300.0), raster(1)
     for begin in range(0, 150_000, 150):
-        picture.put(*live.feed(begin, values[:, begin : begin + 150]))
+        image.put(*live.feed(begin, values[:, begin : begin + 150]))
     top = round(199 * (10.0 - 8.0) / 20.0)
     for sample in at:
-        assert picture.image.pixelColor(int(sample // 300), top).name() == "#e69f00"
+        assert image.image.pixelColor(int(sample // 300), top).name() == "#e69f00"
 
 
 @pytest.mark.parametrize("per_column", [1.5, 40.0, 600.0, 9000.0])
-def test_no_spike_is_lost_when_the_picture_is_made_from_the_history(per_column):
+def test_no_spike_is_lost_when_the_image_is_made_from_the_history(per_column):
     rng = np.random.default_rng(3)
     total = 5 * SEGMENT + 777
     values, rows, at = spiky(rng, 2, total, 80)
@@ -111,14 +111,14 @@ def test_the_history_of_a_very_fast_board_stays_within_its_memory():
     assert held < 230 * 2**20
 
 
-def test_lost_samples_leave_a_hole_in_the_picture(qapp):
-    live, picture = LiveColumns(10.0), raster(1, width=50)
-    picture.put(*live.feed(0, np.ones((1, 100))))
-    picture.put(*live.feed(200, np.ones((1, 100))))
-    shown = [bool(np.isfinite(picture.column(number)[0][0])) for number in range(30)]
+def test_lost_samples_leave_a_hole_in_the_image(qapp):
+    live, image = LiveColumns(10.0), raster(1, width=50)
+    image.put(*live.feed(0, np.ones((1, 100))))
+    image.put(*live.feed(200, np.ones((1, 100))))
+    shown = [bool(np.isfinite(image.column(number)[0][0])) for number in range(30)]
     assert shown == [True] * 10 + [False] * 10 + [True] * 10
     drawn = [
-        any(picture.image.pixelColor(x, y).name() == "#e69f00" for y in range(picture.height))
+        any(image.image.pixelColor(x, y).name() == "#e69f00" for y in range(image.height))
         for x in range(30)
     ]
     assert drawn == shown
@@ -130,29 +130,29 @@ def test_lost_samples_leave_a_hole_in_the_picture(qapp):
 
 
 def test_a_slow_signal_is_a_line_without_steps_or_holes(qapp):
-    live, picture = LiveColumns(0.1), raster(1, width=100)
+    live, image = LiveColumns(0.1), raster(1, width=100)
     for number in range(11):
         found = live.feed(number, np.array([[float(number)]]))
         if found:
-            picture.put(*found)
-    lows = np.array([picture.column(number)[0][0] for number in range(100)])
+            image.put(*found)
+    lows = np.array([image.column(number)[0][0] for number in range(100)])
     assert lows == pytest.approx(np.arange(100) * 0.1, abs=1e-5)
 
 
-def test_a_picture_made_anew_looks_as_the_live_one_did(qapp):
+def test_a_image_made_anew_looks_as_the_live_one_did(qapp):
     rng = np.random.default_rng(4)
     values = rng.normal(0.0, 3.0, (2, 32_000))
-    live, picture, history = LiveColumns(64.0), raster(2), History(2, RATE_HZ)
+    live, image, history = LiveColumns(64.0), raster(2), History(2, RATE_HZ)
     for begin in range(0, 32_000, 150):
-        picture.put(*live.feed(begin, values[:, begin : begin + 150]))
+        image.put(*live.feed(begin, values[:, begin : begin + 150]))
         history.append(begin, values[:, begin : begin + 150])
     again = raster(2)
     again.show(0, history.view().columns(0, 500, 64.0))
-    assert again.image == picture.image
+    assert again.image == image.image
 
 
-def test_a_live_picture_paints_new_columns_only(qapp):
-    live, picture = LiveColumns(100.0), raster(1)
+def test_a_live_image_paints_new_columns_only(qapp):
+    live, image = LiveColumns(100.0), raster(1)
     for begin in range(0, 500_000, 250):
-        picture.put(*live.feed(begin, np.zeros((1, 250))))
-    assert picture.painted <= 5000 + 2000  # each column, and one under way at each refresh
+        image.put(*live.feed(begin, np.zeros((1, 250))))
+    assert image.painted <= 5000 + 2000  # each column, and one under way at each refresh

@@ -118,7 +118,7 @@ def test_nothing_is_clipped_in_a_small_window(qtbot, main, size):
     assert main.plotter.chart.box.height() >= 40
 
 
-def test_a_low_panel_keeps_its_room_for_the_picture(qtbot, main):
+def test_a_low_panel_keeps_its_room_for_the_image(qtbot, main):
     assert main.files.base.isVisible()
     assert main.plotter.bar.rescale.isVisible()
     main.resize(900, 420)

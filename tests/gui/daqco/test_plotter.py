@@ -45,11 +45,11 @@ def tick(plotter, row, state):
 
 
 def colours(plotter):
-    picture = plotter.chart.raster.image
+    image = plotter.chart.raster.image
     return {
-        picture.pixelColor(x, y).name().upper()
-        for x in range(0, picture.width(), 3)
-        for y in range(picture.height())
+        image.pixelColor(x, y).name().upper()
+        for x in range(0, image.width(), 3)
+        for y in range(image.height())
     }
 
 
@@ -133,7 +133,7 @@ def test_scales_that_make_no_sense_are_refused_at_the_field(plotter, qtbot, low,
     assert not getattr(bar, wrong).reason
 
 
-def test_auto_follows_a_signal_that_leaves_the_picture(plotter, port):
+def test_auto_follows_a_signal_that_leaves_the_image(plotter, port):
     acquire(port, [0.1, 0.0])
     plotter.refresh()
     plotter.read_out()
@@ -164,7 +164,7 @@ def test_clear_forgets_the_history(qtbot, plotter, port):
     assert "#56B4E9" in colours(plotter)
 
 
-def test_pause_freezes_the_picture_and_live_shows_what_came_meanwhile(qtbot, plotter, port):
+def test_pause_freezes_the_image_and_live_shows_what_came_meanwhile(qtbot, plotter, port):
     plotter.bar.auto.setChecked(False)
     acquire(port, [1.0, 2.0])
     qtbot.mouseClick(plotter.bar.pause, Qt.MouseButton.LeftButton)
@@ -305,7 +305,7 @@ def test_a_lost_board_is_told(qtbot, plotter, port):
     qtbot.waitUntil(lambda: "Dev1 is gone" in plotter.problem.text())
 
 
-def test_other_channels_begin_a_new_picture(qtbot, plotter, port):
+def test_other_channels_begin_a_new_image(qtbot, plotter, port):
     acquire(port, [1.0, 2.0])
     plotter.refresh()
     port.change(settings=settings(channel=(channel(5, name="torque", scale="Probe"),)))
@@ -371,7 +371,7 @@ def test_the_refresh_rate_is_that_of_the_settings_but_not_more_than_the_screen_s
     assert plotter.refresh_hz == min(300.0, plotter.screen().refreshRate())
 
 
-def test_the_picture_follows_by_itself(qtbot, plotter, port):
+def test_the_image_follows_by_itself(qtbot, plotter, port):
     acquire(port, [1.0, 2.0])
     qtbot.waitUntil(lambda: "#56B4E9" in colours(plotter), timeout=2000)
 

@@ -205,11 +205,11 @@ def test_badges_of_two_states_look_different(qtbot: QtBot) -> None:
     badge = StateBadge()
     qtbot.addWidget(badge)
     badge.resize(badge.sizeHint())
-    pictures = []
+    images = []
     for state in State:
         badge.set_state(state)
-        pictures.append(badge.grab().toImage())
-    assert all(pictures[i] != pictures[j] for i in range(len(pictures)) for j in range(i))
+        images.append(badge.grab().toImage())
+    assert all(images[i] != images[j] for i in range(len(images)) for j in range(i))
 
 
 def test_a_badge_in_a_greyed_panel_claims_nothing_by_colour(qtbot: QtBot) -> None:
@@ -217,10 +217,10 @@ def test_a_badge_in_a_greyed_panel_claims_nothing_by_colour(qtbot: QtBot) -> Non
     qtbot.addWidget(badge)
     badge.resize(badge.sizeHint())
     badge.setEnabled(False)
-    picture = badge.grab().toImage()
+    image = badge.grab().toImage()
     colours = {
-        picture.pixelColor(x, y).hsvSaturation()
-        for x in range(picture.width())
-        for y in range(picture.height())
+        image.pixelColor(x, y).hsvSaturation()
+        for x in range(image.width())
+        for y in range(image.height())
     }
     assert max(colours) < 80

@@ -48,7 +48,7 @@ def own(qtbot):
 
 @pytest.fixture
 def view(own, port):
-    """The view of the camera, on the screen, before the first picture."""
+    """The view of the camera, on the screen, before the first image."""
     made = CameraView(port, "top", now=lambda: WHEN)
     own(made)
     made.resize(900, 700)
@@ -58,15 +58,15 @@ def view(own, port):
 
 @pytest.fixture
 def shown(qtbot, view, camera):
-    """The view with a picture in it."""
-    picture = camera.push()
-    qtbot.waitUntil(lambda: view.view.picture is picture)
+    """The view with an image in it."""
+    image = camera.push()
+    qtbot.waitUntil(lambda: view.view.image is image)
     QApplication.processEvents()
     return view
 
 
 class Mouse:
-    """Moves and presses over a picture, at places given in its pixels."""
+    """Moves and presses over an image, at places given in its pixels."""
 
     def __init__(self, view) -> None:
         self._target = view.viewport()
@@ -88,7 +88,7 @@ class Mouse:
         self.drag(place_px, place_px)
 
     def drag(self, begin_px, end_px) -> None:
-        """Press, move, let go; the places are those before the picture moves along."""
+        """Press, move, let go; the places are those before the image moves along."""
         begin, end = self.screen(begin_px), self.screen(end_px)
         self._send(QEvent.Type.MouseButtonPress, begin, LEFT, LEFT)
         if begin != end:

@@ -9,7 +9,7 @@ import numpy as np
 from cosmic.frame.errors import ConfigError, CosmicError
 from cosmic.frame.operation import Task
 from cosmic.vico.api.places import CalibrationShown
-from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.hw.interface import (
     CameraCounters,
     CameraInfo,
@@ -40,14 +40,14 @@ RANGES = CameraRanges(
 
 
 def centre_line(width: int = WIDTH, height: int = HEIGHT) -> np.ndarray:
-    """Return a curved line across the picture."""
+    """Return a curved line across the image."""
     along = np.linspace(0.0, 1.0, 300)
     x = width * (0.2 + 0.6 * along)
     y = height * (0.5 + 0.18 * np.sin(5.0 * along) - 0.1 * along)
     return np.column_stack([x, y])
 
 
-def fibre_picture(width: int = WIDTH, height: int = HEIGHT, seed: int = 0) -> np.ndarray:
+def fibre_image(width: int = WIDTH, height: int = HEIGHT, seed: int = 0) -> np.ndarray:
     """Return a bright ground with a dark fibre, a saturated spot and a black one."""
     rng = np.random.default_rng(seed)
     y, x = np.mgrid[0:height, 0:width]
@@ -83,7 +83,7 @@ class SeenTip:
 
 @dataclass(frozen=True)
 class Found:
-    picture: Picture
+    image: CameraImage
     fibres: tuple[Seen, ...] = ()
     tips: tuple[SeenTip, ...] = ()
 
@@ -91,7 +91,7 @@ class Found:
 @dataclass(frozen=True)
 class Link:
     name: str = "find fibres"
-    description: str = "Centre lines, ends and measures of the fibres in the picture"
+    description: str = "Centre lines, ends and measures of the fibres in the image"
     on: bool = False
     problem: str = ""
     failing: bool = False
@@ -109,7 +109,7 @@ FORMATS = (
     Format(),
     Format("HuffYUV (fast, lossless)", ".avi", "Bit-exact, above 30 frames/s"),
     Format("H.264 (small)", ".mp4", "Not bit-exact", "the codec is missing"),
-    Format("TIFF pictures", "", "A folder with one file a frame"),
+    Format("TIFF images", "", "A folder with one file a frame"),
 )
 
 
@@ -126,7 +126,7 @@ class Recorded:
 
 
 class FakeCamera:
-    """Has what a `CameraHandle` has; tests push pictures and set what it is to answer."""
+    """Has what a `CameraHandle` has; tests push images and set what it is to answer."""
 
     def __init__(self, port: "FakeVico", name: str, directory: Path) -> None:
         self._port, self.name, self.directory = port, name, directory
@@ -151,10 +151,10 @@ class FakeCamera:
         self.refuse_later = ""
         self.task: Task | None = None
         self.calls: list[tuple[object, ...]] = []
-        self._latest: Picture | None = None
+        self._latest: CameraImage | None = None
         self._next_id = 0
 
-    # pictures
+    # images
 
     def push(
         self,
@@ -162,8 +162,8 @@ class FakeCamera:
         *,
         status: FrameStatus = FrameStatus.COMPLETE,
         pixel_format: PixelFormat = PixelFormat.MONO8,
-    ) -> Picture:
-        """Take a picture."""
+    ) -> CameraImage:
+        """Take an image."""
         if data is None:
             data = np.full((HEIGHT, WIDTH), 100, np.uint8)
         now_s = self._next_id / 30.0
@@ -171,13 +171,13 @@ class FakeCamera:
         self._next_id += 1
         return self.show_frame(shot)
 
-    def show_frame(self, shot: Frame) -> Picture:
+    def show_frame(self, shot: Frame) -> CameraImage:
         """Have a frame as the newest."""
-        self._latest = Picture(self.name, shot, Circumstances(scale_um_px=self.scale_um_px))
+        self._latest = CameraImage(self.name, shot, Circumstances(scale_um_px=self.scale_um_px))
         self.counters = replace(self.counters, completed=self.counters.completed + 1)
         return self._latest
 
-    def latest(self) -> Picture | None:
+    def latest(self) -> CameraImage | None:
         return self._latest
 
     def change(self, **changes: object) -> None:

@@ -33,7 +33,7 @@ def form(qtbot, shown):
     return shown.form
 
 
-def test_exposure_and_gain_stand_beside_the_picture_in_their_units(shown):
+def test_exposure_and_gain_stand_beside_the_image_in_their_units(shown):
     form = shown.form
     assert form.exposure.isVisible()
     assert form.exposure.field.text() == "10"
@@ -176,7 +176,7 @@ def test_a_background_is_taken_and_cleared(qtbot, shown, camera):
     assert camera.calls == [("set background",), ("clear background",)]
 
 
-def test_a_step_of_machine_vision_that_fails_is_told_on_the_picture_until_it_works(shown, camera):
+def test_a_step_of_machine_vision_that_fails_is_told_on_the_image_until_it_works(shown, camera):
     well = camera.algorithms
     camera.change(algorithms=(replace(well[0], on=True, failing=True, problem="finds: broken"),))
     shown.read_out()

@@ -21,20 +21,20 @@ def enter(qtbot, field, text):
 
 
 def dim(low=40, high=90):
-    """Return a picture of noise between two greys."""
+    """Return an image of noise between two greys."""
     return np.random.default_rng(0).integers(low, high, (HEIGHT, WIDTH)).astype(np.uint8)
 
 
 @pytest.fixture
 def panel(qtbot, view, camera):
-    picture = camera.push(dim())
-    qtbot.waitUntil(lambda: view.view.picture is picture)
+    image = camera.push(dim())
+    qtbot.waitUntil(lambda: view.view.image is image)
     click(qtbot, view.row.more)
     qtbot.waitUntil(lambda: view.contrast.plot.histogram is not None)
     return view.contrast
 
 
-def test_once_stretches_the_contrast_and_the_next_picture_does_not(qtbot, panel, view, camera):
+def test_once_stretches_the_contrast_and_the_next_image_does_not(qtbot, panel, view, camera):
     assert view.view.levels == Levels(0.0, 255.0)
     click(qtbot, panel.once)
     levels = view.view.levels
@@ -45,7 +45,7 @@ def test_once_stretches_the_contrast_and_the_next_picture_does_not(qtbot, panel,
     assert view.view.levels == levels
 
 
-def test_auto_follows_the_pictures_and_a_typed_level_ends_it(qtbot, panel, view, camera):
+def test_auto_follows_the_images_and_a_typed_level_ends_it(qtbot, panel, view, camera):
     click(qtbot, panel.auto)
     camera.push(dim(100, 200))
     qtbot.waitUntil(lambda: view.view.levels.low == pytest.approx(100, abs=2))
@@ -97,13 +97,13 @@ def test_the_share_of_lost_pixels_is_told(qtbot, panel, view, camera):
     assert panel.share.text().startswith("over-exposed 25.00 %, black 12.")
 
 
-def test_a_picture_of_one_grey_is_not_stretched_to_noise():
+def test_a_image_of_one_grey_is_not_stretched_to_noise():
     levels = histogram(np.full((600, 800), 100, np.uint8), 255).levels()
     assert levels.low < 100 < levels.high
     assert levels.high - levels.low >= 4
 
 
-def test_the_histogram_is_told_from_a_part_of_a_large_picture():
+def test_the_histogram_is_told_from_a_part_of_a_large_image():
     data = np.zeros((1200, 1600), np.uint16)
     data[:, 800:] = 4095
     found = histogram(data, 4095)

@@ -55,16 +55,16 @@ def made_gui(remote: RemoteApplication[Vico] | None, own: Callable[[QWidget], No
     return gui
 
 
-def test_the_live_view_shows_the_pictures_of_another_station(qtbot, own, rig, window) -> None:
+def test_the_live_view_shows_the_images_of_another_station(qtbot, own, rig, window) -> None:
     view = made_gui(rig.remote, own).cameras["top"]
     assert view.windowTitle() == "From above"
 
     def shown() -> bool:
         rig.home.camera.keep_coming(ramp())
-        return view.view.picture is not None
+        return view.view.image is not None
 
     soon(qtbot, shown)
-    assert np.array_equal(view.view.picture.data, ramp())
+    assert np.array_equal(view.view.image.data, ramp())
     view.read_out()
     assert view.status.badge.state is State.OK
     assert view.recorder.record.isEnabled()
@@ -113,7 +113,7 @@ def test_the_panels_are_grey_while_the_station_is_away(qtbot, own, window, tmp_p
 
         def shown() -> bool:
             home.camera.keep_coming(ramp())
-            return view.view.picture is not None
+            return view.view.image is not None
 
         soon(qtbot, shown)
         soon(qtbot, lambda: lens.home.isEnabled())

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit, QScrollA
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.frame.gui.theme import apply_theme
 from cosmic.vico.gui.vico_gui import VicoGui, VicoWidget
-from gui.vico.fake_vico import FakeVico, Found, Seen, fibre_picture
+from gui.vico.fake_vico import FakeVico, Found, Seen, fibre_image
 
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
@@ -22,11 +22,11 @@ def test_cameras_and_lens_become_docks_of_the_window(own, tmp_path, theme):
     window.add_panel("Lens", gui.lens)
     window.resize(1366, 768)
     window.show()
-    pictures = {name: port.camera(name).push() for name in gui.cameras}
+    images = {name: port.camera(name).push() for name in gui.cameras}
     for name, view in gui.cameras.items():
         view.window().raise_()
         view.look()
-        assert view.view.picture is pictures[name]
+        assert view.view.image is images[name]
     assert gui.lens.camera.isVisibleTo(gui.lens)  # which camera is to become sharp
 
 
@@ -48,7 +48,7 @@ def test_nothing_is_clipped_in_a_small_window(qtbot, shown, size, opened):
     assert shown.view.height() >= 100
 
 
-def test_in_a_low_dock_the_picture_shrinks_before_anything_scrolls(own, shown):
+def test_in_a_low_dock_the_image_shrinks_before_anything_scrolls(own, shown):
     dock = QScrollArea()
     own(dock)
     dock.setWidgetResizable(True)
@@ -63,7 +63,7 @@ def test_in_a_low_dock_the_picture_shrinks_before_anything_scrolls(own, shown):
     dock.takeWidget()
 
 
-def test_the_drawer_takes_its_room_from_the_picture_and_gives_it_back(qtbot, shown):
+def test_the_drawer_takes_its_room_from_the_image_and_gives_it_back(qtbot, shown):
     width = shown.view.width()
     shown.row.more.click()
     QApplication.processEvents()
@@ -74,10 +74,10 @@ def test_the_drawer_takes_its_room_from_the_picture_and_gives_it_back(qtbot, sho
     assert shown.view.width() == width
 
 
-def test_the_theme_can_change_under_a_picture(qtbot, qapp, shown, camera):
-    picture = camera.push(fibre_picture(800, 600))
-    camera.analysis = Found(picture, (Seen(),))
-    qtbot.waitUntil(lambda: shown.view.picture is picture)
+def test_the_theme_can_change_under_a_image(qtbot, qapp, shown, camera):
+    image = camera.push(fibre_image(800, 600))
+    camera.analysis = Found(image, (Seen(),))
+    qtbot.waitUntil(lambda: shown.view.image is image)
     dark = shown.grab().toImage()
     apply_theme(qapp, "light")
     QApplication.processEvents()

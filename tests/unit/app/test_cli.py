@@ -338,20 +338,20 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize("command", [pytest.param([], marks=pytest.mark.slow), ["mico"]])
-def test_a_picture_of_the_window_is_saved_without_a_display(
+def test_a_image_of_the_window_is_saved_without_a_display(
     tmp_path: Path, command: list[str]
 ) -> None:
-    picture = tmp_path / "window.png"
-    options = ("--offscreen", "0.5", "--screenshot", str(picture), "--size", "1366x768")
+    image = tmp_path / "window.png"
+    options = ("--offscreen", "0.5", "--screenshot", str(image), "--size", "1366x768")
     done = run(*command, *options, "--theme", "light")
     assert (done.returncode, done.stderr) == (0, "")
-    head = picture.read_bytes()[:24]
+    head = image.read_bytes()[:24]
     assert head[:4] == b"\x89PNG"
     size = int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")
     assert size == (1366, 768)
 
 
-def test_a_picture_that_cannot_be_saved_is_an_error(tmp_path: Path) -> None:
+def test_a_image_that_cannot_be_saved_is_an_error(tmp_path: Path) -> None:
     done = run("mico", "--offscreen", "0.2", "--screenshot", str(tmp_path / "no" / "window.png"))
     assert done.returncode == 1
     assert "cannot be saved" in done.stderr

@@ -117,18 +117,18 @@ def test_a_tool_is_expected_in_the_size_and_direction_of_the_map() -> None:
 def test_what_a_tool_leaves_behind_is_found_without_fibre_and_noise() -> None:
     rng = np.random.default_rng(3)
 
-    def picture(tip: int) -> np.ndarray:
+    def image(tip: int) -> np.ndarray:
         image = np.full((400, 600), 150.0)
         image[100:145, :tip] = 40.0
         image[245:290, :tip] = 40.0
         image[188:200, : tip + 150] = 70.0  # a fibre between the jaws
         return (image + rng.normal(0.0, 2.5, image.shape)).astype(np.uint8)
 
-    mask = uncovered(picture(300), picture(264), 45.0)
+    mask = uncovered(image(300), image(264), 45.0)
     found = middle(mask)
     assert found is not None
     assert found == pytest.approx((281.5, 194.5), abs=1.0)
-    assert middle(uncovered(picture(300), picture(300), 45.0)) is None
+    assert middle(uncovered(image(300), image(300), 45.0)) is None
 
 
 @pytest.mark.parametrize("forward", [(0.0, 0.0), (float("nan"), 0.0)])

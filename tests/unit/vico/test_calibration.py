@@ -89,8 +89,8 @@ def test_the_uncertainty_told_is_the_error_made() -> None:
 
 def test_a_place_that_was_tracked_wrongly_is_left_out_and_named() -> None:
     sightings = look(grid())
-    x_px, y_px = sightings[4].picture_px
-    sightings[4] = replace(sightings[4], picture_px=(x_px + 40.0, y_px), label="left.x 320 um")
+    x_px, y_px = sightings[4].image_px
+    sightings[4] = replace(sightings[4], image_px=(x_px + 40.0, y_px), label="left.x 320 um")
     fit = fit_map(sightings)
     assert len(fit.outliers) == 1
     assert fit.outliers[0].startswith("left.x 320 um: 40")
@@ -101,16 +101,16 @@ def test_a_place_that_was_tracked_wrongly_is_left_out_and_named() -> None:
 def test_too_many_wrong_places_are_refused() -> None:
     sightings = look(grid())
     for index in (0, 4, 7):
-        x_px, y_px = sightings[index].picture_px
-        sightings[index] = replace(sightings[index], picture_px=(x_px - 50.0, y_px + 9.0 * index))
+        x_px, y_px = sightings[index].image_px
+        sightings[index] = replace(sightings[index], image_px=(x_px - 50.0, y_px + 9.0 * index))
     with pytest.raises(CalibrationRefused, match=r"3 of 9 places.*point 1: .*point 5: .*point 8"):
         fit_map(sightings)
 
 
 def test_an_outlier_among_thirty_places_is_found_without_trying_every_triple() -> None:
     sightings = look(grid(step_um=100.0, count=6))
-    x_px, y_px = sightings[30].picture_px
-    sightings[30] = replace(sightings[30], picture_px=(x_px, y_px - 6.0))
+    x_px, y_px = sightings[30].image_px
+    sightings[30] = replace(sightings[30], image_px=(x_px, y_px - 6.0))
     assert [each.split(":")[0] for each in fit_map(sightings).outliers] == ["point 31"]
 
 
@@ -129,7 +129,7 @@ def test_moves_that_tell_too_little_are_refused(places: np.ndarray, reason: str)
 
 
 def test_a_thing_that_did_not_move_with_the_stage_is_refused() -> None:
-    still = [replace(each, picture_px=(800.0, 600.0)) for each in look(grid())]
+    still = [replace(each, image_px=(800.0, 600.0)) for each in look(grid())]
     with pytest.raises(CalibrationRefused, match="what is tracked moves with the stage"):
         fit_map(still)
 
@@ -151,7 +151,7 @@ def test_an_axis_that_did_not_go_the_whole_way_is_refused() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_what_is_no_number_is_refused(bad: float) -> None:
     sightings = look(grid())
-    sightings[2] = replace(sightings[2], picture_px=(bad, 5.0))
+    sightings[2] = replace(sightings[2], image_px=(bad, 5.0))
     with pytest.raises(CalibrationRefused, match="not a number"):
         fit_map(sightings)
 

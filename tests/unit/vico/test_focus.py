@@ -1,4 +1,4 @@
-"""Focus: sharper pictures measure more, and a sweep finds the peak or says why there is none."""
+"""Focus: sharper images measure more, and a sweep finds the peak or says why there is none."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -39,7 +39,7 @@ def seen(blur_px: float, noise: float = 2.5, gain: float = 1.0, seed: int = 0) -
 
 
 @pytest.mark.parametrize("measure", list(FocusMeasure))
-def test_the_sharper_of_two_pictures_measures_more(measure: FocusMeasure) -> None:
+def test_the_sharper_of_two_images_measures_more(measure: FocusMeasure) -> None:
     values = [sharpness(seen(blur), None, measure) for blur in (1.0, 2.0, 4.0, 8.0)]
     assert values == sorted(values, reverse=True)
 
@@ -68,13 +68,13 @@ def test_only_the_region_counts() -> None:
     assert sharpness(image, Roi(0, 0, 128, 256)) > sharpness(image)
 
 
-def test_a_black_picture_is_not_sharp() -> None:
+def test_a_black_image_is_not_sharp() -> None:
     assert sharpness(np.zeros((64, 64), np.uint8)) == 0.0
 
 
 @pytest.mark.parametrize("region", [Roi(200, 0, 100, 100), Roi(-1, 0, 50, 50), Roi(0, 0, 8, 50)])
-def test_a_region_that_is_not_in_the_picture_is_refused(region: Roi) -> None:
-    with pytest.raises(ConfigError, match="must lie within the picture of 256 x 256"):
+def test_a_region_that_is_not_in_the_image_is_refused(region: Roi) -> None:
+    with pytest.raises(ConfigError, match="must lie within the image of 256 x 256"):
         sharpness(seen(1.0), region)
 
 
@@ -209,7 +209,7 @@ def camera(lens: list[tuple[float, float]]) -> Iterator[Frame]:
 
 
 def test_old_frames_that_still_wait_do_not_mislead_the_search() -> None:
-    """The picture before the move arrives after it: taken, it would shift the peak by a step."""
+    """The image before the move arrives after it: taken, it would shift the peak by a step."""
     lens = [(-1.0, -60.0)]
     frames = camera(lens)
     now_s = 0.0

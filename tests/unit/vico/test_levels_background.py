@@ -1,4 +1,4 @@
-"""Contrast is taken from a histogram, and uneven light is divided out of the picture."""
+"""Contrast is taken from a histogram, and uneven light is divided out of the image."""
 
 import math
 
@@ -52,7 +52,7 @@ def test_a_colour_that_is_over_exposed_is_marked() -> None:
 
 
 @pytest.mark.parametrize("value", [0, 117, 255])
-def test_a_picture_of_one_grey_can_still_be_shown(value: int) -> None:
+def test_a_image_of_one_grey_can_still_be_shown(value: int) -> None:
     low, high = measure_levels(np.full((30, 30), value, np.uint8), PixelFormat.MONO8).stretch()
     assert high >= low + 1.0 - 1e-9
     assert low <= value + 1.0
@@ -122,7 +122,7 @@ def test_no_pixel_exceeds_what_its_format_can_hold(pixel_format: PixelFormat) ->
     assert filled(pixel_format).correct(bright).max() == FULL_SCALE[pixel_format]
 
 
-def test_without_a_background_the_picture_passes_as_it_is() -> None:
+def test_without_a_background_the_image_passes_as_it_is() -> None:
     background = Background()
     shown = frame()
     assert background.correct(shown) is shown.data
@@ -162,7 +162,7 @@ def test_incomplete_frames_are_not_taken() -> None:
     assert background.missing == 1
 
 
-def test_a_picture_changed_meanwhile_begins_the_collection_anew() -> None:
+def test_a_image_changed_meanwhile_begins_the_collection_anew() -> None:
     background = Background()
     background.collect(3)
     background.add(frame())
@@ -174,7 +174,7 @@ def test_a_picture_changed_meanwhile_begins_the_collection_anew() -> None:
 @pytest.mark.parametrize(
     ("other", "binning", "text"),
     [
-        (frame(rows=100), 1, "the picture is 160 x 100 px"),
+        (frame(rows=100), 1, "the image is 160 x 100 px"),
         (frame(pixel_format=PixelFormat.MONO12), 1, "Mono12"),
         (frame(), 2, "binning 2"),
     ],

@@ -10,20 +10,20 @@ from cosmic.frame.errors import ConfigError
 from cosmic.twin.settings import shipped_settings
 from cosmic.vico.core.vision.tips import find_gripper, find_probe
 from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen, ToolEnd
-from unit.twin.optics.picture_bench import PictureBench
-from unit.vico.tool_pictures import ToolPicture, tool_picture
+from unit.twin.optics.image_bench import ImageBench
+from unit.vico.tool_images import ToolImage, tool_image
 
 Found = ToolEnd | GripperTips
 
 
-def gripper(picture: ToolPicture) -> GripperTips:
-    found = find_gripper(picture.image, picture.expected)
+def gripper(image: ToolImage) -> GripperTips:
+    found = find_gripper(image.image, image.expected)
     assert isinstance(found, GripperTips), found
     return found
 
 
-def probe(picture: ToolPicture) -> ToolEnd:
-    found = find_probe(picture.image, picture.expected)
+def probe(image: ToolImage) -> ToolEnd:
+    found = find_probe(image.image, image.expected)
     assert isinstance(found, ToolEnd), found
     return found
 
@@ -32,24 +32,24 @@ def probe(picture: ToolPicture) -> ToolEnd:
     "changes", [{}, {"noise": 12.0}, {"blur": 4.0}, {"width": 23.0, "blur": 3.0}, {"width": 10.0}]
 )
 def test_a_probe_s_tip_is_found_to_a_part_of_a_pixel(changes: dict[str, float]) -> None:
-    pictures = [tool_picture(seed, **changes) for seed in range(4)]
-    found = [probe(picture) for picture in pictures]
-    errors = [math.dist(f.tip_px, p.hold) for f, p in zip(found, pictures, strict=True)]
+    images = [tool_image(seed, **changes) for seed in range(4)]
+    found = [probe(image) for image in images]
+    errors = [math.dist(f.tip_px, p.hold) for f, p in zip(found, images, strict=True)]
     assert np.median(errors) < 0.2
     assert max(errors) < 0.6
     assert all(each.certain for each in found)
-    for each, picture in zip(found, pictures, strict=True):
-        assert each.width_px == pytest.approx(picture.expected.width_px, abs=0.5)
-        assert np.dot(each.forward, picture.forward) > math.cos(math.radians(1.5))
+    for each, image in zip(found, images, strict=True):
+        assert each.width_px == pytest.approx(image.expected.width_px, abs=0.5)
+        assert np.dot(each.forward, image.forward) > math.cos(math.radians(1.5))
 
 
 @pytest.mark.parametrize(
     "changes", [{"gap": 90.0}, {"gap": 60.0, "noise": 12.0}, {"gap": 70.0, "blur": 3.0}]
 )
 def test_a_gripper_s_middle_and_gap_are_found(changes: dict[str, float]) -> None:
-    pictures = [tool_picture(seed, **changes) for seed in range(4)]
-    found = [gripper(picture) for picture in pictures]
-    errors = [math.dist(f.hold_px, p.hold) for f, p in zip(found, pictures, strict=True)]
+    images = [tool_image(seed, **changes) for seed in range(4)]
+    found = [gripper(image) for image in images]
+    errors = [math.dist(f.hold_px, p.hold) for f, p in zip(found, images, strict=True)]
     assert np.median(errors) < 0.25
     assert max(errors) < 0.6
     assert all(each.certain for each in found)
@@ -61,34 +61,34 @@ def test_a_gripper_s_middle_and_gap_are_found(changes: dict[str, float]) -> None
 
 
 def test_the_first_jaw_is_the_one_to_the_left_of_where_the_gripper_points() -> None:
-    picture = tool_picture(2, gap=80.0)
-    x, y = picture.forward
-    first, second = (np.array(jaw.tip_px) for jaw in gripper(picture).jaws)
+    image = tool_image(2, gap=80.0)
+    x, y = image.forward
+    first, second = (np.array(jaw.tip_px) for jaw in gripper(image).jaws)
     assert np.dot(second - first, (-y, x)) > 0.0
 
 
 def test_the_uncertainty_told_is_about_the_error_made() -> None:
-    pictures = [tool_picture(seed, blur=2.0, noise=8.0) for seed in range(12)]
-    found = [probe(picture) for picture in pictures]
-    errors = np.array([np.array(f.tip_px) - p.hold for f, p in zip(found, pictures, strict=True)])
+    images = [tool_image(seed, blur=2.0, noise=8.0) for seed in range(12)]
+    found = [probe(image) for image in images]
+    errors = np.array([np.array(f.tip_px) - p.hold for f, p in zip(found, images, strict=True)])
     told = float(np.mean([each.std_px for each in found]))
     assert 0.4 * told < errors.std() < 1.6 * told
 
 
 def test_a_fibre_between_the_jaws_shifts_nothing() -> None:
     for seed in range(5):
-        picture = tool_picture(seed, gap=90.0, fibre=True)
-        found = gripper(picture)
-        assert math.dist(found.hold_px, picture.hold) < 0.4
+        image = tool_image(seed, gap=90.0, fibre=True)
+        found = gripper(image)
+        assert math.dist(found.hold_px, image.hold) < 0.4
         assert found.gap_px == pytest.approx(90.0, abs=0.5)
 
 
 def test_a_fibre_held_between_the_jaws_is_noticed() -> None:
     doubts = []
     for seed in range(5):
-        picture = tool_picture(seed, gap=14.0, fibre=True)
-        found = gripper(picture)
-        assert math.dist(found.hold_px, picture.hold) < 0.4
+        image = tool_image(seed, gap=14.0, fibre=True)
+        found = gripper(image)
+        assert math.dist(found.hold_px, image.hold) < 0.4
         doubts += found.doubts
     assert any("something lies against a jaw" in doubt for doubt in doubts)
 
@@ -96,73 +96,73 @@ def test_a_fibre_held_between_the_jaws_is_noticed() -> None:
 # --- what cannot be told ----------------------------------------------------------------------
 
 
-def test_an_empty_picture_and_a_fibre_alone_are_no_tool() -> None:
+def test_an_empty_image_and_a_fibre_alone_are_no_tool() -> None:
     rng = np.random.default_rng(0)
     empty = rng.normal(150.0, 4.0, (400, 480)).clip(0, 255).astype(np.uint8)
-    picture = tool_picture(1, gap=90.0, fibre=True)
+    image = tool_image(1, gap=90.0, fibre=True)
     line = empty.copy()
     line[190:203] = 70
     expected = ExpectedTool((240.0, 200.0), (1.0, 0.0), 45.0)
-    for image in (empty, line):
-        found = find_probe(image, expected)
+    for pixels in (empty, line):
+        found = find_probe(pixels, expected)
         assert isinstance(found, NotSeen)
         assert "no large dark body" in found.reason
-    assert isinstance(find_gripper(empty, picture.expected), NotSeen)
+    assert isinstance(find_gripper(empty, image.expected), NotSeen)
 
 
 def test_closed_jaws_and_a_single_jaw_are_told() -> None:
-    closed = find_gripper(tool_picture(3, width=90.0).image, tool_picture(3, gap=1.0).expected)
+    closed = find_gripper(tool_image(3, width=90.0).image, tool_image(3, gap=1.0).expected)
     assert closed == NotSeen("its jaws cannot be told apart: they are closed, or not in focus")
-    single = find_gripper(tool_picture(3).image, tool_picture(3, gap=40.0).expected)
+    single = find_gripper(tool_image(3).image, tool_image(3, gap=40.0).expected)
     assert single == NotSeen("only one of its jaws is seen")
 
 
-def test_a_tip_off_the_picture_or_far_from_where_it_should_be_is_not_seen() -> None:
-    picture = tool_picture(5)
-    off = find_probe(picture.image, replace(picture.expected, tip_px=(500.0, 200.0)))
+def test_a_tip_off_the_image_or_far_from_where_it_should_be_is_not_seen() -> None:
+    image = tool_image(5)
+    off = find_probe(image.image, replace(image.expected, tip_px=(500.0, 200.0)))
     assert isinstance(off, NotSeen)
-    assert "off the picture" in off.reason
-    behind = np.array(picture.hold) - 130.0 * picture.forward
-    far = find_probe(picture.image, replace(picture.expected, tip_px=tuple(behind.tolist())))
+    assert "off the image" in off.reason
+    behind = np.array(image.hold) - 130.0 * image.forward
+    far = find_probe(image.image, replace(image.expected, tip_px=tuple(behind.tolist())))
     assert isinstance(far, NotSeen)
     assert "reaches more than 40 px beyond" in far.reason
 
 
 def test_another_width_or_direction_than_expected_is_doubted() -> None:
-    picture = tool_picture(4, off_px=2.0)
-    broad = find_probe(picture.image, replace(picture.expected, width_px=35.0))
+    image = tool_image(4, off_px=2.0)
+    broad = find_probe(image.image, replace(image.expected, width_px=35.0))
     assert isinstance(broad, ToolEnd)
     assert broad.doubts == ("it is 45 px wide, and should be 35 px",)
-    x, y = picture.forward
+    x, y = image.forward
     turn = math.radians(12.0)
     turned = (x * math.cos(turn) - y * math.sin(turn), x * math.sin(turn) + y * math.cos(turn))
-    leaning = find_probe(picture.image, replace(picture.expected, forward=turned))
+    leaning = find_probe(image.image, replace(image.expected, forward=turned))
     assert isinstance(leaning, ToolEnd)
     assert any("points 12 degrees away" in doubt for doubt in leaning.doubts)
 
 
 def test_a_jaw_whose_front_is_hidden_is_doubted() -> None:
-    picture = tool_picture(6, gap=80.0, off_px=0.0)
-    x, y = picture.forward
-    jaw = picture.hold + 62.5 * np.array([-y, x])
+    image = tool_image(6, gap=80.0, off_px=0.0)
+    x, y = image.forward
+    jaw = image.hold + 62.5 * np.array([-y, x])
     rows, columns = np.mgrid[:400, :480]
     ahead = (columns - jaw[0]) * x + (rows - jaw[1]) * y
     aside = -(columns - jaw[0]) * y + (rows - jaw[1]) * x
-    hidden = picture.image.copy()
+    hidden = image.image.copy()
     hidden[(np.abs(ahead) < 8.0) & (np.abs(aside) < 60.0)] = 45
-    found = find_gripper(hidden, picture.expected)
+    found = find_gripper(hidden, image.expected)
     assert isinstance(found, NotSeen) or any("front lies" in doubt for doubt in found.doubts)
 
 
 def test_a_front_that_a_fibre_crosses_is_doubted() -> None:
-    picture = tool_picture(7, noise=2.0, specks=0)
-    x, y = picture.forward
+    image = tool_image(7, noise=2.0, specks=0)
+    x, y = image.forward
     rows, columns = np.mgrid[:400, :480]
-    ahead = (columns - picture.hold[0]) * x + (rows - picture.hold[1]) * y
-    aside = -(columns - picture.hold[0]) * y + (rows - picture.hold[1]) * x
-    crossed = picture.image.copy()
+    ahead = (columns - image.hold[0]) * x + (rows - image.hold[1]) * y
+    aside = -(columns - image.hold[0]) * y + (rows - image.hold[1]) * x
+    crossed = image.image.copy()
     crossed[(ahead > -1.0) & (ahead < 0.25 * (aside + 5.0)) & (np.abs(aside) < 60.0)] = 50
-    found = find_probe(crossed, picture.expected)
+    found = find_probe(crossed, image.expected)
     assert isinstance(found, ToolEnd)
     assert any("askew" in doubt or "hidden" in doubt for doubt in found.doubts)
 
@@ -180,14 +180,14 @@ def test_a_front_that_a_fibre_crosses_is_doubted() -> None:
 )
 def test_what_cannot_be_looked_for_is_refused(change: dict[str, float]) -> None:
     with pytest.raises(ConfigError, match="tool tips"):
-        replace(tool_picture(1).expected, **change)
+        replace(tool_image(1).expected, **change)
 
 
 # --- the twin ---------------------------------------------------------------------------------
 
 
 def test_the_twin_s_tools_are_found_where_they_truly_are() -> None:
-    bench = PictureBench(shipped_settings()).zoom(2.0).focus(60.0)
+    bench = ImageBench(shipped_settings()).zoom(2.0).focus(60.0)
     lifted = {"left_z": -1440.0, "right_z": -1440.0, "left_gripper": 180.0, "right_gripper": 220.0}
     bench.go(left_x=3700.0, right_x=-3500.0, probe_y=-4600.0, probe_x=-100.0, **lifted)
     image = bench.optics.render(bench.now_s)

@@ -70,7 +70,7 @@ def test_a_straight_edge_is_not_sure_along_itself() -> None:
     assert match.std_px > 0.5
 
 
-def test_the_drift_of_a_whole_picture_is_found() -> None:
+def test_the_drift_of_a_whole_image_is_found() -> None:
     shift, clear = drift_px(scene(), scene((3.4, -6.2), seed=5))
     assert shift == pytest.approx((3.4, -6.2), abs=0.1)
     assert clear > 0.3
@@ -81,7 +81,7 @@ def test_the_drift_of_a_whole_picture_is_found() -> None:
 @pytest.mark.parametrize(
     ("region", "reason"),
     [
-        (Roi(380, 0, 40, 40), "within the picture of 400 x 300"),
+        (Roi(380, 0, 40, 40), "within the image of 400 x 300"),
         (Roi(10, 10, 4, 40), "12 px or more"),
         (Roi(0, 0, 40, 40), "of one grey"),
     ],
@@ -132,10 +132,10 @@ def test_what_is_gone_is_lost_and_found_again_when_it_is_back() -> None:
     assert tracker.follow(scene((20.0, 0.0))).state is TrackState.FOUND
 
 
-def test_what_leaves_the_picture_is_lost() -> None:
+def test_what_leaves_the_image_is_lost() -> None:
     tracker = TemplateTracker(size_px=80, reach_px=15.0)
     tracker.start(scene(), START)
-    assert tracker.follow(scene(), expected_px=(395.0, 150.0)).reason == "it left the picture"
+    assert tracker.follow(scene(), expected_px=(395.0, 150.0)).reason == "it left the image"
 
 
 def test_two_places_that_look_alike_are_not_told_apart() -> None:
@@ -175,7 +175,7 @@ def test_what_changes_slowly_is_learnt_anew_and_the_uncertainty_grows() -> None:
 
 
 def test_nothing_is_followed_before_it_is_started() -> None:
-    with pytest.raises(NotAvailable, match="start on a picture"):
+    with pytest.raises(NotAvailable, match="start on an image"):
         TemplateTracker().follow(scene())
     with pytest.raises(NotAvailable, match="start with one that was found"):
         FibreTracker().follow([])
@@ -250,7 +250,7 @@ def test_a_movement_that_goes_on_is_expected() -> None:
 @pytest.mark.parametrize(
     ("others", "reason"),
     [
-        ([], "there is no fibre on the picture"),
+        ([], "there is no fibre on the image"),
         ([fibre(0.0, 90.0)], "the nearest lies 90 px away"),
         ([fibre(length=230.0)], "the length of the one there differs by -23 %"),
         ([fibre(width=20.0)], "the width of the one there differs by [+]67 %"),

@@ -9,32 +9,32 @@ import pytest
 
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import ConfigError
-from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.core.vision.algorithms import FindTools, TrackFibre, TrackPlace, make_chain
 from cosmic.vico.core.vision.chain import Chain, Registry, Results, Unavailable
 from cosmic.vico.core.vision.fibre_tracking import FibreTrack
 from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen
 from cosmic.vico.core.vision.tracking import Track
 from cosmic.vico.hw.interface import Frame, Pixels, Roi
-from unit.vico.tool_pictures import tool_picture
+from unit.vico.tool_images import tool_image
 
 
-def picture(data: Pixels | None = None, number: int = 1) -> Picture:
+def image(data: Pixels | None = None, number: int = 1) -> CameraImage:
     data = np.full((60, 80), 100, np.uint8) if data is None else data
-    return Picture("cam", Frame(data, number, 0.1 * number, 0.1 * number), Circumstances())
+    return CameraImage("cam", Frame(data, number, 0.1 * number, 0.1 * number), Circumstances())
 
 
 class Mean:
     name = "mean"
 
-    def run(self, picture: Picture, results: Results) -> object:
-        return float(picture.data.mean())
+    def run(self, image: CameraImage, results: Results) -> object:
+        return float(image.data.mean())
 
 
 class Double:
     name = "double"
 
-    def run(self, picture: Picture, results: Results) -> object:
+    def run(self, image: CameraImage, results: Results) -> object:
         mean = results.get("mean")
         return 2.0 * mean if isinstance(mean, float) else Unavailable("there is no mean")
 
@@ -48,33 +48,33 @@ class Moody:
         self.raises = True
         self.runs = 0
 
-    def run(self, picture: Picture, results: Results) -> object:
+    def run(self, image: CameraImage, results: Results) -> object:
         self.runs += 1
         if self.raises:
-            raise ZeroDivisionError("divided the picture by nothing")
+            raise ZeroDivisionError("divided the image by nothing")
         return "well"
 
 
 class Meddler:
     name = "meddler"
 
-    def run(self, picture: Picture, results: Results) -> object:
+    def run(self, image: CameraImage, results: Results) -> object:
         results["mean"] = 0.0  # type: ignore[index]
         return None
 
 
 def test_each_sees_what_those_before_it_found() -> None:
-    shown = picture()
+    shown = image()
     analysis = Chain([Mean(), Double()]).run(shown)
     assert dict(analysis.results) == {"mean": 100.0, "double": 200.0}
-    assert analysis.picture is shown
+    assert analysis.image is shown
     assert analysis.failures == {}
     assert list(analysis.durations_s) == ["mean", "double"]
     assert 0.0 <= sum(analysis.durations_s.values()) <= analysis.duration_s
 
 
 def test_a_result_is_asked_for_by_name_and_kind() -> None:
-    analysis = Chain([Double()]).run(picture())
+    analysis = Chain([Double()]).run(image())
     assert analysis.get("double", float) is None
     assert analysis.get("double", Unavailable) == Unavailable("there is no mean")
     assert analysis.get("nobody", float) is None
@@ -83,18 +83,18 @@ def test_a_result_is_asked_for_by_name_and_kind() -> None:
 def test_one_that_is_switched_off_does_not_run_until_it_is_switched_on() -> None:
     chain = Chain([Mean(), Double()], off=["mean"])
     assert [state.on for state in chain.states] == [False, True]
-    assert list(chain.run(picture()).results) == ["double"]
+    assert list(chain.run(image()).results) == ["double"]
     chain.switch("mean", on=True)
-    assert list(chain.run(picture()).results) == ["mean", "double"]
+    assert list(chain.run(image()).results) == ["mean", "double"]
     assert all(state.last_s is not None for state in chain.states)
 
 
 def test_one_that_raises_is_named_and_the_rest_runs(caplog: pytest.LogCaptureFixture) -> None:
     chain = Chain([Moody(), Mean()])
     with caplog.at_level(logging.ERROR):
-        analysis = chain.run(picture(number=17))
+        analysis = chain.run(image(number=17))
     assert dict(analysis.results) == {"mean": 100.0}
-    assert analysis.failures["moody"].text == "moody: divided the picture by nothing"
+    assert analysis.failures["moody"].text == "moody: divided the image by nothing"
     assert not analysis.failures["moody"].resting
     assert "moody failed on frame 17" in caplog.text
 
@@ -107,21 +107,21 @@ def test_after_three_failures_in_a_row_it_rests_says_why_and_is_tried_again(
     moody = Moody()
     chain = Chain([moody, Mean()])
     with caplog.at_level(logging.INFO):
-        seen = [chain.run(picture()).failures for _ in range(5)]
+        seen = [chain.run(image()).failures for _ in range(5)]
         assert moody.runs == 3
         assert [each["moody"].resting for each in seen if each] == [False, False, True]
         state = chain.states[0]
         assert state.on, "nobody switched it off"
         assert "3 times in a row, is tried again every 2 s: moody: divided" in state.reason
         clock.advance(2.1)
-        chain.run(picture())
-        chain.run(picture())
+        chain.run(image())
+        chain.run(image())
         assert moody.runs == 4
         assert caplog.text.count("moody failed") == 1, "it is said once"
         moody.raises = False
         clock.advance(2.1)
-        assert chain.run(picture()).results["moody"] == "well"
-        assert chain.run(picture()).results["moody"] == "well"
+        assert chain.run(image()).results["moody"] == "well"
+        assert chain.run(image()).results["moody"] == "well"
     assert chain.states[0].reason == ""
     assert caplog.text.count("moody works again") == 1
 
@@ -131,12 +131,12 @@ def test_failures_now_and_then_switch_nothing_off() -> None:
     chain = Chain([moody])
     for number in range(12):
         moody.raises = number % 3 != 0
-        chain.run(picture())
+        chain.run(image())
     assert moody.runs == 12
 
 
 def test_nobody_changes_what_another_found() -> None:
-    analysis = Chain([Mean(), Meddler()]).run(picture())
+    analysis = Chain([Mean(), Meddler()]).run(image())
     assert dict(analysis.results) == {"mean": 100.0}
     assert "meddler" in analysis.failures
 
@@ -157,12 +157,12 @@ def test_one_line_above_a_class_adds_it_to_every_chain() -> None:
     class Brightness:
         name = "brightness"
 
-        def run(self, picture: Picture, results: Results) -> object:
-            return int(picture.data.max())
+        def run(self, image: CameraImage, results: Results) -> object:
+            return int(image.data.max())
 
     chain = registry.chain()
     assert chain.names == ("brightness",)
-    assert chain.run(picture()).results["brightness"] == 100
+    assert chain.run(image()).results["brightness"] == 100
     assert chain.algorithm("brightness") is not registry.chain().algorithm("brightness")
     assert isinstance(chain.algorithm("brightness"), Brightness)
 
@@ -177,14 +177,14 @@ def only(*names: str) -> Chain:
     return chain
 
 
-def test_the_focus_measure_says_when_its_region_is_not_on_the_picture() -> None:
+def test_the_focus_measure_says_when_its_region_is_not_on_the_image() -> None:
     chain = only("focus")
     textured = np.random.default_rng(0).integers(0, 255, (60, 80), np.uint8)
-    assert chain.run(picture(textured)).get("focus", float)
+    assert chain.run(image(textured)).get("focus", float)
     chain.algorithm("focus").region = Roi(50, 0, 60, 60)  # type: ignore[attr-defined]
-    found = chain.run(picture(textured)).get("focus", Unavailable)
+    found = chain.run(image(textured)).get("focus", Unavailable)
     assert found is not None
-    assert "must lie within the picture" in found.reason
+    assert "must lie within the image" in found.reason
 
 
 def strand(bend_px: float = 30.0, shift: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
@@ -204,10 +204,10 @@ def drawn(*lines: np.ndarray, width_px: int = 10, seed: int = 0) -> np.ndarray:
     )
 
 
-def test_fibres_are_found_on_grey_and_on_coloured_pictures() -> None:
+def test_fibres_are_found_on_grey_and_on_coloured_images() -> None:
     grey = drawn(strand())
     for data in (grey, np.ascontiguousarray(np.stack([grey] * 3, axis=2))):
-        analysis = only("fibres").run(picture(data))
+        analysis = only("fibres").run(image(data))
         (fibre,) = analysis.results["fibres"]  # type: ignore[misc]
         assert fibre.width_px == pytest.approx(11.0, abs=1.5)
 
@@ -216,19 +216,19 @@ def test_a_fibre_that_was_found_is_followed_until_it_is_ended() -> None:
     chain = only("fibres", "fibre track")
     tracker = chain.algorithm("fibre track")
     assert isinstance(tracker, TrackFibre)
-    first = chain.run(picture(drawn(strand(), strand(shift=(0.0, 120.0)))))
+    first = chain.run(image(drawn(strand(), strand(shift=(0.0, 120.0)))))
     assert first.get("fibre track", Unavailable) == Unavailable("no fibre is followed")
     fibres = first.results["fibres"]
     mine = min(fibres, key=lambda each: each.ends_px[0, 1])  # type: ignore[attr-defined]
     tracker.follow(mine)
-    moved = chain.run(picture(drawn(strand(shift=(6.0, 10.0)), strand(shift=(0.0, 120.0)), seed=1)))
+    moved = chain.run(image(drawn(strand(shift=(6.0, 10.0)), strand(shift=(0.0, 120.0)), seed=1)))
     track = moved.get("fibre track", FibreTrack)
     assert track is not None
     assert track.moved_px == pytest.approx((6.0, 10.0), abs=1.0)
     chain.switch("fibres", on=False)
-    assert chain.run(picture(drawn())).get("fibre track", Unavailable) is not None
+    assert chain.run(image(drawn())).get("fibre track", Unavailable) is not None
     tracker.end()
-    ended = chain.run(picture(drawn())).get("fibre track", Unavailable)
+    ended = chain.run(image(drawn())).get("fibre track", Unavailable)
     assert ended == Unavailable("no fibre is followed")
 
 
@@ -237,13 +237,13 @@ def test_a_place_is_followed_or_refused_without_a_failure() -> None:
     tracker = chain.algorithm("place track")
     assert isinstance(tracker, TrackPlace)
     tracker.follow((590.0, 20.0))
-    refused = chain.run(picture(drawn(strand()))).get("place track", Unavailable)
+    refused = chain.run(image(drawn(strand()))).get("place track", Unavailable)
     assert refused is not None
-    assert "within the picture" in refused.reason
+    assert "within the image" in refused.reason
     line = strand()
     tracker.follow((60.0, float(line[0, 1])))
-    assert chain.run(picture(drawn(line))).get("place track", Track) is not None
-    track = chain.run(picture(drawn(strand(shift=(5.0, 0.0)), seed=1))).get("place track", Track)
+    assert chain.run(image(drawn(line))).get("place track", Track) is not None
+    track = chain.run(image(drawn(strand(shift=(5.0, 0.0)), seed=1))).get("place track", Track)
     assert track is not None
     assert track.position_px == pytest.approx((65.0, line[0, 1]), abs=0.5)
 
@@ -252,20 +252,20 @@ def test_tools_are_looked_for_where_they_are_expected() -> None:
     chain = only("tools")
     finder = chain.algorithm("tools")
     assert isinstance(finder, FindTools)
-    drawing = tool_picture(1, gap=80.0)
-    nobody = chain.run(picture(drawing.image)).get("tools", Unavailable)
+    drawing = tool_image(1, gap=80.0)
+    nobody = chain.run(image(drawing.image)).get("tools", Unavailable)
     assert nobody is not None
     away = ExpectedTool((-5.0, 0.0), (1.0, 0.0), 20.0)
     finder.expected = {"left": drawing.expected, "probe": away}
-    tools = chain.run(picture(drawing.image)).results["tools"]
+    tools = chain.run(image(drawing.image)).results["tools"]
     assert isinstance(tools, Mapping)
     assert isinstance(tools["left"], GripperTips)
     assert isinstance(tools["probe"], NotSeen)
 
 
-def test_everything_built_in_runs_on_an_empty_picture_without_a_failure() -> None:
+def test_everything_built_in_runs_on_an_empty_image_without_a_failure() -> None:
     chain = make_chain()
     assert chain.names == ("focus", "fibres", "fibre track", "place track", "tools", "tips")
-    analysis = chain.run(picture(np.full((400, 600), 150, np.uint8)))
+    analysis = chain.run(image(np.full((400, 600), 150, np.uint8)))
     assert analysis.failures == {}
     assert analysis.results["fibres"] == ()

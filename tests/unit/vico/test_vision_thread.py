@@ -1,4 +1,4 @@
-"""Pictures are analysed for those who want to know, and for nobody else."""
+"""Images are analysed for those who want to know, and for nobody else."""
 
 from collections.abc import Iterator
 from threading import Event
@@ -7,26 +7,26 @@ import numpy as np
 import pytest
 
 from cosmic.frame.failure import FailurePolicy
-from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.core.vision_thread import VisionThread
 from cosmic.vico.hw.interface import Frame
 
 
 class Bench:
-    """The thread, and the numbers of the pictures that it analysed."""
+    """The thread, and the numbers of the images that it analysed."""
 
     def __init__(self) -> None:
         self.analysed: list[int] = []
         self.thread: VisionThread[int] = VisionThread("cam", self._analyse, FailurePolicy())
         self.thread.start()
 
-    def _analyse(self, picture: Picture) -> int:
-        self.analysed.append(picture.frame.frame_id)
-        return picture.frame.frame_id
+    def _analyse(self, image: CameraImage) -> int:
+        self.analysed.append(image.frame.frame_id)
+        return image.frame.frame_id
 
     def put(self, number: int) -> None:
         frame = Frame(np.zeros((4, 4), np.uint8), number, 0.1 * number, 0.1 * number)
-        self.thread.put(Picture("cam", frame, Circumstances()))
+        self.thread.put(CameraImage("cam", frame, Circumstances()))
 
 
 @pytest.fixture
@@ -37,15 +37,15 @@ def bench() -> Iterator[Bench]:
     assert bench.thread.join()
 
 
-def test_pictures_that_nobody_asks_about_are_not_analysed(bench: Bench) -> None:
+def test_images_that_nobody_asks_about_are_not_analysed(bench: Bench) -> None:
     for number in range(20):
         bench.put(number)
-    assert bench.thread.newest == 19  # the first look waits, and is for the newest picture
+    assert bench.thread.newest == 19  # the first look waits, and is for the newest image
     assert bench.analysed == [19]
     assert bench.thread.passed_over == 0
 
 
-def test_pictures_are_analysed_as_they_come_after_a_look(bench: Bench) -> None:
+def test_images_are_analysed_as_they_come_after_a_look(bench: Bench) -> None:
     bench.put(1)
     assert bench.thread.newest == 1
     found = Event()
@@ -55,7 +55,7 @@ def test_pictures_are_analysed_as_they_come_after_a_look(bench: Bench) -> None:
         assert not found.wait(0.001)  # and whoever does not want it is not told
 
 
-def test_pictures_are_analysed_while_a_listener_wants_them(bench: Bench) -> None:
+def test_images_are_analysed_while_a_listener_wants_them(bench: Bench) -> None:
     told, heard = list[int](), Event()
 
     def listen(number: int) -> None:

@@ -14,22 +14,22 @@ DAQCO: Final = "DAQCo"
 LENS: Final = "Lens and light"
 NARROW_SCREEN_PX: Final = 1600
 LOW_SCREEN_PX: Final = 1000
-_WITH_PICTURE: Final = [5, 5, 4]
+_WITH_IMAGE: Final = [5, 5, 4]
 _WITH_SCENE: Final = [3, 2]
 """How panels beside each other share the width at a first start."""
 _SHARES: Final = [1, 1]
 """How scene and force share their column."""
 _ABOVE_LENS: Final = [3, 1]
-"""How picture and lens share theirs."""
+"""How image and lens share theirs."""
 _WITH_LENS: Final = [3, 1]
-"""How picture and lens share the width where they stand alone."""
+"""How image and lens share the width where they stand alone."""
 
 
 @dataclass(frozen=True)
 class Instruments:
     """The panels of vision and acquisition, as far as there are any."""
 
-    pictures: VicoGui | None
+    images: VicoGui | None
     force: UDaqMainWidget | None
 
     @property
@@ -38,13 +38,13 @@ class Instruments:
         found: dict[str, list[str]] = {}
         if self.force is not None:
             found["daqco"] = [DAQCO]
-        if self.pictures is not None and self.pictures.cameras:
-            titles = [view.windowTitle() for view in self.pictures.cameras.values()]
+        if self.images is not None and self.images.cameras:
+            titles = [view.windowTitle() for view in self.images.cameras.values()]
             found["vico"] = [*titles, LENS]
         return found
 
     def place(self, window: CosmicServerGui, scene: str, left: str) -> str:
-        """Add them to the window, and share its width out; return the first picture's title.
+        """Add them to the window, and share its width out; return the first image's title.
 
         Parameters
         ----------
@@ -52,11 +52,11 @@ class Instruments:
             Titles of the panel with the scene and of the one at the left; "" where there is none.
         """
         low = window.screen().availableGeometry().height() < LOW_SCREEN_PX
-        first = add_instruments(window, self.pictures, self.force, scene, low=low)
+        first = add_instruments(window, self.images, self.force, scene, low=low)
         behind = window.tabifiedDockWidgets(window.dock(first)) if first else []
         aside = scene if scene and window.dock(scene) not in behind else ""
         columns = [title for title in (left, first, aside) if title]
-        shares = _WITH_PICTURE if first else _WITH_SCENE
+        shares = _WITH_IMAGE if first else _WITH_SCENE
         window.share_out(columns, shares[: len(columns)], Qt.Orientation.Horizontal)
         return first
 
@@ -73,13 +73,13 @@ def instruments_of(platform: Platform) -> Instruments:
 
 def add_instruments(
     window: CosmicServerGui,
-    pictures: VicoGui | None,
+    images: VicoGui | None,
     force: UDaqMainWidget | None,
     scene: str,
     *,
     low: bool,
 ) -> str:
-    """Put the picture between the actuators and the scene, lens and force below these two.
+    """Put the image between the actuators and the scene, lens and force below these two.
 
     Parameters
     ----------
@@ -93,20 +93,20 @@ def add_instruments(
     str
         Title of the first camera's panel; "" where there is none.
     """
-    views = list(pictures.cameras.values()) if pictures is not None else []
+    views = list(images.cameras.values()) if images is not None else []
     first = views[0].windowTitle() if views else ""
     if first:
         window.add_panel(first, views[0], Qt.DockWidgetArea.RightDockWidgetArea, scroll=False)
     if first and scene:
-        picture, other = window.dock(first), window.dock(scene)
+        image, other = window.dock(first), window.dock(scene)
         if window.screen().availableGeometry().width() < NARROW_SCREEN_PX:
-            window.tabifyDockWidget(picture, other)
+            window.tabifyDockWidget(image, other)
         else:
-            window.splitDockWidget(picture, other, Qt.Orientation.Horizontal)
+            window.splitDockWidget(image, other, Qt.Orientation.Horizontal)
     if force is not None:
         _add_force(window, force, first or scene if low else scene or first, low=low)
-    if first and pictures is not None:
-        _add_lens(window, pictures, first, scene, low=low)
+    if first and images is not None:
+        _add_lens(window, images, first, scene, low=low)
     # Only now, for a dock that has tabs cannot be divided any more.
     for view in views[1:]:
         window.add_panel(view.windowTitle(), view, scroll=False, beside=first, tabbed=True)

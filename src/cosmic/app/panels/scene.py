@@ -50,7 +50,7 @@ class ScenePanel(QWidget):
     Signals
     -------
     refused_gone()
-        The refused movement was taken out of the picture.
+        The refused movement was taken out of the image.
     """
 
     refused_gone = Signal()
@@ -119,7 +119,7 @@ class ScenePanel(QWidget):
         self._asked = True
         if self._scene is not None:
             return
-        # Imported here: it waits for the first picture of the window.
+        # Imported here: it waits for the first image of the window.
         from cosmic.mico.gui.scene.scene_widget import SceneWidget
 
         scene = SceneWidget(prefer_gl=self._model is not None)
@@ -272,7 +272,7 @@ class ScenePanel(QWidget):
         }
 
     def clear_refused(self) -> None:
-        """Take the refused movement out of the picture."""
+        """Take the refused movement out of the image."""
         self._on_refused_cleared()
         if self._scene is not None:
             self._scene.clear_refused()

@@ -90,7 +90,7 @@ class OperatorWindow(CosmicServerGui):
         self._bridge = WindowBridge()
         self._forget_policy = platform.policy.subscribe(self._bridge.tell_failure)
         self._add_mico(settings)
-        pictures = self._add_instruments()
+        images = self._add_instruments()
         if self._mico_gui is not None and self._scene is not None:
             self._procedures = ProcedurePanels(
                 self, self._mico_gui, self._scene, self._rig.control, beside=SCENE
@@ -104,8 +104,8 @@ class OperatorWindow(CosmicServerGui):
             self._campaign.replayed.connect(self._raise_scene)
             self._calibrations = add_calibrations(self, self._rig, beside=MICO)
             self.dock(MICO).raise_()
-        if pictures:
-            self.dock(pictures).raise_()
+        if images:
+            self.dock(images).raise_()
         self._stations = WindowStations(self, platform, host, self._instruments.panels)
         model = self._mico_gui is not None and self._mico_gui.collision.has_model
         blocked = blocked_modes(
@@ -148,7 +148,7 @@ class OperatorWindow(CosmicServerGui):
         self._guide.offered.connect(self._raise_scene)
 
     def _add_instruments(self) -> str:
-        """Put picture and lens in the middle, force below the scene; return the picture's title."""
+        """Put image and lens in the middle, force below the scene; return the image's title."""
         if self._platform.mico is None:
             self.top_bar.set_collision_model(present=True)  # nothing moves that could collide
         scene = SCENE if self._scene is not None else ""
@@ -270,9 +270,9 @@ class OperatorWindow(CosmicServerGui):
         )
 
     def _cancel_tool(self) -> bool:
-        """Put the tools on the pictures away, as Escape does first."""
-        pictures = self._instruments.pictures
-        views = list(pictures.cameras.values()) if pictures is not None else []
+        """Put the tools on the images away, as Escape does first."""
+        images = self._instruments.images
+        views = list(images.cameras.values()) if images is not None else []
         chosen = [each for each in views if each.isVisible() and each.view.tool is not None]
         for each in chosen:
             each.tools.put_away()

@@ -46,7 +46,7 @@ class WindowOptions:
     offscreen_s : float or None
         Show nothing and close after so many seconds.
     screenshot : Path or None
-        Where to save a picture of the window before it closes.
+        Where to save an image of the window before it closes.
     sample : str or None
         What lies on the simulated plate, as twin.toml names it.
     truth : Path or None
@@ -140,7 +140,7 @@ def _application() -> QApplication:
 
 @contextmanager
 def _settings(*, offscreen: bool) -> Iterator[QSettings]:
-    """Give the operator's settings; a picture neither sees nor changes them."""
+    """Give the operator's settings; an image neither sees nor changes them."""
     if not offscreen:
         yield QSettings(QSettings.Format.IniFormat, QSettings.Scope.UserScope, "CoSMic", "CoSMic")
         return
@@ -204,7 +204,7 @@ def _closed_by_signals(close: Callable[[], object]) -> Iterator[None]:
 
 
 class _Photographer(QObject):
-    """Takes a picture of the window after a while, and closes it."""
+    """Takes an image of the window after a while, and closes it."""
 
     def __init__(self, window: OperatorWindow, file: Path | None) -> None:
         super().__init__(window)
@@ -213,7 +213,7 @@ class _Photographer(QObject):
         self.failed = False
 
     def finish(self) -> None:
-        """Save the picture and close; what cannot be saved ends the program with an error."""
+        """Save the image and close; what cannot be saved ends the program with an error."""
         if self._file is not None and not self._window.grab().save(str(self._file)):
             self.failed = True
         self._window.close()
@@ -233,6 +233,6 @@ def _run(app: QApplication, window: OperatorWindow, options: WindowOptions) -> i
         QTimer.singleShot(round(1000 * options.offscreen_s), photographer.finish)
     code = app.exec()
     if photographer.failed:
-        sys.stderr.write(f"cosmic: {options.screenshot}: the picture cannot be saved\n")
+        sys.stderr.write(f"cosmic: {options.screenshot}: the image cannot be saved\n")
         return 1
     return code

@@ -18,7 +18,7 @@ DRIFT: Final = "drift of the tips"
 
 
 class CheckDrift(FibreOperation):
-    """Gripper and probe are seen on one picture again, every so many fibres.
+    """Gripper and probe are seen on one image again, every so many fibres.
 
     What has moved by more than the setting, and by more than can be noise, is followed: maps,
     rotation centre and the probe's place. What has moved far, or is not seen, is measured anew.
@@ -110,6 +110,6 @@ def _note(work: HandlingContext, gripper: TipOff, moved: Off, limit_um: float) -
             now_s,
             registry.session,
             zoom=work.settings.calibration.compare_zoom,
-            how="one picture of both tips",
+            how="one image of both tips",
         )
     )

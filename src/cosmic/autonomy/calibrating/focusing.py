@@ -10,7 +10,7 @@ from cosmic.frame.errors import NotAvailable
 from cosmic.vico.api.lens import LensHandle
 from cosmic.vico.core.calibration_fit import CalibrationRefused
 from cosmic.vico.core.focus import FocusAnswer, FocusFault, FocusMeasure, peak_of, sharpness
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.hw.peripherals import LensAxis
 
 SWEEPS = 3
@@ -80,8 +80,8 @@ def _sweep(
     yield lens.seek_focus(max(0, round(low) - PLAY_COUNTS))
     for place in np.linspace(low, high, frames).round().tolist():
         yield lens.seek_focus(int(place))
-        picture = yield work.picture()
-        assert isinstance(picture, Picture)
-        # The whole picture, and its edges: of a tool, how much of it is dark tells little.
-        curve.append((place, sharpness(picture.data, None, FocusMeasure.TENENGRAD)))
+        image = yield work.image()
+        assert isinstance(image, CameraImage)
+        # The whole image, and its edges: of a tool, how much of it is dark tells little.
+        curve.append((place, sharpness(image.data, None, FocusMeasure.TENENGRAD)))
     return peak_of(curve)

@@ -15,7 +15,7 @@ from cosmic.autonomy.calibrating.focusing import (
 )
 from cosmic.autonomy.calibrating.registry import CalibrationEntry
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
-from cosmic.autonomy.handling.prepare import clear_picture, retract_probe, zoom_to
+from cosmic.autonomy.handling.prepare import clear_image, retract_probe, zoom_to
 from cosmic.autonomy.procedures.operation import Steps, Yielded
 from cosmic.autonomy.tools import tip_um
 from cosmic.frame.errors import NotAvailable
@@ -77,14 +77,14 @@ class HeightByFocus(Calibrated):
 
     def _at(self, work: HandlingContext, zoom: float, begun_counts: float) -> Steps:
         try:
-            yield from clear_picture(work)
+            yield from clear_image(work)
             yield from zoom_to(work, zoom)
             plate = yield from _plate(work, zoom, begun_counts)
             high = work.hold_tip_um
             tips = []
             for height in (high, LOW_PART * high):
                 tips.append((yield from _gripper(work, zoom, plate[0], height)))
-            yield from clear_picture(work)
+            yield from clear_image(work)
             probe = yield from _probe(work, zoom, plate[0])
             yield from retract_probe(work)
         finally:
@@ -128,7 +128,7 @@ class HeightByFocus(Calibrated):
             "counts_um": counts_um,
             "zoom": zoom,
         }
-        how = f"{settings.focus_frames} pictures a sweep at {zoom:g}x"
+        how = f"{settings.focus_frames} images a sweep at {zoom:g}x"
         self.kept(work, std_um, "um", settings.height_um, values=values, how=how)
 
     @override
@@ -148,11 +148,11 @@ class HeightByFocus(Calibrated):
         """Focus on the plate and on the tip once, and see that they are as far apart as before."""
         zoom, begun = entry.values["zoom"], focus_now(work)
         try:
-            yield from clear_picture(work)
+            yield from clear_image(work)
             yield from zoom_to(work, zoom)
             plate = yield from _plate(work, zoom, begun)
             tip = yield from _gripper(work, zoom, plate[0], LOW_PART * work.hold_tip_um)
-            yield from clear_picture(work)
+            yield from clear_image(work)
         finally:
             work.shared.zoomed = None
         yield from seek_from_below(work, begun)

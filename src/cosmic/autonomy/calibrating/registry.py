@@ -108,11 +108,11 @@ class CalibrationEntry:
     session : str
         The start of the program in which it was made, or checked last.
     zoom : float or None
-        Magnification of the pictures; None: no picture, or several.
+        Magnification of the images; None: no image, or several.
     made_with : str
         What it rests on; made with anything else it is none.
     how : str
-        Method and amount, such as "9 pictures a sweep".
+        Method and amount, such as "9 images a sweep".
     version : str
         Of the program.
     checked : datetime or None

@@ -31,24 +31,24 @@ class CalibrationSettings(StrictModel):
     focus_zoom, focus_wide_zoom : float
         Magnification at which they are measured, and the one where nothing with edges is in view.
     focus_x_um, focus_y_um : float
-        Where tips stand meanwhile: in the middle of the picture.
+        Where tips stand meanwhile: in the middle of the image.
     focus_um_count : float
         About what a count of the focus is worth; what it is worth is measured.
     focus_reach_um, focus_frames : float, int
-        How far a sweep goes to both sides, and how many pictures it has.
+        How far a sweep goes to both sides, and how many images it has.
     lying_um : float
         How high above the plate that is in focus which lies on it.
     height_um : float
         Largest standard deviation of a height.
     touch : bool
-        The probe feels for the jaws before fibres are handled; otherwise only the picture says
+        The probe feels for the jaws before fibres are handled; otherwise only the image says
         where it is.
     touch_behind_um, touch_below_um : float
         How far behind the tips of the jaws, and above their lower edge, the probe touches.
     touch_closing_um : float
         How much further than their travel the jaws are closed before.
     touch_stand_off_um : float
-        How far before the jaw, as the picture shows it, the small steps begin.
+        How far before the jaw, as the image shows it, the small steps begin.
     touch_step_v, touch_step_um : float
         Amplitude of these steps, and how long one may be: even a rigid jaw must be felt before the
         force is too high.
@@ -57,7 +57,7 @@ class CalibrationSettings(StrictModel):
     touches : int
         How often the jaw is touched.
     touch_off_um : float
-        How far touch and picture may disagree.
+        How far touch and image may disagree.
     touch_std_um : float
         Largest standard deviation of the place found by touch.
     zooms_gap_um, zooms_small_um_px : float

@@ -27,7 +27,7 @@ class TouchJaw(Calibrated):
     """The probe comes up to the outside of the closed jaws, a step at a time, until it is felt.
 
     No step is so long that even a rigid jaw could bring the force near what the sensor bears. Where
-    the jaw is must be known from a picture before: the first steps begin close to it. Only the
+    the jaw is must be known from an image before: the first steps begin close to it. Only the
     direction in which the probe feels can be touched in.
     """
 
@@ -38,7 +38,7 @@ class TouchJaw(Calibrated):
     def measure(self, work: HandlingContext) -> Steps:
         settings = work.settings.calibration
         if PROBE not in work.calibration.made:
-            raise NotAvailable("see probe and gripper on one picture before they touch")
+            raise NotAvailable("see probe and gripper on one image before they touch")
         if not work.daqco.running:
             work.daqco.start()
         distrust_gap(work)
@@ -119,7 +119,7 @@ class TouchJaw(Calibrated):
                 return 0.5 * (before + here)
             before = here
         raise CalibrationRefused(
-            f"nothing was felt within {abs(before - begun):.0f} um of where the picture shows the "
+            f"nothing was felt within {abs(before - begun):.0f} um of where the image shows the "
             "jaw; check the sensor, and that the jaws are closed"
         )
 
@@ -132,8 +132,8 @@ class TouchJaw(Calibrated):
         apart = felt_y - seen_y
         if not abs(apart) <= settings.touch_off_um:
             raise CalibrationRefused(
-                f"touch and picture disagree by {apart:.1f} um, at most {settings.touch_off_um:g} "
-                "um are allowed; look whether a tip is bent, and calibrate the picture anew"
+                f"touch and image disagree by {apart:.1f} um, at most {settings.touch_off_um:g} "
+                "um are allowed; look whether a tip is bent, and calibrate the image anew"
             )
         work.calibration.probe_off_um = off_x, felt_y
         values = {"off_y_um": felt_y, "seen_y_um": seen_y, "apart_um": apart, "spread_um": spread}

@@ -1,4 +1,4 @@
-"""The map from platform to picture at every step of the lens, one after the other."""
+"""The map from platform to image at every step of the lens, one after the other."""
 
 from typing import Final
 
@@ -13,7 +13,7 @@ from cosmic.autonomy.calibrating.focusing import (
 )
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.jaws import in_step, move_jaws, zero_jaws
-from cosmic.autonomy.handling.prepare import clear_picture, zoom_to
+from cosmic.autonomy.handling.prepare import clear_image, zoom_to
 from cosmic.autonomy.procedures.operation import Steps
 from cosmic.autonomy.stage_procedure import LARGEST_PART
 from cosmic.vico.core.calibration_fit import CalibrationRefused
@@ -24,7 +24,7 @@ DEEP_ZOOM: Final = 3.0
 
 
 class CalibrateZooms(Calibrated):
-    """The gripper's tip, well above the plate, goes about the picture at each step of the lens.
+    """The gripper's tip, well above the plate, goes about the image at each step of the lens.
 
     Where the field is small the jaws are opened less, so that all of both is seen.
     """
@@ -38,7 +38,7 @@ class CalibrateZooms(Calibrated):
         steps = lens_of(work).steps
         if not steps:
             raise CalibrationRefused("the lens has no zoom steps: list them in the platform file")
-        yield from clear_picture(work)
+        yield from clear_image(work)
         if not in_step(work):
             yield from zero_jaws(work)
         height = max(work.settings.places.travel_um, work.height_now())

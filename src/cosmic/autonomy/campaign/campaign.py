@@ -115,7 +115,7 @@ class Campaign:
         self.work = work
         self._treatment = treatment
         self._recorder = FibreRecorder(
-            work, store, measures=treatment.measures, pictures=recipe.file.output.pictures
+            work, store, measures=treatment.measures, images=recipe.file.output.pictures
         )
         self._rule = StopRule(recipe.file.stop)
         self._policy = policy
@@ -186,7 +186,7 @@ class Campaign:
 
     @property
     def fibres(self) -> tuple[FibreRecord, ...]:
-        """All fibres so far without curves and pictures, those of earlier runs included."""
+        """All fibres so far without curves and images, those of earlier runs included."""
         return self._recorder.fibres
 
     @property

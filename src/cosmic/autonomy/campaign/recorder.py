@@ -12,10 +12,10 @@ import numpy as np
 
 from cosmic.autonomy.campaign.records import (
     CalibrationNote,
+    FibreImage,
     FibreRecord,
     OperationRecord,
     Outcome,
-    Picture,
     Pose,
     Series,
     Shape,
@@ -35,7 +35,7 @@ from cosmic.daqco.core.chunk import DataChunk
 from cosmic.frame.clock import Clock
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.motion.positioner import PositionerState
-from cosmic.vico.core.picture import Picture as TakenPicture
+from cosmic.vico.core.image import CameraImage
 
 
 class Journal:
@@ -202,7 +202,7 @@ def record_of(
     *,
     ended_s: float,
     measures: bool,
-    pictures: bool,
+    images: bool,
     events: Sequence[NodeEvent],
     series: tuple[Series, ...],
     interrupted: str = "",
@@ -217,8 +217,8 @@ def record_of(
         On the platform's clock, for a fibre that does not know.
     measures : bool
         The procedure measures: without a result the fibre is no good one.
-    pictures : bool
-        Keep its pictures.
+    images : bool
+        Keep its images.
     interrupted : str
         Why the treatment was cut off; empty when it was not.
     """
@@ -243,11 +243,11 @@ def record_of(
         peak_force_un=fibre.peak_un,
         bending=fibre.bending,
         spans=tuple(fibre.spans),
-        pictures=tuple(
-            _picture(name, each, _region_px(fibre, each) if name == GEOMETRY else None)
-            for name, each in fibre.pictures.items()
+        images=tuple(
+            _image(name, each, _region_px(fibre, each) if name == GEOMETRY else None)
+            for name, each in fibre.images.items()
         )
-        if pictures
+        if images
         else (),
         operations=operations_of(events),
         series=series,
@@ -267,14 +267,14 @@ def _outcome(fibre: HeldFibre, *, measures: bool, interrupted: str) -> tuple[Out
     return Outcome.GOOD, "", ""
 
 
-def _picture(
-    name: str, taken: TakenPicture, region_px: tuple[int, int, int, int] | None
-) -> Picture:
+def _image(
+    name: str, taken: CameraImage, region_px: tuple[int, int, int, int] | None
+) -> FibreImage:
     def known(value: float | None) -> float:
         return math.nan if value is None else value
 
     now = taken.circumstances
-    return Picture(
+    return FibreImage(
         name=name,
         pixels=taken.data,
         taken_s=taken.frame.exposed_s,
@@ -286,8 +286,8 @@ def _picture(
     )
 
 
-def _region_px(fibre: HeldFibre, taken: TakenPicture) -> tuple[int, int, int, int] | None:
-    """Return the part of a picture with the fibre in it, with room around it."""
+def _region_px(fibre: HeldFibre, taken: CameraImage) -> tuple[int, int, int, int] | None:
+    """Return the part of an image with the fibre in it, with room around it."""
     line = fibre.line_px
     if line is None:
         return None
@@ -316,19 +316,19 @@ class FibreRecorder:
     ----------
     measures : bool
         The procedure measures: a fibre without a result is no good one.
-    pictures : bool
-        Keep the pictures.
+    images : bool
+        Keep the images.
     """
 
     def __init__(
-        self, work: HandlingContext, store: CampaignStore, *, measures: bool, pictures: bool
+        self, work: HandlingContext, store: CampaignStore, *, measures: bool, images: bool
     ) -> None:
         self.store = store
         self.times = OperationTimes()
         self.fibres: tuple[FibreRecord, ...] = store.reader.fibres()
         self._work = work
         self._measures = measures
-        self._pictures = pictures
+        self._images = images
         self._journal = Journal(store, work.clock.now_s)
         self._motion = MotionLog(work.mico, work.daqco, work.settings.push.channel, work.clock)
         self._before_s = store.reader.elapsed_s()
@@ -404,7 +404,7 @@ class FibreRecorder:
                 found.number,
                 ended_s=self._work.clock.now_s(),
                 measures=self._measures,
-                pictures=self._pictures,
+                images=self._images,
                 events=self._events.get(fibre.arm, ()),
                 series=self._motion.series(fibre.found_s, felt_s=felt_s(fibre)),
                 interrupted=interrupted,
@@ -413,7 +413,7 @@ class FibreRecorder:
         self._in_work = tuple(each for each in self._in_work if each is not found)
         self._journal.fibre = None
         self._events.pop(fibre.arm, None)
-        fibre.pictures.clear()
+        fibre.images.clear()
         self.fibres = self.store.reader.fibres()
 
     def close(self, reason: str) -> None:

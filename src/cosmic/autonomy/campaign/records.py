@@ -55,7 +55,7 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """What the picture says about a fibre; nan where it was not measured.
+    """What the image says about a fibre; nan where it was not measured.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Shape:
 
     @property
     def width_resolved(self) -> bool:
-        """Whether the picture shows the width, and not only that it is small."""
+        """Whether the image shows the width, and not only that it is small."""
         return self.width_std_um <= UNRESOLVED * self.width_um
 
 
@@ -96,8 +96,8 @@ class OperationRecord:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Picture:
-    """One picture with what is needed to measure on it.
+class FibreImage:
+    """One image with what is needed to measure on it.
 
     Attributes
     ----------
@@ -168,7 +168,7 @@ class FibreRecord:
     peak_force_un: float = math.nan
     bending: BendingResult | None = None
     spans: tuple[Span, ...] = ()
-    pictures: tuple[Picture, ...] = ()
+    images: tuple[FibreImage, ...] = ()
     operations: tuple[OperationRecord, ...] = ()
     series: tuple[Series, ...] = ()
 

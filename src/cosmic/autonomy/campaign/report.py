@@ -37,9 +37,9 @@ from cosmic.autonomy.campaign.records import (
     CalibrationNote,
     CampaignError,
     CampaignInfo,
+    FibreImage,
     FibreRecord,
     Outcome,
-    Picture,
 )
 from cosmic.autonomy.campaign.snapshot import SpanCurve, span_curves
 from cosmic.autonomy.campaign.statistics import CampaignProgress, MeanEi, progress
@@ -54,10 +54,10 @@ ShowPng = Callable[[bytes, int, str], str]
 """Returns the element that shows a PNG, so many pixels wide, with words for who cannot see it."""
 
 TEMPLATES: Final = Path(__file__).parent / "templates"
-PICTURE_PX: Final = 360
+IMAGE_PX: Final = 360
 ASPECT: Final = 4.0 / 3.0
 ROOM: Final = 1.5
-"""How much more of the picture is shown than what it is about."""
+"""How much more of the image is shown than what it is about."""
 PALE: Final = "#9dbfdc"
 FEW: Final = 8
 """Fewer fibres are drawn one by one."""
@@ -84,7 +84,7 @@ class ReportData:
     Attributes
     ----------
     finished : tuple of FibreRecord
-        Without curves and pictures.
+        Without curves and images.
     whole : callable
         Returns a fibre with them, by its number: they are not all held at once.
     """
@@ -344,35 +344,35 @@ class _Card:
 def _cards(data: ReportData, svg: ShowSvg, png: ShowPng) -> Iterator[_Card]:
     for each in data.finished:
         record = data.whole(each.number)
-        figures = [_shown(picture, png) for picture in record.pictures[:2]]
+        figures = [_shown(image, png) for image in record.images[:2]]
         drawn = force_figure(record), stiffness_figure(record)
         figures += [Markup(svg(figure, 430)) for figure in drawn if figure]
         rows = [] if record.bending is None else _span_rows(record.bending)
         yield _Card(record, figures, rows)
 
 
-def _shown(picture: Picture, png: ShowPng) -> Markup:
-    pixels = _cut(picture)
+def _shown(image: FibreImage, png: ShowPng) -> Markup:
+    pixels = _cut(image)
     if pixels.dtype == np.uint16:
         pixels = (pixels >> 8).astype(np.uint8)
     height, width = pixels.shape[:2]
-    if width > PICTURE_PX:
-        size = PICTURE_PX, max(1, round(height * PICTURE_PX / width))
+    if width > IMAGE_PX:
+        size = IMAGE_PX, max(1, round(height * IMAGE_PX / width))
         pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
     _, data = cv2.imencode(".png", pixels)
-    scale = f", {picture.scale_um_px * width:.0f} µm wide" if picture.scale_um_px > 0.0 else ""
-    words = f"{picture.name}{scale}"
-    shown_px = PICTURE_PX if picture.region_px is not None else pixels.shape[1]
+    scale = f", {image.scale_um_px * width:.0f} µm wide" if image.scale_um_px > 0.0 else ""
+    words = f"{image.name}{scale}"
+    shown_px = IMAGE_PX if image.region_px is not None else pixels.shape[1]
     shown = Markup(png(data.tobytes(), shown_px, words))
     return Markup("{}<br><small>{}</small>").format(shown, words)
 
 
-def _cut(picture: Picture) -> npt.NDArray[Any]:
-    """Return what a picture is about, with room around it, as wide as high times 4 / 3."""
-    pixels: npt.NDArray[Any] = picture.pixels
-    if picture.region_px is None:
+def _cut(image: FibreImage) -> npt.NDArray[Any]:
+    """Return what an image is about, with room around it, as wide as high times 4 / 3."""
+    pixels: npt.NDArray[Any] = image.pixels
+    if image.region_px is None:
         return pixels
-    left, top, width, height = picture.region_px
+    left, top, width, height = image.region_px
     wide = max(width, height * ASPECT) * ROOM
     high = wide / ASPECT
     x, y = left + width / 2.0 - wide / 2.0, top + height / 2.0 - high / 2.0

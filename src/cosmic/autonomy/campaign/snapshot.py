@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from cosmic.autonomy.bending.result import BendingResult, SpanFit
 from cosmic.autonomy.bending.span import Span
-from cosmic.autonomy.campaign.records import FibreRecord, Floats, Outcome, Picture, Shape
+from cosmic.autonomy.campaign.records import FibreImage, FibreRecord, Floats, Outcome, Shape
 from cosmic.autonomy.campaign.statistics import CampaignProgress, MeanEi, mean_ei
 
 Mask = npt.NDArray[np.bool_]
@@ -200,7 +200,7 @@ class FibreCardData:
         What makes the result doubtful, in a few words and in sentences.
     curves : tuple of SpanCurve
         Its spans.
-    pictures : tuple of Picture
+    images : tuple of FibreImage
         What was kept of it, the first first.
     failures : tuple of (str, str)
         Operations that failed on the way, with the cause of each.
@@ -220,7 +220,7 @@ class FibreCardData:
     flags: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     curves: tuple[SpanCurve, ...] = ()
-    pictures: tuple[Picture, ...] = ()
+    images: tuple[FibreImage, ...] = ()
     failures: tuple[tuple[str, str], ...] = ()
 
 
@@ -242,7 +242,7 @@ def card_of(record: FibreRecord) -> FibreCardData:
         flags=() if result is None else tuple(sorted(str(each) for each in result.flags)),
         doubts=() if result is None else result.reasons,
         curves=span_curves(record, most_points=MOST_CURVE_POINTS),
-        pictures=record.pictures,
+        images=record.images,
         failures=tuple((each.name, each.cause) for each in record.operations if each.failed),
     )
 

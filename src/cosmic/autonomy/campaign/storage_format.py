@@ -14,11 +14,11 @@ from cosmic.autonomy.bending.result import BendingResult, Quality, SpanFit
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.campaign.records import (
     CampaignError,
+    FibreImage,
     FibreRecord,
     Floats,
     OperationRecord,
     Outcome,
-    Picture,
     Pose,
     Series,
     Shape,
@@ -181,24 +181,24 @@ def span_row(fit: SpanFit) -> dict[str, Cell]:
     return row | {"freedom": fit.freedom, "flags": SEPARATOR.join(sorted(fit.flags))}
 
 
-def picture_row(picture: Picture, file: PurePosixPath, sha256: str) -> dict[str, Cell]:
-    """Return the row of a picture."""
-    region = picture.region_px or (None, None, None, None)
+def image_row(image: FibreImage, file: PurePosixPath, sha256: str) -> dict[str, Cell]:
+    """Return the row of an image."""
+    region = image.region_px or (None, None, None, None)
     return {
-        "name": picture.name,
+        "name": image.name,
         "file": str(file),
         "sha256": sha256,
-        "taken_s": picture.taken_s,
-        "scale_um_px": cell(picture.scale_um_px),
-        "zoom": cell(picture.zoom),
-        "focus_um": cell(picture.focus_um),
-        "light_percent": cell(picture.light_percent),
+        "taken_s": image.taken_s,
+        "scale_um_px": cell(image.scale_um_px),
+        "zoom": cell(image.zoom),
+        "focus_um": cell(image.focus_um),
+        "light_percent": cell(image.light_percent),
         **dict(zip(REGION_NUMBERS, region, strict=True)),
     }
 
 
 def region_px(row: Row) -> tuple[int, int, int, int] | None:
-    """Return the region of a picture, if it has one."""
+    """Return the region of an image, if it has one."""
     # A table of a campaign begun before there were regions does not have the columns.
     left, top, width, height = (row.get(name) for name in REGION_NUMBERS)
     if left is None or top is None or width is None or height is None:
@@ -219,7 +219,7 @@ def operation_row(operation: OperationRecord) -> dict[str, Cell]:
 
 
 def fibre_record(row: Row, spans: Sequence[Row], operations: Sequence[Row]) -> FibreRecord:
-    """Return a record without curves and pictures."""
+    """Return a record without curves and images."""
     return FibreRecord(
         number=int(number(row["number"])),
         outcome=Outcome(str(row["outcome"])),

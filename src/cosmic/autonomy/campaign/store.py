@@ -20,9 +20,9 @@ from cosmic.autonomy.campaign.records import (
     CalibrationNote,
     CampaignError,
     CampaignInfo,
+    FibreImage,
     FibreRecord,
     Outcome,
-    Picture,
     Pose,
     Value,
 )
@@ -35,9 +35,9 @@ from cosmic.autonomy.campaign.storage_format import (
     cell,
     curves_file,
     fibre_row,
+    image_row,
     insert,
     operation_row,
-    picture_row,
     span_row,
     update,
 )
@@ -427,9 +427,9 @@ class CampaignStore:
             name = f"{record.number:05d}"
             curves = PurePosixPath(FIBRES, f"{name}.h5")
             write_whole(self.folder / curves, curves_file(record))
-            pictures = [
-                self._write_picture(picture, PurePosixPath(FIBRES, f"{name}-{order:02d}.png"))
-                for order, picture in enumerate(record.pictures)
+            images = [
+                self._write_image(image, PurePosixPath(FIBRES, f"{name}-{order:02d}.png"))
+                for order, image in enumerate(record.images)
             ]
             write_through(self.folder / FIBRES)
             with self._connection.transaction() as connection:
@@ -437,7 +437,7 @@ class CampaignStore:
                 update(connection, "fibre", fibre_row(record, str(curves)), key=record.number)
                 fits = record.bending.spans if record.bending is not None else ()
                 _insert_all(connection, "span", record.number, [span_row(fit) for fit in fits])
-                _insert_all(connection, "picture", record.number, pictures)
+                _insert_all(connection, "picture", record.number, images)
                 steps = [operation_row(each) for each in record.operations]
                 _insert_all(connection, "operation", record.number, steps)
 
@@ -483,16 +483,16 @@ class CampaignStore:
         if row[0] != Outcome.RUNNING:
             raise CampaignError(f"fibre {fibre} in {self.folder} is already completed: {row[0]}")
 
-    def _write_picture(self, picture: Picture, file: PurePosixPath) -> Row:
-        done, data = cv2.imencode(".png", picture.pixels)
+    def _write_image(self, image: FibreImage, file: PurePosixPath) -> Row:
+        done, data = cv2.imencode(".png", image.pixels)
         if not done:
             raise CampaignError(
-                f"the picture {picture.name!r} ({picture.pixels.shape}, {picture.pixels.dtype}) "
+                f"the image {image.name!r} ({image.pixels.shape}, {image.pixels.dtype}) "
                 "cannot be kept as PNG"
             )
         content = data.tobytes()
         write_whole(self.folder / file, content)
-        return picture_row(picture, file, hashlib.sha256(content).hexdigest())
+        return image_row(image, file, hashlib.sha256(content).hexdigest())
 
 
 def _insert_all(

@@ -16,10 +16,10 @@ from cosmic.autonomy.campaign.records import (
     CalibrationNote,
     CampaignError,
     CampaignInfo,
+    FibreImage,
     FibreRecord,
     Image,
     JournalEntry,
-    Picture,
 )
 from cosmic.autonomy.campaign.storage_format import (
     DATABASE,
@@ -111,7 +111,7 @@ class CampaignReader:
         )
 
     def fibres(self) -> tuple[FibreRecord, ...]:
-        """Return all fibres without curves and pictures, those in treatment included."""
+        """Return all fibres without curves and images, those in treatment included."""
         spans = self._by_fibre("SELECT * FROM span ORDER BY fibre, number")
         steps = self._by_fibre("SELECT * FROM operation ORDER BY fibre, number")
         return tuple(
@@ -120,11 +120,11 @@ class CampaignReader:
         )
 
     def finished(self) -> tuple[FibreRecord, ...]:
-        """Return the fibres that have their end, without curves and pictures."""
+        """Return the fibres that have their end, without curves and images."""
         return tuple(each for each in self.fibres() if each.outcome in FINISHED)
 
     def fibre(self, fibre: int) -> FibreRecord:
-        """Return one fibre with curves and pictures.
+        """Return one fibre with curves and images.
 
         Raises
         ------
@@ -148,14 +148,14 @@ class CampaignReader:
             ]
             bending = replace(bending, spans=tuple(fits))
         return replace(
-            record, bending=bending, spans=measured, series=series, pictures=self.pictures(fibre)
+            record, bending=bending, spans=measured, series=series, images=self.images(fibre)
         )
 
-    def pictures(self, fibre: int) -> tuple[Picture, ...]:
-        """Return the pictures of one fibre."""
+    def images(self, fibre: int) -> tuple[FibreImage, ...]:
+        """Return the images of one fibre."""
         rows = self._rows("SELECT * FROM picture WHERE fibre = ? ORDER BY number", fibre)
         return tuple(
-            Picture(
+            FibreImage(
                 name=str(row["name"]),
                 pixels=_pixels(self.folder / str(row["file"])),
                 taken_s=number(row["taken_s"]),

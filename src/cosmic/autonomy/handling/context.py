@@ -13,7 +13,7 @@ from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Jaws, PlateFrame
 from cosmic.autonomy.handling.retrying_move import RetryingMove, way_back
 from cosmic.autonomy.handling.settings import HandlingSettings, of_arm
-from cosmic.autonomy.handling.sight import LastSeen, LivePicture, map_at
+from cosmic.autonomy.handling.sight import LastSeen, LiveImage, map_at
 from cosmic.autonomy.places import PlatformPlaces
 from cosmic.autonomy.procedures.failures import failure_of
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps, UnitOperation
@@ -25,7 +25,7 @@ from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.mico.api.mico import Mico
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.vico import Vico
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import Floats, PixelMap
 from cosmic.vico.core.tool_settings import ToolSettings
 
@@ -108,7 +108,7 @@ class Calibration:
     probe_off_um : (float, float)
         How far the probe's tip is from where its stages say, in the frame of the gripper.
     seen_off_um : (float, float)
-        The same as a picture showed it last: a touch tells it better, drift is told from this.
+        The same as an image showed it last: a touch tells it better, drift is told from this.
     drift_looked_at : int
         How many fibres were done with when drift was looked at last.
     touching : bool
@@ -343,20 +343,20 @@ class HandlingContext:
 
     # Looking
 
-    def picture(self) -> LivePicture:
-        """Return the next picture to be exposed; to be yielded."""
-        return LivePicture(self.vico.camera(self.settings.camera), self.clock, self.shared.seen)
+    def image(self) -> LiveImage:
+        """Return the next image to be exposed; to be yielded."""
+        return LiveImage(self.vico.camera(self.settings.camera), self.clock, self.shared.seen)
 
-    def mapped(self, picture: Picture, height_um: float = 0.0) -> PixelMap:
-        """Return the map of a picture for things at a height above the plate."""
+    def mapped(self, image: CameraImage, height_um: float = 0.0) -> PixelMap:
+        """Return the map of an image for things at a height above the plate."""
         plate_um = self.vision.settings.plate_um
         tool = self.settings.gripper if self.beside_another else None
-        return map_at(self.vision.places, picture, plate_um + height_um, tool)
+        return map_at(self.vision.places, image, plate_um + height_um, tool)
 
-    def mapped_near(self, picture: Picture, height_um: float) -> PixelMap:
+    def mapped_near(self, image: CameraImage, height_um: float) -> PixelMap:
         """Return the map of whichever of the two heights measured is nearer."""
         held = height_um > 0.5 * self.hold_tip_um
-        return self.mapped(picture, self.hold_tip_um if held else 0.0)
+        return self.mapped(image, self.hold_tip_um if held else 0.0)
 
     def held_fibre(self) -> HeldFibre:
         """Return the held fibre."""

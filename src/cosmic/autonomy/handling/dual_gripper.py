@@ -8,13 +8,13 @@ from typing_extensions import override
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.grasp import Carry
 from cosmic.autonomy.handling.plate import PlateFrame, Reach
-from cosmic.autonomy.handling.prepare import clear_picture
+from cosmic.autonomy.handling.prepare import clear_image
 from cosmic.autonomy.handling.put_away import GIVEN_UP, Wipe, bin_place
 from cosmic.autonomy.handling.survey import NONE_LEFT, Choose, none_left, ways_of
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.frame.errors import MoveRefused
 from cosmic.frame.verdict import Reason
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 
 IN_THE_WAY: Final = "other gripper in the way"
 NOT_FREE: Final = "jaws not free"
@@ -173,14 +173,14 @@ class GoOn(FibreOperation):
 
 
 class ClearAway(FibreOperation):
-    """The arm leaves the picture, where the sample is to be looked at again."""
+    """The arm leaves the image, where the sample is to be looked at again."""
 
     name = "clear the view"
 
     @override
     def steps(self, work: HandlingContext) -> Steps:
         if not (work.shared.surveyed and work.shared.candidates):
-            yield from clear_picture(work)
+            yield from clear_image(work)
 
 
 class SeeSides(FibreOperation):
@@ -193,13 +193,13 @@ class SeeSides(FibreOperation):
 
     @override
     def steps(self, work: HandlingContext) -> Steps:
-        picture = yield work.picture()
-        assert isinstance(picture, Picture)
+        image = yield work.image()
+        assert isinstance(image, CameraImage)
         other = work.shared.arms[self._other]
-        height, width = picture.data.shape[:2]
+        height, width = image.data.shape[:2]
         middle_px = (width / 2.0, height / 2.0)
-        off = np.asarray(work.mapped(picture).to_um(middle_px))
-        off = off - np.asarray(other.mapped(picture).to_um(middle_px))
+        off = np.asarray(work.mapped(image).to_um(middle_px))
+        off = off - np.asarray(other.mapped(image).to_um(middle_px))
         x, y = other.calibration.frame.centre_um
         work.calibration.frame = PlateFrame((x + float(off[0]), y + float(off[1])))
         yield SAFE_POINT

@@ -13,7 +13,7 @@ from cosmic.autonomy.handling.plate import along, ways
 from cosmic.autonomy.handling.reach import LOST, line_of
 from cosmic.autonomy.handling.sight import trace_along
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import Floats
 
 TANGENT_UM: Final = 120.0
@@ -110,13 +110,13 @@ class TestGrasp(FibreOperation):
         with work.mico.collision.contact("grasp"):
             yield work.go_up(places.test_um)
         yield work.go(work.at(work.gripper, x, y + places.test_aside_um))
-        picture = yield work.picture()
-        assert isinstance(picture, Picture)
-        if seen_at(work, fibre, picture, in_jaws(work, fibre), places.test_um):
+        image = yield work.image()
+        assert isinstance(image, CameraImage)
+        if seen_at(work, fibre, image, in_jaws(work, fibre), places.test_um):
             fibre.held = True
             work.learn_height(held=True)
             return
-        if seen_at(work, fibre, picture, before, 0.0):
+        if seen_at(work, fibre, image, before, 0.0):
             work.learn_height(held=False)
             raise OperationFailed(
                 MISSED, f"fibre {fibre.number} lies where it was: the jaws closed beside it"
@@ -147,11 +147,11 @@ def in_jaws(work: HandlingContext, fibre: HeldFibre) -> Floats:
 
 
 def seen_at(
-    work: HandlingContext, fibre: HeldFibre, picture: Picture, line_um: Floats, height_um: float
+    work: HandlingContext, fibre: HeldFibre, image: CameraImage, line_um: Floats, height_um: float
 ) -> bool:
     """Return whether something as dark as the fibre lies along a line, or next to it."""
-    mapped = work.mapped_near(picture, height_um)
-    trace = trace_along(picture, mapped.to_px(line_um), REACH_UM / mapped.scale_um_px)
+    mapped = work.mapped_near(image, height_um)
+    trace = trace_along(image, mapped.to_px(line_um), REACH_UM / mapped.scale_um_px)
     contrast = fibre.reach.candidate.contrast
     return trace.contrast > SEEN_PART * contrast
 
@@ -167,9 +167,9 @@ class Carry(FibreOperation):
         yield work.go_up(work.hold_tip_um)
         x = places.hold_x_um * work.jaws.forward
         yield work.go(work.at(work.gripper, x, places.hold_y_um, work.hold_tip_um))
-        picture = yield work.picture()
-        assert isinstance(picture, Picture)
-        fibre.pictures["held"] = picture
-        if not seen_at(work, fibre, picture, in_jaws(work, fibre), work.hold_tip_um):
+        image = yield work.image()
+        assert isinstance(image, CameraImage)
+        fibre.images["held"] = image
+        if not seen_at(work, fibre, image, in_jaws(work, fibre), work.hold_tip_um):
             fibre.held, work.shared.surveyed = False, False
             raise OperationFailed(DROPPED, f"fibre {fibre.number} is no longer in the jaws")

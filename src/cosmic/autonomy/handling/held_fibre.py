@@ -7,7 +7,7 @@ from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.handling.plate import Reach
 from cosmic.autonomy.handling.sight import SeenFibre
 from cosmic.autonomy.procedures.operation import OperationFailed
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import Floats
 
 
@@ -57,7 +57,7 @@ class HeldFibre:
     looks: int = 0
     ei_guess_n_m2: float | None = None
     spans: list[Span] = field(default_factory=list)
-    pictures: dict[str, Picture] = field(default_factory=dict)
+    images: dict[str, CameraImage] = field(default_factory=dict)
     bending: BendingResult | None = None
     peak_un: float = 0.0
     found_s: float = 0.0

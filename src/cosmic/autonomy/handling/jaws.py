@@ -15,7 +15,7 @@ CLOSED_STD_UM: Final = 10.0
 OVER: Final = 0.1
 """Part of the travel by which the jaws are closed too far, to be closed for sure."""
 COUNT_UM: Final = 130.0
-"""How wrong the opening counted may be for a calibration; pictures show the jaws all the same."""
+"""How wrong the opening counted may be for a calibration; images show the jaws all the same."""
 
 
 def zero_jaws(work: HandlingContext) -> Steps:

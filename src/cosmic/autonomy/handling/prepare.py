@@ -18,7 +18,7 @@ from cosmic.frame.errors import DeviceError, MoveRefused, NotAvailable
 from cosmic.frame.verdict import Reason
 from cosmic.mico.core.motion.positioner import Confidence
 from cosmic.vico.api.lens import LensHandle
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.tool_settings import ToolSettings
 from cosmic.vico.hw.peripherals import LensAxis
 
@@ -221,10 +221,10 @@ def still_at(
     yield from to_place(work, settings.place_x_um, settings.place_y_um)
     with work.mico.collision.contact("grasp"):
         yield work.go_up(z_um)
-        picture = yield work.picture()
-        assert isinstance(picture, Picture)
+        image = yield work.image()
+        assert isinstance(image, CameraImage)
         yield work.go_up(max(work.settings.places.travel_um, z_um))
-    seen = tip_off(work, picture, work.gripper)
+    seen = tip_off(work, image, work.gripper)
     if not seen.certain:
         return False
     far = math.hypot(*seen.off_um)
@@ -264,8 +264,8 @@ def calibrate_at(
     return max((each.residual_px for each in new), default=0.0)
 
 
-def clear_picture(work: HandlingContext) -> Steps:
-    """Take gripper and probe out of the picture."""
+def clear_image(work: HandlingContext) -> Steps:
+    """Take gripper and probe out of the image."""
     places = work.settings.places
     yield work.go_up(max(places.travel_um, work.height_now()))
     yield from retract_probe(work)
@@ -276,7 +276,7 @@ def clear_picture(work: HandlingContext) -> Steps:
 
 
 class ComparePlaces(Calibrated):
-    """Where the probe's tip is in the frame of the gripper, on one picture with both."""
+    """Where the probe's tip is in the frame of the gripper, on one image with both."""
 
     name = "see probe and gripper"
     key = PROBE
@@ -297,7 +297,7 @@ class ComparePlaces(Calibrated):
         gripper, probe = yield from see_both(work)
         off = probe.off_um[0] - gripper.off_um[0], probe.off_um[1] - gripper.off_um[1]
         work.calibration.probe_off_um = work.calibration.seen_off_um = off
-        self.kept(work, residual, "px", settings.residual_px, values=_both(off), how="one picture")
+        self.kept(work, residual, "px", settings.residual_px, values=_both(off), how="one image")
 
     @override
     def check(self, work: HandlingContext, entry: CalibrationEntry) -> Holds:
@@ -327,16 +327,16 @@ def _both(off_um: tuple[float, float]) -> dict[str, float]:
 
 
 def see_both(work: HandlingContext) -> Generator[Yielded, object, tuple[TipOff, TipOff]]:
-    """Return where gripper and probe are seen on one picture; raises `NotAvailable`."""
+    """Return where gripper and probe are seen on one image; raises `NotAvailable`."""
     yield from beside_jaws(work)
-    picture = yield work.picture()
-    assert isinstance(picture, Picture)
+    image = yield work.image()
+    assert isinstance(image, CameraImage)
     yield from retract_probe(work)
-    return tip_off(work, picture, work.gripper), tip_off(work, picture, work.probe)
+    return tip_off(work, image, work.gripper), tip_off(work, image, work.probe)
 
 
 def beside_jaws(work: HandlingContext) -> Steps:
-    """Hold the jaws where fibres are pushed, and the probe beside them: both in one picture."""
+    """Hold the jaws where fibres are pushed, and the probe beside them: both in one image."""
     places, settings = work.settings.places, work.settings.calibration
     hold_x = places.hold_x_um * work.jaws.forward
     yield work.go_up(max(places.travel_um, work.height_now()))

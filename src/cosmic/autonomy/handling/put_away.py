@@ -11,7 +11,7 @@ from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.jaws import move_jaws
 from cosmic.autonomy.handling.prepare import retract_probe
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 
 ADHESION: Final = "jaw adhesion"
 GIVEN_UP: Final = "given up"
@@ -45,9 +45,9 @@ class ToBin(FibreOperation):
         fibre, places = work.held_fibre(), work.settings.places
         x = places.view_x_um * work.jaws.forward
         yield work.go(work.at(work.gripper, x, places.view_y_um))
-        picture = yield work.picture()
-        assert isinstance(picture, Picture)
-        if not seen_at(work, fibre, picture, in_jaws(work, fibre), work.height_now()):
+        image = yield work.image()
+        assert isinstance(image, CameraImage)
+        if not seen_at(work, fibre, image, in_jaws(work, fibre), work.height_now()):
             fibre.held, work.shared.surveyed = False, False
             work.shared.dropped.append(fibre)
 
@@ -80,14 +80,14 @@ class Release(FibreOperation):
 
 
 def see_released(work: HandlingContext) -> Steps:
-    """See by picture that nothing hangs at the jaws.
+    """See by image that nothing hangs at the jaws.
 
     They are not moved aside for a second look: a fibre that falls off there is in the sample again.
     """
     fibre = work.held_fibre()
-    picture = yield work.picture()
-    assert isinstance(picture, Picture)
-    if _hangs(work, fibre, picture):
+    image = yield work.image()
+    assert isinstance(image, CameraImage)
+    if _hangs(work, fibre, image):
         fibre.looks += 1
         failure = OperationFailed(ADHESION, f"fibre {fibre.number} still sticks to the jaws")
         work.failures.append((Release.name, failure))
@@ -95,12 +95,12 @@ def see_released(work: HandlingContext) -> Steps:
     fibre.held = False
 
 
-def _hangs(work: HandlingContext, fibre: HeldFibre, picture: Picture) -> bool:
+def _hangs(work: HandlingContext, fibre: HeldFibre, image: CameraImage) -> bool:
     """Return whether something lies where the fibre would: what sticks goes with one jaw."""
     line, apart = in_jaws(work, fibre), 0.5 * (work.gap_um or 0.0)
     places = (line + np.array([0.0, y]) for y in (0.0, apart, -apart))
     height = work.height_now()
-    return any(seen_at(work, fibre, picture, place, height) for place in places)
+    return any(seen_at(work, fibre, image, place, height) for place in places)
 
 
 class Wipe(FibreOperation):

@@ -12,7 +12,7 @@ from cosmic.autonomy.handling.plate import along, ways
 from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen, trace_along
 from cosmic.autonomy.handling.tips import see_tip
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import Floats
 from cosmic.vico.core.vision.tool_types import GripperTips
 
@@ -54,36 +54,36 @@ class FindAgain(FibreOperation):
             x, y = work.tip_now(work.gripper)
             yield work.go_up(work.settings.places.travel_um)
             yield work.go(work.at(work.gripper, x - STAND_BACK_UM * work.jaws.forward, y))
-        picture = yield work.picture()
-        assert isinstance(picture, Picture)
-        if not fibre.tries and _where_foretold(work, fibre, picture):
+        image = yield work.image()
+        assert isinstance(image, CameraImage)
+        if not fibre.tries and _where_foretold(work, fibre, image):
             return
-        mapped = work.mapped(picture)
+        mapped = work.mapped(image)
         line_px = mapped.to_px(fibre.reach.line_um)
         margins = [MARGIN_UM * (1.0 + look) / mapped.scale_um_px for look in range(LOOKS)]
-        boxes = [box_around(line_px, margin_px, picture) for margin_px in margins]
+        boxes = [box_around(line_px, margin_px, image) for margin_px in margins]
         for box in boxes:
-            seen = _matching(find_seen(picture, mapped, box), fibre)
+            seen = _matching(find_seen(image, mapped, box), fibre)
             if seen is not None:
-                _take_note(work, fibre, seen, picture)
+                _take_note(work, fibre, seen, image)
                 return
-        fibre.pictures["not found"] = picture
+        fibre.images["not found"] = image
         # One that was grasped, and is gone, lies somewhere else now.
         work.shared.surveyed = work.shared.surveyed and not fibre.tries
         raise OperationFailed(LOST, f"fibre {fibre.number} was not found where the table turned it")
 
 
-def _where_foretold(work: HandlingContext, fibre: HeldFibre, picture: Picture) -> bool:
+def _where_foretold(work: HandlingContext, fibre: HeldFibre, image: CameraImage) -> bool:
     """Take note of a fibre that lies where the turn should have brought it."""
-    mapped, candidate = work.mapped(picture), fibre.reach.candidate
+    mapped, candidate = work.mapped(image), fibre.reach.candidate
     line_px = mapped.to_px(fibre.reach.line_um)
-    trace = trace_along(picture, line_px, FORETOLD_UM / mapped.scale_um_px)
+    trace = trace_along(image, line_px, FORETOLD_UM / mapped.scale_um_px)
     if not trace.contrast > FORETOLD_PART * candidate.contrast:
         return False
     fibre.line_um, fibre.line_px = fibre.reach.line_um, line_px
     fibre.inside_um = work.settings.grasp.inside_um
     fibre.free_um = candidate.length_um - fibre.inside_um
-    fibre.pictures["geometry"] = picture
+    fibre.images["geometry"] = image
     return True
 
 
@@ -98,7 +98,9 @@ def _matching(found: list[SeenFibre], fibre: HeldFibre) -> SeenFibre | None:
     return min(fitting, key=lambda pair: pair[0])[1] if fitting else None
 
 
-def _take_note(work: HandlingContext, fibre: HeldFibre, seen: SeenFibre, picture: Picture) -> None:
+def _take_note(
+    work: HandlingContext, fibre: HeldFibre, seen: SeenFibre, image: CameraImage
+) -> None:
     start = fibre.reach.line_um[0]
     turned = np.linalg.norm(seen.line_um[0] - start) > np.linalg.norm(seen.line_um[-1] - start)
     step = -1 if turned else 1
@@ -106,7 +108,7 @@ def _take_note(work: HandlingContext, fibre: HeldFibre, seen: SeenFibre, picture
     fibre.line_um, fibre.line_px = seen.line_um[::step], seen.line_px[::step]
     fibre.inside_um = work.settings.grasp.inside_um
     fibre.free_um = seen.length_um - fibre.inside_um
-    fibre.pictures["geometry"] = picture
+    fibre.images["geometry"] = image
 
 
 def line_of(fibre: HeldFibre) -> Floats:
@@ -147,17 +149,17 @@ class Approach(FibreOperation):
 
 
 class Refine(FibreOperation):
-    """Jaws and fibre are seen on one picture, and the jaws are moved until the fibre is between."""
+    """Jaws and fibre are seen on one image, and the jaws are moved until the fibre is between."""
 
-    name = "refine by picture"
+    name = "refine by image"
 
     @override
     def steps(self, work: HandlingContext) -> Steps:
         fibre, settings = work.held_fibre(), work.settings.grasp
         for _ in range(settings.corrections):
-            picture = yield work.picture()
-            assert isinstance(picture, Picture)
-            off = _off_um(work, fibre, picture)
+            image = yield work.image()
+            assert isinstance(image, CameraImage)
+            off = _off_um(work, fibre, image)
             if off is None:
                 continue
             if abs(off - fibre.shift_um) <= settings.close_enough_um:
@@ -165,21 +167,21 @@ class Refine(FibreOperation):
             x, y = work.tip_now(work.gripper)
             with work.mico.collision.contact("grasp"):
                 yield work.go(work.at(work.gripper, x, y + off - fibre.shift_um))
-        picture = yield work.picture()
-        assert isinstance(picture, Picture)
-        off = _off_um(work, fibre, picture)
+        image = yield work.image()
+        assert isinstance(image, CameraImage)
+        off = _off_um(work, fibre, image)
         if off is None or abs(off - fibre.shift_um) > 2.0 * settings.close_enough_um:
             raise OperationFailed(
                 TIP_NOT_SEEN, "the jaws were not seen around the fibre: check light and focus"
             )
 
 
-def _off_um(work: HandlingContext, fibre: HeldFibre, picture: Picture) -> float | None:
+def _off_um(work: HandlingContext, fibre: HeldFibre, image: CameraImage) -> float | None:
     """Return how far the fibre is from the middle between the jaws, in y; None: not seen."""
-    found = see_tip(work, picture, work.gripper)
+    found = see_tip(work, image, work.gripper)
     if not isinstance(found, GripperTips):
         return None
-    mapped = work.mapped(picture)
+    mapped = work.mapped(image)
     hold = mapped.to_um(found.hold_px)
     gap_um = found.gap_px * mapped.scale_um_px
     note_gap(work, gap_um, GAP_STD_PX * mapped.scale_um_px)

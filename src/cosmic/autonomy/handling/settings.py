@@ -63,7 +63,7 @@ class PlaceSettings(StrictModel):
     view_x_um, view_y_um : float
         Where the empty jaws are looked at.
     away_x_um : float
-        Out of the picture, so that the whole sample can be seen.
+        Out of the image, so that the whole sample can be seen.
     probe_away_y_um : float
         Place of the probe's tip while nothing is measured.
     """
@@ -111,7 +111,7 @@ class GraspSettings(StrictModel):
     close_enough_um : float
         How far beside the middle between the jaws a fibre may lie when they close.
     corrections : int
-        How often their place is corrected by picture.
+        How often their place is corrected by image.
     tries : int
         How often a grasp is tried.
     shift_um : float
@@ -216,7 +216,7 @@ class HandlingSettings(StrictModel):
     camera : str
         Camera that looks; "" is the first.
     zoom : float
-        Magnification of all pictures.
+        Magnification of all images.
     frequency_hz : float
         Closed-loop frequency of all linear axes; it limits their speed.
     re_survey : int

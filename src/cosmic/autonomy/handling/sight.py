@@ -1,4 +1,4 @@
-"""What the camera shows of fibres, on pictures that are known to be new."""
+"""What the camera shows of fibres, on images that are known to be new."""
 
 import logging
 import math
@@ -13,7 +13,7 @@ from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, DeviceTimeout, NotAvailable
 from cosmic.frame.operation import Task
 from cosmic.vico.api.camera import CameraHandle
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import Floats, PixelMap
 from cosmic.vico.core.vision.algorithms import grey
 from cosmic.vico.core.vision.fibre import Fibre
@@ -28,24 +28,24 @@ def _nothing() -> None:
     return
 
 
-class PictureWanted:
-    """A picture exposed from a time on; to be yielded by an operation."""
+class ImageWanted:
+    """An image exposed from a time on; to be yielded by an operation."""
 
     def __init__(self, camera: CameraHandle, clock: Clock) -> None:
         self._camera = camera
         self._since_s = clock.now_s()
         self._late_wall_s = WALL.now_s() + LIMIT_WALL_S
-        self._picture: Picture | None = None
+        self._image: CameraImage | None = None
         self._forget: Callable[[], None] = _nothing
 
     @property
     def done(self) -> bool:
         """It is there, or was given up."""
-        if self._picture is None:
-            self._picture = self._camera.picture_since(self._since_s)
-        return self._picture is not None or WALL.now_s() > self._late_wall_s
+        if self._image is None:
+            self._image = self._camera.image_since(self._since_s)
+        return self._image is not None or WALL.now_s() > self._late_wall_s
 
-    def add_callback(self, callback: Callable[["PictureWanted"], object]) -> None:
+    def add_callback(self, callback: Callable[["ImageWanted"], object]) -> None:
         """Call `callback(self)` when it may be there, in the camera's thread."""
 
         def look() -> None:
@@ -53,10 +53,10 @@ class PictureWanted:
                 self._forget()
                 callback(self)
 
-        self._forget = self._camera.on_picture(look)
+        self._forget = self._camera.on_image(look)
         look()
 
-    def wait(self, timeout_s: float | None = None) -> Picture:
+    def wait(self, timeout_s: float | None = None) -> CameraImage:
         """Wait for it, and return it.
 
         Raises
@@ -70,14 +70,14 @@ class PictureWanted:
             left_s = max(0.0, self._late_wall_s - WALL.now_s())
             wait_s = left_s if timeout_s is None else min(timeout_s, left_s)
             try:
-                self._picture = self._camera.next_picture(wait_s, self._since_s)
+                self._image = self._camera.next_image(wait_s, self._since_s)
             except NotAvailable as exc:
                 if not self.done:
                     raise DeviceTimeout(str(exc)) from exc
-        if self._picture is None:
+        if self._image is None:
             why = self._camera.problem or "none arrived"
-            raise NotAvailable(f"no picture of {self._camera.name} in {LIMIT_WALL_S:g} s: {why}")
-        return self._picture
+            raise NotAvailable(f"no image of {self._camera.name} in {LIMIT_WALL_S:g} s: {why}")
+        return self._image
 
     def cancel(self) -> None:
         """Want it no longer: nothing was set in motion."""
@@ -87,12 +87,12 @@ class PictureWanted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenFibre:
-    """A fibre on a picture and on the platform.
+    """A fibre on an image and on the platform.
 
     Attributes
     ----------
     line_um, line_px : ndarray, shape (n, 2)
-        Centre line on the platform and on the picture.
+        Centre line on the platform and on the image.
     scale_part : float
         Standard deviation of the scale, as a part of it.
     """
@@ -134,18 +134,18 @@ class SeenFibre:
         return known if isinstance(known, float) else math.nan
 
 
-def find_seen(picture: Picture, mapped: PixelMap, box: Box | None = None) -> list[SeenFibre]:
-    """Find fibres on a picture, or on a part of it: left, top, right, bottom in pixels."""
+def find_seen(image: CameraImage, mapped: PixelMap, box: Box | None = None) -> list[SeenFibre]:
+    """Find fibres on an image, or on a part of it: left, top, right, bottom in pixels."""
     # Imported here: it loads OpenCV and scipy.
     from cosmic.vico.core.vision.finding import find_fibres
 
-    height, width = picture.data.shape[:2]
+    height, width = image.data.shape[:2]
     left, top, right, bottom = box or (0, 0, width, height)
-    image = np.ascontiguousarray(grey(picture.data)[top:bottom, left:right])
-    if min(image.shape) < 16:
+    pixels = np.ascontiguousarray(grey(image.data)[top:bottom, left:right])
+    if min(pixels.shape) < 16:
         return []
     found = []
-    for fibre in find_fibres(image):
+    for fibre in find_fibres(pixels):
         line_px = fibre.centre_line_px + np.array([left, top], dtype=np.float64)
         found.append(
             SeenFibre(fibre, mapped.to_um(line_px), line_px, mapped.scale_um_px, mapped.scale_part)
@@ -153,9 +153,9 @@ def find_seen(picture: Picture, mapped: PixelMap, box: Box | None = None) -> lis
     return found
 
 
-def box_around(line_px: Floats, margin_px: float, picture: Picture) -> Box:
-    """Return the part of a picture around a line."""
-    height, width = picture.data.shape[:2]
+def box_around(line_px: Floats, margin_px: float, image: CameraImage) -> Box:
+    """Return the part of an image around a line."""
+    height, width = image.data.shape[:2]
     low, high = line_px.min(axis=0) - margin_px, line_px.max(axis=0) + margin_px
     return (
         max(0, math.floor(low[0])),
@@ -172,7 +172,7 @@ class Trace:
     Attributes
     ----------
     contrast : float
-        How much darker than the ground it is, grey levels; 0 off the picture.
+        How much darker than the ground it is, grey levels; 0 off the image.
     offset_px : float
         How far beside the line, to the left of its direction on the screen.
     """
@@ -181,9 +181,9 @@ class Trace:
     offset_px: float
 
 
-def trace_along(picture: Picture, line_px: Floats, reach_px: float) -> Trace:
+def trace_along(image: CameraImage, line_px: Floats, reach_px: float) -> Trace:
     """Look for something dark along a line, or beside it up to `reach_px`."""
-    image = grey(picture.data)
+    pixels = grey(image.data)
     points = _spaced(np.asarray(line_px, dtype=np.float64))
     ahead = np.gradient(points, axis=0)
     ahead = ahead / np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-9)
@@ -191,11 +191,11 @@ def trace_along(picture: Picture, line_px: Floats, reach_px: float) -> Trace:
     offsets = np.arange(-2.0 * reach_px, 2.0 * reach_px + 0.5, 0.5)
     places = points[:, None, :] + offsets[None, :, None] * normal[:, None, :]
     rows, columns = np.rint(places[..., 1]).astype(int), np.rint(places[..., 0]).astype(int)
-    height, width = image.shape
+    height, width = pixels.shape
     inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
     if not inside.mean() > 0.8:
         return Trace(0.0, 0.0)
-    greys = image[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)].astype(np.float64)
+    greys = pixels[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)].astype(np.float64)
     profile = np.median(greys, axis=0)
     smooth = np.convolve(np.pad(profile, 2, mode="edge"), np.ones(5) / 5.0, mode="valid")
     ground = float(np.percentile(smooth, 75))
@@ -212,13 +212,15 @@ def _spaced(line: Floats) -> Floats:
     return np.column_stack([np.interp(at, way, line[:, 0]), np.interp(at, way, line[:, 1])])
 
 
-def map_at(places: object, picture: Picture, height_um: float, tool: str | None = None) -> PixelMap:
+def map_at(
+    places: object, image: CameraImage, height_um: float, tool: str | None = None
+) -> PixelMap:
     """Return the map for things at a height; raises `NotAvailable` where it was not measured."""
     if not isinstance(places, PlatformPlaces):
         raise NotAvailable(
             "pixels cannot be converted to positions: micromanipulation is not hosted here"
         )
-    return places.map_of(picture, height_um, tool)
+    return places.map_of(image, height_um, tool)
 
 
 RESTARTS: Final = 5
@@ -229,67 +231,67 @@ APART_PX: Final = 16
 
 @dataclass(slots=True, eq=False)
 class LastSeen:
-    """The last picture that was taken to be new."""
+    """The last image that was taken to be new."""
 
-    picture: Picture | None = None
+    image: CameraImage | None = None
 
-    def shows_the_same(self, picture: Picture) -> bool:
-        """Return whether a later picture is the same to the last bit, which noise never allows."""
-        before = self.picture
-        if before is None or before.frame.exposed_s == picture.frame.exposed_s:
+    def shows_the_same(self, image: CameraImage) -> bool:
+        """Return whether a later image is the same to the last bit, which noise never allows."""
+        before = self.image
+        if before is None or before.frame.exposed_s == image.frame.exposed_s:
             return False
-        some = picture.data[::APART_PX, ::APART_PX]
+        some = image.data[::APART_PX, ::APART_PX]
         # One without any light in it, or with too much, has no noise.
         return np.array_equal(before.data[::APART_PX, ::APART_PX], some) and bool(np.ptp(some))
 
 
-class LivePicture:
-    """A picture exposed from now on that is not an old one; to be yielded by an operation.
+class LiveImage:
+    """An image exposed from now on that is not an old one; to be yielded by an operation.
 
-    Where the same picture comes again, or none, the camera is stopped and started, some times.
+    Where the same image comes again, or none, the camera is stopped and started, some times.
 
     Parameters
     ----------
     last : LastSeen
-        Shared by all pictures of one camera.
+        Shared by all images of one camera.
     """
 
     def __init__(self, camera: CameraHandle, clock: Clock, last: LastSeen) -> None:
         self._camera = camera
         self._clock = clock
         self._last = last
-        self._wanted = PictureWanted(camera, clock)
+        self._wanted = ImageWanted(camera, clock)
         self._steps: list[Callable[[], Task]] = []
         self._task: Task | None = None
         self._again_wall_s = 0.0
         self._restarts = 0
-        self._picture: Picture | None = None
+        self._image: CameraImage | None = None
         self._error: CosmicError | None = None
 
     @property
     def done(self) -> bool:
         """A new one is there, or it was given up."""
-        if self._picture is not None or self._error is not None:
+        if self._image is not None or self._error is not None:
             return True
         if self._task is not None or self._steps:
             self._restart()
             return False
         if self._wanted.done:
             self._take()
-        return self._picture is not None or self._error is not None
+        return self._image is not None or self._error is not None
 
     def _take(self) -> None:
         try:
-            picture = self._wanted.wait(0.0)
+            image = self._wanted.wait(0.0)
         except NotAvailable as exc:
             self._begin_anew(exc)
             return
-        if not self._last.shows_the_same(picture):
-            self._last.picture = self._picture = picture
+        if not self._last.shows_the_same(image):
+            self._last.image = self._image = image
             return
         self._begin_anew(
             NotAvailable(
-                f"{self._camera.name} shows the same picture again and again, also after its "
+                f"{self._camera.name} shows the same image again and again, also after its "
                 f"stream was restarted {self._restarts} times: check the camera and its cable"
             )
         )
@@ -299,7 +301,7 @@ class LivePicture:
             self._error = trouble
             return
         self._restarts += 1
-        logger.warning("%s: no new picture; its stream is restarted", self._camera.name)
+        logger.warning("%s: no new image; its stream is restarted", self._camera.name)
         self._steps = [self._camera.stop, self._camera.start]
         self._again_wall_s = WALL.now_s() + APART_WALL_S * (self._restarts - 1)
 
@@ -311,15 +313,15 @@ class LivePicture:
             logger.warning("%s: %s", self._camera.name, self._task.failure)
         self._task = None
         if not self._steps:
-            self._wanted = PictureWanted(self._camera, self._clock)
+            self._wanted = ImageWanted(self._camera, self._clock)
         elif WALL.now_s() >= self._again_wall_s:
             self._task = self._steps.pop(0)()
 
-    def add_callback(self, callback: Callable[["LivePicture"], object]) -> None:
-        """Call `callback(self)` when the first picture may be there, in the camera's thread."""
+    def add_callback(self, callback: Callable[["LiveImage"], object]) -> None:
+        """Call `callback(self)` when the first image may be there, in the camera's thread."""
         self._wanted.add_callback(lambda _: callback(self))
 
-    def wait(self, timeout_s: float | None = None) -> Picture:
+    def wait(self, timeout_s: float | None = None) -> CameraImage:
         """Wait for it, and return it.
 
         Raises
@@ -333,12 +335,12 @@ class LivePicture:
         while not self.done:
             left_s = until_wall_s - WALL.now_s()
             if left_s <= 0.0:
-                raise DeviceTimeout(f"no new picture of {self._camera.name} yet")
+                raise DeviceTimeout(f"no new image of {self._camera.name} yet")
             WALL.sleep(min(left_s, POLL_WALL_S))
-        if self._picture is None:
+        if self._image is None:
             assert self._error is not None
             raise self._error
-        return self._picture
+        return self._image
 
     def cancel(self) -> None:
         """Want it no longer; a camera that was stopped is started all the same."""
@@ -346,4 +348,4 @@ class LivePicture:
         if self._camera.start in self._steps:
             self._camera.start()
         self._steps, self._restarts = [], RESTARTS
-        self._error = self._error or NotAvailable("the picture is no longer wanted")
+        self._error = self._error or NotAvailable("the image is no longer wanted")

@@ -11,10 +11,10 @@ from typing_extensions import override
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Neighbours, Reach, distance_um, reaches
-from cosmic.autonomy.handling.prepare import clear_picture
+from cosmic.autonomy.handling.prepare import clear_image
 from cosmic.autonomy.handling.sight import SeenFibre, find_seen
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import Floats
 
 CROSSING = "crossing"
@@ -38,7 +38,7 @@ SPILLED_CURL = 0.006
 
 
 class Survey(FibreOperation):
-    """A wide picture, and what lies on it; only when it is due."""
+    """A wide image, and what lies on it; only when it is due."""
 
     name = "survey"
 
@@ -47,11 +47,11 @@ class Survey(FibreOperation):
         due = work.settings.re_survey and work.shared.since_survey >= work.settings.re_survey
         if work.shared.surveyed and work.shared.candidates and not due:
             return
-        yield from clear_picture(work)
-        picture = yield work.picture()
-        assert isinstance(picture, Picture)
-        mapped = work.mapped(picture)
-        look(work, find_seen(picture, mapped))
+        yield from clear_image(work)
+        image = yield work.image()
+        assert isinstance(image, CameraImage)
+        mapped = work.mapped(image)
+        look(work, find_seen(image, mapped))
         if not work.shared.candidates:
             raise OperationFailed(NONE_LEFT, none_left(work.shared.skip_reasons))
         yield SAFE_POINT

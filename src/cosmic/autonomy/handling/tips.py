@@ -10,7 +10,7 @@ from cosmic.autonomy.handling.sight import map_at
 from cosmic.autonomy.places import REACH_PX, PlatformPlaces
 from cosmic.autonomy.tools import expected, tip_um
 from cosmic.frame.errors import CosmicError, NotAvailable
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.tool_settings import ToolSettings
 from cosmic.vico.core.vision.algorithms import grey
 from cosmic.vico.core.vision.tips import find_gripper, find_probe
@@ -29,11 +29,11 @@ class TipOff:
     Attributes
     ----------
     std_um : float
-        Of a coordinate: of the tip on the picture and of the map there.
+        Of a coordinate: of the tip on the image and of the map there.
     scale_um_px : float
-        Of the picture.
+        Of the image.
     certain : bool
-        Nothing on the picture makes one doubt it, such as a fibre at an edge.
+        Nothing on the image makes one doubt it, such as a fibre at an edge.
     """
 
     off_um: Off
@@ -42,15 +42,15 @@ class TipOff:
     certain: bool = True
 
 
-def tip_off(work: HandlingContext, picture: Picture, tool: ToolSettings) -> TipOff:
+def tip_off(work: HandlingContext, image: CameraImage, tool: ToolSettings) -> TipOff:
     """Return how far a tip is from where it should be seen; raises `NotAvailable`."""
-    found = see_tip(work, picture, tool)
+    found = see_tip(work, image, tool)
     if isinstance(found, NotSeen):
         raise NotAvailable(f"{tool.shown} was not seen: {found.reason}")
-    believed = tip_um(tool, picture.circumstances.positions)
+    believed = tip_um(tool, image.circumstances.positions)
     if believed is None:
         raise NotAvailable(f"{tool.name}: its position is unknown")
-    mapped = work.mapped(picture, believed[2])
+    mapped = work.mapped(image, believed[2])
     seen_px = found.hold_px if isinstance(found, GripperTips) else found.tip_px
     x, y = mapped.to_um(seen_px).tolist()
     std_um = math.hypot(found.std_px * mapped.scale_um_px, float(mapped.std_um(seen_px)))
@@ -72,21 +72,21 @@ def shift_maps(work: HandlingContext, off_um: Off) -> None:
 
 
 def see_tip(
-    work: HandlingContext, picture: Picture, tool: ToolSettings
+    work: HandlingContext, image: CameraImage, tool: ToolSettings
 ) -> GripperTips | ToolEnd | NotSeen:
     """Look for a tool's tip where its stages say it is, with the jaws as far open as counted."""
-    positions = picture.circumstances.positions
+    positions = image.circumstances.positions
     tip = tip_um(tool, positions)
     if tip is None:
         return NotSeen("its position is unknown")
     try:
-        mapped = map_at(work.vision.places, picture, tip[2])
+        mapped = map_at(work.vision.places, image, tip[2])
     except CosmicError as exc:
         return NotSeen(str(exc))
     wanted = expected(tool, mapped, tip[:2], positions, REACH_PX)
     if wanted is None:
         return NotSeen("it is too small in the image: zoom in")
     if not tool.gap_axis:
-        return find_probe(grey(picture.data), wanted)
+        return find_probe(grey(image.data), wanted)
     gap_px = (work.gap_um or 0.0) / mapped.scale_um_px
-    return find_gripper(grey(picture.data), replace(wanted, gap_px=gap_px))
+    return find_gripper(grey(image.data), replace(wanted, gap_px=gap_px))

@@ -10,12 +10,12 @@ from cosmic.autonomy.calibrating.calibrated import Calibrated
 from cosmic.autonomy.calibrating.registry import CalibrationEntry
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.plate import Candidate, PlateFrame
-from cosmic.autonomy.handling.prepare import TABLE, clear_picture
+from cosmic.autonomy.handling.prepare import TABLE, clear_image
 from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps, Yielded
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.core.calibration_fit import CalibrationRefused, RotationFit, fit_rotation
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import Floats
 
 AWAY_DEG: Final = (-40.0, -20.0, 0.0, 20.0, 40.0, 60.0)
@@ -43,7 +43,7 @@ class FindRotationCentre(Calibrated):
             return
         if not work.shared.candidates:
             raise OperationFailed("no fibre", "no fibre on the plate is clear enough to follow")
-        yield from clear_picture(work)
+        yield from clear_image(work)
         begun = work.table_deg
         nearest = sorted(work.shared.candidates, key=lambda each: float(np.hypot(*each.place_um)))
         why = ""
@@ -74,11 +74,11 @@ def _followed(
     places: list[Floats] = []
     for away in AWAY_DEG:
         yield work.go({work.table: begun_deg + away})
-        picture = yield work.picture()
-        assert isinstance(picture, Picture)
+        image = yield work.image()
+        assert isinstance(image, CameraImage)
         angle = work.table_deg
         wanted = work.calibration.frame.on_platform(candidate.line_um, angle)
-        seen = _nearest(work, picture, wanted, candidate.length_um)
+        seen = _nearest(work, image, wanted, candidate.length_um)
         if seen is None:
             raise NotAvailable(f"the fibre was lost at {angle:.0f} degrees")
         angles.append(angle)
@@ -87,13 +87,13 @@ def _followed(
 
 
 def _nearest(
-    work: HandlingContext, picture: Picture, wanted: Floats, length_um: float
+    work: HandlingContext, image: CameraImage, wanted: Floats, length_um: float
 ) -> SeenFibre | None:
-    mapped = work.mapped(picture)
-    box = box_around(mapped.to_px(wanted), MARGIN_UM / mapped.scale_um_px, picture)
+    mapped = work.mapped(image)
+    box = box_around(mapped.to_px(wanted), MARGIN_UM / mapped.scale_um_px, image)
     fitting = [
         each
-        for each in find_seen(picture, mapped, box)
+        for each in find_seen(image, mapped, box)
         if abs(each.length_um - length_um) <= SAME_LENGTH * length_um
     ]
     middle = wanted.mean(axis=0)

@@ -84,7 +84,7 @@ class UnitOperation(Generic[W]):
         raise NotImplementedError
 
     def verify(self, work: W) -> Steps | None:
-        """See by picture or force whether it worked; None: there is nothing to see.
+        """See by image or force whether it worked; None: there is nothing to see.
 
         Raises
         ------

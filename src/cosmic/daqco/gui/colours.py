@@ -31,6 +31,6 @@ def readable(colour: str, ground: str | None = None) -> str:
 
 def swatch(colour: str, size_px: int = 14) -> QIcon:
     """Return a square of that colour, for lists and buttons."""
-    picture = QPixmap(size_px, size_px)
-    picture.fill(QColor(colour))
-    return QIcon(picture)
+    image = QPixmap(size_px, size_px)
+    image.fill(QColor(colour))
+    return QIcon(image)

@@ -23,7 +23,7 @@ class FieldDialog(QDialog):
 
 
 def button_box(buttons: QDialogButtonBox.StandardButton) -> QDialogButtonBox:
-    """Return the buttons of a dialog, without the pictures that some desktops put on them."""
+    """Return the buttons of a dialog, without the images that some desktops put on them."""
     box = QDialogButtonBox(buttons)
     for each in box.buttons():
         each.setIcon(QIcon())

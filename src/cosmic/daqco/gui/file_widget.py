@@ -114,7 +114,7 @@ class UDaqFileWidget(QWidget):
         self._arrange()
 
     def _arrange(self) -> None:
-        """Put the fields into two columns where there is room, so that the picture keeps it."""
+        """Put the fields into two columns where there is room, so that the image keeps it."""
         columns = 2 if self.width() >= WIDE_PX else 1
         if columns == self._columns:
             return

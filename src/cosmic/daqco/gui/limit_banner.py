@@ -31,7 +31,7 @@ def limit_text(limit: DaqLimit, unit: str) -> str:
 
 
 class LimitBanner(QWidget):
-    """One line over the picture while a limit is latched."""
+    """One line over the image while a limit is latched."""
 
     reset_requested = Signal(str)
 

@@ -61,7 +61,7 @@ class UDaqPlotter(QWidget):
         self.banner = LimitBanner()
         self.cursors = Cursors(self.chart)
         self.limit_lines = LimitLines(self.chart)
-        self.state = Chip("LIVE", tip="Whether the picture follows the newest samples")
+        self.state = Chip("LIVE", tip="Whether the image follows the newest samples")
         self.lost = Chip("lost 0", tip="Samples a channel that were lost")
         self.window_text, self.problem = QLabel(), ElidedLabel()
         self._heard_s = WALL.now_s()
@@ -117,7 +117,7 @@ class UDaqPlotter(QWidget):
         self.banner.reset_requested.connect(self._on_reset_requested)
 
     def set_compact(self, compact: bool, *, narrow: bool) -> None:
-        """Leave the room to the picture; where it is narrow, the channels stand below it."""
+        """Leave the room to the image; where it is narrow, the channels stand below it."""
         self.bar.set_compact(compact)
         upright = Qt.Orientation.Vertical if narrow else Qt.Orientation.Horizontal
         if self.split.orientation() is not upright:
@@ -128,7 +128,7 @@ class UDaqPlotter(QWidget):
 
     @property
     def refresh_hz(self) -> float:
-        """How often the picture is looked at: the setting, or what the screen can show."""
+        """How often the image is looked at: the setting, or what the screen can show."""
         return shown_rate_hz(self._daqco.settings.refresh_hz, self.screen())
 
     @property
@@ -137,7 +137,7 @@ class UDaqPlotter(QWidget):
         return self._ranges.shown(self.chart.traces)
 
     def set_paused(self, paused: bool) -> None:
-        """Freeze the picture, or follow again."""
+        """Freeze the image, or follow again."""
         if paused:
             self.refresh()
             self.chart.freeze()
@@ -297,7 +297,7 @@ class UDaqPlotter(QWidget):
         self._show_cursors()
 
     def _share_room(self) -> None:
-        """Give the channels what they need and the picture the rest."""
+        """Give the channels what they need and the image the rest."""
         beside = self.split.orientation() is Qt.Orientation.Horizontal
         needed = self.channels.sizeHint().width() if beside else 1
         self.split.setSizes([max(1, self.split.width() - needed), needed])

@@ -17,7 +17,7 @@ _LEAST = QSize(160, 80)
 def room_for(window: QWidget) -> QRect | None:
     """Return the part of its screen that windows may cover, in logical pixels; None offscreen.
 
-    Offscreen nobody looks: a picture may be as large as it was asked to be.
+    Offscreen nobody looks: an image may be as large as it was asked to be.
     """
     if QApplication.platformName() in ("offscreen", "minimal"):
         return None

@@ -26,7 +26,7 @@ class WheelGuard(QObject):
 
     A combo box and a tab bar never react to the wheel; a spin box and a slider do once they have
     the focus, which the wheel itself never gives. What lies around them scrolls instead. Scroll
-    bars, open lists and pictures keep the wheel. GUI thread.
+    bars, open lists and images keep the wheel. GUI thread.
     """
 
     def __init__(self, app: QApplication, parent: QObject | None = None) -> None:

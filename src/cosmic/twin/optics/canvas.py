@@ -1,6 +1,6 @@
-"""The part of a picture that something is drawn on, coarser where it is badly out of focus.
+"""The part of an image that something is drawn on, coarser where it is badly out of focus.
 
-Layers are uint16: brightness times a scale that their owner chooses. Picture coordinates are x, y
+Layers are uint16: brightness times a scale that their owner chooses. Image coordinates are x, y
 in pixels; a pixel's centre has whole numbers.
 """
 
@@ -39,7 +39,7 @@ class Patch:
     columns: slice
 
     def cells(self, points_px: Floats) -> Floats:
-        """Return picture coordinates as coordinates in the patch."""
+        """Return image coordinates as coordinates in the patch."""
         return np.asarray((points_px + 0.5) / self.cell - (self.x + 0.5, self.y + 0.5))
 
     def fine(self, values: Single | Mask) -> Single | Mask:

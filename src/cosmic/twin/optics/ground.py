@@ -9,7 +9,7 @@ import numpy as np
 
 from cosmic.twin.optics.canvas import Floats, Layer
 from cosmic.twin.optics.projection import Projection
-from cosmic.twin.optics.settings import PictureSettings, SensorSettings
+from cosmic.twin.optics.settings import ImageSettings, SensorSettings
 from cosmic.twin.optics.strokes import Shade, speck, stroke
 
 FULL: Final = 16384
@@ -43,27 +43,27 @@ class Dirt:
     on_sensor: Floats
 
 
-def make_dirt(picture: PictureSettings, seed: int) -> Dirt:
+def make_dirt(image: ImageSettings, seed: int) -> Dirt:
     """Return dirt that depends on the seed alone."""
     rng = np.random.default_rng([seed, 0xD1])
-    count = round(picture.dust_per_mm2 * (2e-3 * REACH_UM) ** 2)
+    count = round(image.dust_per_mm2 * (2e-3 * REACH_UM) ** 2)
     specks = np.empty((count, 4))
     specks[:, :2] = rng.uniform(-REACH_UM, REACH_UM, (count, 2))
-    specks[:, 2] = picture.dust_um * rng.lognormal(0.0, 0.5, count)
+    specks[:, 2] = image.dust_um * rng.lognormal(0.0, 0.5, count)
     specks[:, 3] = rng.uniform(0.25, 0.85, count)
-    middle = rng.uniform(-REACH_UM, REACH_UM, (picture.scratches, 2))
-    angle = rng.uniform(0.0, math.pi, picture.scratches)
-    half = rng.uniform(150.0, 900.0, picture.scratches)
+    middle = rng.uniform(-REACH_UM, REACH_UM, (image.scratches, 2))
+    angle = rng.uniform(0.0, math.pi, image.scratches)
+    half = rng.uniform(150.0, 900.0, image.scratches)
     arm = np.stack([half * np.cos(angle), half * np.sin(angle)], axis=1)
-    on_sensor = np.empty((picture.sensor_specks, 4))
-    on_sensor[:, :2] = rng.uniform(0.05, 0.95, (picture.sensor_specks, 2))
-    on_sensor[:, 2] = rng.uniform(6.0, 14.0, picture.sensor_specks)
-    on_sensor[:, 3] = rng.uniform(0.93, 0.98, picture.sensor_specks)
+    on_sensor = np.empty((image.sensor_specks, 4))
+    on_sensor[:, :2] = rng.uniform(0.05, 0.95, (image.sensor_specks, 2))
+    on_sensor[:, 2] = rng.uniform(6.0, 14.0, image.sensor_specks)
+    on_sensor[:, 3] = rng.uniform(0.93, 0.98, image.sensor_specks)
     return Dirt(specks, np.stack([middle - arm, middle + arm], axis=1), on_sensor)
 
 
 def even_light(
-    shape: tuple[int, int], view: Projection, sensor: SensorSettings, picture: PictureSettings
+    shape: tuple[int, int], view: Projection, sensor: SensorSettings, image: ImageSettings
 ) -> Layer:
     """Return the bare plate in uneven light; darkest in the corners and on the right."""
     height, width = shape
@@ -72,7 +72,7 @@ def even_light(
     y = (np.arange(0, height + 2 * COARSE_PX, COARSE_PX) - view.axis_px[1]) / side
     corner = 0.25 * (1.0 + (sensor.height_px / sensor.width_px) ** 2)
     radius = (x * x + (y * y)[:, None]) / corner
-    light = (1.0 - picture.uneven * radius) * (1.0 - picture.slanted * x)
+    light = (1.0 - image.uneven * radius) * (1.0 - image.slanted * x)
     coarse = (FULL * light.clip(0.05, 2.0)).astype(np.float32)
     # Cells are sampled at their first pixel, where resize expects their middle.
     rows = (np.arange(height, dtype=np.float32) / COARSE_PX)[:, None]
@@ -98,14 +98,14 @@ def soil(
     """
     sigma = view.sigma_px(float(plate[2, 3]))
     scale = view.px_um_at(float(plate[2, 3]))
-    places = view.picture_px(on_plate(dirt.specks[:, :2], plate))
+    places = view.image_px(on_plate(dirt.specks[:, :2], plate))
     height, width = layer.shape
     reach = 4.0 * sigma + 60.0 * scale
     seen = ((places > -reach) & (places < [width + reach, height + reach])).all(axis=1)
     for place, (_, _, radius, passes) in zip(places[seen], dirt.specks[seen], strict=True):
         speck(layer, place, radius * scale, sigma, passes)
     for ends in dirt.scratches:
-        line = view.picture_px(on_plate(ends, plate))
+        line = view.image_px(on_plate(ends, plate))
         stroke(layer, line, SCRATCH_UM * scale, sigma, SCRATCH)
     per_px = view.px_um / view.magnification * sensor.pixel_um
     sides = np.array([sensor.width_px, sensor.height_px])

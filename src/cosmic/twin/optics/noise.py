@@ -1,4 +1,4 @@
-"""Noise of the sensor, made once and cut out anew for each picture, and the sensor's range."""
+"""Noise of the sensor, made once and cut out anew for each image, and the sensor's range."""
 
 import random
 from typing import Final
@@ -12,7 +12,7 @@ from cosmic.twin.optics.canvas import Layer
 Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
 MARGIN_PX: Final = 192
-"""So many places across and down from which a picture's noise may be cut."""
+"""So many places across and down from which an image's noise may be cut."""
 
 ZERO: Final = 32768
 ONE: Final = 6000.0
@@ -28,7 +28,7 @@ class Noise:
     Parameters
     ----------
     width_px, height_px : int
-        Of the largest picture.
+        Of the largest image.
     """
 
     def __init__(self, *, width_px: int, height_px: int, seed: int) -> None:

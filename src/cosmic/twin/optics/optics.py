@@ -165,7 +165,7 @@ class Optics:
 
     # ------------------------------------------------------------------ truth, for tests only
 
-    def world_to_picture_px(
+    def world_to_image_px(
         self,
         point_um: Point | Floats,
         at_s: float,
@@ -173,7 +173,7 @@ class Optics:
         binning: int = 1,
         view: str = MICROSCOPE,
     ) -> Floats:
-        """Return where points of the world truly lie in the picture: shape (2,) or (n, 2), x and y.
+        """Return where points of the world truly lie in the image: shape (2,) or (n, 2), x and y.
 
         For tests that need to know; code that controls the platform must find out for itself.
 
@@ -184,7 +184,7 @@ class Optics:
         """
         points = np.asarray(point_um, dtype=np.float64)
         projection = self.projection(at_s, roi, binning, view)
-        found = projection.picture_px(points.reshape(-1, 3))
+        found = projection.image_px(points.reshape(-1, 3))
         return found[0] if points.ndim == 1 else found
 
     def projection(

@@ -15,7 +15,7 @@ EDGE_SIGMA_PX: Final = 0.45
 """Blur that their edges have already."""
 
 MARGIN_PX: Final = 64.0
-"""So far outside a picture outlines are cut off: OpenCV's fixed point would overflow."""
+"""So far outside an image outlines are cut off: OpenCV's fixed point would overflow."""
 
 _SHIFT: Final = 8
 

@@ -1,4 +1,4 @@
-"""Where a point in the world lies in a picture, and how sharp it is there."""
+"""Where a point in the world lies in an image, and how sharp it is there."""
 
 import math
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from cosmic.twin.optics.settings import SensorSettings, ViewSettings
 Floats = npt.NDArray[np.float64]
 
 DIFFRACTION: Final = 0.21
-"""Standard deviation of the picture of a point, in wavelengths over the aperture."""
+"""Standard deviation of the image of a point, in wavelengths over the aperture."""
 
 PIXEL_SIGMA: Final = 0.29
 """Standard deviation that the square of a pixel adds."""
@@ -20,7 +20,7 @@ PIXEL_SIGMA: Final = 0.29
 
 @dataclass(frozen=True, slots=True)
 class Area:
-    """The part of the sensor in a picture, in binned pixels."""
+    """The part of the sensor in an image, in binned pixels."""
 
     x_px: int
     y_px: int
@@ -35,7 +35,7 @@ class Projection:
     Attributes
     ----------
     axis_px : (float, float)
-        Where the optical axis meets the picture; a pixel's centre has whole numbers.
+        Where the optical axis meets the image; a pixel's centre has whole numbers.
     axis_um : (float, float)
         Where it meets the plate.
     px_um : float
@@ -57,8 +57,8 @@ class Projection:
     focus_um: float
     distance_um: float
 
-    def picture_px(self, points_um: Floats) -> Floats:
-        """Return where points of the world, shape (n, 3), lie in the picture, shape (n, 2)."""
+    def image_px(self, points_um: Floats) -> Floats:
+        """Return where points of the world, shape (n, 3), lie in the image, shape (n, 2)."""
         x = points_um[:, 0] - self.axis_um[0]
         y = points_um[:, 1] - self.axis_um[1]
         scale = self.px_um * self.distance_um / (self.distance_um - points_um[:, 2])

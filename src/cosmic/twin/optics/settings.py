@@ -1,4 +1,4 @@
-"""Constants of the twin's cameras and of how things look in their pictures."""
+"""Constants of the twin's cameras and of how things look in their images."""
 
 from typing import Self
 
@@ -50,15 +50,15 @@ class ViewSettings(StrictModel):
     rotation_deg : float
         By which the camera is turned against the platform, counter-clockwise from above.
     centre_x_um, centre_y_um : float
-        Place on the plate in the middle of the picture at the lowest zoom.
+        Place on the plate in the middle of the image at the lowest zoom.
     zoom_shift_x_px, zoom_shift_y_px : float
-        How far the picture wanders on the sensor from the lowest to the highest zoom.
+        How far the image wanders on the sensor from the lowest to the highest zoom.
     magnification_low, magnification_high : float
         At the ends of the zoom; between them it grows by equal factors.
     aperture_low, aperture_high : float
         Numerical aperture there.
     dimming : float
-        The picture darkens with the magnification to this power.
+        The image darkens with the magnification to this power.
     working_distance_um : float
         From the lens to the plate: what lies higher looks larger.
     focus_low_um, focus_high_um : float
@@ -91,7 +91,7 @@ class ViewSettings(StrictModel):
         return self
 
 
-class PictureSettings(StrictModel):
+class ImageSettings(StrictModel):
     """How things look; brightness as a part of the bare plate's.
 
     Attributes
@@ -111,7 +111,7 @@ class PictureSettings(StrictModel):
     hidden : tuple of str
         Links of the URDF that cameras do not see.
     uneven : float
-        How much darker the corners of the picture are.
+        How much darker the corners of the image are.
     slanted : float
         How much darker the right side is than the left.
     dust_per_mm2 : float
@@ -148,4 +148,4 @@ class OpticsSettings(StrictModel):
 
     camera: SensorSettings
     views: dict[str, ViewSettings]
-    picture: PictureSettings
+    picture: ImageSettings

@@ -181,9 +181,9 @@ class Subjects:
     def _ahead(
         self, moment: Moment, push: Push, tips: Mapping[str, Point], first: str, towards: int
     ) -> tuple[float, float]:
-        """Return where the probe is along the fibre, and by how much it bends it, in the picture.
+        """Return where the probe is along the fibre, and by how much it bends it, in the image.
 
-        What the probe went since the force side looked last shows in the picture too.
+        What the probe went since the force side looked last shows in the image too.
         """
         ahead = [
             (now[first][1] - now["probe"][1], (now["probe"][0] - now[first][0]) * towards)

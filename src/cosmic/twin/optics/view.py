@@ -73,8 +73,8 @@ class View:
         self._view = view
         self._dirt = dirt
         self._noise = noise
-        picture = settings.picture
-        self._shade = Shade(picture.wall, picture.lumen, picture.wall_part)
+        image = settings.picture
+        self._shade = Shade(image.wall, image.lumen, image.wall_part)
         self._lock = Lock()
         self._even_key: object = None
         self._even: Layer = np.empty((0, 0), np.uint16)
@@ -109,10 +109,10 @@ class View:
 
     def _grey(self, percent: float, projection: Projection) -> float:
         """Return the grey level of the bare plate for an exposure of one second at 0 dB."""
-        picture = self._settings.picture
-        lamp = percent / picture.full_percent + picture.stray
+        image = self._settings.picture
+        lamp = percent / image.full_percent + image.stray
         dimming = projection.magnification**-self._view.dimming
-        return float(picture.ground_grey * lamp * dimming / picture.full_exposure_s)
+        return float(image.ground_grey * lamp * dimming / image.full_exposure_s)
 
     def _exposed(self, layer: Layer, shot: Shot, *, grey: float, gain: float) -> Pixels:
         camera = self._settings.camera
@@ -138,11 +138,11 @@ class View:
         return self._lit
 
     def _plate(self, subject: Subject, projection: Projection, area: Area) -> Layer:
-        sensor, picture = self._settings.camera, self._settings.picture
+        sensor, image = self._settings.camera, self._settings.picture
         even_key = area, projection.px_um / projection.magnification, projection.axis_px
         if even_key != self._even_key:
             shape = area.height_px, area.width_px
-            self._even = even_light(shape, projection, sensor, picture)
+            self._even = even_light(shape, projection, sensor, image)
             self._even_key = even_key
         layer = self._even.copy()
         soil(layer, self._dirt, projection, sensor, subject.plate)
@@ -156,21 +156,21 @@ class View:
         height = strand.height_um
         stroke(
             layer,
-            projection.picture_px(strand.line_um),
+            projection.image_px(strand.line_um),
             0.5 * strand.width_um * projection.px_um_at(height),
             projection.sigma_px(height),
             self._shade,
         )
 
     def _solid(self, layer: Layer, projection: Projection, solid: Solid, grey: float) -> None:
-        picture = self._settings.picture
-        points = projection.picture_px(solid.corners_um)
+        image = self._settings.picture
+        points = projection.image_px(solid.corners_um)
         sigma = projection.sigma_px(solid.height_um)
         if patch(layer, points, 1.0, sigma) is None:
             return
         corners = hull(points)
         silicon = solid.link.startswith("probe")
-        value = (picture.silicon if silicon else picture.steel) * grey * PER_GREY
+        value = (image.silicon if silicon else image.steel) * grey * PER_GREY
         rim_px = RIM_UM * projection.px_um
         inner = shrunk(corners, rim_px) if rim_px > sigma else None
         outline(layer, corners, sigma, value if inner is None else RIM_SHADE * value)

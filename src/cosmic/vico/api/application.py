@@ -16,8 +16,8 @@ from cosmic.frame.task_application import TaskApplication
 from cosmic.vico.api.places import Places
 from cosmic.vico.core.camera_libraries import CameraLibraries
 from cosmic.vico.core.camera_unit import CameraUnit
+from cosmic.vico.core.image import Circumstances
 from cosmic.vico.core.lens_control import PeripheralThread
-from cosmic.vico.core.picture import Circumstances
 from cosmic.vico.core.settings import Backend, CameraPlace, VicoSettings
 from cosmic.vico.core.zoom_scale import ZoomScale
 from cosmic.vico.hw.interface import CameraInfo, CameraLibrary, CameraSettings, Frame
@@ -114,7 +114,7 @@ class VicoApplication(TaskApplication):
         return self.begin("Looking for cameras", job)
 
     def use(self, camera: str, key: str) -> Task:
-        """Begin to take the pictures of `camera` with the one of that key."""
+        """Begin to take the images of `camera` with the one of that key."""
         self.unit(camera).use(key)
         task = Task(f"{camera}: {key}")
         task.finish()
@@ -163,7 +163,7 @@ class VicoApplication(TaskApplication):
 
     @property
     def directory(self) -> Path:
-        """Where pictures go unless somebody says otherwise."""
+        """Where images go unless somebody says otherwise."""
         return Path(self.settings.directory).expanduser() if self.settings.directory else Path.cwd()
 
     # What was known of a frame

@@ -17,7 +17,7 @@ FINE_STEPS: Final = 6
 NEAR_SHARE: Final = 0.2
 """Of the travel, to both sides: looked at first."""
 MOVE_S: Final = 30.0
-PICTURE_S: Final = 5.0
+IMAGE_S: Final = 5.0
 FRAMES: Final = 2
 
 
@@ -66,10 +66,10 @@ def _sweep(
         if target != at:
             lens.seek(LensAxis.FOCUS, round(target)).wait(MOVE_S)
             at, since_s = target, clock.now_s()
-        picture = unit.thread.next_picture(since_s, PICTURE_S)
+        image = unit.thread.next_image(since_s, IMAGE_S)
         # A frame is used once: the next one must be exposed after it was complete.
-        since_s = picture.frame.time_s
-        search.add(float(round(target)), sharpness(picture.data))
+        since_s = image.frame.time_s
+        search.add(float(round(target)), sharpness(image.data))
         taken += 1
         task.report(min(0.99, taken / whole), f"focus at {round(target)} counts")
     answer = search.answer

@@ -17,22 +17,22 @@ from cosmic.frame.network.caller import called_from_elsewhere
 from cosmic.frame.network.transport import Rule
 from cosmic.frame.operation import Task
 from cosmic.vico.api.application import VicoApplication
-from cosmic.vico.api.camera_pictures import (
-    CameraPictures,
-    PicturesElsewhere,
-    PicturesHere,
+from cosmic.vico.api.camera_images import (
+    CameraImages,
+    LocalImages,
+    RemoteImages,
     always,
 )
 from cosmic.vico.api.camera_places import CameraPlaces
 from cosmic.vico.api.camera_shape import CameraShape
 from cosmic.vico.api.camera_shown import FormatShown, LinkShown, Seen, formats_shown, links_shown
-from cosmic.vico.api.picture_wait import PictureWait
+from cosmic.vico.api.image_wait import ImageWait
 from cosmic.vico.api.places import Places, RotationShown
-from cosmic.vico.api.sent_picture import SentPicture, SentSeen
-from cosmic.vico.core.camera_recordings import PictureRecordingState
-from cosmic.vico.core.picture import Picture
-from cosmic.vico.core.recording.formats import FORMATS, picture_bytes_per_s
-from cosmic.vico.core.recording.snap import save_picture
+from cosmic.vico.api.sent_image import SentImage, SentSeen
+from cosmic.vico.core.camera_recordings import ImageRecordingState
+from cosmic.vico.core.image import CameraImage
+from cosmic.vico.core.recording.formats import FORMATS, image_bytes_per_s
+from cosmic.vico.core.recording.snap import save_image
 from cosmic.vico.core.recording.time_lapse import TimeLapsePlan
 from cosmic.vico.core.vision.chain import Analysis
 from cosmic.vico.hw.interface import (
@@ -48,7 +48,7 @@ BACKGROUND_FRAMES = 8
 
 @checked_class
 class CameraHandle(CameraPlaces, CameraShape, Declared):
-    """One camera: its pictures, settings, recordings and what machine vision finds; any thread.
+    """One camera: its images, settings, recordings and what machine vision finds; any thread.
 
     It has the shape of a bluesky detector without importing bluesky.
     """
@@ -58,23 +58,23 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
         self._unit = application.unit(name)
         self._thread = self._unit.thread
         self.name = name
-        self._pictures: CameraPictures = PicturesHere(application, self._unit)
+        self._images: CameraImages = LocalImages(application, self._unit)
 
     @override
     def prepare(self, key: str, policy: FailurePolicy) -> None:
-        """Take pictures over the line."""
+        """Take images over the line."""
         self.name = key
-        self._pictures = PicturesElsewhere(self, policy)
+        self._images = RemoteImages(self, policy)
 
     @property
-    def pictures(self) -> CameraPictures:
-        """Where the pictures come from."""
-        return self._pictures
+    def images(self) -> CameraImages:
+        """Where the images come from."""
+        return self._images
 
     @override
     @command(reads=True)
     def now_s(self) -> float:
-        """Return the platform's time where the camera is, by which its pictures are dated."""
+        """Return the platform's time where the camera is, by which its images are dated."""
         return self._application.clock.now_s()
 
     # What is in force
@@ -131,7 +131,7 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
 
     @property
     def running(self) -> bool:
-        """It takes pictures, or waits for its trigger."""
+        """It takes images, or waits for its trigger."""
         return not self.away and self._running
 
     @property
@@ -141,7 +141,7 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
 
     @property
     def problem(self) -> str:
-        """Why no pictures come; empty when all is well."""
+        """Why no images come; empty when all is well."""
         return self.away or self._fault
 
     @property
@@ -149,21 +149,21 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
     def _fault(self) -> str:
         return self._thread.problem
 
-    # Pictures
+    # Images
 
-    def latest(self) -> Picture | None:
-        """Return the newest whole picture, background corrected; None before the first."""
-        return self._pictures.latest()
+    def latest(self) -> CameraImage | None:
+        """Return the newest whole image, background corrected; None before the first."""
+        return self._images.latest()
 
     @command(reads=True)
-    def sent_latest(self) -> SentPicture | None:
-        """Return the newest whole picture as it travels to another station."""
+    def sent_latest(self) -> SentImage | None:
+        """Return the newest whole image as it travels to another station."""
         newest = self.latest()
-        return None if newest is None else SentPicture.of(newest, self._places)
+        return None if newest is None else SentImage.of(newest, self._places)
 
     @override
-    def next_picture(self, timeout_s: float = 5.0, since_s: float | None = None) -> Picture:
-        """Wait for a whole picture exposed from `since_s` of platform time on; None is now.
+    def next_image(self, timeout_s: float = 5.0, since_s: float | None = None) -> CameraImage:
+        """Wait for a whole image exposed from `since_s` of platform time on; None is now.
 
         Raises
         ------
@@ -172,45 +172,45 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
         WrongThreadError
             Called in the GUI thread.
         """
-        return self._pictures.next(timeout_s, since_s)
+        return self._images.next(timeout_s, since_s)
 
     @command(reads=True)
-    def await_picture(self, since_s: float | None = None) -> PictureWait:
-        """Begin to wait for a whole picture exposed from `since_s` on; None is now."""
+    def await_image(self, since_s: float | None = None) -> ImageWait:
+        """Begin to wait for a whole image exposed from `since_s` on; None is now."""
         since = self.clock.now_s() if since_s is None else since_s
-        return PictureWait(self._thread, since, self._places)
+        return ImageWait(self._thread, since, self._places)
 
-    def picture_since(self, since_s: float) -> Picture | None:
-        """Return the newest whole picture if it was exposed at `since_s` of platform time or later.
+    def image_since(self, since_s: float) -> CameraImage | None:
+        """Return the newest whole image if it was exposed at `since_s` of platform time or later.
 
-        Asked for often, it costs nothing: who wants a certain picture does not look at all.
+        Asked for often, it costs nothing: who wants a certain image does not look at all.
         """
-        return self._pictures.since(since_s)
+        return self._images.since(since_s)
 
-    def on_picture(self, listener: Callable[[], object]) -> Callable[[], None]:
-        """Call `listener()` in the camera's thread at each whole picture; returns what ends it."""
-        return self._pictures.on_picture(listener)
+    def on_image(self, listener: Callable[[], object]) -> Callable[[], None]:
+        """Call `listener()` in the camera's thread at each whole image; returns what ends it."""
+        return self._images.on_image(listener)
 
-    @stream(Rule.ALL, topic="pictures")
+    @stream(Rule.ALL, topic="images")
     def watch_frames(
-        self, receiver: Callable[[SentPicture], object], wanted: Callable[[], bool] | None = None
+        self, receiver: Callable[[SentImage], object], wanted: Callable[[], bool] | None = None
     ) -> Callable[[], None]:
         """Call `receiver` with every frame as it came, in order, while it is `wanted`."""
 
-        def take(picture: Picture) -> None:
+        def take(image: CameraImage) -> None:
             if wanted is None or wanted():
-                receiver(SentPicture.of(picture, self._places))
+                receiver(SentImage.of(image, self._places))
 
         return self._thread.subscribe(take)
 
     @stream(Rule.LATEST, topic="shown")
     def watch_shown(
-        self, receiver: Callable[[SentPicture], object], wanted: Callable[[], bool] | None = None
+        self, receiver: Callable[[SentImage], object], wanted: Callable[[], bool] | None = None
     ) -> Callable[[], None]:
-        """Call `receiver` with whole pictures as a view shows them, while they are `wanted`."""
+        """Call `receiver` with whole images as a view shows them, while they are `wanted`."""
 
-        def take(picture: Picture) -> None:
-            receiver(SentPicture.of(picture, self._places))
+        def take(image: CameraImage) -> None:
+            receiver(SentImage.of(image, self._places))
 
         return self._unit.live.subscribe(take, wanted or always)
 
@@ -243,25 +243,25 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
     @property
     @state(quiet=True)
     def focus(self) -> float | None:
-        """How sharp the newest picture is; None while that is not measured."""
+        """How sharp the newest image is; None while that is not measured."""
         newest = self._unit.vision.newest
         return newest.get("focus", float) if newest is not None else None
 
     @property
     @state
     def has_background(self) -> bool:
-        """Pictures are corrected by a background."""
+        """Images are corrected by a background."""
         return self._unit.background.frames > 0
 
     @command(aside=True)
     def set_background(self) -> None:
-        """Correct pictures by the mean of the next few: show an empty ground meanwhile."""
+        """Correct images by the mean of the next few: show an empty ground meanwhile."""
         self._unit.background.collect(BACKGROUND_FRAMES)
         self._application.status_changed.emit()
 
     @command(aside=True)
     def clear_background(self) -> None:
-        """Show pictures as they come."""
+        """Show images as they come."""
         self._unit.background.reset()
         self._application.status_changed.emit()
 
@@ -274,19 +274,19 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
 
     @command
     def start(self) -> Task:
-        """Begin to take pictures."""
-        return self._thread.start_pictures()
+        """Begin to take images."""
+        return self._thread.start_images()
 
     @command
     def stop(self, success: bool = True) -> Task:  # noqa: ARG002 - bluesky's signature
-        """End taking pictures; a recording is closed."""
+        """End taking images; a recording is closed."""
         self._unit.recordings.request_stop()
-        return self._thread.stop_pictures()
+        return self._thread.stop_images()
 
     @override
     @command(aside=True)
     def software_trigger(self) -> None:
-        """Take one picture, with the software trigger; raises `NotAvailable` without it."""
+        """Take one image, with the software trigger; raises `NotAvailable` without it."""
         self._thread.trigger()
 
     # Machine vision
@@ -304,21 +304,21 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
 
     @command(aside=True)
     def switch(self, algorithm: str, *, on: bool) -> None:
-        """Have an algorithm run on the pictures, or not; raises `ConfigError`."""
+        """Have an algorithm run on the images, or not; raises `ConfigError`."""
         self._unit.chain.switch(algorithm, on=on)
         self._application.status_changed.emit()
 
     @property
     def analysis(self) -> Seen | None:
         """The newest result; None while nothing is on."""
-        return self._pictures.analysis if any(each.on for each in self._links) else None
+        return self._images.analysis if any(each.on for each in self._links) else None
 
     # Files
 
     @property
     @state(unknown=Path())
     def directory(self) -> Path:
-        """Where pictures go unless the operator says otherwise."""
+        """Where images go unless the operator says otherwise."""
         return self._application.directory
 
     @property
@@ -334,14 +334,14 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
         return tuple(replace(each, name=str(each.name)) for each in shown)
 
     @property
-    def recording(self) -> PictureRecordingState:
+    def recording(self) -> ImageRecordingState:
         """The recording that runs, or the last one."""
         found = self._recording
         return replace(found, active=False) if self.away else found
 
     @property
-    @state(unknown=PictureRecordingState())
-    def _recording(self) -> PictureRecordingState:
+    @state(unknown=ImageRecordingState())
+    def _recording(self) -> ImageRecordingState:
         return self._unit.recordings.state
 
     @command(reads=True, remembered_s=2.0, meanwhile=None)
@@ -351,20 +351,20 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
         chosen = next((each for each in FORMATS if each == format_name), None)
         if settings is None or chosen is None:
             return None
-        return space_left(directory, picture_bytes_per_s(chosen, settings)).left_s
+        return space_left(directory, image_bytes_per_s(chosen, settings)).left_s
 
     @command
     def snap(self, path: Path, *, overwrite: bool = False) -> Task:
-        """Begin to write the newest picture to a .tif or .png; the camera goes on meanwhile."""
+        """Begin to write the newest image to a .tif or .png; the camera goes on meanwhile."""
         path = self._on_disk(path)
 
         def job(task: Task) -> None:
             try:
-                picture = self._unit.shown()
-                if picture is None:
-                    raise NotAvailable(f"{self.name}: {self.problem or 'no picture yet'}")
+                image = self._unit.shown()
+                if image is None:
+                    raise NotAvailable(f"{self.name}: {self.problem or 'no image yet'}")
                 axes = self._unit.recordings.axes
-                save_picture(picture, path, axes=axes, overwrite=overwrite)
+                save_image(image, path, axes=axes, overwrite=overwrite)
                 task.finish()
             except CosmicError as exc:
                 task.fail(exc)
@@ -382,7 +382,7 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
         """Ask for the file to be closed; it is when `recording.active` is False."""
         self.end_recording()
         if wait:
-            self._pictures.wait_closed()
+            self._images.wait_closed()
 
     @command(aside=True)
     def end_recording(self) -> None:
@@ -399,7 +399,7 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
         count: int,
         overwrite: bool = False,
     ) -> Task:
-        """Begin to record one picture each `interval_s`, `count` in all; raises as `record`."""
+        """Begin to record one image each `interval_s`, `count` in all; raises as `record`."""
         plan = TimeLapsePlan(interval_s, count)
         now_s = self._application.clock.now_s()
         recordings = self._unit.recordings
@@ -407,7 +407,7 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
         return recordings.time_lapse(path, format_name, plan, now_s, overwrite=overwrite)
 
     def _on_disk(self, path: Path | str) -> Path:
-        """Return a path on this disk; named elsewhere, it begins where pictures go."""
+        """Return a path on this disk; named elsewhere, it begins where images go."""
         if not called_from_elsewhere():
             return Path(path)
         return self._application.directory / Path(path).expanduser()
@@ -417,7 +417,7 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
     @property
     @state
     def axes(self) -> Mapping[str, str]:
-        """Unit of each axis whose position comes with the pictures."""
+        """Unit of each axis whose position comes with the images."""
         return dict(self._unit.recordings.axes)
 
     @property
@@ -429,13 +429,13 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
 
     @property
     @override
-    def _newest(self) -> Picture | None:
-        return self._pictures.newest
+    def _newest(self) -> CameraImage | None:
+        return self._images.newest
 
     @property
     @override
     def _places(self) -> Places | None:
-        return self._pictures.places
+        return self._images.places
 
     @property
     @override
@@ -445,7 +445,7 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
     @property
     @override
     def _jobs(self) -> JobQueue:
-        return self._pictures.jobs
+        return self._images.jobs
 
     @property
     @override

@@ -9,8 +9,8 @@ from cosmic.frame.declaration import command
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.operation import Task
 from cosmic.vico.api.places import CalibrationShown, Pixel, Places
-from cosmic.vico.api.sent_picture import same_place
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.api.sent_image import same_place
+from cosmic.vico.core.image import CameraImage
 
 WITHIN_UM: Final = 2.0
 """How far two maps may differ for a click still to mean the same place."""
@@ -29,8 +29,8 @@ class CameraPlaces(ABC):
 
     @property
     @abstractmethod
-    def _newest(self) -> Picture | None:
-        """The newest picture as it came."""
+    def _newest(self) -> CameraImage | None:
+        """The newest image as it came."""
 
     @property
     def calibration_problem(self) -> str:
@@ -38,10 +38,10 @@ class CameraPlaces(ABC):
         places, newest = self._places, self._newest
         if places is None:
             return "micromanipulation is not hosted here"
-        return places.problem(newest) if newest is not None else "no picture yet"
+        return places.problem(newest) if newest is not None else "no image yet"
 
     def platform_um(self, place_px: Pixel) -> tuple[float, float] | None:
-        """Return where on the platform a pixel of the newest picture is; None where unknown."""
+        """Return where on the platform a pixel of the newest image is; None where unknown."""
         places, newest = self._places, self._newest
         if places is None or newest is None or places.problem(newest):
             return None
@@ -49,13 +49,13 @@ class CameraPlaces(ABC):
 
     @property
     def targets(self) -> Sequence[str]:
-        """What can be moved to a place in the picture, such as "left"."""
+        """What can be moved to a place in the image, such as "left"."""
         places = self._places
         return places.targets if places is not None else ()
 
     @property
     def calibrated(self) -> Sequence[CalibrationShown]:
-        """The maps from platform to picture that are in force for this camera."""
+        """The maps from platform to image that are in force for this camera."""
         places = self._places
         known = places.calibrated if places is not None else ()
         return tuple(each for each in known if each.camera == self.name)
@@ -78,7 +78,7 @@ class CameraPlaces(ABC):
         return places
 
     def click_to_move(self, place_px: Pixel, what: str) -> str:
-        """Begin to move `what` to a pixel of the newest picture, and say what was begun.
+        """Begin to move `what` to a pixel of the newest image, and say what was begun.
 
         Raises
         ------
@@ -92,18 +92,18 @@ class CameraPlaces(ABC):
 
     @command(moves=True)
     def click(self, place_px: Pixel, place_um: Pixel, what: str) -> str:
-        """Move `what` to a pixel of the newest picture, which must lie at `place_um`.
+        """Move `what` to a pixel of the newest image, which must lie at `place_um`.
 
         Raises
         ------
         MoveRefused, NotAvailable
-            The gate says no, or the picture has changed since.
+            The gate says no, or the image has changed since.
         """
         there_um = self.platform_um(place_px)
         if there_um is None:
             raise NotAvailable(self.calibration_problem)
         if not same_place(there_um, place_um, WITHIN_UM):
-            raise NotAvailable("the picture has changed since the click; click again")
+            raise NotAvailable("the image has changed since the click; click again")
         return self.click_to_move(place_px, what)
 
     @command(moves=True, aside=True)

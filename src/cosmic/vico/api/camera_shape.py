@@ -22,8 +22,8 @@ from cosmic.frame.plan_shape import (
     unix_of_platform_s,
     whole_key,
 )
-from cosmic.vico.core.picture import Picture
-from cosmic.vico.core.recording.snap import save_picture
+from cosmic.vico.core.image import CameraImage
+from cosmic.vico.core.recording.snap import save_image
 from cosmic.vico.hw.interface import CameraInfo, CameraSettings, Trigger
 
 if TYPE_CHECKING:
@@ -61,16 +61,16 @@ class CameraShape:
         """What is in force, as read back; None while it is not connected."""
 
     @abstractmethod
-    def next_picture(self, timeout_s: float = 5.0, since_s: float | None = None) -> Picture:
-        """Wait for a whole picture exposed from `since_s` of platform time on."""
+    def next_image(self, timeout_s: float = 5.0, since_s: float | None = None) -> CameraImage:
+        """Wait for a whole image exposed from `since_s` of platform time on."""
 
     @abstractmethod
     def software_trigger(self) -> None:
-        """Take one picture, with the software trigger."""
+        """Take one image, with the software trigger."""
 
     @abstractmethod
     def now_s(self) -> float:
-        """Return the time by which pictures are dated."""
+        """Return the time by which images are dated."""
 
     @property
     @abstractmethod
@@ -80,12 +80,12 @@ class CameraShape:
     @property
     @abstractmethod
     def _jobs(self) -> JobQueue:
-        """Takes the pictures."""
+        """Takes the images."""
 
     @property
     @abstractmethod
     def _axes(self) -> Mapping[str, str]:
-        """Unit of each axis whose position comes with the pictures."""
+        """Unit of each axis whose position comes with the images."""
 
     @property
     @abstractmethod
@@ -94,15 +94,15 @@ class CameraShape:
 
     # Plans
 
-    def plan_pictures(
+    def plan_images(
         self, folder: str | Path | None = None, *, suffix: str = ".tif", fibres: bool = False
     ) -> None:
-        """Say what a trigger does with its picture, and so what `read` returns.
+        """Say what a trigger does with its image, and so what `read` returns.
 
         Parameters
         ----------
         folder : path or None
-            Where each picture goes, into a file of its own; None keeps none.
+            Where each image goes, into a file of its own; None keeps none.
         suffix : str
             ".tif" or ".png".
         fibres : bool
@@ -116,18 +116,18 @@ class CameraShape:
             There is no such folder, or nothing can be written to it.
         """
         if suffix not in SUFFIXES:
-            raise ConfigError(f"{suffix!r}: a picture is one of {', '.join(SUFFIXES)}")
+            raise ConfigError(f"{suffix!r}: an image is one of {', '.join(SUFFIXES)}")
         chosen = None if folder is None else check_directory(Path(folder).absolute())
         self._folder, self._suffix, self._fibres, self._last = chosen, suffix, fibres, None
         self._number = 0 if chosen is None else _last_number(chosen, self.name)
 
     def trigger(self) -> PlanStatus:
-        """Begin to take a picture exposed after this call; the status ends when all is done.
+        """Begin to take an image exposed after this call; the status ends when all is done.
 
         With the software trigger chosen, it is given. The status fails with `NotAvailable` where no
-        picture comes in time, and with `RecordingError` where it cannot be kept.
+        image comes in time, and with `RecordingError` where it cannot be kept.
         """
-        status = PlanStatus(f"picture of {self.name}")
+        status = PlanStatus(f"image of {self.name}")
         since_s = self.now_s()
         self._jobs.put(lambda: self._take(since_s), status)
         return status
@@ -137,41 +137,41 @@ class CameraShape:
         if settings is not None and settings.trigger is Trigger.SOFTWARE:
             self.software_trigger()
         exposure_s = settings.exposure_s if settings is not None else 0.0
-        picture = self.next_picture(WAIT_S + 2.0 * exposure_s, since_s)
-        when_s = unix_of_platform_s(self._clock, picture.frame.exposed_s)
-        self._last = self._readings(picture, when_s), when_s
+        image = self.next_image(WAIT_S + 2.0 * exposure_s, since_s)
+        when_s = unix_of_platform_s(self._clock, image.frame.exposed_s)
+        self._last = self._readings(image, when_s), when_s
 
-    def _readings(self, picture: Picture, when_s: float) -> Readings:
-        scale = picture.circumstances.scale_um_px
+    def _readings(self, image: CameraImage, when_s: float) -> Readings:
+        scale = image.circumstances.scale_um_px
         values: dict[str, object] = {
-            "frame": picture.frame.frame_id,
-            "mean": float(picture.data.mean()),
+            "frame": image.frame.frame_id,
+            "mean": float(image.data.mean()),
             "scale_um_px": math.nan if scale is None else scale,
         }
         if self._folder is not None:
-            values["file"] = str(self._save(picture, self._folder))
+            values["file"] = str(self._save(image, self._folder))
         if self._fibres:
-            values |= self._measured(picture)
+            values |= self._measured(image)
         return {
             f"{self.name}_{key}": {"value": value, "timestamp": when_s}
             for key, value in values.items()
         }
 
-    def _save(self, picture: Picture, folder: Path) -> Path:
+    def _save(self, image: CameraImage, folder: Path) -> Path:
         axes = self._axes
         while True:
             self._number += 1
             path = folder / f"{self.name}_{self._number:05d}{self._suffix}"
             try:
-                return save_picture(picture, path, axes=axes)
+                return save_image(image, path, axes=axes)
             except RecordingExistsError:
                 continue  # somebody else put it there meanwhile: never replaced
 
-    def _measured(self, picture: Picture) -> dict[str, object]:
+    def _measured(self, image: CameraImage) -> dict[str, object]:
         # Imported here: it loads OpenCV and scipy.
         from cosmic.vico.api.fibres import place_fibres
 
-        found = place_fibres(picture, self._places)
+        found = place_fibres(image, self._places)
         longest = max(found, key=lambda each: each.length_px, default=None)
         return {
             "fibres": len(found),
@@ -185,14 +185,14 @@ class CameraShape:
         Raises
         ------
         NotAvailable
-            Nothing has triggered it since `plan_pictures`.
+            Nothing has triggered it since `plan_images`.
         """
         if self._last is None:
-            raise NotAvailable(f"{self.name}: there is no picture to read; trigger it first")
+            raise NotAvailable(f"{self.name}: there is no image to read; trigger it first")
         return dict(self._last[0])
 
     def describe(self) -> DataKeys:
-        """Return what `read` returns, in bluesky's terms; it follows `plan_pictures`."""
+        """Return what `read` returns, in bluesky's terms; it follows `plan_images`."""
         source = self._source
         keys = {
             "frame": whole_key(source),
@@ -249,7 +249,7 @@ def _number(fibre: "PlacedFibre | None", key: str) -> float:
 
 
 def _last_number(folder: Path, camera: str) -> int:
-    """Return the highest number of a picture of `camera` in a folder; 0 without any."""
+    """Return the highest number of an image of `camera` in a folder; 0 without any."""
     pattern = re.compile(rf"{re.escape(camera)}_(\d+)\.\w+")
     found = (pattern.fullmatch(path.name) for path in folder.iterdir())
     return max((int(match[1]) for match in found if match is not None), default=0)

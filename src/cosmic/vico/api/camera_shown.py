@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 from cosmic.frame.errors import CosmicError
-from cosmic.vico.core.picture import Picture
-from cosmic.vico.core.recording.formats import FORMATS, PictureFormat, recording_suffix
+from cosmic.vico.core.image import CameraImage
+from cosmic.vico.core.recording.formats import FORMATS, ImageFormat, recording_suffix
 from cosmic.vico.core.recording.video_writer import check_codec
 from cosmic.vico.core.vision.chain import Analysis, LinkState, Unavailable
 from cosmic.vico.core.vision.tool_tips import TipSeen
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from cosmic.vico.core.vision.fibre import Fibre
 
 DESCRIPTIONS = {
-    "focus": "how sharp the picture is",
+    "focus": "how sharp the image is",
     "fibres": "find fibres and measure them",
-    "fibre track": "follow one fibre from picture to picture",
-    "place track": "follow one place from picture to picture",
+    "fibre track": "follow one fibre from image to image",
+    "place track": "follow one place from image to image",
     "tools": "measure the ends of grippers and probe",
     "tips": "find the tips of grippers and probe",
 }
@@ -46,7 +46,7 @@ class LinkShown:
 
 @dataclass(frozen=True, slots=True)
 class FormatShown:
-    """A way to record pictures."""
+    """A way to record images."""
 
     name: str
     suffix: str
@@ -56,9 +56,9 @@ class FormatShown:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """What the chain found on one picture."""
+    """What the chain found on one image."""
 
-    picture: Picture
+    image: CameraImage
     fibres: tuple["Fibre", ...]
     tips: tuple[TipSeen, ...]
 
@@ -67,7 +67,7 @@ class Seen:
         """Return what is shown of the newest analysis."""
         fibres, tips = newest.results.get("fibres"), newest.results.get("tips")
         return cls(
-            newest.picture,
+            newest.image,
             fibres if isinstance(fibres, tuple) else (),
             tuple(each for each in tips if isinstance(each, TipSeen))
             if isinstance(tips, tuple)
@@ -76,7 +76,7 @@ class Seen:
 
 
 def links_shown(states: Sequence[LinkState], newest: Analysis | None) -> tuple[LinkShown, ...]:
-    """Return the links of a chain, in its order, as the newest picture left them."""
+    """Return the links of a chain, in its order, as the newest image left them."""
     return tuple(
         LinkShown(
             state.name,
@@ -106,7 +106,7 @@ def formats_shown(settings: CameraSettings | None) -> tuple[FormatShown, ...]:
     )
 
 
-def _format_problem(name: PictureFormat, settings: CameraSettings | None) -> str:
+def _format_problem(name: ImageFormat, settings: CameraSettings | None) -> str:
     try:
         check_codec(name, load=False)
     except CosmicError as exc:

@@ -6,7 +6,7 @@ import numpy as np
 
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.api.places import Places
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.vision.algorithms import grey
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.finding import find_fibres
@@ -15,19 +15,19 @@ from cosmic.vico.core.vision.grey import Floats
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedFibre(Fibre):
-    """A fibre found on one picture, with its size and place where those can be told.
+    """A fibre found on one image, with its size and place where those can be told.
 
     Attributes
     ----------
-    picture : Picture
+    image : CameraImage
         Where it was found; the values in px are those of its pixels.
     scale_um_px : float or None
-        Of the zoom the picture was taken with; None where nobody knows: then every um is None.
+        Of the zoom the image was taken with; None where nobody knows: then every um is None.
     centre_line_um, ends_um, grasp_points_um : ndarray, shape (n, 2), or None
         x, y on the platform; None where the camera was not calibrated. `doubts` says why.
     """
 
-    picture: Picture
+    image: CameraImage
     scale_um_px: float | None
     centre_line_um: Floats | None
     ends_um: Floats | None
@@ -57,31 +57,31 @@ class PlacedFibre(Fibre):
         return None if self.scale_um_px is None else value_px * self.scale_um_px
 
 
-def place_fibres(picture: Picture, places: Places | None) -> list[PlacedFibre]:
-    """Find the fibres on a picture and say how long they are and where."""
-    reason = "micromanipulation is not hosted here" if places is None else places.problem(picture)
-    return [_placed(each, picture, places, reason) for each in find_fibres(grey(picture.data))]
+def place_fibres(image: CameraImage, places: Places | None) -> list[PlacedFibre]:
+    """Find the fibres on an image and say how long they are and where."""
+    reason = "micromanipulation is not hosted here" if places is None else places.problem(image)
+    return [_placed(each, image, places, reason) for each in find_fibres(grey(image.data))]
 
 
-def _placed(fibre: Fibre, picture: Picture, places: Places | None, reason: str) -> PlacedFibre:
-    scale = picture.circumstances.scale_um_px
+def _placed(fibre: Fibre, image: CameraImage, places: Places | None, reason: str) -> PlacedFibre:
+    scale = image.circumstances.scale_um_px
     doubts = list(fibre.doubts)
     if scale is None:
-        doubts.append("no um: the scale of this picture is not known")
+        doubts.append("no um: the scale of this image is not known")
     lines: list[Floats | None] = [None, None, None]
     if places is None or reason:
         doubts.append(f"no place on the platform: {reason}")
     else:
         wanted = (fibre.centre_line_px, fibre.ends_px, fibre.grasp_points_px)
         try:
-            lines = [_on_platform(each, picture, places) for each in wanted]
+            lines = [_on_platform(each, image, places) for each in wanted]
         except NotAvailable as exc:
             doubts.append(f"no place on the platform: {exc}")
     centre_line_um, ends_um, grasp_points_um = lines
     known = {each.name: getattr(fibre, each.name) for each in fields(Fibre)}
     return PlacedFibre(
         **known | {"doubts": tuple(doubts)},
-        picture=picture,
+        image=image,
         scale_um_px=scale,
         centre_line_um=centre_line_um,
         ends_um=ends_um,
@@ -89,6 +89,6 @@ def _placed(fibre: Fibre, picture: Picture, places: Places | None, reason: str) 
     )
 
 
-def _on_platform(points_px: Floats, picture: Picture, places: Places) -> Floats:
-    found = [places.platform_um(picture, (float(x), float(y))) for x, y in points_px]
+def _on_platform(points_px: Floats, image: CameraImage, places: Places) -> Floats:
+    found = [places.platform_um(image, (float(x), float(y))) for x, y in points_px]
     return np.array(found, dtype=np.float64).reshape(-1, 2)

@@ -111,7 +111,7 @@ class LensHandle(Declared):
 
     @command(moves=True)
     def autofocus(self, camera: str = "") -> Task:
-        """Begin to look for the sharpest picture of a camera behind the lens.
+        """Begin to look for the sharpest image of a camera behind the lens.
 
         Frames exposed before a movement ended are not looked at. Where none is found, the lens
         goes back to where it was.

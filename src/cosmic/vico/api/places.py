@@ -7,14 +7,14 @@ from datetime import datetime
 from typing import Protocol
 
 from cosmic.frame.operation import Task
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 
 Pixel = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class CalibrationShown:
-    """One map from platform to picture that is in force.
+    """One map from platform to image that is in force.
 
     Attributes
     ----------
@@ -55,9 +55,9 @@ class RotationShown:
 
 
 class Places(Protocol):
-    """Calibrations in use, how they are measured, and what can be moved to a place in a picture.
+    """Calibrations in use, how they are measured, and what can be moved to a place in an image.
 
-    Any thread. Pixels are those of the picture they were read in, its ROI and binning.
+    Any thread. Pixels are those of the image they were read in, its ROI and binning.
     """
 
     @abstractmethod
@@ -65,11 +65,11 @@ class Places(Protocol):
         """Return the calibrated size of an unbinned pixel; None where it was not calibrated."""
 
     @abstractmethod
-    def problem(self, picture: Picture) -> str:
-        """Return why pixels of `picture` cannot be told as places; empty when they can."""
+    def problem(self, image: CameraImage) -> str:
+        """Return why pixels of `image` cannot be told as places; empty when they can."""
 
     @abstractmethod
-    def platform_um(self, picture: Picture, place_px: Pixel) -> tuple[float, float]:
+    def platform_um(self, image: CameraImage, place_px: Pixel) -> tuple[float, float]:
         """Return x and y on the platform of what lies on the sample plate at a pixel.
 
         Raises
@@ -84,7 +84,7 @@ class Places(Protocol):
         """What can be moved, such as "left"."""
 
     @abstractmethod
-    def move_to(self, picture: Picture, place_px: Pixel, what: str) -> str:
+    def move_to(self, image: CameraImage, place_px: Pixel, what: str) -> str:
         """Begin to move the tip of `what` over a pixel and say what was begun; returns at once.
 
         Raises
@@ -97,7 +97,7 @@ class Places(Protocol):
 
     @abstractmethod
     def calibrate_stage(self, tool: str, camera: str) -> Task:
-        """Begin to measure the map from platform to picture by moving a tool.
+        """Begin to measure the map from platform to image by moving a tool.
 
         Raises
         ------

@@ -19,10 +19,10 @@ from cosmic.frame.operation import Task
 from cosmic.frame.weakly import weakly
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.camera import CameraHandle
-from cosmic.vico.api.camera_pictures import PicturesElsewhere
+from cosmic.vico.api.camera_images import RemoteImages
 from cosmic.vico.api.lens import LensHandle, LightHandle
 from cosmic.vico.api.places import CalibrationShown, Places, RotationShown
-from cosmic.vico.api.places_on_pictures import PlacesOnPictures
+from cosmic.vico.api.places_on_images import PlacesOnImages
 from cosmic.vico.hw.interface import CameraInfo, Pixels
 
 if TYPE_CHECKING:
@@ -30,24 +30,24 @@ if TYPE_CHECKING:
 
 
 class _Follower(Companion):
-    """Has pictures of another station come only while somebody looks."""
+    """Has images of another station come only while somebody looks."""
 
     def __init__(self, vico: "Vico") -> None:
         self._vico = vico
 
     @override
     def look(self, silent_s: float) -> None:
-        for each in self._pictures():
+        for each in self._images():
             each.tidy()
 
     @override
     def close(self) -> None:
-        for each in self._pictures():
+        for each in self._images():
             each.close()
 
-    def _pictures(self) -> list[PicturesElsewhere]:
-        found = (each.pictures for each in self._vico.camera_handles.values())
-        return [each for each in found if isinstance(each, PicturesElsewhere)]
+    def _images(self) -> list[RemoteImages]:
+        found = (each.images for each in self._vico.camera_handles.values())
+        return [each for each in found if isinstance(each, RemoteImages)]
 
 
 @checked_class
@@ -58,7 +58,7 @@ class Vico(Declared):
         self._application = application
         self._handles = {name: CameraHandle(application, name) for name in application.cameras}
         self._lens, self._light = LensHandle(application), LightHandle(application)
-        self._on_pictures: PlacesOnPictures | None = None
+        self._on_images: PlacesOnImages | None = None
         # At once: a call that still waits in a queue when a plain object goes would reach what is
         # no more.
         direct = Qt.ConnectionType.DirectConnection
@@ -71,8 +71,8 @@ class Vico(Declared):
 
     @override
     def prepare(self, key: str, policy: FailurePolicy) -> None:
-        """Read places from the pictures that come."""
-        self._on_pictures = PlacesOnPictures(self)
+        """Read places from the images that come."""
+        self._on_images = PlacesOnImages(self)
 
     @override
     def made_companion(self) -> Companion:
@@ -109,8 +109,8 @@ class Vico(Declared):
             known = ", ".join(handles) or self.away or "none"
             raise ConfigError(f"there is no camera {chosen!r}; the platform has: {known}")
         handle = handles[chosen]
-        if self._on_pictures is not None and isinstance(handle.pictures, PicturesElsewhere):
-            handle.pictures.join_places(self._on_pictures)
+        if self._on_images is not None and isinstance(handle.images, RemoteImages):
+            handle.images.join_places(self._on_images)
         return handle
 
     @property
@@ -148,44 +148,44 @@ class Vico(Declared):
 
     @command
     def use(self, camera: str, key: str) -> Task:
-        """Begin to take the pictures of `camera` with the one of that key."""
+        """Begin to take the images of `camera` with the one of that key."""
         return self._application.use(camera, key)
 
-    # Pictures
+    # Images
 
     def snap(self, camera: str = "", timeout_s: float = 5.0) -> Pixels:
-        """Take a picture: one exposed after this call; shape (height, width) or with 3 layers.
+        """Take an image: one exposed after this call; shape (height, width) or with 3 layers.
 
         Raises
         ------
         NotAvailable
             None came in time; the text says why.
         """
-        return self.camera(camera).next_picture(timeout_s).data
+        return self.camera(camera).next_image(timeout_s).data
 
     def find_fibres(self, camera: str = "", timeout_s: float = 5.0) -> "list[PlacedFibre]":
-        """Take a picture and return the fibres on it, in pixels, in um and on the platform.
+        """Take an image and return the fibres on it, in pixels, in um and on the platform.
 
         Raises
         ------
         NotAvailable
-            No picture came in time.
+            No image came in time.
         """
         # Imported here: it loads OpenCV and scipy.
         from cosmic.vico.api.fibres import place_fibres
 
-        picture = self.camera(camera).next_picture(timeout_s)
-        return place_fibres(picture, self._places)
+        image = self.camera(camera).next_image(timeout_s)
+        return place_fibres(image, self._places)
 
     # Places on the platform
 
     @property
     def _places(self) -> Places | None:
-        return self._on_pictures or self._application.places
+        return self._on_images or self._application.places
 
     @property
     def tools(self) -> Sequence[str]:
-        """What can be moved to a place in a picture, and what calibrates, such as "left"."""
+        """What can be moved to a place in an image, and what calibrates, such as "left"."""
         return () if self.away else self._tools
 
     @property
@@ -196,7 +196,7 @@ class Vico(Declared):
 
     @property
     def calibrated(self) -> Sequence[CalibrationShown]:
-        """The maps from platform to picture that are in force."""
+        """The maps from platform to image that are in force."""
         return self._calibrated
 
     @property
@@ -208,7 +208,7 @@ class Vico(Declared):
     def calibrate_stage(self, tool: str, camera: str = "") -> Task:
         """Begin to measure where on the platform the pixels of a camera lie, by moving a tool.
 
-        The tip of `tool` must be in the picture and sharp, near the height that matters. It goes
+        The tip of `tool` must be in the image and sharp, near the height that matters. It goes
         to nine places about where it stands, through the gate, and back.
 
         Raises
@@ -247,7 +247,7 @@ class Vico(Declared):
         camera: str = "",
         overwrite: bool = False,
     ) -> Iterator[Path]:
-        """Record every picture while the block runs; see `CameraHandle.record`.
+        """Record every image while the block runs; see `CameraHandle.record`.
 
         Raises
         ------

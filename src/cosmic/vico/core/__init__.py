@@ -1,1 +1,1 @@
-"""What ViCo does with pictures: acquiring, keeping, measuring."""
+"""What ViCo does with images: acquiring, keeping, measuring."""

@@ -1,4 +1,4 @@
-"""Correct a picture for uneven light and for dust that is always there."""
+"""Correct an image for uneven light and for dust that is always there."""
 
 from dataclasses import dataclass
 from threading import Lock
@@ -20,7 +20,7 @@ DARKEST_PART: Final = 0.1
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """What a picture must have in common with the background it is corrected by."""
+    """What an image must have in common with the background it is corrected by."""
 
     shape: tuple[int, ...]
     pixel_format: PixelFormat
@@ -42,7 +42,7 @@ class Background:
     """The flat field of one camera: collected from frames of an empty ground, then divided by.
 
     One thread gives the frames (`correct`); any may call the rest. Nothing set, nothing is
-    changed: a picture passes as it is, also while frames are being collected.
+    changed: an image passes as it is, also while frames are being collected.
     """
 
     def __init__(self) -> None:
@@ -79,14 +79,14 @@ class Background:
             self._wanted = frames
 
     def reset(self) -> None:
-        """Have pictures pass as they are, and collect none."""
+        """Have images pass as they are, and collect none."""
         with self._lock:
             self._wanted, self._field = 0, None
 
     def add(self, frame: Frame, binning: int = 1) -> None:
         """Take a frame for the background if one is being collected; incomplete ones are not.
 
-        Frames of another kind than the first begin the collection anew: the picture was changed.
+        Frames of another kind than the first begin the collection anew: the image was changed.
 
         Raises
         ------
@@ -116,7 +116,7 @@ class Background:
         if field is None or field.kind == kind:
             return ""
         return (
-            f"background: it was taken at {field.kind}, and the picture is {kind}; "
+            f"background: it was taken at {field.kind}, and the image is {kind}; "
             "take it again or reset it"
         )
 

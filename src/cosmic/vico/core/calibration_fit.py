@@ -1,4 +1,4 @@
-"""Measure the map from stage to picture, and the table's rotation centre, from places tracked."""
+"""Measure the map from stage to image, and the table's rotation centre, from places tracked."""
 
 import itertools
 import math
@@ -40,14 +40,14 @@ class Sighting:
     ----------
     platform_um : (float, float)
         By the stages' encoders.
-    picture_px : (float, float)
+    image_px : (float, float)
         On the whole sensor, unbinned; see `PixelMap`.
     label : str
         How an outlier is named; empty: by its number, from 1.
     """
 
     platform_um: Pair
-    picture_px: Pair
+    image_px: Pair
     label: str = ""
 
 
@@ -70,7 +70,7 @@ class MapFit:
 
 
 def fit_map(sightings: Sequence[Sighting], *, limit_px: float = LARGEST_RMS_PX) -> MapFit:
-    """Fit the map from stage to picture.
+    """Fit the map from stage to image.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def fit_map(sightings: Sequence[Sighting], *, limit_px: float = LARGEST_RMS_PX) 
         `limit_px` RMS; the two axes are seen at different scales.
     """
     places = np.array([each.platform_um for each in sightings], dtype=np.float64).reshape(-1, 2)
-    seen = np.array([each.picture_px for each in sightings], dtype=np.float64).reshape(-1, 2)
+    seen = np.array([each.image_px for each in sightings], dtype=np.float64).reshape(-1, 2)
     if not (np.isfinite(places).all() and np.isfinite(seen).all()):
         raise CalibrationRefused("calibration: a place or a pixel is not a number; track again")
     _check_places(places, seen)
@@ -111,7 +111,7 @@ def _check_places(places: Floats, seen: Floats) -> None:
         raise CalibrationRefused(
             "calibration: the stage moved along a line only; move in both directions"
         )
-    # Of the picture itself, so that a thing that did not move with the stage is caught as well.
+    # Of the image itself, so that a thing that did not move with the stage is caught as well.
     spread_px = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)[1] / math.sqrt(len(seen))
     if not spread_px >= SMALLEST_SPREAD_PX:
         raise CalibrationRefused(
@@ -125,7 +125,7 @@ def _check_map(fitted: PixelMap, rms_px: float, limit_px: float) -> None:
     if not rms_px <= limit_px:
         raise CalibrationRefused(
             f"calibration: residual of {rms_px:.2f} px RMS, at most {limit_px:g} px are accepted; "
-            "focus, wait until the stage rests before each picture, and measure again"
+            "focus, wait until the stage rests before each image, and measure again"
         )
     if not fitted.anisotropy <= LARGEST_ANISOTROPY:
         raise CalibrationRefused(

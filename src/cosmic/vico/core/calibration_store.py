@@ -23,7 +23,7 @@ from cosmic.vico.core.pixel_map import PixelMap
 HEAD: Final = """\
 # ViCo's calibration of one camera, written by the program when it measures.
 # Pixels are those of the whole sensor, unbinned; the matrix says what a move of the platform by
-# one um does in the picture. Delete a [[planes]] section to have it measured anew.
+# one um does in the image. Delete a [[planes]] section to have it measured anew.
 """
 
 Pair = Annotated[tuple[float, float], Field(strict=False)]
@@ -51,7 +51,7 @@ class _Plane(StrictModel):
         matrix = np.array(self.matrix_px_um)
         large, small = np.linalg.svd(matrix, compute_uv=False)
         if not (small > 1e-6 and large < 1e4 and small > 0.5 * large):
-            raise ValueError("matrix_px_um maps no platform to a picture; measure again")
+            raise ValueError("matrix_px_um maps no platform to an image; measure again")
         leverage = np.array(self.leverage_um2)
         if not (np.allclose(leverage, leverage.T) and np.linalg.eigvalsh(leverage).min() > 0.0):
             raise ValueError("leverage_um2 is no inverse of a sum of squares; measure again")

@@ -13,26 +13,26 @@ from cosmic.frame.events import Event, Unsubscribe
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Task
 from cosmic.vico.core.camera_thread import CameraThread
-from cosmic.vico.core.picture import Picture
-from cosmic.vico.core.recording.formats import PictureFormat, traits
-from cosmic.vico.core.recording.picture_recorder import PictureRecorder
+from cosmic.vico.core.image import CameraImage
+from cosmic.vico.core.recording.formats import ImageFormat, traits
+from cosmic.vico.core.recording.image_recorder import ImageRecorder
 from cosmic.vico.core.recording.time_lapse import TimeLapse, TimeLapsePlan
 
 logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class PictureRecordingState:
+class ImageRecordingState:
     """The recording that runs, or the last one.
 
     Attributes
     ----------
     active : bool
-        Pictures are being written.
+        Images are being written.
     path : Path or None
         None before the first recording.
     written, dropped, waiting : int
-        Pictures in the file, not in it for whatever reason, and in the queue.
+        Images in the file, not in it for whatever reason, and in the queue.
     left_s : float or None
         How long the disk lasts at this pace.
     failure : str
@@ -56,14 +56,14 @@ class CameraRecordings:
     Attributes
     ----------
     axes : mapping of str to str
-        Unit of each axis whose position comes with the pictures.
+        Unit of each axis whose position comes with the images.
     """
 
     def __init__(self, camera: CameraThread, policy: FailurePolicy) -> None:
         self._camera = camera
         self._policy = policy
         self._lock = RLock()
-        self._writer: PictureRecorder | None = None
+        self._writer: ImageRecorder | None = None
         self._unsubscribe: Callable[[], None] | None = None
         self._task: Task | None = None
         self._changed: Event[[]] = Event()
@@ -74,13 +74,13 @@ class CameraRecordings:
         return self._changed.subscribe(listener)
 
     @property
-    def state(self) -> PictureRecordingState:
+    def state(self) -> ImageRecordingState:
         """How it stands."""
         writer = self._writer
         if writer is None:
-            return PictureRecordingState()
+            return ImageRecordingState()
         stats, error = writer.stats, writer.error
-        return PictureRecordingState(
+        return ImageRecordingState(
             active=writer.isRunning() and error is None,
             path=stats.path,
             written=stats.written,
@@ -92,8 +92,8 @@ class CameraRecordings:
             failure=str(error) if error is not None else "",
         )
 
-    def start(self, path: Path, picture_format: str, *, overwrite: bool = False) -> None:
-        """Begin to write every picture that is taken.
+    def start(self, path: Path, image_format: str, *, overwrite: bool = False) -> None:
+        """Begin to write every image that is taken.
 
         Raises
         ------
@@ -104,40 +104,40 @@ class CameraRecordings:
             `overwrite` is False.
         """
         with self._lock:
-            writer = self._begin(path, picture_format, overwrite=overwrite)
+            writer = self._begin(path, image_format, overwrite=overwrite)
             self._unsubscribe = self._camera.subscribe(writer.put)
         self._changed.emit()
 
     def time_lapse(
         self,
         path: Path,
-        picture_format: str,
+        image_format: str,
         plan: TimeLapsePlan,
         now_s: float,
         *,
         overwrite: bool = False,
     ) -> Task:
-        """Begin to write one picture each interval; raises as `start`."""
+        """Begin to write one image each interval; raises as `start`."""
         lapse, task = TimeLapse(plan, now_s), Task("Time-lapse")
 
-        def choose(picture: Picture) -> None:
-            if lapse.take(picture.frame.exposed_s):
-                writer.put(picture)
+        def choose(image: CameraImage) -> None:
+            if lapse.take(image.frame.exposed_s):
+                writer.put(image)
                 whole = plan.count or 0
-                text = f"{lapse.taken} pictures, {lapse.late} late, {lapse.missed} missed"
+                text = f"{lapse.taken} images, {lapse.late} late, {lapse.missed} missed"
                 task.report(lapse.taken / whole if whole else 0.0, text)
-            if lapse.done:  # also where no picture came until after the end
+            if lapse.done:  # also where no image came until after the end
                 self.request_stop()
 
         with self._lock:
-            writer = self._begin(path, picture_format, overwrite=overwrite)
+            writer = self._begin(path, image_format, overwrite=overwrite)
             self._task = task
             task.on_cancel(self.request_stop)
             self._unsubscribe = self._camera.subscribe(choose)
         self._changed.emit()
         return task
 
-    def _begin(self, path: Path, picture_format: str, *, overwrite: bool) -> PictureRecorder:
+    def _begin(self, path: Path, image_format: str, *, overwrite: bool) -> ImageRecorder:
         if self.state.active:
             raise NotAvailable(f"{self.state.path} is being recorded; stop it first")
         settings = self._camera.settings
@@ -145,10 +145,10 @@ class CameraRecordings:
             reason = self._camera.problem or "it is not connected"
             raise NotAvailable(f"{self._camera.camera_name} cannot be recorded: {reason}")
         self._join_last()
-        traits(picture_format)  # says which there are
-        writer = PictureRecorder(
+        traits(image_format)  # says which there are
+        writer = ImageRecorder(
             path,
-            PictureFormat(picture_format),
+            ImageFormat(image_format),
             settings,
             self._policy,
             axes=self.axes,
@@ -183,7 +183,7 @@ class CameraRecordings:
             return
         writer.request_end()
         while not writer.join():
-            logger.warning("%s: still writing %d pictures", writer.path, writer.stats.waiting)
+            logger.warning("%s: still writing %d images", writer.path, writer.stats.waiting)
 
     def _on_recorded(self, _stats: object) -> None:
         self._changed.emit()

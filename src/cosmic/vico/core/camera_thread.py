@@ -1,4 +1,4 @@
-"""`CameraThread`: takes the pictures of one camera in a thread of its own (thesis 5.2, V1)."""
+"""`CameraThread`: takes the images of one camera in a thread of its own (thesis 5.2, V1)."""
 
 import logging
 from collections.abc import Callable
@@ -21,7 +21,7 @@ from cosmic.frame.events import Event, Unsubscribe
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Task
 from cosmic.frame.threads import WorkerThread, forbid_waiting_here
-from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.hw.interface import (
     Camera,
     CameraCounters,
@@ -41,15 +41,15 @@ SEARCH_S: Final = 1.0
 REFUSALS: Final = frozenset({DeviceFault.BUSY, DeviceFault.PARAMETER, DeviceFault.UNSUPPORTED})
 """What a camera may answer without being lost."""
 
-Receiver = Callable[[Picture], object]
+Receiver = Callable[[CameraImage], object]
 Command = Callable[[Camera], None]
 
 
 class CameraThread(WorkerThread):
-    """Opens a camera, takes pictures until it is told not to, and looks for it when it is lost.
+    """Opens a camera, takes images until it is told not to, and looks for it when it is lost.
 
     Receivers get every frame, incomplete ones too, in the camera's thread and in order; they
-    must return at once. The newest whole picture waits for whoever only wants to look.
+    must return at once. The newest whole image waits for whoever only wants to look.
 
     Parameters
     ----------
@@ -93,11 +93,11 @@ class CameraThread(WorkerThread):
         self._ranges: CameraRanges | None = None
         self._last_id: int | None = None
         self._reopen = False
-        self._newest: Picture | None = None
-        self._shown: Picture | None = None
+        self._newest: CameraImage | None = None
+        self._shown: CameraImage | None = None
         self._looked_s = self._drawn_s = -SEARCH_S
         self._arrived = Condition()
-        self._received: Event[Picture] = Event()
+        self._received: Event[CameraImage] = Event()
         self._renewed: Event[[]] = Event()
         self._lock = Lock()
         self._over = False
@@ -128,17 +128,17 @@ class CameraThread(WorkerThread):
 
     @property
     def running(self) -> bool:
-        """It takes pictures, or waits for its trigger."""
+        """It takes images, or waits for its trigger."""
         return self._running
 
     @property
     def problem(self) -> str:
-        """Why no pictures come; empty when all is well."""
+        """Why no images come; empty when all is well."""
         return self._problem
 
     @property
-    def newest(self) -> Picture | None:
-        """The newest whole picture; None before the first.
+    def newest(self) -> CameraImage | None:
+        """The newest whole image; None before the first.
 
         While somebody looks again and again it is one whose pixels are at hand, `SHOWN_HZ` times
         a second; a simulated camera would else draw it in the thread that looks.
@@ -147,8 +147,8 @@ class CameraThread(WorkerThread):
         return self._shown or self._newest
 
     @property
-    def last(self) -> Picture | None:
-        """The newest whole picture, for one who wants a certain one and does not look at all."""
+    def last(self) -> CameraImage | None:
+        """The newest whole image, for one who wants a certain one and does not look at all."""
         return self._newest
 
     def on_newest(self, listener: Callable[[], object]) -> Unsubscribe:
@@ -156,11 +156,11 @@ class CameraThread(WorkerThread):
         return self._renewed.subscribe(listener)
 
     def subscribe(self, receiver: Receiver) -> Unsubscribe:
-        """Call `receiver(picture)` with every frame, in the camera's thread."""
+        """Call `receiver(image)` with every frame, in the camera's thread."""
         return self._received.subscribe(receiver)
 
-    def next_picture(self, since_s: float, timeout_s: float) -> Picture:
-        """Wait for a whole picture whose exposure began at `since_s` of platform time or later.
+    def next_image(self, since_s: float, timeout_s: float) -> CameraImage:
+        """Wait for a whole image whose exposure began at `since_s` of platform time or later.
 
         Raises
         ------
@@ -169,7 +169,7 @@ class CameraThread(WorkerThread):
         WrongThreadError
             Called in the GUI thread.
         """
-        forbid_waiting_here("waiting for a picture")
+        forbid_waiting_here("waiting for an image")
 
         def fresh() -> bool:
             newest = self._newest
@@ -180,7 +180,7 @@ class CameraThread(WorkerThread):
             newest = self._newest
         if newest is None or not fresh():
             reason = self._problem or ("it is stopped" if not self._running else "none arrived")
-            raise NotAvailable(f"no picture of {self.camera_name} in {timeout_s:g} s: {reason}")
+            raise NotAvailable(f"no image of {self.camera_name} in {timeout_s:g} s: {reason}")
         return newest
 
     # Commands; any thread
@@ -200,8 +200,8 @@ class CameraThread(WorkerThread):
 
         return self._put(f"Settings of {self.camera_name}", command)
 
-    def start_pictures(self) -> Task:
-        """Begin to take pictures; harmless while it does."""
+    def start_images(self) -> Task:
+        """Begin to take images; harmless while it does."""
 
         def command(camera: Camera) -> None:
             self._wanted_running = True
@@ -210,8 +210,8 @@ class CameraThread(WorkerThread):
 
         return self._put(f"Starting {self.camera_name}", command)
 
-    def stop_pictures(self) -> Task:
-        """End taking pictures; the newest stays."""
+    def stop_images(self) -> Task:
+        """End taking images; the newest stays."""
 
         def command(camera: Camera) -> None:
             self._wanted_running = False
@@ -227,7 +227,7 @@ class CameraThread(WorkerThread):
         self._reopen = True
 
     def trigger(self) -> None:
-        """Take one picture, with the software trigger.
+        """Take one image, with the software trigger.
 
         Raises
         ------
@@ -267,7 +267,7 @@ class CameraThread(WorkerThread):
                 self._arrived.notify_all()
 
     def _work(self) -> None:
-        """Open the camera and take pictures until the end, another camera or a failure."""
+        """Open the camera and take images until the end, another camera or a failure."""
         self._reopen = False
         self._close()
         self._camera = camera = self._open_camera()
@@ -323,31 +323,31 @@ class CameraThread(WorkerThread):
     def _hand_on(self, frame: Frame, settings: CameraSettings) -> None:
         lost = frame.frame_id - self._last_id - 1 if self._last_id is not None else 0
         self._last_id = frame.frame_id
-        picture = Picture(
+        image = CameraImage(
             camera=self.camera_name,
             frame=frame,
             circumstances=self._circumstances(frame, settings),
             lost_before=max(0, lost),
         )
-        self._received.emit(picture)
+        self._received.emit(image)
         if frame.status is FrameStatus.COMPLETE:
-            self._show(picture)
+            self._show(image)
             with self._arrived:
-                self._newest = picture
+                self._newest = image
                 self._arrived.notify_all()
             self._renewed.emit()
 
-    def _show(self, picture: Picture) -> None:
+    def _show(self, image: CameraImage) -> None:
         now_s = WALL.now_s()
         if now_s - self._looked_s > LOOKED_S:
             self._shown = None
         elif now_s - self._drawn_s >= 1.0 / SHOWN_HZ:
             self._drawn_s = now_s
-            picture.data.view()
-            self._shown = picture
+            image.data.view()
+            self._shown = image
 
     def _lose(self, error: CosmicError) -> None:
-        """Say why there are no pictures, and wait before the camera is looked for again."""
+        """Say why there are no images, and wait before the camera is looked for again."""
         text = str(error)
         if text != self._problem:
             log = logger.warning if isinstance(error, NotConnectedError) else logger.error

@@ -11,8 +11,8 @@ from cosmic.vico.core.background import Background
 from cosmic.vico.core.camera_libraries import CameraLibraries
 from cosmic.vico.core.camera_recordings import CameraRecordings
 from cosmic.vico.core.camera_thread import CameraThread
+from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.core.live_view import LiveView
-from cosmic.vico.core.picture import Circumstances, Picture
 from cosmic.vico.core.settings import CameraPlace
 from cosmic.vico.core.vision.algorithms import make_chain
 from cosmic.vico.core.vision.chain import Analysis
@@ -25,16 +25,16 @@ CircumstancesOf = Callable[[CameraPlace, Frame, CameraSettings], Circumstances]
 
 
 class CameraUnit:
-    """A camera's thread, the chain of machine vision on its pictures, and its recordings.
+    """A camera's thread, the chain of machine vision on its images, and its recordings.
 
     Attributes
     ----------
     thread : CameraThread
     recordings : CameraRecordings
     vision : VisionThread
-        Runs `chain` on the newest picture, background corrected.
+        Runs `chain` on the newest image, background corrected.
     jobs : JobQueue
-        Takes the pictures that plans ask for.
+        Takes the images that plans ask for.
     live : LiveView
         Hands on what views at other stations show.
     """
@@ -60,7 +60,7 @@ class CameraUnit:
             policy,
         )
         self.recordings = CameraRecordings(self.thread, policy)
-        self.jobs = JobQueue(f"pictures of {place.name}", policy)
+        self.jobs = JobQueue(f"images of {place.name}", policy)
         self.vision: VisionThread[Analysis] = VisionThread(place.name, self._analyse, policy)
         self.live = LiveView(place.name, self.corrected, policy)
         self.thread.subscribe(self._collect)
@@ -73,17 +73,17 @@ class CameraUnit:
         return self._place
 
     def use(self, key: str) -> None:
-        """Take the pictures with another camera of the same backend."""
+        """Take the images with another camera of the same backend."""
         self._place = self._place.model_copy(update={"key": key})
         self.thread.reopen()
 
-    def shown(self) -> Picture | None:
-        """Return the newest picture, background corrected; None before the first."""
+    def shown(self) -> CameraImage | None:
+        """Return the newest image, background corrected; None before the first."""
         newest = self.thread.newest
         return self.corrected(newest) if newest is not None else None
 
     def start(self) -> None:
-        """Begin to look for the camera and to take pictures."""
+        """Begin to look for the camera and to take images."""
         self.vision.start()
         self.live.start()
         self.thread.start()
@@ -104,31 +104,31 @@ class CameraUnit:
         self.live.join()
         self.vision.join()
 
-    def _collect(self, picture: Picture) -> None:
+    def _collect(self, image: CameraImage) -> None:
         """Give the background what it waits for; in the camera's thread."""
         if not self.background.missing:
             return
         try:
-            self.background.add(picture.frame, self._binning())
+            self.background.add(image.frame, self._binning())
         except ConfigError as exc:
             logger.warning("%s: %s", self._place.name, exc)
 
-    def corrected(self, picture: Picture) -> Picture:
-        """Return a picture without the background, where there is one that fits."""
+    def corrected(self, image: CameraImage) -> CameraImage:
+        """Return an image without the background, where there is one that fits."""
         binning = self._binning()
-        if not self.background.frames or self.background.misfit(picture.frame, binning):
-            return picture  # of another size it is shown as it comes
-        data = self.background.correct(picture.frame, binning)
-        return replace(picture, frame=replace(picture.frame, data=data))
+        if not self.background.frames or self.background.misfit(image.frame, binning):
+            return image  # of another size it is shown as it comes
+        data = self.background.correct(image.frame, binning)
+        return replace(image, frame=replace(image.frame, data=data))
 
     def _binning(self) -> int:
         settings = self.thread.settings
         return settings.binning if settings is not None else 1
 
-    def _analyse(self, picture: Picture) -> Analysis | None:
+    def _analyse(self, image: CameraImage) -> Analysis | None:
         if not any(state.on for state in self.chain.states):
             return None
-        return self.chain.run(self.corrected(picture))
+        return self.chain.run(self.corrected(image))
 
     def _prepare(self, camera: Camera) -> CameraSettings:
         """Return what is configured, and what the camera has where nothing is."""

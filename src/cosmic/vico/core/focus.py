@@ -1,4 +1,4 @@
-"""How sharp a picture is, and where along a sweep it is sharpest."""
+"""How sharp an image is, and where along a sweep it is sharpest."""
 
 import math
 from collections.abc import Sequence
@@ -36,15 +36,15 @@ class FocusMeasure(StrEnum):
 def sharpness(
     data: Pixels, region: Roi | None = None, measure: FocusMeasure = FocusMeasure.VARIANCE
 ) -> float:
-    """Return how sharp a picture is in `region`; larger is sharper.
+    """Return how sharp an image is in `region`; larger is sharper.
 
     Half the size is looked at: it costs a quarter and holds less of the camera's noise. A black
-    picture gives 0.
+    image gives 0.
 
     Raises
     ------
     ConfigError
-        The region lies not within the picture, or is smaller than 16 px.
+        The region lies not within the image, or is smaller than 16 px.
     """
     part = data if region is None else _cut(data, region)
     grey = cv2.cvtColor(part, cv2.COLOR_RGB2GRAY) if part.ndim == 3 else part
@@ -71,7 +71,7 @@ def _cut(data: Pixels, region: Roi) -> Pixels:
     if not (inside and min(region.width_px, region.height_px) >= SMALLEST_REGION_PX):
         raise ConfigError(
             f"focus: the region {region.width_px} x {region.height_px} px at {region.x_px}, "
-            f"{region.y_px} must lie within the picture of {width} x {height} px and be at least "
+            f"{region.y_px} must lie within the image of {width} x {height} px and be at least "
             f"{SMALLEST_REGION_PX} px wide and high"
         )
     return data[region.y_px : bottom, region.x_px : right]
@@ -88,10 +88,10 @@ def fresh(frame: Frame, since_s: float) -> bool:
 class FocusFault(StrEnum):
     """Why a sweep found no focus."""
 
-    FLAT = "the picture is as sharp everywhere"
+    FLAT = "the image is as sharp everywhere"
     AT_END = "sharpest at the end of the range"
     NOISE = "the curve is too noisy"
-    NO_MEASURE = "a picture could not be measured"
+    NO_MEASURE = "an image could not be measured"
 
 
 @dataclass(frozen=True, slots=True)

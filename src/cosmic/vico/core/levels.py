@@ -1,4 +1,4 @@
-"""Contrast, histogram and saturation of a picture, from a part of its pixels."""
+"""Contrast, histogram and saturation of an image, from a part of its pixels."""
 
 from dataclasses import dataclass
 from typing import Final, cast
@@ -24,7 +24,7 @@ FULL_SCALE: Final = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Levels:
-    """How the grey levels of a picture are spread.
+    """How the grey levels of an image are spread.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Levels:
 
 
 def measure_levels(data: Pixels, pixel_format: PixelFormat) -> Levels:
-    """Return how the grey levels of a picture are spread, looking at some 150 000 pixels.
+    """Return how the grey levels of an image are spread, looking at some 150 000 pixels.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The pictures of a camera as views at other stations show them."""
+"""The images of a camera as views at other stations show them."""
 
 from collections.abc import Callable
 from threading import Lock
@@ -7,34 +7,34 @@ from cosmic.frame.events import Unsubscribe
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.delivery import Backlog, InboxReader
 from cosmic.frame.network.transport import Rule
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.hw.interface import FrameStatus
 
-Viewer = tuple[Callable[[Picture], object], Callable[[], bool]]
+Viewer = tuple[Callable[[CameraImage], object], Callable[[], bool]]
 
 
 class LiveView:
-    """Corrects the newest picture and hands it on in a thread of its own, while it is wanted.
+    """Corrects the newest image and hands it on in a thread of its own, while it is wanted.
 
     Parameters
     ----------
     correct : callable
-        Makes of a picture what is shown.
+        Makes of an image what is shown.
     """
 
     def __init__(
-        self, name: str, correct: Callable[[Picture], Picture], policy: FailurePolicy
+        self, name: str, correct: Callable[[CameraImage], CameraImage], policy: FailurePolicy
     ) -> None:
         self._correct = correct
         self._lock = Lock()
         self._viewers: tuple[Viewer, ...] = ()
-        self._newest: Backlog[Picture] = Backlog(Rule.LATEST)
+        self._newest: Backlog[CameraImage] = Backlog(Rule.LATEST)
         self._thread = InboxReader(f"view of {name}", policy, self._newest, self._view)
 
     def subscribe(
-        self, receiver: Callable[[Picture], object], wanted: Callable[[], bool]
+        self, receiver: Callable[[CameraImage], object], wanted: Callable[[], bool]
     ) -> Unsubscribe:
-        """Call `receiver(picture)` with the newest, while it is `wanted`; any thread."""
+        """Call `receiver(image)` with the newest, while it is `wanted`; any thread."""
         viewer = (receiver, wanted)
         with self._lock:
             self._viewers = (*self._viewers, viewer)
@@ -45,12 +45,12 @@ class LiveView:
 
         return end
 
-    def put(self, picture: Picture) -> None:
-        """Offer a picture; returns at once."""
-        if picture.frame.status is not FrameStatus.COMPLETE:
+    def put(self, image: CameraImage) -> None:
+        """Offer an image; returns at once."""
+        if image.frame.status is not FrameStatus.COMPLETE:
             return
         if any(wanted() for _, wanted in self._viewers):
-            self._newest.put(picture)
+            self._newest.put(image)
 
     def start(self) -> None:
         """Begin to hand on what comes."""
@@ -64,8 +64,8 @@ class LiveView:
         """Wait until it has ended."""
         self._thread.join()
 
-    def _view(self, picture: Picture) -> None:
-        shown = self._correct(picture)
+    def _view(self, image: CameraImage) -> None:
+        shown = self._correct(image)
         for receiver, wanted in self._viewers:
             if wanted():
                 receiver(shown)

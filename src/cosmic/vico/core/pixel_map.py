@@ -1,4 +1,4 @@
-"""From the platform to the picture and back: an affine map that knows how sure it is."""
+"""From the platform to the image and back: an affine map that knows how sure it is."""
 
 import math
 from dataclasses import dataclass, replace
@@ -13,15 +13,15 @@ Matrix = tuple[Pair, Pair]
 
 @dataclass(frozen=True, slots=True)
 class PixelMap:
-    """Where a place on the platform is seen in the picture, for one zoom and one height.
+    """Where a place on the platform is seen in the image, for one zoom and one height.
 
     Pixels are those of the whole sensor, unbinned; (0, 0) is the middle of the upper left one.
-    `for_window` gives the map for pictures of a part of the sensor, or binned.
+    `for_window` gives the map for images of a part of the sensor, or binned.
 
     Attributes
     ----------
     matrix_px_um : two rows of two
-        What a move of the platform does in the picture.
+        What a move of the platform does in the image.
     centre_um, centre_px : (float, float)
         Mean of the places it was measured with, and where that is seen.
     noise_px : float
@@ -52,7 +52,7 @@ class PixelMap:
 
     @property
     def rotation_rad(self) -> float:
-        """Angle of the platform's x axis in the picture, from right towards down."""
+        """Angle of the platform's x axis in the image, from right towards down."""
         (a, _), (c, _) = self.matrix_px_um
         return math.atan2(c, a)
 
@@ -61,7 +61,7 @@ class PixelMap:
         """Whether the platform is seen as in a mirror.
 
         Seen from above, x to the right and y away from the operator is x to the right and y up,
-        which is against the picture's rows: a negative determinant is the straight view.
+        which is against the image's rows: a negative determinant is the straight view.
         """
         return _determinant(self.matrix_px_um) > 0.0
 
@@ -76,24 +76,24 @@ class PixelMap:
         away = np.asarray(platform_um, dtype=np.float64) - self.centre_um
         return np.asarray(away @ np.array(self.matrix_px_um).T + self.centre_px)
 
-    def to_um(self, picture_px: npt.ArrayLike) -> Floats:
-        """Return which places are seen at points of the picture; shape (..., 2), as x, y."""
-        away = np.asarray(picture_px, dtype=np.float64) - self.centre_px
+    def to_um(self, image_px: npt.ArrayLike) -> Floats:
+        """Return which places are seen at points of the image; shape (..., 2), as x, y."""
+        away = np.asarray(image_px, dtype=np.float64) - self.centre_px
         return np.asarray(away @ np.linalg.inv(np.array(self.matrix_px_um)).T + self.centre_um)
 
-    def std_um(self, picture_px: npt.ArrayLike) -> Floats:
+    def std_um(self, image_px: npt.ArrayLike) -> Floats:
         """Return the standard deviation of a coordinate of `to_um` due to this map; shape (...).
 
-        It grows away from where the map was measured. What the point in the picture is unsure by
+        It grows away from where the map was measured. What the point in the image is unsure by
         comes on top: multiply that by `scale_um_px`.
         """
-        away = self.to_um(picture_px) - self.centre_um
+        away = self.to_um(image_px) - self.centre_um
         leverage = np.einsum("...i,ij,...j", away, np.array(self.leverage_um2), away)
         spread = np.sqrt(1.0 / self.points + np.maximum(leverage, 0.0))
         return np.asarray(self.noise_px * self.scale_um_px * spread)
 
     def for_window(self, *, x_px: int = 0, y_px: int = 0, binning: int = 1) -> "PixelMap":
-        """Return the map for pictures read from `x_px`, `y_px` on, in binned pixels."""
+        """Return the map for images read from `x_px`, `y_px` on, in binned pixels."""
         middle = 0.5 * (binning - 1)
         u_px, v_px = self.centre_px
         matrix = np.array(self.matrix_px_um) / binning

@@ -54,7 +54,7 @@ class VicoSettings(StrictModel):
     Attributes
     ----------
     directory : str
-        Where pictures go; empty: where the program was started.
+        Where images go; empty: where the program was started.
     calibration : str
         Folder that calibrations are kept in, beside the platform file; empty: until the end.
     plate_um : float
@@ -62,7 +62,7 @@ class VicoSettings(StrictModel):
     table_axis : str
         Positioner that turns the plate; empty: none does.
     sources : tuple of str
-        Films, folders of pictures and addresses, for the backend "opencv".
+        Films, folders of images and addresses, for the backend "opencv".
     producers : tuple of str
         GenTL producers (.cti files), for the backend "harvesters"; empty: those installed.
     """

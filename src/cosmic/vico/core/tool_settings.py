@@ -1,4 +1,4 @@
-"""What platform.toml says about the tools that stages carry through the picture."""
+"""What platform.toml says about the tools that stages carry through the image."""
 
 import math
 from collections.abc import Collection, Sequence

@@ -1,4 +1,4 @@
-"""`VisionThread`: runs machine vision on the newest picture, at the pace it can keep (V5)."""
+"""`VisionThread`: runs machine vision on the newest image, at the pace it can keep (V5)."""
 
 import math
 from collections.abc import Callable
@@ -12,27 +12,27 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.events import Event
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.threads import WorkerThread, may_wait_here
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.hw.interface import FrameStatus
 
 T = TypeVar("T")
 
 LOOK_S: Final = 0.2
 LOOKED_S: Final = 1.0
-"""So long after somebody looked, pictures are analysed for the next look, wall time."""
+"""So long after somebody looked, images are analysed for the next look, wall time."""
 WAIT_S: Final = 1.0
 """How long the first look waits for what it asks for, wall time."""
 
 
 class VisionThread(WorkerThread, Generic[T]):
-    """Analyses pictures one at a time; those that arrive meanwhile are passed over but the newest.
+    """Analyses images one at a time; those that arrive meanwhile are passed over but the newest.
 
     It does so while somebody listens or looks again and again, and else not at all.
 
     Parameters
     ----------
     analyse : callable
-        From a picture to what was found in it, or None where nothing is to be done.
+        From an image to what was found in it, or None where nothing is to be done.
     """
 
     may_wait = False
@@ -40,13 +40,13 @@ class VisionThread(WorkerThread, Generic[T]):
     def __init__(
         self,
         name: str,
-        analyse: Callable[[Picture], T | None],
+        analyse: Callable[[CameraImage], T | None],
         policy: FailurePolicy,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(f"vision {name}", policy, parent)
         self._analyse = analyse
-        self._next: Picture | None = None
+        self._next: CameraImage | None = None
         self._newest: T | None = None
         self._passed_over = 0
         self._looked_s = -math.inf
@@ -59,7 +59,7 @@ class VisionThread(WorkerThread, Generic[T]):
     def newest(self) -> T | None:
         """What was found last; None before.
 
-        Who looks for the first time in a while waits for the newest picture to be analysed, or
+        Who looks for the first time in a while waits for the newest image to be analysed, or
         gets None where nothing may wait.
         """
         awake, self._looked_s = self.awake, WALL.now_s()
@@ -77,18 +77,18 @@ class VisionThread(WorkerThread, Generic[T]):
 
     @property
     def awake(self) -> bool:
-        """True while pictures are analysed, because somebody wants to know."""
+        """True while images are analysed, because somebody wants to know."""
         return WALL.now_s() - self._looked_s < LOOKED_S or any(wanted() for wanted in self._wanted)
 
     @property
     def passed_over(self) -> int:
-        """Pictures that nobody had time for."""
+        """Images that nobody had time for."""
         return self._passed_over
 
     def subscribe(
         self, listener: Callable[[T], object], wanted: Callable[[], bool] = lambda: True
     ) -> None:
-        """Call `listener(found)` after each picture, in this thread, while it is `wanted`."""
+        """Call `listener(found)` after each image, in this thread, while it is `wanted`."""
 
         def hear(found: T) -> None:
             if wanted():
@@ -97,14 +97,14 @@ class VisionThread(WorkerThread, Generic[T]):
         self._wanted = (*self._wanted, wanted)
         self._found.subscribe(hear)
 
-    def put(self, picture: Picture) -> None:
-        """Offer a picture; any thread, returns at once."""
-        if picture.frame.status is not FrameStatus.COMPLETE:
+    def put(self, image: CameraImage) -> None:
+        """Offer an image; any thread, returns at once."""
+        if image.frame.status is not FrameStatus.COMPLETE:
             return
         awake = self.awake
         with self._changed:
             self._passed_over += awake and self._next is not None
-            self._next = picture
+            self._next = image
             if awake:
                 self._changed.notify_all()
 
@@ -119,10 +119,10 @@ class VisionThread(WorkerThread, Generic[T]):
                 self._changed.wait_for(self._due, LOOK_S)
                 if not self._due():
                     continue
-                picture, self._next = self._next, None
-            if picture is None:
+                image, self._next = self._next, None
+            if image is None:
                 continue
-            found = self._analyse(picture)
+            found = self._analyse(image)
             with self._changed:
                 self._newest = found
                 self._analysed += 1

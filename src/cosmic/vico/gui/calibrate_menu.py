@@ -68,7 +68,7 @@ class CalibrateButton(QToolButton):
         self.setToolTip(TIP if tools else "Not here: no tool can be moved from this window")
         for tool in tools:
             action = menu.addAction(f"Move {tool}")
-            action.setToolTip("Its tip must be on the picture, and sharp")
+            action.setToolTip("Its tip must be on the image, and sharp")
             action.triggered.connect(lambda _=False, tool=tool: self._begin_stage(tool))
         action = menu.addAction("Find the table's rotation centre")
         action.setToolTip("Turns the table by 24° to both sides; a fibre must lie near the middle")

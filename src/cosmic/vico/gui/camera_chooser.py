@@ -1,4 +1,4 @@
-"""Which of the cameras found takes the pictures."""
+"""Which of the cameras found takes the images."""
 
 from PySide6.QtWidgets import QComboBox, QGridLayout, QWidget
 
@@ -23,7 +23,7 @@ class CameraChooser(QWidget):
     def __init__(self, vico: Vico, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._vico, self._name = vico, name
-        self.box = tipped(QComboBox(), "The camera that takes the pictures shown here")
+        self.box = tipped(QComboBox(), "The camera that takes the images shown here")
         self.box.setMinimumContentsLength(10)
         self.box.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon

@@ -1,4 +1,4 @@
-"""`CameraView`: the live picture of one camera, with all that belongs beside it."""
+"""`CameraView`: the live image of one camera, with all that belongs beside it."""
 
 from collections.abc import Callable
 from datetime import datetime
@@ -16,15 +16,15 @@ from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.overrides import override
 from cosmic.vico.api.places import Pixel
 from cosmic.vico.api.vico import Vico
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.gui.calibrate_menu import CalibrateButton
 from cosmic.vico.gui.camera_chooser import CameraChooser
 from cosmic.vico.gui.chain_panel import ChainPanel
 from cosmic.vico.gui.contrast_panel import ContrastPanel
+from cosmic.vico.gui.image_tools import ImageTools
+from cosmic.vico.gui.image_view import CameraImageView
 from cosmic.vico.gui.layers import CornerText, Crosshair, Note, ScaleBar
 from cosmic.vico.gui.levels import Histogram, histogram
-from cosmic.vico.gui.picture_tools import PictureTools
-from cosmic.vico.gui.picture_view import PictureView
 from cosmic.vico.gui.pointer_text import pointer_text
 from cosmic.vico.gui.record_bar import RecordBar
 from cosmic.vico.gui.seen_layer import SeenLayer
@@ -35,7 +35,7 @@ from cosmic.vico.hw.interface import FrameStatus, Trigger
 
 LOOK_MS: Final = 8
 LEAST_S: Final = 0.025
-"""Between two pictures: less than 1/30 s, as pictures of 30 Hz do not come evenly."""
+"""Between two images: less than 1/30 s, as images of 30 Hz do not come evenly."""
 READOUT_MS: Final = 200
 SELDOM: Final = 5
 """Readouts between two looks at the disk."""
@@ -44,7 +44,7 @@ DRAWER_PX: Final = 38 * STEP_PX
 
 
 class CameraView(QWidget):
-    """Shows the newest picture of a camera; content of a dock, or a window of its own.
+    """Shows the newest image of a camera; content of a dock, or a window of its own.
 
     Parameters
     ----------
@@ -67,14 +67,14 @@ class CameraView(QWidget):
         super().__init__(parent)
         self.setWindowTitle(f"Camera {name}")
         self._camera, self._now = vico.camera(name), now
-        self._newest: Picture | None = None
-        self._coming: Picture | None = None
+        self._newest: CameraImage | None = None
+        self._coming: CameraImage | None = None
         self._came, self._came_s, self._drawn_s = "", WALL.now_s(), 0.0
         self._histogram: Histogram | None = None
         self._readouts, self._was_running, self._refused = 0, False, ""
         self._failing = ""
         self._pointed: Pixel | None = None
-        self.view = PictureView()
+        self.view = CameraImageView()
         self.cross, self.scale_bar = Crosshair(), ScaleBar()
         self.seen, self.note = SeenLayer(), Note()
         self.row, self.status = ToolRow(), StatusRow(self._camera)
@@ -84,7 +84,7 @@ class CameraView(QWidget):
         self.chooser = CameraChooser(vico, name)
         self.recorder = RecordBar(self._camera, now=now)
         self.pointer, self.message = CornerText(top=False), CornerText(top=True)
-        self.tools = PictureTools(self.view, self.row, self._camera, self)
+        self.tools = ImageTools(self.view, self.row, self._camera, self)
         corners = (self.scale_bar, self.pointer, self.message)
         self.view.layers = [self.cross, self.seen, *self.tools.layers, *corners, self.note]
         self._look = QTimer(self, timerType=Qt.TimerType.PreciseTimer, interval=LOOK_MS)
@@ -180,12 +180,12 @@ class CameraView(QWidget):
         self._readout.stop()
         self._coming = None
 
-    # Pictures
+    # Images
 
     def look(self) -> None:
-        """Show the newest picture, unless the last one was shown just now, or it is not drawn yet.
+        """Show the newest image, unless the last one was shown just now, or it is not drawn yet.
 
-        The window waits for no picture: it is shown at a later look.
+        The window waits for no image: it is shown at a later look.
         """
         newest = self._coming or self._camera.latest()
         if newest is self._newest or newest is None:
@@ -203,15 +203,15 @@ class CameraView(QWidget):
         self._came, self._came_s = f"{self._now():%H:%M:%S}", now_s
         self.seen.analysis = self._camera.analysis
         self._show_old("")
-        self.view.show_picture(newest)
+        self.view.show_image(newest)
         if first:
             self.recorder.refresh()
 
     def read_out(self) -> None:
         """Show numbers, histogram and state."""
-        picture = self.view.picture
-        if picture is not None and picture is self._newest:
-            self._histogram = histogram(picture.data, self.view.full)
+        image = self.view.image
+        if image is not None and image is self._newest:
+            self._histogram = histogram(image.data, self.view.full)
             self.contrast.show_histogram(self._histogram)
         self.status.refresh(self._histogram)
         self._readouts += 1
@@ -222,7 +222,7 @@ class CameraView(QWidget):
         self._show_pointer()
 
     def _show_failing(self) -> None:
-        """Say over the picture that a step of machine vision fails, once, and until it works."""
+        """Say over the image that a step of machine vision fails, once, and until it works."""
         failing = next((each.problem for each in self._camera.algorithms if each.failing), "")
         if failing != self._failing:
             self._failing = failing
@@ -233,7 +233,7 @@ class CameraView(QWidget):
         if camera.running and not self._was_running:
             self._came_s = WALL.now_s()  # give it time to begin
         self._was_running = camera.running
-        since = f"no picture since {self._came}" if self._came else "no picture yet"
+        since = f"no image since {self._came}" if self._came else "no image yet"
         if camera.problem:
             self._show_old(f"{camera.problem}\n{since}")
             self.status.show_state(State.ERROR, camera.problem)
@@ -252,8 +252,8 @@ class CameraView(QWidget):
 
     @property
     def _age(self) -> str:
-        """How old the picture shown is."""
-        return f"picture of {self._came}, {WALL.now_s() - self._came_s:.0f} s ago"
+        """How old the image shown is."""
+        return f"image of {self._came}, {WALL.now_s() - self._came_s:.0f} s ago"
 
     @property
     def _patience_s(self) -> float:
@@ -299,13 +299,13 @@ class CameraView(QWidget):
         self._show_pointer()
 
     def _show_pointer(self) -> None:
-        text = pointer_text(self._camera, self.view.picture, self._pointed)
+        text = pointer_text(self._camera, self.view.image, self._pointed)
         if text != self.pointer.text:
             self.pointer.text = text
             self.view.redraw()
 
     def say(self, text: str) -> None:
-        """Write one line over the picture, such as a refusal; empty takes it away."""
+        """Write one line over the image, such as a refusal; empty takes it away."""
         self.message.text = text
         self.view.redraw()
 
@@ -314,7 +314,9 @@ class CameraView(QWidget):
         return QSize(90 * STEP_PX, 70 * STEP_PX)
 
 
-def _shower(layer: Crosshair | ScaleBar | SeenLayer, view: PictureView) -> Callable[[bool], None]:
+def _shower(
+    layer: Crosshair | ScaleBar | SeenLayer, view: CameraImageView
+) -> Callable[[bool], None]:
     def show(shown: bool) -> None:
         layer.shown = shown
         view.redraw()

@@ -1,4 +1,4 @@
-"""The chain of algorithms run on the pictures, and the background taken off them."""
+"""The chain of algorithms run on the images, and the background taken off them."""
 
 from collections.abc import Callable
 from functools import partial
@@ -23,7 +23,7 @@ class ChainPanel(QWidget):
         self._links = QVBoxLayout()
         self._links.setSpacing(STEP_PX // 2)
         self.take = push_button(
-            "Take background", "Even out the light by the picture shown: nothing may lie in it"
+            "Take background", "Even out the light by the image shown: nothing may lie in it"
         )
         self.clear = push_button("Clear", "")
         self.reason = ElidedLabel()
@@ -55,7 +55,7 @@ class ChainPanel(QWidget):
         taken = self._camera.has_background
         self.clear.setEnabled(taken)
         self.clear.setToolTip(
-            "Show pictures as they come" if taken else "No background has been taken"
+            "Show images as they come" if taken else "No background has been taken"
         )
 
     def _rebuild(self) -> None:

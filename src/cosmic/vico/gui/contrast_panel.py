@@ -1,4 +1,4 @@
-"""What is shown black and what white: by hand, once by the picture, or always by the picture."""
+"""What is shown black and what white: by hand, once by the image, or always by the image."""
 
 from typing import Final
 
@@ -23,7 +23,7 @@ class ContrastPanel(QWidget):
     Signals
     -------
     levels_changed(Levels)
-        The picture is to be shown with these levels.
+        The image is to be shown with these levels.
     marks_changed(bool)
         Pixels that are over-exposed or quite black are to be coloured, or not.
     """
@@ -41,7 +41,7 @@ class ContrastPanel(QWidget):
         self.once = push_button(
             "Once", f"Stretch the contrast now: {CUT_PERCENT:g} % black, as many white"
         )
-        self.auto = push_button("Auto", "Keep stretching the contrast as the picture changes")
+        self.auto = push_button("Auto", "Keep stretching the contrast as the image changes")
         self.auto.setCheckable(True)
         self.reset = push_button("Full", "Show the whole range of the camera")
         self.marks = tipped(
@@ -80,7 +80,7 @@ class ContrastPanel(QWidget):
         return self._levels
 
     def show_histogram(self, histogram: Histogram) -> None:
-        """Take over how bright the newest picture is."""
+        """Take over how bright the newest image is."""
         self._histogram = histogram
         if histogram.full != self._full:
             self._rescale(histogram.full)
@@ -92,7 +92,7 @@ class ContrastPanel(QWidget):
         )
 
     def stretch(self) -> None:
-        """Fit the levels to the newest picture, once."""
+        """Fit the levels to the newest image, once."""
         if self._histogram is not None:
             self._take(self._histogram.levels(CUT_PERCENT))
 

@@ -1,4 +1,4 @@
-"""Where pictures go: base of the name, time stamp, directory."""
+"""Where images go: base of the name, time stamp, directory."""
 
 from collections.abc import Callable
 from datetime import datetime
@@ -100,7 +100,7 @@ class FileFields(QWidget):
         self.edited.emit()
 
     def _on_browse(self) -> None:
-        title = "Directory for pictures"
+        title = "Directory for images"
         ask_directory(self, title, self.directory.text(), self._on_chosen)
 
     def _on_chosen(self, folder: str) -> None:

@@ -1,4 +1,4 @@
-"""The histogram of the picture shown, with the levels in it."""
+"""The histogram of the image shown, with the levels in it."""
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt

@@ -1,4 +1,4 @@
-"""Pens and labels that can be seen over any picture, bright or dark."""
+"""Pens and labels that can be seen over any image, bright or dark."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -14,7 +14,7 @@ HALO: Final = QColor(0, 0, 0, 150)
 WHITE: Final = QColor("#FFFFFF")
 SKY: Final = QColor(OKABE_ITO["sky blue"])
 GREEN: Final = QColor("#35D0A0")
-"""Okabe-Ito's bluish green, lighter: the original is lost on a grey picture."""
+"""Okabe-Ito's bluish green, lighter: the original is lost on a grey image."""
 ORANGE: Final = QColor(OKABE_ITO["orange"])
 YELLOW: Final = QColor(OKABE_ITO["yellow"])
 PINK: Final = QColor(OKABE_ITO["reddish purple"])
@@ -22,7 +22,7 @@ PINK: Final = QColor(OKABE_ITO["reddish purple"])
 
 @cache
 def ink_font(size_px: int = 12, *, bold: bool = True) -> QFont:
-    """Return the font over pictures; kept, as finding it takes longer than drawing a fibre."""
+    """Return the font over images; kept, as finding it takes longer than drawing a fibre."""
     return number_font(size_px, bold=bold)
 
 

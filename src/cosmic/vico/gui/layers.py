@@ -1,4 +1,4 @@
-"""Layers over the picture that only show: crosshair, scale bar, note."""
+"""Layers over the image that only show: crosshair, scale bar, note."""
 
 import math
 from typing import Final
@@ -8,8 +8,8 @@ from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPen
 
 from cosmic.frame.gui.theme import STEP_PX, current_palette
 from cosmic.frame.overrides import override
+from cosmic.vico.gui.image_view import CameraImageView, Layer
 from cosmic.vico.gui.ink import HALO, SKY, WHITE, ink_font, line, pen
-from cosmic.vico.gui.picture_view import Layer, PictureView
 
 BAR_SHARE: Final = 0.25
 EDGE_PX: Final = 2 * STEP_PX
@@ -23,8 +23,8 @@ def round_length(most: float) -> float:
     return max(factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= most * 1.0001)
 
 
-def _visible(view: PictureView) -> QRectF:
-    """Return where the picture lies on the screen; all of the view where that is too little."""
+def _visible(view: CameraImageView) -> QRectF:
+    """Return where the image lies on the screen; all of the view where that is too little."""
     width, height = view.size_px
     whole = QRectF(view.rect())
     seen = view.to_screen.mapRect(QRectF(-0.5, -0.5, width, height)).intersected(whole)
@@ -32,13 +32,13 @@ def _visible(view: PictureView) -> QRectF:
 
 
 class Crosshair(Layer):
-    """Marks the middle of the picture."""
+    """Marks the middle of the image."""
 
     def __init__(self) -> None:
         self.shown = False
 
     @override
-    def paint(self, painter: QPainter, view: PictureView) -> None:
+    def paint(self, painter: QPainter, view: CameraImageView) -> None:
         width, height = view.size_px
         if not self.shown or not width:
             return
@@ -52,7 +52,7 @@ class Crosshair(Layer):
 
 
 class ScaleBar(Layer):
-    """Says how long something is, by the scale that was in force when the picture was taken."""
+    """Says how long something is, by the scale that was in force when the image was taken."""
 
     def __init__(self) -> None:
         self.shown = True
@@ -61,8 +61,8 @@ class ScaleBar(Layer):
         """Of the bar, on the screen."""
 
     @override
-    def paint(self, painter: QPainter, view: PictureView) -> None:
-        if not self.shown or view.picture is None:
+    def paint(self, painter: QPainter, view: CameraImageView) -> None:
+        if not self.shown or view.image is None:
             self.text = ""
             return
         room = _visible(view)
@@ -87,10 +87,10 @@ class ScaleBar(Layer):
         painter.setPen(QPen(WHITE, 3.0 / ratio if ratio > 1 else 3.0))
         painter.drawLine(QPointF(left, y), QPointF(left + self.length_px, y))
 
-    def _measure(self, view: PictureView, width: float) -> None:
-        picture = view.picture
-        scale = picture.circumstances.scale_um_px if picture is not None else None
-        screen_px = abs(view.to_screen.m11())  # for one pixel of the picture
+    def _measure(self, view: CameraImageView, width: float) -> None:
+        image = view.image
+        scale = image.circumstances.scale_um_px if image is not None else None
+        screen_px = abs(view.to_screen.m11())  # for one pixel of the image
         room = BAR_SHARE * width
         if scale is None:
             length = round_length(room / screen_px)
@@ -115,7 +115,7 @@ class CornerText(Layer):
         self._top = top
 
     @override
-    def paint(self, painter: QPainter, view: PictureView) -> None:
+    def paint(self, painter: QPainter, view: CameraImageView) -> None:
         if not self.text:
             return
         font = ink_font(bold=False)
@@ -136,13 +136,13 @@ class CornerText(Layer):
 
 
 class Note(Layer):
-    """One line across the picture, for why it is not live."""
+    """One line across the image, for why it is not live."""
 
     def __init__(self) -> None:
         self.text = ""
 
     @override
-    def paint(self, painter: QPainter, view: PictureView) -> None:
+    def paint(self, painter: QPainter, view: CameraImageView) -> None:
         if not self.text:
             return
         font = ink_font(15)

@@ -54,7 +54,7 @@ class LensPanel(QWidget):
         self.home = named(push_button("Home", ""), "home")
         self.abort = named(push_button("Abort", "Stop both motors now"), "abort")
         self.autofocus = named(push_button("Autofocus", ""), "autofocus")
-        self.camera = tipped(QComboBox(), "The camera whose picture is to become sharp")
+        self.camera = tipped(QComboBox(), "The camera whose image is to become sharp")
         self.light = SliderField("Light", "%")
         self.light.set_range(0.0, 100.0)
         self.tasks = TaskBar()
@@ -193,7 +193,7 @@ class LensPanel(QWidget):
         _enable(self.home, gone, "Run both motors to where counting begins")
         _enable(self.abort, gone, "Stop both motors now")
         nothing = unknown or ("" if self._vico.cameras else "There is no camera")
-        _enable(self.autofocus, nothing, "Look for the sharpest picture")
+        _enable(self.autofocus, nothing, "Look for the sharpest image")
         self.focus.set_usable(unknown)
         self.zoom.set_usable(unknown)
         for name, button in self.steps.items():

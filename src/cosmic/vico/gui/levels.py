@@ -1,4 +1,4 @@
-"""Brightness of a picture: histogram, contrast, and which pixels say nothing any more."""
+"""Brightness of an image: histogram, contrast, and which pixels say nothing any more."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -65,7 +65,7 @@ class Histogram:
     def levels(self, cut_percent: float = 0.3) -> Levels:
         """Return levels that leave `cut_percent` of the pixels black, and as many white."""
         low, high = self.percentile(cut_percent), self.percentile(100.0 - cut_percent)
-        least = max(1.0, self.full / 64)  # a picture of one grey is not to be noise on the screen
+        least = max(1.0, self.full / 64)  # an image of one grey is not to be noise on the screen
         if high - low < least:
             middle = (low + high) / 2.0
             low, high = middle - least / 2.0, middle + least / 2.0
@@ -118,8 +118,8 @@ def palette(levels: Levels, full: int, *, marks: bool, greyed: bool = False) -> 
     return colours
 
 
-def colour_picture(data: Pixels, levels: Levels, *, marks: bool, greyed: bool = False) -> Table:
-    """Return an RGB picture with its contrast changed, and marks for lost pixels."""
+def colour_image(data: Pixels, levels: Levels, *, marks: bool, greyed: bool = False) -> Table:
+    """Return an RGB image with its contrast changed, and marks for lost pixels."""
     import cv2  # numpy takes thirty times as long
 
     grey = palette(levels, 255, marks=False, greyed=greyed)[:, 0]

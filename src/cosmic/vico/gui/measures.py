@@ -1,4 +1,4 @@
-"""Distances and angles that the operator measures on the picture."""
+"""Distances and angles that the operator measures on the image."""
 
 import math
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ from PySide6.QtGui import QPainter, QPainterPath
 
 from cosmic.frame.overrides import override
 from cosmic.vico.api.places import Pixel
+from cosmic.vico.gui.image_view import CameraImageView, Layer
 from cosmic.vico.gui.ink import HALO, PINK, YELLOW, label, pen, stroke
-from cosmic.vico.gui.picture_view import Layer, PictureView
 from cosmic.vico.gui.texts import length_text
 
 NEAR_PX: Final = 9.0
@@ -24,7 +24,7 @@ class Measure:
     Attributes
     ----------
     scale_um_px : float or None
-        Of the picture it was measured on.
+        Of the image it was measured on.
     """
 
     points: list[Pixel]
@@ -48,7 +48,7 @@ def angle_deg(first: Pixel, vertex: Pixel, last: Pixel) -> float:
 
 
 class MeasureLayer(Layer):
-    """Draws the measurements; those taken at another scale than the picture's are dashed."""
+    """Draws the measurements; those taken at another scale than the image's are dashed."""
 
     def __init__(self) -> None:
         self.measures: list[Measure] = []
@@ -70,7 +70,7 @@ class MeasureLayer(Layer):
         """Take them all away."""
         self.measures, self.chosen = [], None
 
-    def at(self, place: QPointF, view: PictureView) -> Measure | None:
+    def at(self, place: QPointF, view: CameraImageView) -> Measure | None:
         """Return the measurement that is drawn near a place on the screen."""
         here = (place.x(), place.y())
         for measure in reversed(self.measures):
@@ -80,15 +80,15 @@ class MeasureLayer(Layer):
         return None
 
     @override
-    def paint(self, painter: QPainter, view: PictureView) -> None:
-        if view.picture is None:
+    def paint(self, painter: QPainter, view: CameraImageView) -> None:
+        if view.image is None:
             return
-        scale = view.picture.circumstances.scale_um_px
+        scale = view.image.circumstances.scale_um_px
         for measure in self.measures:
             self._paint_one(painter, view, measure, other=measure.scale_um_px != scale)
 
     def _paint_one(
-        self, painter: QPainter, view: PictureView, measure: Measure, *, other: bool
+        self, painter: QPainter, view: CameraImageView, measure: Measure, *, other: bool
     ) -> None:
         to = view.to_screen
         points = [to.map(QPointF(*each)) for each in measure.points]

@@ -2,18 +2,18 @@
 
 from cosmic.vico.api.camera import CameraHandle
 from cosmic.vico.api.places import Pixel
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 
 
-def pointer_text(camera: CameraHandle, picture: Picture | None, place_px: Pixel | None) -> str:
+def pointer_text(camera: CameraHandle, image: CameraImage | None, place_px: Pixel | None) -> str:
     """Return place and brightness of a pixel, and where that is on the platform."""
-    if picture is None or place_px is None:
+    if image is None or place_px is None:
         return ""
-    height, width = picture.data.shape[:2]
+    height, width = image.data.shape[:2]
     x, y = round(place_px[0]), round(place_px[1])
     if not (0 <= x < width and 0 <= y < height):
         return ""
-    value = picture.data[y, x]
+    value = image.data[y, x]
     shown = f"{int(value)}" if value.ndim == 0 else ", ".join(f"{int(each)}" for each in value)
     there_um = camera.platform_um(place_px)
     where = "" if there_um is None else f"  at {', '.join(f'{v:.1f}' for v in there_um)} µm"

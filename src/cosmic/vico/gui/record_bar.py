@@ -50,10 +50,10 @@ class RecordBar(QWidget):
         super().__init__(parent)
         self._camera = camera
         self._error = ""
-        self.snap = named(push_button("Snap", "Write the picture shown to a file"), "snap")
+        self.snap = named(push_button("Snap", "Write the image shown to a file"), "snap")
         self.record = named(push_button("Record", ""), "record")
         self.record.setCheckable(True)
-        self.lapse = push_button("Time-lapse…", "Record one picture every so often")
+        self.lapse = push_button("Time-lapse…", "Record one image every so often")
         self.more = push_button("File…", "Show the fields for name, directory and format")
         self.more.setCheckable(True)
         self.format = tipped(QComboBox(), "How recordings are written")
@@ -117,18 +117,18 @@ class RecordBar(QWidget):
         self.files.setEnabled(not recording.active)
         self.format.setEnabled(not recording.active)
         away = self._camera.problem if self._camera.elsewhere else ""
-        still_wrong = wrong or away or ("" if self._camera.latest() else "There is no picture yet")
+        still_wrong = wrong or away or ("" if self._camera.latest() else "There is no image yet")
         chosen = self.chosen
         wrong = wrong or (chosen.problem if chosen is not None else "There is no format")
-        wrong = wrong or ("" if self._camera.running else "No pictures are taken: start the camera")
-        _allow(self.snap, still_wrong, "Write the picture shown to a file")
-        _allow(self.lapse, wrong or _busy(recording.active), "Record one picture every so often")
+        wrong = wrong or ("" if self._camera.running else "No images are taken: start the camera")
+        _allow(self.snap, still_wrong, "Write the image shown to a file")
+        _allow(self.lapse, wrong or _busy(recording.active), "Record one image every so often")
         self.record.setChecked(recording.active)
         self.record.setText("■ Stop" if recording.active else "● Record")
         _allow(
             self.record,
             "" if recording.active else wrong,
-            "Stop recording and close the file" if recording.active else "Record every picture",
+            "Stop recording and close the file" if recording.active else "Record every image",
         )
         self._tell()
 
@@ -222,7 +222,7 @@ class RecordBar(QWidget):
         dialog.open()
 
     def begin_lapse(self, interval_s: float, count: int) -> None:
-        """Record `count` pictures, one each `interval_s`."""
+        """Record `count` images, one each `interval_s`."""
         chosen = self.chosen
         if chosen is None:
             return

@@ -1,4 +1,4 @@
-"""What machine vision found, drawn over the picture: fibres, their ends, tips."""
+"""What machine vision found, drawn over the image: fibres, their ends, tips."""
 
 from typing import Final
 
@@ -10,8 +10,8 @@ from cosmic.frame.overrides import override
 from cosmic.vico.api.camera_shown import Seen
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.tool_tips import TipSeen
+from cosmic.vico.gui.image_view import CameraImageView, Layer
 from cosmic.vico.gui.ink import GREEN, HALO, ORANGE, SKY, WHITE, label, pen, stroke
-from cosmic.vico.gui.picture_view import Layer, PictureView
 from cosmic.vico.gui.texts import length_text
 
 NOT_SURE: Final = "not sure"
@@ -36,19 +36,19 @@ class SeenLayer(Layer):
         """Where labels stand on the screen, and what to say there."""
 
     @override
-    def paint(self, painter: QPainter, view: PictureView) -> None:
+    def paint(self, painter: QPainter, view: CameraImageView) -> None:
         self.labels = []
         found = self.analysis
         if not self.shown or found is None or not self._fits(view, found):
             return
-        scale = found.picture.circumstances.scale_um_px
+        scale = found.image.circumstances.scale_um_px
         for fibre in found.fibres:
             self._paint_fibre(painter, view, fibre, scale)
         for tip in found.tips:
             self._paint_tip(painter, view, tip)
 
     @override
-    def tip(self, place: QPointF, view: PictureView) -> str:
+    def tip(self, place: QPointF, view: CameraImageView) -> str:
         return next((text for box, text in self.labels if box.contains(place)), "")
 
     @property
@@ -56,12 +56,12 @@ class SeenLayer(Layer):
         return [box for box, _ in self.labels]
 
     @staticmethod
-    def _fits(view: PictureView, found: Seen) -> bool:
-        """Tell whether it was found in a picture of the size shown."""
-        return found.picture.data.shape[:2] == view.size_px[::-1]
+    def _fits(view: CameraImageView, found: Seen) -> bool:
+        """Tell whether it was found in an image of the size shown."""
+        return found.image.data.shape[:2] == view.size_px[::-1]
 
     def _paint_fibre(
-        self, painter: QPainter, view: PictureView, fibre: Fibre, scale: float | None
+        self, painter: QPainter, view: CameraImageView, fibre: Fibre, scale: float | None
     ) -> None:
         colour = GREEN if fibre.certain else ORANGE
         path = _path(fibre.centre_line_px, view)
@@ -81,7 +81,7 @@ class SeenLayer(Layer):
         said = "certain" if fibre.certain else f"{NOT_SURE}: " + "; ".join(fibre.doubts)
         self.labels.append((box, f"Fibre, {said}"))
 
-    def _paint_tip(self, painter: QPainter, view: PictureView, tip: TipSeen) -> None:
+    def _paint_tip(self, painter: QPainter, view: CameraImageView, tip: TipSeen) -> None:
         place = view.to_screen.map(QPointF(*tip.place_px))
         colour = SKY if tip.certain else ORANGE
         path = QPainterPath()
@@ -94,7 +94,7 @@ class SeenLayer(Layer):
         self.labels.append((box, f"Tip of {text}"))
 
 
-def _path(points_px: np.ndarray, view: PictureView) -> QPainterPath:
+def _path(points_px: np.ndarray, view: CameraImageView) -> QPainterPath:
     """Return a line on the screen, with no more points than the eye can tell."""
     points = np.asarray(points_px, float)
     step = max(1, len(points) // MOST_POINTS)

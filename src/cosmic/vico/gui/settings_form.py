@@ -36,7 +36,7 @@ class SettingsForm(QObject):
     Attributes
     ----------
     exposure, gain : SliderField
-        Beside the picture.
+        Beside the image.
     panel : QWidget
         The others, for the drawer.
     """
@@ -54,7 +54,7 @@ class SettingsForm(QObject):
         self.binning = tipped(QComboBox(), "Pixels joined to one, in each direction")
         self.pixel_format = tipped(QComboBox(), "How a pixel is coded")
         self.trigger = tipped(QComboBox(), "What starts an exposure")
-        self.shoot = push_button("Trigger", "Take one picture now")
+        self.shoot = push_button("Trigger", "Take one image now")
         self.full_sensor = push_button("Full sensor", "Read the whole sensor again")
         self.roi_text, self.reason = QLabel(), ElidedLabel()
         self.panel = QWidget(parent)
@@ -100,9 +100,7 @@ class SettingsForm(QObject):
             widget.setEnabled(there)
         self.shoot.setEnabled(settings is not None and settings.trigger is Trigger.SOFTWARE)
         self.shoot.setToolTip(
-            "Take one picture now"
-            if self.shoot.isEnabled()
-            else "Choose the software trigger first"
+            "Take one image now" if self.shoot.isEnabled() else "Choose the software trigger first"
         )
         if settings is None or ranges is None:
             for field in (self.exposure, self.gain, self.rate):
@@ -129,7 +127,7 @@ class SettingsForm(QObject):
     # Wishes
 
     def read_part(self, x_px: int, y_px: int, width_px: int, height_px: int) -> None:
-        """Read a part of the picture shown; widened to what the camera can do."""
+        """Read a part of the image shown; widened to what the camera can do."""
         settings, ranges = self._camera.settings, self._camera.ranges
         if settings is None or ranges is None:
             return

@@ -1,4 +1,4 @@
-"""A field with a slider beside it, for a value that is changed while looking at the picture."""
+"""A field with a slider beside it, for a value that is changed while looking at the image."""
 
 import math
 from typing import Final

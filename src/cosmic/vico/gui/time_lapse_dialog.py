@@ -11,12 +11,12 @@ from cosmic.vico.gui.amount_field import AmountField
 
 
 class TimeLapseDialog(QDialog):
-    """Asks for interval and number of pictures.
+    """Asks for interval and number of images.
 
     Signals
     -------
     agreed(float, int)
-        Interval in seconds, number of pictures.
+        Interval in seconds, number of images.
     """
 
     agreed = Signal(float, int)
@@ -25,9 +25,9 @@ class TimeLapseDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Time-lapse")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.interval = AmountField("Time between pictures", "s", low=0.1, high=86400.0, value=10.0)
+        self.interval = AmountField("Time between images", "s", low=0.1, high=86400.0, value=10.0)
         self.count = AmountField(
-            "Number of pictures", "", low=1.0, high=1e6, value=60.0, integers=True
+            "Number of images", "", low=1.0, high=1e6, value=60.0, integers=True
         )
         self.total = QLabel()
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
@@ -36,8 +36,8 @@ class TimeLapseDialog(QDialog):
             each.setIcon(QIcon())
         form = QFormLayout(self)
         form.setSpacing(STEP_PX)
-        form.addRow("One picture every", self.interval)
-        form.addRow("Pictures", self.count)
+        form.addRow("One image every", self.interval)
+        form.addRow("Images", self.count)
         form.addRow("Takes", self.total)
         form.addRow(buttons)
         buttons.accepted.connect(self._on_begin)

@@ -1,4 +1,4 @@
-"""The buttons above the picture: what part is shown, what lies over it, what a click does."""
+"""The buttons above the image: what part is shown, what lies over it, what a click does."""
 
 from typing import Final, TypeVar
 
@@ -17,7 +17,7 @@ TOOLS: Final = {
     "angle": ("Angle", "Measure an angle: click one arm, the vertex, the other arm"),
     "region": ("Region", "Read only a part of the sensor: press, drag, let go"),
 }
-MOVE_TIP: Final = "Move something to the place you click in the picture"
+MOVE_TIP: Final = "Move something to the place you click in the image"
 
 
 class ToolRow(QWidget):
@@ -37,7 +37,7 @@ class ToolRow(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.live = named(_button("Live", "", checkable=True), "live")
-        self.fit = _button("Fit", "Show all of the picture")
+        self.fit = _button("Fit", "Show all of the image")
         self.one_to_one = _button("1:1", "Show each pixel of the camera by one of the screen")
         self.tools = {
             name: named(_button(text, tip, checkable=True), name)
@@ -89,11 +89,9 @@ class ToolRow(QWidget):
         self.go.setChecked(name == "move")
 
     def show_running(self, running: bool, problem: str) -> None:
-        """Show whether pictures are taken."""
+        """Show whether images are taken."""
         self.live.setChecked(running)
-        self.live.setToolTip(
-            "End taking pictures" if running else problem or "Begin to take pictures"
-        )
+        self.live.setToolTip("End taking images" if running else problem or "Begin to take images")
 
     def show_targets(self, targets: tuple[str, ...], problem: str) -> None:
         """Offer what can be moved; a problem disables the button and stands in its tooltip."""

@@ -1,4 +1,4 @@
-"""What the left mouse button does over the picture, once a tool is chosen."""
+"""What the left mouse button does over the image, once a tool is chosen."""
 
 from collections.abc import Callable
 from typing import Final
@@ -8,9 +8,9 @@ from PySide6.QtGui import QPainter
 
 from cosmic.frame.overrides import override
 from cosmic.vico.api.places import Pixel
+from cosmic.vico.gui.image_view import CameraImageView, Layer, Tool
 from cosmic.vico.gui.ink import HALO, SKY, label, pen
 from cosmic.vico.gui.measures import Measure, MeasureLayer
-from cosmic.vico.gui.picture_view import Layer, PictureView, Tool
 
 LEAST_PX: Final = 2.0
 LEAST_ROI_PX: Final = 8
@@ -85,17 +85,17 @@ class AngleTool(Tool):
 
 
 class RoiTool(QObject):
-    """Press, drag, let go: the part of the picture that is to be read.
+    """Press, drag, let go: the part of the image that is to be read.
 
     Signals
     -------
     chosen(int, int, int, int)
-        x, y, width and height in pixels of the picture shown.
+        x, y, width and height in pixels of the image shown.
     """
 
     chosen = Signal(int, int, int, int)
 
-    def __init__(self, view: PictureView, parent: QObject) -> None:
+    def __init__(self, view: CameraImageView, parent: QObject) -> None:
         super().__init__(parent)
         self.cursor = Qt.CursorShape.CrossCursor
         self._view = view
@@ -145,7 +145,7 @@ class RoiLayer(Layer):
         self._tool = tool
 
     @override
-    def paint(self, painter: QPainter, view: PictureView) -> None:
+    def paint(self, painter: QPainter, view: CameraImageView) -> None:
         if self._tool.box is None:
             return
         x, y, width, height = self._tool.box

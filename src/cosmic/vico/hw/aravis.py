@@ -293,7 +293,7 @@ class AravisFeatures:
 
     def write(self, asked: CameraSettings, present: CameraSettings | None) -> None:
         """Put settings in force, what differs from `present`; all of them where it is None."""
-        self._write_picture(asked, present)
+        self._write_image(asked, present)
         rate_changes = present is None or asked.rate_hz != present.rate_hz
         # A longer exposure needs the lower rate first, and the other way round.
         slower = rate_changes and asked.rate_hz < self._float("frame_rate")
@@ -309,7 +309,7 @@ class AravisFeatures:
         if asked.trigger != self._trigger or (rate_changes and asked.trigger != Trigger.FREE_RUN):
             self._set_trigger(asked.trigger)
 
-    def _write_picture(self, asked: CameraSettings, present: CameraSettings | None) -> None:
+    def _write_image(self, asked: CameraSettings, present: CameraSettings | None) -> None:
         binning_changes = present is None or asked.binning != present.binning
         if self._has["binning"] and binning_changes:
             self._call("arv_camera_set_binning", asked.binning, asked.binning)
@@ -502,7 +502,7 @@ class AravisLibrary(BaseCameraLibrary[AravisCamera]):
     def _handle(self, key: str) -> int:
         """Return a new ArvCamera."""
         # Left to itself Aravis takes the first network card over which the camera answers, which
-        # need not be the one that its pictures can come back by; a full list settles that.
+        # need not be the one that its images can come back by; a full list settles that.
         places = self._places()
         if key not in places:
             places = self._places(anew=True)

@@ -440,9 +440,9 @@ class AravisBuffer:
         return int(self._get("system_timestamp"))
 
     def pixels(self, settings: CameraSettings) -> Pixels | None:
-        """Return a copy of the picture, None where it is not of the size in force."""
-        picture = empty_pixels(settings)
-        height, width = picture.shape[:2]
+        """Return a copy of the image, None where it is not of the size in force."""
+        image = empty_pixels(settings)
+        height, width = image.shape[:2]
         gap = 0
         if self.whole:  # else Aravis does not tell
             if (self._get("image_width"), self._get("image_height")) != (width, height):
@@ -451,14 +451,14 @@ class AravisBuffer:
             name = "arv_buffer_get_image_padding"
             self._calls.plain(name, self._buffer, byref(across), byref(down))
             gap = across.value
-        line = picture.nbytes // height + gap
+        line = image.nbytes // height + gap
         size = c_size_t()
         start = self._calls.plain("arv_buffer_get_data", self._buffer, byref(size))
         if not start or size.value < line * height - gap:
             return None
-        copy_rows(start, line, picture)
-        picture.flags.writeable = False
-        return picture
+        copy_rows(start, line, image)
+        image.flags.writeable = False
+        return image
 
     def _get(self, what: str) -> int:
         return int(self._calls.plain(f"arv_buffer_get_{what}", self._buffer))

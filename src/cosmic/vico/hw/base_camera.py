@@ -123,7 +123,7 @@ class BaseCamera(Camera, ABC):
 
     @abstractmethod
     def _begin(self) -> None:
-        """Begin to take pictures; raises `DeviceError` with everything given back."""
+        """Begin to take images; raises `DeviceError` with everything given back."""
 
     @abstractmethod
     def _fetch(self, wait_s: float) -> Frame | None:
@@ -140,7 +140,7 @@ class BaseCamera(Camera, ABC):
 
     @abstractmethod
     def _end(self) -> None:
-        """End taking pictures, and give back what `_begin` took, whatever fails."""
+        """End taking images, and give back what `_begin` took, whatever fails."""
 
     @abstractmethod
     def _release(self) -> None:
@@ -160,7 +160,7 @@ class BaseCamera(Camera, ABC):
         return asked
 
     def _fire(self) -> None:
-        """Take one picture by software; only where `Trigger.SOFTWARE` is in force."""
+        """Take one image by software; only where `Trigger.SOFTWARE` is in force."""
         raise NotImplementedError
 
     def _wake(self) -> None:
@@ -220,7 +220,7 @@ class BaseCamera(Camera, ABC):
         with self._lock:
             self._require("start")
             if self._running:
-                raise self._error("it takes pictures already", DeviceFault.STATE)
+                raise self._error("it takes images already", DeviceFault.STATE)
             self._counters = CameraCounters()
             self._underrun = 0
             self._stopping.clear()
@@ -520,7 +520,7 @@ def _check_period(name: str, asked: CameraSettings, ranges: CameraRanges) -> Non
 
 
 def check_unchanged(name: str, asked: CameraSettings, in_force: CameraSettings) -> None:
-    """Refuse what cannot change while pictures are taken; raises `DeviceFault.BUSY`."""
+    """Refuse what cannot change while images are taken; raises `DeviceFault.BUSY`."""
     fixed = (
         ("ROI", asked.roi, in_force.roi),
         ("binning", asked.binning, in_force.binning),
@@ -530,7 +530,7 @@ def check_unchanged(name: str, asked: CameraSettings, in_force: CameraSettings) 
     for what, wanted, present in fixed:
         if wanted != present:
             raise DeviceError(
-                f"{name}: the {what} cannot change while pictures are taken; stop it first",
+                f"{name}: the {what} cannot change while images are taken; stop it first",
                 fault=DeviceFault.BUSY,
             )
 

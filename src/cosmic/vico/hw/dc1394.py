@@ -433,7 +433,7 @@ class Dc1394Trigger:
 
 
 class Video(ABC):
-    """What pictures the camera sends.
+    """What images the camera sends.
 
     Attributes
     ----------
@@ -451,7 +451,7 @@ class Video(ABC):
 
     @abstractmethod
     def rates_hz(self, roi: Roi, pixel_format: PixelFormat) -> Range:
-        """Return the rates that pictures of a size and format can have."""
+        """Return the rates that images of a size and format can have."""
 
     @abstractmethod
     def write(self, roi: Roi, pixel_format: PixelFormat, rate_hz: float) -> None:

@@ -46,7 +46,7 @@ def make_camera_library(
         "simulated" (views of the twin), "harvesters" (GenTL producers of the vendors, extra
         ``gentl``: the usual way to GigE Vision and USB3 Vision), "aravis" (the same two on
         Linux, without anything of the vendor's), "opencv" (USB cameras, films, folders of
-        pictures, addresses), "dc1394" (FireWire on Linux).
+        images, addresses), "dc1394" (FireWire on Linux).
     clock : Clock or None
         The platform's, which stamps frames and paces simulated cameras; None is the wall's.
     scene : Scene or None

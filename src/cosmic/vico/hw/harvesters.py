@@ -459,7 +459,7 @@ class Features:
                 self._set(self._first(names), number)
 
     def fire(self) -> None:
-        """Take one picture, with the software trigger."""
+        """Take one image, with the software trigger."""
         self._map.TriggerSoftware.execute()
 
     def binning(self) -> int:
@@ -583,12 +583,12 @@ class Features:
 
 
 def pixels_of(buffer: Any, name: str) -> tuple[Pixels, PixelFormat]:
-    """Copy the first picture of a GenTL buffer, which is the driver's again afterwards.
+    """Copy the first image of a GenTL buffer, which is the driver's again afterwards.
 
     Raises
     ------
     DeviceError
-        It holds no picture in a format that CoSMic reads.
+        It holds no image in a format that CoSMic reads.
     """
     for component in buffer.payload.components:
         code = str(component.data_format)
@@ -608,7 +608,7 @@ def _shaped(component: Any, code: str) -> Pixels:
     if _FORMATS[code] is not PixelFormat.RGB8:
         return flat[: height * width].reshape(height, width).copy()
     layers = 4 if "a8" in code else 3
-    picture = flat[: height * width * layers].reshape(height, width, layers)[:, :, :3]
+    image = flat[: height * width * layers].reshape(height, width, layers)[:, :, :3]
     if code.startswith("BGR"):
-        picture = picture[:, :, ::-1]
-    return np.ascontiguousarray(picture) if layers == 4 or code[0] == "B" else picture.copy()
+        image = image[:, :, ::-1]
+    return np.ascontiguousarray(image) if layers == 4 or code[0] == "B" else image.copy()

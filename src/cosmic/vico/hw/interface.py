@@ -12,7 +12,7 @@ Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
 
 class PixelFormat(StrEnum):
-    """How a picture is coded; names are GenICam's."""
+    """How an image is coded; names are GenICam's."""
 
     MONO8 = "Mono8"
     MONO10 = "Mono10"
@@ -30,7 +30,7 @@ class Trigger(StrEnum):
 
 
 class FrameStatus(StrEnum):
-    """Whether a picture can be trusted."""
+    """Whether an image can be trusted."""
 
     COMPLETE = "complete"
     INCOMPLETE = "incomplete"
@@ -77,7 +77,7 @@ class CameraInfo:
 
 @dataclass(frozen=True, slots=True)
 class CameraSettings:
-    """How a camera takes its pictures."""
+    """How a camera takes its images."""
 
     exposure_s: float
     gain_db: float
@@ -126,7 +126,7 @@ class CameraCounters:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One picture as the camera gave it.
+    """One image as the camera gave it.
 
     Attributes
     ----------
@@ -208,13 +208,13 @@ class Camera(Protocol):
 
     @abstractmethod
     def start(self) -> None:
-        """Begin to take pictures; counters begin anew.
+        """Begin to take images; counters begin anew.
 
         Raises
         ------
         DeviceError
             The camera is gone or taken by another program, or `DeviceFault.STATE`: it takes
-            pictures already.
+            images already.
         """
 
     @abstractmethod
@@ -231,7 +231,7 @@ class Camera(Protocol):
 
     @abstractmethod
     def trigger(self) -> None:
-        """Take one picture now, with `Trigger.SOFTWARE`.
+        """Take one image now, with `Trigger.SOFTWARE`.
 
         Raises
         ------
@@ -243,7 +243,7 @@ class Camera(Protocol):
 
     @abstractmethod
     def stop(self) -> None:
-        """End taking pictures; harmless when none are. A `receive` that waits returns None."""
+        """End taking images; harmless when none are. A `receive` that waits returns None."""
 
     @abstractmethod
     def close(self) -> None:

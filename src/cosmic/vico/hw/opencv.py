@@ -1,4 +1,4 @@
-"""USB cameras, films, folders of pictures and network addresses through OpenCV."""
+"""USB cameras, films, folders of images and network addresses through OpenCV."""
 
 import logging
 import math
@@ -35,9 +35,9 @@ logger = logging.getLogger(__name__)
 _FILM_RATES_HZ: Final = Range(0.01, 1000.0)
 _EXPOSURES_S: Final = Range(1e-4, 1.0, 1e-4)
 _RATES_HZ: Final = Range(1.0, 240.0)
-# More pictures than a driver keeps ready; after a start they are old.
+# More images than a driver keeps ready; after a start they are old.
 _KEPT: Final = 5
-# A picture that came faster lay ready.
+# An image that came faster lay ready.
 _READY_S: Final = 2e-3
 _SLICE_S: Final = 0.02
 _EXPOSURE_UNIT_S: Final = 1e-4  # of video4linux's "exposure_time_absolute"
@@ -51,7 +51,7 @@ class OpenCvCamera(BaseCamera):
     Parameters
     ----------
     first : ndarray
-        A picture of it, which tells size and depth.
+        An image of it, which tells size and depth.
     """
 
     exposures_s: Range | None = None
@@ -108,7 +108,7 @@ class OpenCvCamera(BaseCamera):
     ) -> Frame:
         if raw.shape[1::-1] != self._info.sensor_px:
             raise self._error(
-                f"receive: a picture of {raw.shape[1]} x {raw.shape[0]} px came, the first had "
+                f"receive: an image of {raw.shape[1]} x {raw.shape[0]} px came, the first had "
                 f"{self._info.sensor_px[0]} x {self._info.sensor_px[1]}; open it again",
                 DeviceFault.OTHER,
             )
@@ -124,7 +124,7 @@ class OpenCvCamera(BaseCamera):
 
 
 class FilmCamera(OpenCvCamera):
-    """A film or a folder of pictures, played on the platform's clock; none is ever left out.
+    """A film or a folder of images, played on the platform's clock; none is ever left out.
 
     At its end, unless it loops, nothing more comes.
     """
@@ -145,7 +145,7 @@ class FilmCamera(OpenCvCamera):
     @override
     def _write(self, asked: CameraSettings, present: CameraSettings | None) -> None:
         with self._due_changed:
-            # The picture that is under way comes in the time of the new rate.
+            # The image that is under way comes in the time of the new rate.
             due_s = self._due_s + 1.0 / asked.rate_hz - 1.0 / self._in_force.rate_hz
             self._due_s = max(due_s, self._clock.now_s())
             self._in_force = asked
@@ -189,7 +189,7 @@ class FilmCamera(OpenCvCamera):
         return raw
 
     def _wait_until_due(self, wait_s: float) -> bool:
-        """Return whether the next picture is due within `wait_s` of wall time."""
+        """Return whether the next image is due within `wait_s` of wall time."""
         end_s = WALL.now_s() + wait_s
         while not self._stopping.is_set():
             now_s = self._clock.now_s()
@@ -209,7 +209,7 @@ class LiveCamera(OpenCvCamera):
     """A camera that goes on by itself.
 
     Exposure and rate are offered where the device tells its own, and read back: a device that
-    makes something else of a value has refused it. How many pictures were lost, OpenCV does not
+    makes something else of a value has refused it. How many images were lost, OpenCV does not
     tell.
 
     Parameters
@@ -217,7 +217,7 @@ class LiveCamera(OpenCvCamera):
     capture : object
         An opened cv2.VideoCapture.
     reopen : callable
-        Opens another; for addresses, whose line keeps old pictures.
+        Opens another; for addresses, whose line keeps old images.
     """
 
     slice_s = _SLICE_S
@@ -243,7 +243,7 @@ class LiveCamera(OpenCvCamera):
         if not there:
             capture.release()
             raise NotConnectedError(
-                f"{info.key}: it opens but sends no picture; close other programs that use it",
+                f"{info.key}: it opens but sends no image; close other programs that use it",
                 fault=DeviceFault.COMMUNICATION,
             )
         rate_hz = float(capture.get(cv2.CAP_PROP_FPS))
@@ -294,17 +294,17 @@ class LiveCamera(OpenCvCamera):
 
     @override
     def _loss(self) -> str:
-        return f"no picture for {SILENCE_S:g} s, or the line was cut"
+        return f"no image for {SILENCE_S:g} s, or the line was cut"
 
     def _grabbed(self, wait_s: float) -> Raw | None:
-        """Return a picture, None when there is none yet; raises `DeviceError` when it is gone."""
+        """Return an image, None when there is none yet; raises `DeviceError` when it is gone."""
         before_s, asked_s = self._clock.now_s(), WALL.now_s()
         there, raw = self._read_raw(wait_s)
         now_s = WALL.now_s()
         if there:
             self._heard_s = now_s
             waited = now_s - asked_s > _READY_S
-            # Pictures that lay ready are older than this look.
+            # Images that lay ready are older than this look.
             self._stale = 0 if waited and self._stale < _KEPT else self._stale - 1
             if waited:
                 self._empty_s = before_s
@@ -316,7 +316,7 @@ class LiveCamera(OpenCvCamera):
 
     def _read_raw(self, wait_s: float) -> tuple[bool, Raw | None]:
         if not self._can_wait:
-            # OpenCV waits by itself here, until a picture comes or SILENCE_S is over.
+            # OpenCV waits by itself here, until an image comes or SILENCE_S is over.
             there, raw = self._capture.read()
             return bool(there), raw
         try:
@@ -411,7 +411,7 @@ class OpenCvLibrary(BaseCameraLibrary[OpenCvCamera]):
         source = self._sources.get(key, VideoSource(key, loop=True))
         if key not in listed and not _can_be_tried(source):
             raise self._not_there(key, listed, "Check its cable, or the path")
-        if source.kind in (Kind.FILM, Kind.PICTURES):
+        if source.kind in (Kind.FILM, Kind.IMAGES):
             return FilmCamera(source, open_film(source), self._clock, self._forget)
 
         def opened() -> object:

@@ -1,6 +1,6 @@
-"""Where OpenCV gets pictures from, and how it hands them over.
+"""Where OpenCV gets images from, and how it hands them over.
 
-USB cameras and network addresses are captures; video files and folders of pictures are films.
+USB cameras and network addresses are captures; video files and folders of images are films.
 """
 
 import re
@@ -21,10 +21,10 @@ from cosmic.vico.hw.interface import CameraInfo, PixelFormat, Pixels, Roi
 
 SYSFS: Final = Path("/sys/class/video4linux")
 SILENCE_S: Final = 1.5
-"""After so long without a picture a camera counts as gone."""
+"""After so long without an image a camera counts as gone."""
 
 _DEVICE: Final = re.compile(r"(?:/dev/)?video(\d+)")
-_PICTURES_HZ: Final = 15.0
+_IMAGES_HZ: Final = 15.0
 _ENDINGS: Final = (".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm")
 
 Raw = Pixels
@@ -36,25 +36,25 @@ class Kind(StrEnum):
 
     DEVICE = "USB camera"
     FILM = "video file"
-    PICTURES = "folder of pictures"
+    IMAGES = "folder of images"
     ADDRESS = "network address"
 
 
 @dataclass(frozen=True, slots=True)
 class VideoSource:
-    """One source of pictures.
+    """One source of images.
 
     Attributes
     ----------
     address : str
-        ``video0`` for a device by its number, the path of a video file, of a folder of pictures
+        ``video0`` for a device by its number, the path of a video file, of a folder of images
         (in the order of their names), or an address such as ``http://192.168.0.7/video.mjpg``.
     rate_hz : float
-        At which films and pictures are played; 0 is the film's own, or 15 for pictures.
+        At which films and images are played; 0 is the film's own, or 15 for images.
     loop : bool
-        Begin anew at the end; otherwise the last picture is the last.
+        Begin anew at the end; otherwise the last image is the last.
     paced : bool
-        False: a film gives its pictures as fast as they are asked for.
+        False: a film gives its images as fast as they are asked for.
     size_px : (int, int) or None
         What a USB camera is asked to send; None is what it sends by itself.
     """
@@ -72,7 +72,7 @@ class VideoSource:
             return Kind.ADDRESS
         if _DEVICE.fullmatch(self.address):
             return Kind.DEVICE
-        return Kind.PICTURES if Path(self.address).is_dir() else Kind.FILM
+        return Kind.IMAGES if Path(self.address).is_dir() else Kind.FILM
 
     @property
     def device(self) -> int:
@@ -95,7 +95,7 @@ class VideoSource:
 def attached_devices(sysfs: Path = SYSFS) -> tuple[CameraInfo, ...]:
     """Return the video devices that Linux knows; none on other systems.
 
-    A camera shows up twice or more, once for its pictures (index 0) and once for its metadata.
+    A camera shows up twice or more, once for its images (index 0) and once for its metadata.
     """
     found = []
     for folder in sorted(sysfs.glob("video*"), key=lambda each: (len(each.name), each.name)):
@@ -121,12 +121,12 @@ def _text(path: Path) -> str:
 
 
 class Film(ABC):
-    """Pictures in their order; one thread.
+    """Images in their order; one thread.
 
     Attributes
     ----------
     first : ndarray
-        Its first picture, as OpenCV reads it.
+        Its first image, as OpenCV reads it.
     rate_hz : float
         Its own rate.
     """
@@ -136,7 +136,7 @@ class Film(ABC):
 
     @abstractmethod
     def read(self) -> Raw | None:
-        """Return the next picture, None at the end; raises `DeviceError` for a broken one."""
+        """Return the next image, None at the end; raises `DeviceError` for a broken one."""
 
     @abstractmethod
     def rewind(self) -> None:
@@ -156,16 +156,16 @@ class VideoFilm(Film):
         first = self.read() if self._capture.isOpened() else None
         if first is None:
             self.close()
-            raise _unreadable(path, "OpenCV finds no pictures that it can decode in it")
+            raise _unreadable(path, "OpenCV finds no images that it can decode in it")
         self.first = first
         rate_hz = float(self._capture.get(cv2.CAP_PROP_FPS))
-        self.rate_hz = rate_hz if 0.0 < rate_hz < 1e4 else _PICTURES_HZ
+        self.rate_hz = rate_hz if 0.0 < rate_hz < 1e4 else _IMAGES_HZ
         self.rewind()
 
     @override
     def read(self) -> Raw | None:
-        there, picture = self._capture.read()
-        return picture if there else None
+        there, image = self._capture.read()
+        return image if there else None
 
     @override
     def rewind(self) -> None:
@@ -180,8 +180,8 @@ class VideoFilm(Film):
         self._capture.release()
 
 
-class PictureFilm(Film):
-    """A folder of pictures of one size, in the order of their names."""
+class ImageFilm(Film):
+    """A folder of images of one size, in the order of their names."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -189,12 +189,12 @@ class PictureFilm(Film):
             each for each in folder.iterdir() if each.suffix.lower() in _ENDINGS and each.is_file()
         )
         if not self._paths:
-            raise _unreadable(folder, f"it holds no pictures ({', '.join(_ENDINGS)})")
-        self.rate_hz = _PICTURES_HZ
+            raise _unreadable(folder, f"it holds no images ({', '.join(_ENDINGS)})")
+        self.rate_hz = _IMAGES_HZ
         self._next = 0
         first = _decoded(self._paths[0])
         if first is None:
-            raise _unreadable(self._paths[0], "it is no picture of 8 or 16 bits")
+            raise _unreadable(self._paths[0], "it is no image of 8 or 16 bits")
         self.first = first
 
     @override
@@ -205,10 +205,10 @@ class PictureFilm(Film):
         self._next += 1
         if not path.is_file():
             raise _gone(path)
-        picture = _decoded(path)
-        if picture is None or picture.dtype != self.first.dtype:
+        image = _decoded(path)
+        if image is None or image.dtype != self.first.dtype:
             raise _unreadable(path, "it cannot be decoded, or its depth differs from the first")
-        return picture
+        return image
 
     @override
     def rewind(self) -> None:
@@ -220,7 +220,7 @@ class PictureFilm(Film):
 
 
 def open_film(source: VideoSource) -> Film:
-    """Open a film or a folder of pictures.
+    """Open a film or a folder of images.
 
     Raises
     ------
@@ -230,13 +230,13 @@ def open_film(source: VideoSource) -> Film:
     path = Path(source.address)
     if not path.exists():
         raise _gone(path)
-    return PictureFilm(path) if source.kind is Kind.PICTURES else VideoFilm(path)
+    return ImageFilm(path) if source.kind is Kind.IMAGES else VideoFilm(path)
 
 
 def _decoded(path: Path) -> Raw | None:
-    picture: Any = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    known = picture is not None and picture.dtype in (np.uint8, np.uint16)
-    return picture if known else None
+    image: Any = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    known = image is not None and image.dtype in (np.uint8, np.uint16)
+    return image if known else None
 
 
 def _gone(path: Path) -> NotConnectedError:
@@ -284,18 +284,18 @@ def open_capture(source: VideoSource, make: MakeCapture) -> Any:
     return capture
 
 
-def formats_of(picture: Pixels) -> tuple[PixelFormat, ...]:
-    """Return what a picture can be made into, the format nearest to its own first."""
-    if picture.dtype == np.uint16:
+def formats_of(image: Pixels) -> tuple[PixelFormat, ...]:
+    """Return what an image can be made into, the format nearest to its own first."""
+    if image.dtype == np.uint16:
         return (PixelFormat.MONO16, PixelFormat.MONO8)
-    if picture.ndim == 2:
+    if image.ndim == 2:
         return (PixelFormat.MONO8, PixelFormat.RGB8)
     return (PixelFormat.RGB8, PixelFormat.MONO8)
 
 
-def made_of(picture: Pixels, pixel_format: PixelFormat, roi: Roi) -> Pixels:
+def made_of(image: Pixels, pixel_format: PixelFormat, roi: Roi) -> Pixels:
     """Return a read-only copy of the part `roi` in `pixel_format`."""
-    part = picture[roi.y_px : roi.y_px + roi.height_px, roi.x_px : roi.x_px + roi.width_px]
+    part = image[roi.y_px : roi.y_px + roi.height_px, roi.x_px : roi.x_px + roi.width_px]
     shaped = _layers(part, colour=pixel_format is PixelFormat.RGB8)
     wide = pixel_format is PixelFormat.MONO16
     if shaped.dtype == np.uint16 and not wide:

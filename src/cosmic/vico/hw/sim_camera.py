@@ -106,7 +106,7 @@ class CameraRun:
         self.settings = settings
 
     def expose(self, now_s: float, busy_s: float) -> None:
-        """Take one picture, when the one before is out of the way.
+        """Take one image, when the one before is out of the way.
 
         Parameters
         ----------

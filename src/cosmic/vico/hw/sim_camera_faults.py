@@ -35,7 +35,7 @@ class CameraFaults:
     - `taken`: another program has the camera; it can be listed, not opened.
     - `incomplete`: frames arrive with parts missing.
     - `lost`: frames do not arrive.
-    - `frozen`: frames arrive in time with the same picture again and again.
+    - `frozen`: frames arrive in time with the same image again and again.
     - `slow`: frames arrive half a second late.
     """
 

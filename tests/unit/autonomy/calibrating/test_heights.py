@@ -1,4 +1,4 @@
-"""Heights from where plate and tips are in focus, on pictures that blur as a lens does."""
+"""Heights from where plate and tips are in focus, on images that blur as a lens does."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -16,7 +16,7 @@ from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.frame.clock import ManualClock
 from cosmic.vico.api.lens import LensHandle
-from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.core.tool_settings import ToolSettings
 from cosmic.vico.hw.peripherals import LensState
 from unit.autonomy.handling.test_push import GRIPPER, PROBE, Done
@@ -84,7 +84,7 @@ class Bench(HandlingContext):
         return Moved()
 
     @override
-    def picture(self) -> Any:
+    def image(self) -> Any:
         focus_um = (self.lens.counts - PLATE_COUNTS) * UM_COUNT + LYING_UM
         image = np.full((60, 80), 165.0)
         if self.with_fibre:
@@ -96,7 +96,7 @@ class Bench(HandlingContext):
             image = self._drawn(image, (30, 38), 700.0 - 25.0 + self.probe_up - focus_um)
         noisy = image + self.random.normal(0.0, 0.3, image.shape)
         frame: Any = SimpleNamespace(data=np.clip(noisy, 0, 255).astype(np.uint8), exposed_s=0.0)
-        return Done(Picture("top", frame, Circumstances()))
+        return Done(CameraImage("top", frame, Circumstances()))
 
     def _drawn(self, image: Any, rows: tuple[int, int], off_um: float) -> Any:
         dark = np.zeros_like(image)

@@ -138,7 +138,7 @@ def test_the_contact_is_allowed_while_it_lasts_and_the_limit_armed() -> None:
     assert not bench.calibration.touching
 
 
-def test_what_is_far_from_where_the_picture_shows_it_is_refused_with_numbers() -> None:
+def test_what_is_far_from_where_the_image_shows_it_is_refused_with_numbers() -> None:
     bench = Bench(off_um=13.0, seen_um=1.0)
     with pytest.raises(OperationFailed, match=r"disagree by 12\.\d um, at most 10 um") as failed:
         carried_out(bench)
@@ -166,7 +166,7 @@ def test_steps_that_are_too_long_to_be_safe_are_noticed_before_anything_is_touch
     assert bench.peak_un == 0.0
 
 
-def test_without_a_picture_of_both_nothing_is_touched() -> None:
+def test_without_a_image_of_both_nothing_is_touched() -> None:
     bench = Bench()
     del bench.calibration.made[PROBE]
     with pytest.raises(OperationFailed, match="see probe and gripper"):

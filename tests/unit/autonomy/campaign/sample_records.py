@@ -1,4 +1,4 @@
-"""Records such as a campaign makes, from simulated pushes and drawn pictures."""
+"""Records such as a campaign makes, from simulated pushes and drawn images."""
 
 import math
 from functools import cache
@@ -10,11 +10,11 @@ from cosmic.autonomy.bending.plan import plan_spans
 from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.campaign.records import (
+    CameraImage,
     CampaignInfo,
     FibreRecord,
     OperationRecord,
     Outcome,
-    Picture,
     Pose,
     Series,
     Shape,
@@ -51,8 +51,8 @@ def measured(ei_n_m2: float = 5e-11, seed: int = 0) -> tuple[tuple[Span, ...], B
     return spans, fit_bending(spans)
 
 
-def picture(seed: int = 0, size: tuple[int, int] = (240, 320)) -> Picture:
-    """Return a picture of a bow, dark on light."""
+def image(seed: int = 0, size: tuple[int, int] = (240, 320)) -> CameraImage:
+    """Return an image of a bow, dark on light."""
     rng = np.random.default_rng(seed)
     y, x = np.mgrid[: size[0], : size[1]].astype(float)
     bow = size[0] / 2 + 30.0 * np.sin(x / size[1] * math.pi + seed)
@@ -60,7 +60,7 @@ def picture(seed: int = 0, size: tuple[int, int] = (240, 320)) -> Picture:
     grey = np.where(inside, 70.0, 165.0) + 3.0 * rng.standard_normal(size)
     pixels = grey.astype(np.uint8)
     region = (40, int(bow.min()) - 5, size[1] - 80, int(np.ptp(bow)) + 10)
-    return Picture("before grasp", pixels, 12.0, 7.6, 0.58, 0.0, 50.0, region)
+    return CameraImage("before grasp", pixels, 12.0, 7.6, 0.58, 0.0, 50.0, region)
 
 
 def good(
@@ -86,7 +86,7 @@ def good(
         peak_force_un=max(each.peak_un for each in result.spans),
         bending=result,
         spans=spans,
-        pictures=(picture(seed),),
+        images=(image(seed),),
         operations=tuple(steps),
         series=(
             Series("left.x", "um", times, np.cumsum(rng.standard_normal(60))),
@@ -105,9 +105,9 @@ def failed(number: int, cause: str = "missed grasp", *, began_s: float = 0.0) ->
         found=Pose(300.0 * number, 400.0, -40.0),
         shape=Shape(1500.0, 8.0, 28.0, 0.2),
         cause=cause,
-        text="the fibre did not follow the jaws in 4 tries: look at its picture",
+        text="the fibre did not follow the jaws in 4 tries: look at its image",
         attempts=4,
-        pictures=(picture(number),),
+        images=(image(number),),
         operations=(
             OperationRecord("approach", began_s, began_s + 2.0),
             OperationRecord("close", began_s + 2.0, began_s + 3.0, 1, cause, "try 1"),

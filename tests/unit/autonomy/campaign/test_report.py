@@ -118,7 +118,7 @@ def test_a_lost_file_costs_its_fibre_the_figures_and_no_more(tmp_path: Path) -> 
         for _ in range(2):
             store.finish_fibre(good(store.begin_fibre(time_s=0.0)))
         (tmp_path / "run" / "fibres" / "00001.h5").unlink()
-        (tmp_path / "run" / "fibres" / "00002-00.png").write_bytes(b"no picture")
+        (tmp_path / "run" / "fibres" / "00002-00.png").write_bytes(b"no image")
         write_report(store, tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "00001.h5 cannot be read" in text

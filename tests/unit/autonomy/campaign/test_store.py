@@ -54,9 +54,9 @@ def test_what_is_written_is_read_back_whole(store: CampaignStore) -> None:
         np.testing.assert_array_equal(fit.fitted_un, same.fitted_un)
         assert fit.k_un_um == same.k_un_um
         assert fit.flags == same.flags
-    np.testing.assert_array_equal(read.pictures[0].pixels, record.pictures[0].pixels)
-    assert read.pictures[0].scale_um_px == 7.6
-    assert read.pictures[0].region_px == record.pictures[0].region_px
+    np.testing.assert_array_equal(read.images[0].pixels, record.images[0].pixels)
+    assert read.images[0].scale_um_px == 7.6
+    assert read.images[0].region_px == record.images[0].region_px
     assert {each.name: each.unit for each in read.series} == {"left.x": "um", "force": "uN"}
 
 
@@ -282,7 +282,7 @@ def test_a_writer_killed_at_any_moment_loses_and_doubles_nothing(
     for each in finished:
         whole = CampaignReader(tmp_path).fibre(each.number)
         assert whole.series[0].values[-1] == each.peak_force_un
-        assert whole.pictures[0].pixels.shape == (200, 200)
+        assert whole.images[0].pixels.shape == (200, 200)
     with CampaignStore.open(tmp_path) as store:
         store.interrupt_running()
         outcomes = {each.outcome for each in store.reader.fibres()}

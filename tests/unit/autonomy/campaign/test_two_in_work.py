@@ -56,7 +56,7 @@ class Desk:
                 failures=[],
             )
         self.store = CampaignStore.create(folder, INFO, time_s=0.0)
-        self.recorder = FibreRecorder(self.work, self.store, measures=False, pictures=False)
+        self.recorder = FibreRecorder(self.work, self.store, measures=False, images=False)
 
     def take(self, arm: str, number: int) -> HeldFibre:
         way = np.linspace(-600.0, 600.0, 20)

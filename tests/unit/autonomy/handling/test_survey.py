@@ -44,7 +44,7 @@ class Peak:
 
 
 class Seen:
-    """A fibre on a picture, as much of it as a survey looks at."""
+    """A fibre on an image, as much of it as a survey looks at."""
 
     def __init__(
         self,
@@ -78,7 +78,7 @@ def looked(*seen: Seen) -> Bench:
         (Seen(0.0, 0.0, length_um=5000.0), survey.TOO_LONG),
         (Seen(0.0, 0.0, curl=0.4), survey.TOO_CURLED),
         (Seen(0.0, 0.0, doubts=("a crossing can be read in two ways",)), survey.CROSSING),
-        (Seen(0.0, 0.0, doubts=("the picture's border cuts it off",)), survey.OUT_OF_FIELD),
+        (Seen(0.0, 0.0, doubts=("the image's border cuts it off",)), survey.OUT_OF_FIELD),
         (Seen(0.0, 0.0, doubts=("it runs into something wider",)), survey.NOT_CERTAIN),
     ],
 )

@@ -1,25 +1,25 @@
-"""Where things lie in the picture, and how sharp they are there."""
+"""Where things lie in the image, and how sharp they are there."""
 
 import math
 
 import numpy as np
 import pytest
 
-from unit.twin.optics.picture_bench import PictureBench
+from unit.twin.optics.image_bench import ImageBench
 
 
-def scale_um_px(bench: PictureBench, height_um: float = 0.0) -> float:
+def scale_um_px(bench: ImageBench, height_um: float = 0.0) -> float:
     here, there = bench.px(0.0, 0.0, height_um), bench.px(100.0, 0.0, height_um)
     return 100.0 / math.hypot(*(there - here))
 
 
 @pytest.mark.parametrize(("magnification", "um_px"), [(0.58, 7.586), (2.0, 2.2), (7.0, 0.6286)])
 def test_the_scale_is_that_of_pixel_and_magnification(magnification: float, um_px: float) -> None:
-    assert scale_um_px(PictureBench().zoom(magnification)) == pytest.approx(um_px, rel=1e-3)
+    assert scale_um_px(ImageBench().zoom(magnification)) == pytest.approx(um_px, rel=1e-3)
 
 
 def test_zoom_grows_by_equal_factors_over_its_counts() -> None:
-    bench = PictureBench()
+    bench = ImageBench()
     scales = []
     for part in (0.0, 0.5, 1.0):
         bench._turn("zoom", part)
@@ -28,7 +28,7 @@ def test_zoom_grows_by_equal_factors_over_its_counts() -> None:
 
 
 def test_x_runs_to_the_right_and_y_upwards_turned_by_the_mounting() -> None:
-    bench = PictureBench().zoom(2.0)
+    bench = ImageBench().zoom(2.0)
     x_way = bench.px(100.0, 0.0, 0.0) - bench.px(0.0, 0.0, 0.0)
     y_way = bench.px(0.0, 100.0, 0.0) - bench.px(0.0, 0.0, 0.0)
     assert x_way[0] > 40.0
@@ -37,33 +37,33 @@ def test_x_runs_to_the_right_and_y_upwards_turned_by_the_mounting() -> None:
     assert x_way @ y_way == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_middle_of_the_picture_is_beside_the_origin_and_wanders_with_the_zoom() -> None:
-    bench = PictureBench()
+def test_the_middle_of_the_image_is_beside_the_origin_and_wanders_with_the_zoom() -> None:
+    bench = ImageBench()
     wide = bench.px(60.0, -45.0, 0.0)
     assert np.allclose(wide, [799.5, 599.5])
     assert np.allclose(bench.zoom(7.0).px(60.0, -45.0, 0.0) - wide, [14.0, -9.0])
 
 
 def test_what_lies_higher_looks_larger() -> None:
-    bench = PictureBench()
+    bench = ImageBench()
     ratio = scale_um_px(bench, 0.0) / scale_um_px(bench, 1500.0)
     assert ratio == pytest.approx(86.0 / 84.5)
 
 
-def test_a_part_of_the_sensor_and_binning_shift_and_shrink_the_picture() -> None:
+def test_a_part_of_the_sensor_and_binning_shift_and_shrink_the_image() -> None:
     class Roi:
         x_px, y_px, width_px, height_px = 96, 40, 400, 300
 
-    bench = PictureBench()
+    bench = ImageBench()
     whole = bench.px(500.0, 700.0, 0.0)
-    part = bench.optics.world_to_picture_px((500.0, 700.0, 0.0), bench.now_s, Roi(), 1)
-    binned = bench.optics.world_to_picture_px((500.0, 700.0, 0.0), bench.now_s, Roi(), 2)
+    part = bench.optics.world_to_image_px((500.0, 700.0, 0.0), bench.now_s, Roi(), 1)
+    binned = bench.optics.world_to_image_px((500.0, 700.0, 0.0), bench.now_s, Roi(), 2)
     assert np.allclose(part, whole - [96, 40])
     assert np.allclose(binned, (whole + 0.5) / 2 - 0.5 - [96, 40])
 
 
 def test_sharpness_falls_off_around_the_focus_and_faster_at_high_zoom() -> None:
-    bench = PictureBench().focus(200.0)
+    bench = ImageBench().focus(200.0)
     widths = []
     for magnification in (0.58, 5.0):
         bench.zoom(magnification)
@@ -76,7 +76,7 @@ def test_sharpness_falls_off_around_the_focus_and_faster_at_high_zoom() -> None:
 
 
 def test_several_points_are_told_at_once() -> None:
-    bench = PictureBench()
+    bench = ImageBench()
     points = np.array([[0.0, 0.0, 0.0], [10.0, 20.0, 30.0]])
-    found = bench.optics.world_to_picture_px(points, bench.now_s)
+    found = bench.optics.world_to_image_px(points, bench.now_s)
     assert np.allclose(found, [bench.px(*points[0]), bench.px(*points[1])])

@@ -14,7 +14,7 @@ class FakeDevice:
     Attributes
     ----------
     ready : int
-        Pictures that wait in the driver.
+        Images that wait in the driver.
     stubborn : set of int
         Properties that keep their value whatever is set.
     most : dict of int to float

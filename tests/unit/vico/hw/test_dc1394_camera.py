@@ -97,7 +97,7 @@ def test_two_cameras_run_at_once(library: Dc1394Library, camera: Camera) -> None
 
 
 @needs_compiler
-def test_the_picture_is_the_one_that_the_camera_sent(camera: Camera) -> None:
+def test_the_image_is_the_one_that_the_camera_sent(camera: Camera) -> None:
     camera.start()
     first, second = some(camera, 2)
     rows, columns = np.ogrid[:240, :320]

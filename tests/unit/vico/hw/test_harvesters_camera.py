@@ -44,7 +44,7 @@ def camera(device: FakeGenTL, told: list[Camera]) -> Iterator[HarvestersCamera]:
     assert told == [made]
 
 
-def picture(frame_id: int) -> Buffer:
+def image(frame_id: int) -> Buffer:
     return Buffer(frame_id, np.full((480, 640), 7, np.uint8), "Mono8")
 
 
@@ -144,7 +144,7 @@ def test_what_the_camera_itself_refuses_is_put_back(
 
 
 def test_a_frame_outlives_its_buffer(camera: HarvestersCamera, device: FakeGenTL) -> None:
-    buffer = picture(12)
+    buffer = image(12)
     device.buffers.append(buffer)
     camera.start()
     frame = camera.receive(0.0)
@@ -170,7 +170,7 @@ def test_a_colour_in_the_wrong_order_is_turned_round(
 def test_gaps_in_the_numbers_are_counted_also_where_they_begin_anew(
     camera: HarvestersCamera, device: FakeGenTL
 ) -> None:
-    device.buffers += [picture(number) for number in (65530, 65533, 65535, 1, 2)]
+    device.buffers += [image(number) for number in (65530, 65533, 65535, 1, 2)]
     camera.start()
     ids = [frame.frame_id for _ in range(5) if (frame := camera.receive(0.0)) is not None]
     assert ids == [0, 3, 5, 6, 7]
@@ -181,7 +181,7 @@ def test_a_frame_with_parts_missing_is_counted_and_not_taken_for_good(
     camera: HarvestersCamera, device: FakeGenTL, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     camera.start()
-    device.buffers.append(picture(1))
+    device.buffers.append(image(1))
     camera.receive(0.0)
 
     def incomplete(*, timeout: float) -> None:
@@ -192,7 +192,7 @@ def test_a_frame_with_parts_missing_is_counted_and_not_taken_for_good(
         frame = camera.receive(0.0)
     assert frame is not None
     assert (frame.status, frame.frame_id) == (FrameStatus.INCOMPLETE, 1)
-    device.buffers.append(picture(3))
+    device.buffers.append(image(3))
     after = camera.receive(0.0)
     assert after is not None and after.frame_id == 2
     assert (camera.counters.failed, camera.counters.lost) == (1, 0)

@@ -1,4 +1,4 @@
-"""Films, folders of pictures and addresses through OpenCV."""
+"""Films, folders of images and addresses through OpenCV."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from contract.cameras.mjpeg_server import MjpegServer
-from contract.cameras.opencv import HEIGHT, WIDTH, pattern, write_film, write_pictures
+from contract.cameras.opencv import HEIGHT, WIDTH, pattern, write_film, write_images
 from cosmic.frame.clock import ManualClock, RatedClock
 from cosmic.frame.errors import DeviceError, NotConnectedError
 from cosmic.vico.hw.interface import Frame, PixelFormat, Roi
@@ -28,7 +28,7 @@ def all_of(camera: OpenCvCamera) -> list[Frame]:
 
 
 @pytest.mark.parametrize("ending", ["avi", "mkv"])
-def test_a_lossless_film_gives_its_pictures_bit_by_bit(tmp_path: Path, ending: str) -> None:
+def test_a_lossless_film_gives_its_images_bit_by_bit(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"film.{ending}"
     write_film(path, 12)
     camera = opened(VideoSource(str(path), paced=False))
@@ -69,7 +69,7 @@ def test_a_film_is_played_at_its_own_rate_on_the_platforms_clock(tmp_path: Path)
 
 
 def test_at_its_end_a_film_gives_nothing_more_and_a_loop_begins_anew(tmp_path: Path) -> None:
-    write_pictures(tmp_path / "pictures", 3)
+    write_images(tmp_path / "pictures", 3)
     for loop, expected in ((False, [0, 1, 2]), (True, [0, 1, 2, 0, 1])):
         camera = opened(VideoSource(str(tmp_path / "pictures"), loop=loop, paced=False))
         camera.start()
@@ -84,10 +84,10 @@ def test_at_its_end_a_film_gives_nothing_more_and_a_loop_begins_anew(tmp_path: P
         camera.close()
 
 
-def test_pictures_come_in_the_order_of_their_names_and_other_files_are_left_out(
+def test_images_come_in_the_order_of_their_names_and_other_files_are_left_out(
     tmp_path: Path,
 ) -> None:
-    write_pictures(tmp_path / "p", 11)
+    write_images(tmp_path / "p", 11)
     (tmp_path / "p" / "notes.txt").write_text("nothing to see")
     camera = opened(VideoSource(str(tmp_path / "p"), rate_hz=7.0, paced=False))
     assert camera.settings.rate_hz == 7.0
@@ -98,7 +98,7 @@ def test_pictures_come_in_the_order_of_their_names_and_other_files_are_left_out(
     camera.close()
 
 
-def test_pictures_of_16_bits_stay_so_and_can_be_had_in_8(tmp_path: Path) -> None:
+def test_images_of_16_bits_stay_so_and_can_be_had_in_8(tmp_path: Path) -> None:
     deep = pattern(0).astype(np.uint16) * 257
     cv2.imwrite(str(tmp_path / "a.tif"), deep)
     camera = opened(VideoSource(str(tmp_path), paced=False))
@@ -131,18 +131,18 @@ def test_what_is_no_film_is_named_with_the_reason(tmp_path: Path) -> None:
     (tmp_path / "film.mkv").write_bytes(b"this is no film" * 100)
     (tmp_path / "empty").mkdir()
     (tmp_path / "broken").mkdir()
-    (tmp_path / "broken" / "a.png").write_bytes(b"no picture")
+    (tmp_path / "broken" / "a.png").write_bytes(b"no image")
     for name, reason in (
-        ("film.mkv", "no pictures"),
-        ("empty", "holds no pictures"),
-        ("broken", "no picture of 8 or 16 bits"),
+        ("film.mkv", "no images"),
+        ("empty", "holds no images"),
+        ("broken", "no image of 8 or 16 bits"),
         ("gone.mkv", "cannot open a camera"),
     ):
         with pytest.raises(NotConnectedError, match=reason):
             opened(VideoSource(str(tmp_path / name)))
 
 
-def test_a_picture_of_another_size_ends_the_reception(tmp_path: Path) -> None:
+def test_a_image_of_another_size_ends_the_reception(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "a.png"), pattern(0))
     cv2.imwrite(str(tmp_path / "b.png"), pattern(0)[:50])
     camera = opened(VideoSource(str(tmp_path), paced=False))
@@ -172,7 +172,7 @@ def test_an_address_that_does_not_answer_says_so_soon() -> None:
         opened(VideoSource(server.address))
 
 
-def test_pictures_of_an_address_are_new_at_every_start() -> None:
+def test_images_of_an_address_are_new_at_every_start() -> None:
     flat = [np.full((48, 64), level, np.uint8) for level in range(0, 250, 5)]
     server = MjpegServer(flat, rate_hz=100.0)
     try:

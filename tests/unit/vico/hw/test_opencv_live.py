@@ -59,7 +59,7 @@ def test_a_device_that_another_program_has_says_so(sysfs: Path, device: FakeDevi
         library.open("video2")
 
 
-def test_pictures_from_before_the_start_are_left_out(camera: Camera, device: FakeDevice) -> None:
+def test_images_from_before_the_start_are_left_out(camera: Camera, device: FakeDevice) -> None:
     camera.start()
     received = threading.Event()
     frames = []

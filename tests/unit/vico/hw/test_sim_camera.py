@@ -205,7 +205,7 @@ def test_the_second_camera_is_another_view(stand: Stand) -> None:
     assert not np.array_equal(frames[0].data, frames[1].data)  # type: ignore[union-attr]
 
 
-def test_sixteen_bits_and_binning_reach_the_picture(stand: Stand) -> None:
+def test_sixteen_bits_and_binning_reach_the_image(stand: Stand) -> None:
     camera = stand.open(binning=2, roi=Roi(0, 0, 800, 600), pixel_format=PixelFormat.MONO16)
     camera.start()
     (frame,) = stand.after(camera, 0.1)[:1]
@@ -292,7 +292,7 @@ def test_lost_frames_leave_gaps_that_the_seed_decides() -> None:
     assert ids(1) == ids(1) != ids(2)
 
 
-def test_a_frozen_camera_shows_the_same_picture_with_new_numbers(stand: Stand) -> None:
+def test_a_frozen_camera_shows_the_same_image_with_new_numbers(stand: Stand) -> None:
     camera = stand.open()
     camera.start()
     before = stand.after(camera, 2 * PERIOD_S)[-1]
@@ -328,7 +328,7 @@ def test_nan_is_no_exposure(stand: Stand) -> None:
     assert camera.settings == before
 
 
-def test_a_picture_that_nobody_looks_at_is_not_drawn(
+def test_a_image_that_nobody_looks_at_is_not_drawn(
     stand: Stand, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     camera = stand.open()

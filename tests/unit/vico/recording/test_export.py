@@ -1,23 +1,23 @@
-"""Recordings of pictures in another format."""
+"""Recordings of images in another format."""
 
 import numpy as np
 import pytest
 
 from cosmic.frame.errors import ExportCancelled, RecordingError, RecordingExistsError
-from cosmic.vico.core.recording.export import export_pictures
-from cosmic.vico.core.recording.formats import PictureFormat
-from cosmic.vico.core.recording.picture_file import PictureFile
-from cosmic.vico.core.recording.reading import open_picture_recording
+from cosmic.vico.core.recording.export import export_images
+from cosmic.vico.core.recording.formats import ImageFormat
+from cosmic.vico.core.recording.image_file import ImageFile
+from cosmic.vico.core.recording.reading import open_image_recording
 from cosmic.vico.core.recording.side_row import row_of
 from cosmic.vico.hw.interface import PixelFormat
-from unit.vico.recording.picture_helpers import AXES, pictures
+from unit.vico.recording.image_helpers import AXES, images
 
 
 @pytest.fixture
 def make(tmp_path):
-    def make(picture_format=PictureFormat.FFV1, name="run", count=6, **how):
-        file = PictureFile(tmp_path / name, picture_format, axes=AXES)
-        for shot in pictures(count, **how):
+    def make(image_format=ImageFormat.FFV1, name="run", count=6, **how):
+        file = ImageFile(tmp_path / name, image_format, axes=AXES)
+        for shot in images(count, **how):
             file.append(shot.data, row_of(shot, None))
         file.close(complete=True)
         return file.path
@@ -29,18 +29,18 @@ def names(directory):
     return sorted(str(each.relative_to(directory)) for each in directory.rglob("*"))
 
 
-@pytest.mark.parametrize("to", PictureFormat)
-def test_an_export_has_the_same_pictures_and_rows(tmp_path, make, to):
-    path = make(PictureFormat.FAST)
+@pytest.mark.parametrize("to", ImageFormat)
+def test_an_export_has_the_same_images_and_rows(tmp_path, make, to):
+    path = make(ImageFormat.FAST)
     told = []
-    out = export_pictures(path, to, progress=told.append)
+    out = export_images(path, to, progress=told.append)
     assert out == tmp_path / f"run_{to}{'' if to in {'tiff', 'png'} else out.suffix}"
     assert told == [0.0, *(pytest.approx(number / 6) for number in range(1, 7))]
-    with open_picture_recording(path) as before, open_picture_recording(out) as after:
+    with open_image_recording(path) as before, open_image_recording(out) as after:
         assert after.complete
         assert after.rows == before.rows
         assert after.axes == AXES
-        if to is not PictureFormat.SMALL:
+        if to is not ImageFormat.SMALL:
             for one, other in zip(before, after, strict=True):
                 np.testing.assert_array_equal(one.data, other.data)
     if out.is_dir():
@@ -48,22 +48,22 @@ def test_an_export_has_the_same_pictures_and_rows(tmp_path, make, to):
     assert not [each for each in names(tmp_path) if "export" in each]
 
 
-@pytest.mark.parametrize("to", [PictureFormat.FFV1, PictureFormat.TIFF])
+@pytest.mark.parametrize("to", [ImageFormat.FFV1, ImageFormat.TIFF])
 def test_a_cancelled_export_leaves_nothing(tmp_path, make, to):
-    path = make(PictureFormat.FAST)
+    path = make(ImageFormat.FAST)
     before = names(tmp_path)
     with pytest.raises(ExportCancelled, match="cancelled"):
-        export_pictures(path, to, progress=lambda fraction: fraction < 0.5)
+        export_images(path, to, progress=lambda fraction: fraction < 0.5)
     assert names(tmp_path) == before
 
 
 def test_what_is_there_is_replaced_only_when_asked_to(tmp_path, make):
     path = make()
-    for to in (PictureFormat.TIFF, PictureFormat.FAST):
-        export_pictures(path, to)
+    for to in (ImageFormat.TIFF, ImageFormat.FAST):
+        export_images(path, to)
         with pytest.raises(RecordingExistsError, match="may be replaced"):
-            export_pictures(path, to)
-        export_pictures(path, to, overwrite=True)
+            export_images(path, to)
+        export_images(path, to, overwrite=True)
 
 
 def test_files_of_others_are_never_replaced(tmp_path, make):
@@ -71,29 +71,29 @@ def test_files_of_others_are_never_replaced(tmp_path, make):
     (tmp_path / "run_tiff").mkdir()
     (tmp_path / "run_tiff" / "notes.txt").touch()
     with pytest.raises(RecordingError, match="there are other files"):
-        export_pictures(path, "tiff", overwrite=True)
+        export_images(path, "tiff", overwrite=True)
     with pytest.raises(RecordingError, match="onto itself"):
-        export_pictures(path, "ffv1", path, overwrite=True)
+        export_images(path, "ffv1", path, overwrite=True)
     with pytest.raises(RecordingError, match="onto itself"):
-        export_pictures(path, "png", tmp_path / "run", overwrite=True)
-    with open_picture_recording(path) as found:
+        export_images(path, "png", tmp_path / "run", overwrite=True)
+    with open_image_recording(path) as found:
         assert len(found) == 6
 
 
 def test_formats_that_do_not_fit_are_told(make):
     path = make(pixel_format=PixelFormat.MONO12)
     with pytest.raises(RecordingError, match="small cannot keep Mono12"):
-        export_pictures(path, "small")
+        export_images(path, "small")
     with pytest.raises(RecordingError, match="cannot export to 'csv'; there are ffv1"):
-        export_pictures(path, "csv")
+        export_images(path, "csv")
 
 
 def test_a_recording_cut_off_is_exported_as_far_as_it_goes(tmp_path, make):
     path = make(count=10)
     side = tmp_path / "run.csv"
     side.write_text("".join(side.read_text().splitlines(keepends=True)[:4]))
-    out = export_pictures(path, "png")
-    with open_picture_recording(out) as found:
+    out = export_images(path, "png")
+    with open_image_recording(out) as found:
         assert len(found) == 10
         assert [row.status for row in found.rows] == ["complete"] * 3 + ["unknown"] * 7
         assert np.diff(found.time_s) == pytest.approx(1 / 20.0)

@@ -1,4 +1,4 @@
-"""`save_picture`: a file that other programs read, with its scale."""
+"""`save_image`: a file that other programs read, with its scale."""
 
 import struct
 import zlib
@@ -10,10 +10,10 @@ import pytest
 import tifffile
 
 from cosmic.frame.errors import RecordingError, RecordingExistsError
-from cosmic.vico.core.recording.snap import save_picture
+from cosmic.vico.core.recording.snap import save_image
 from cosmic.vico.core.recording.tiff_png import encoded_png
 from cosmic.vico.hw.interface import FrameStatus, PixelFormat
-from unit.vico.recording.picture_helpers import AXES, noise, picture
+from unit.vico.recording.image_helpers import AXES, image, noise
 
 UTC_NOW = datetime(2026, 5, 4, 9, 8, 7, 123456, tzinfo=UTC)
 
@@ -34,8 +34,8 @@ def chunks(path):
 @pytest.mark.parametrize("pixel_format", PixelFormat)
 @pytest.mark.parametrize("name", ["a.tif", "a.TIFF", "a.png"])
 def test_a_snap_keeps_every_bit(tmp_path, name, pixel_format):
-    shot = picture(data=noise(pixel_format), pixel_format=pixel_format)
-    path = save_picture(shot, tmp_path / name)
+    shot = image(data=noise(pixel_format), pixel_format=pixel_format)
+    path = save_image(shot, tmp_path / name)
     if name.endswith("png"):
         read = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
         read = read[:, :, ::-1] if read.ndim == 3 else read
@@ -47,7 +47,7 @@ def test_a_snap_keeps_every_bit(tmp_path, name, pixel_format):
 
 
 def test_a_tiff_says_its_scale_and_circumstances(tmp_path):
-    path = save_picture(picture(7), tmp_path / "a.tif", axes=AXES, utc=UTC_NOW)
+    path = save_image(image(7), tmp_path / "a.tif", axes=AXES, utc=UTC_NOW)
     with tifffile.TiffFile(path) as file:
         page = file.pages[0]
         assert page.tags["ResolutionUnit"].value == tifffile.RESUNIT.CENTIMETER
@@ -69,7 +69,7 @@ def test_a_tiff_says_its_scale_and_circumstances(tmp_path):
 
 
 def test_a_png_says_its_scale_and_circumstances(tmp_path):
-    path = save_picture(picture(7), tmp_path / "a.png", axes=AXES, utc=UTC_NOW)
+    path = save_image(image(7), tmp_path / "a.png", axes=AXES, utc=UTC_NOW)
     found = chunks(path)
     assert found[0][0] == "IHDR"
     (pixels_a_metre,) = [body for kind, body in found if kind == "pHYs"]
@@ -82,7 +82,7 @@ def test_a_png_says_its_scale_and_circumstances(tmp_path):
 
 @pytest.mark.parametrize("name", ["a.tif", "a.png"])
 def test_without_a_known_scale_none_is_said(tmp_path, name):
-    path = save_picture(picture(scale_um_px=None), tmp_path / name)
+    path = save_image(image(scale_um_px=None), tmp_path / name)
     if name.endswith("png"):
         assert "pHYs" not in [kind for kind, _ in chunks(path)]
     else:
@@ -92,11 +92,11 @@ def test_without_a_known_scale_none_is_said(tmp_path, name):
 
 
 def test_a_snap_that_is_there_is_replaced_only_when_asked_to(tmp_path):
-    path = save_picture(picture(0), tmp_path / "a.png")
+    path = save_image(image(0), tmp_path / "a.png")
     with pytest.raises(RecordingExistsError, match="may be replaced"):
-        save_picture(picture(1), path)
-    save_picture(picture(1), path, overwrite=True)
-    np.testing.assert_array_equal(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), picture(1).data)
+        save_image(image(1), path)
+    save_image(image(1), path, overwrite=True)
+    np.testing.assert_array_equal(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), image(1).data)
 
 
 @pytest.mark.parametrize(
@@ -109,12 +109,12 @@ def test_a_snap_that_is_there_is_replaced_only_when_asked_to(tmp_path):
 )
 def test_a_path_that_cannot_be_is_refused(tmp_path, name, said):
     with pytest.raises(RecordingError, match=said):
-        save_picture(picture(), tmp_path / name)
+        save_image(image(), tmp_path / name)
 
 
-def test_an_incomplete_picture_is_not_saved(tmp_path):
-    with pytest.raises(RecordingError, match="parts of the picture are missing"):
-        save_picture(picture(status=FrameStatus.INCOMPLETE), tmp_path / "a.png")
+def test_an_incomplete_image_is_not_saved(tmp_path):
+    with pytest.raises(RecordingError, match="parts of the image are missing"):
+        save_image(image(status=FrameStatus.INCOMPLETE), tmp_path / "a.png")
 
 
 def test_a_disk_that_is_full_leaves_nothing_behind(tmp_path, monkeypatch):
@@ -124,7 +124,7 @@ def test_a_disk_that_is_full_leaves_nothing_behind(tmp_path, monkeypatch):
 
     monkeypatch.setattr("pathlib.Path.write_bytes", full)
     with pytest.raises(RecordingError, match="No space left on device"):
-        save_picture(picture(), tmp_path / "a.png")
+        save_image(image(), tmp_path / "a.png")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -1,4 +1,4 @@
-"""`TimeLapse`: a picture each interval of platform time, late ones counted."""
+"""`TimeLapse`: an image each interval of platform time, late ones counted."""
 
 import math
 
@@ -12,7 +12,7 @@ def chosen(lapse, times_s):
     return [time_s for time_s in times_s if lapse.take(time_s)]
 
 
-def test_a_picture_is_taken_at_each_interval_so_many_times():
+def test_a_image_is_taken_at_each_interval_so_many_times():
     lapse = TimeLapse(TimeLapsePlan(interval_s=2.0, count=3), start_s=10.0)
     assert chosen(lapse, [9.0 + 0.5 * step for step in range(20)]) == [10.0, 12.0, 14.0]
     assert (lapse.taken, lapse.late, lapse.missed) == (3, 0, 0)
@@ -33,13 +33,13 @@ def test_without_an_end_it_goes_on():
     assert not lapse.done
 
 
-def test_a_late_picture_is_counted_and_delays_no_other():
+def test_a_late_image_is_counted_and_delays_no_other():
     lapse = TimeLapse(TimeLapsePlan(interval_s=1.0), start_s=0.0, late_after_s=0.2)
     assert chosen(lapse, [0.1, 1.5, 1.9, 2.1, 3.0]) == [0.1, 1.5, 2.1, 3.0]
     assert lapse.late == 1
 
 
-def test_times_that_pass_without_a_picture_are_counted_as_missed():
+def test_times_that_pass_without_a_image_are_counted_as_missed():
     lapse = TimeLapse(TimeLapsePlan(interval_s=1.0, count=6), start_s=0.0)
     assert chosen(lapse, [0.0, 3.05, 3.5, 4.0]) == [0.0, 3.05, 4.0]
     assert (lapse.taken, lapse.late, lapse.missed) == (3, 0, 2)
@@ -48,7 +48,7 @@ def test_times_that_pass_without_a_picture_are_counted_as_missed():
     assert lapse.done
 
 
-def test_a_picture_of_no_known_time_is_not_taken():
+def test_a_image_of_no_known_time_is_not_taken():
     assert not TimeLapse(TimeLapsePlan(interval_s=1.0), start_s=0.0).take(math.nan)
 
 
@@ -58,7 +58,7 @@ def test_a_picture_of_no_known_time_is_not_taken():
         ({"interval_s": 0.0}, "interval 0.0 s"),
         ({"interval_s": math.nan}, "interval nan s"),
         ({"interval_s": math.inf}, "interval inf s"),
-        ({"interval_s": 1.0, "count": 0}, "0 pictures"),
+        ({"interval_s": 1.0, "count": 0}, "0 images"),
         ({"interval_s": 1.0, "until_s": math.nan}, "not a number"),
     ],
 )

@@ -1,4 +1,4 @@
-"""Small pictures of fibres for tests; the benchmarks have the thorough ones."""
+"""Small images of fibres for tests; the benchmarks have the thorough ones."""
 
 import cv2
 import numpy as np
@@ -38,7 +38,7 @@ def strip(shape: tuple[int, int], line: np.ndarray, width: float) -> np.ndarray:
     return small.astype(np.float32) / 255.0
 
 
-def picture(
+def drawn_image(
     lines: list[np.ndarray],
     widths: list[float],
     *,
@@ -50,7 +50,7 @@ def picture(
     lumen: float = 0.0,
     seed: int = 0,
 ) -> np.ndarray:
-    """Return a picture of fibres on an even ground."""
+    """Return an image of fibres on an even ground."""
     share = np.zeros(shape, np.float32)
     for line, width in zip(lines, widths, strict=True):
         body = strip(shape, line, width)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.vico.api import Fibre, fibre_mask, find_fibres
 from cosmic.vico.core.vision.smoothing import UndeterminedError, smooth
-from unit.vico.vision.drawn_fibres import arc, loop, picture
+from unit.vico.vision.drawn_fibres import arc, drawn_image, loop
 
 BOW = arc((120.0, 180.0), 0.2, 400.0, 0.9)
 LOOP = loop((180.0, 150.0), 0.3, 800.0)
@@ -33,7 +33,7 @@ def ends_error_px(fibre: Fibre, line: np.ndarray) -> float:
 
 @pytest.mark.parametrize("width", [3.0, 9.0, 24.0])
 def test_a_fibre_is_measured_whatever_its_width(width: float) -> None:
-    fibre = only(picture([BOW], [width]))
+    fibre = only(drawn_image([BOW], [width]))
     assert fibre.certain, fibre.doubts
     assert fibre.length_px == pytest.approx(400.0, rel=0.003)
     assert fibre.width_px == pytest.approx(width, abs=0.6)
@@ -42,27 +42,27 @@ def test_a_fibre_is_measured_whatever_its_width(width: float) -> None:
 
 
 def test_a_fibre_lighter_than_the_ground_is_measured_alike() -> None:
-    fibre = only(picture([BOW], [9.0], contrast=60.0, ground=70.0))
+    fibre = only(drawn_image([BOW], [9.0], contrast=60.0, ground=70.0))
     assert fibre.lighter
     assert fibre.certain
     assert fibre.length_px == pytest.approx(400.0, rel=0.003)
 
 
 def test_sixteen_bits_give_what_eight_give() -> None:
-    image = picture([BOW], [9.0])
+    image = drawn_image([BOW], [9.0])
     deep = only(image.astype(np.uint16) * 16)
     assert deep.certain
     assert deep.length_px == pytest.approx(only(image).length_px, abs=0.05)
 
 
-def test_a_coloured_picture_is_turned_to_grey() -> None:
-    image = picture([BOW], [9.0])
+def test_a_coloured_image_is_turned_to_grey() -> None:
+    image = drawn_image([BOW], [9.0])
     assert only(cv2.merge([image, image, image])).length_px == pytest.approx(400.0, rel=0.003)
 
 
 @pytest.mark.parametrize("lumen", [0.5, 0.8])
 def test_a_hollow_fibre_is_one_fibre_and_not_its_two_walls(lumen: float) -> None:
-    fibre = only(picture([BOW], [22.0], lumen=lumen))
+    fibre = only(drawn_image([BOW], [22.0], lumen=lumen))
     assert fibre.certain, fibre.doubts
     assert fibre.width_px == pytest.approx(22.0, abs=0.8)
     assert fibre.length_px == pytest.approx(400.0, rel=0.003)
@@ -70,11 +70,11 @@ def test_a_hollow_fibre_is_one_fibre_and_not_its_two_walls(lumen: float) -> None
 
 def test_two_dark_lines_with_ground_between_them_are_doubted() -> None:
     beside = arc((117.0, 193.0), 0.2, 400.0, 0.9)
-    assert not certain(picture([BOW, beside], [7.0, 7.0]))
+    assert not certain(drawn_image([BOW, beside], [7.0, 7.0]))
 
 
 def test_a_fibre_that_crosses_itself_is_followed_through() -> None:
-    fibre = only(picture([LOOP], [9.0]))
+    fibre = only(drawn_image([LOOP], [9.0]))
     assert fibre.certain, fibre.doubts
     assert fibre.length_px == pytest.approx(800.0, rel=0.005)
     assert ends_error_px(fibre, LOOP) < 1.5
@@ -83,7 +83,7 @@ def test_a_fibre_that_crosses_itself_is_followed_through() -> None:
 def test_two_fibres_that_cross_are_told_apart() -> None:
     down = arc((150.0, 80.0), 0.7, 420.0, 0.2)
     up = arc((150.0, 400.0), -0.7, 420.0, -0.2)
-    fibres = find_fibres(picture([down, up], [8.0, 11.0]))
+    fibres = find_fibres(drawn_image([down, up], [8.0, 11.0]))
     assert [fibre.certain for fibre in fibres] == [True, True]
     assert sorted(fibre.width_px for fibre in fibres) == pytest.approx([8.0, 11.0], abs=0.6)
     assert [fibre.length_px for fibre in fibres] == pytest.approx([420.0, 420.0], rel=0.005)
@@ -91,18 +91,18 @@ def test_two_fibres_that_cross_are_told_apart() -> None:
 
 def test_several_fibres_come_longest_first() -> None:
     lines = [arc((60.0, y), 0.1, length, 0.3) for y, length in ((80.0, 200.0), (220.0, 480.0))]
-    lengths = [fibre.length_px for fibre in find_fibres(picture(lines, [8.0, 8.0]))]
+    lengths = [fibre.length_px for fibre in find_fibres(drawn_image(lines, [8.0, 8.0]))]
     assert lengths == pytest.approx([480.0, 200.0], rel=0.005)
 
 
 def test_a_fibre_cut_off_by_the_border_says_so() -> None:
-    fibre = only(picture([arc((-60.0, 200.0), 0.1, 400.0, 0.4)], [9.0]))
+    fibre = only(drawn_image([arc((-60.0, 200.0), 0.1, 400.0, 0.4)], [9.0]))
     assert not fibre.certain
     assert any("border" in doubt for doubt in fibre.doubts)
 
 
 def test_a_gap_in_a_fibre_is_doubted() -> None:
-    image = picture([BOW], [9.0])
+    image = drawn_image([BOW], [9.0])
     image[:, 280:296] = np.random.default_rng(1).normal(150.0, 3.0, (480, 16))
     assert not certain(image)
 
@@ -110,18 +110,18 @@ def test_a_gap_in_a_fibre_is_doubted() -> None:
 def test_an_end_that_lies_on_another_fibre_is_doubted() -> None:
     along = arc((80.0, 240.0), 0.0, 480.0, 0.0)
     onto = arc((330.0, 243.0), 1.2, 180.0, 0.1)
-    shorter = find_fibres(picture([along, onto], [9.0, 9.0]))[-1]
+    shorter = find_fibres(drawn_image([along, onto], [9.0, 9.0]))[-1]
     assert not shorter.certain
 
 
-def test_a_picture_out_of_focus_is_doubted() -> None:
-    fibre = only(picture([BOW], [12.0], blur_px=7.0))
+def test_a_image_out_of_focus_is_doubted() -> None:
+    fibre = only(drawn_image([BOW], [12.0], blur_px=7.0))
     assert not fibre.certain
     assert any("focus" in doubt for doubt in fibre.doubts)
 
 
 def test_a_fibre_that_fades_away_is_doubted() -> None:
-    image = picture([BOW], [9.0], noise=0.0).astype(float)
+    image = drawn_image([BOW], [9.0], noise=0.0).astype(float)
     fade = np.linspace(1.4, -0.4, 640).clip(0.0, 1.0)[None, :]
     faded = 150.0 + (image - 150.0) * fade + np.random.default_rng(2).normal(0.0, 3.0, image.shape)
     assert not certain(np.clip(faded, 0, 255).astype(np.uint8))
@@ -151,7 +151,7 @@ def test_a_network_holds_no_fibre_that_is_certain() -> None:
         arc((rng.uniform(0, 320), rng.uniform(0, 240)), rng.uniform(0, 6.3), 200.0, 1.0)
         for _ in range(24)
     ]
-    assert not certain(picture(lines, [4.0] * 24, shape=(240, 320)))
+    assert not certain(drawn_image(lines, [4.0] * 24, shape=(240, 320)))
 
 
 @pytest.mark.parametrize(
@@ -166,7 +166,7 @@ def test_a_network_holds_no_fibre_that_is_certain() -> None:
     ],
     ids=["black", "saturated", "constant", "noise", "ramp", "tiny"],
 )
-def test_a_picture_of_nothing_holds_no_fibre(image: np.ndarray) -> None:
+def test_a_image_of_nothing_holds_no_fibre(image: np.ndarray) -> None:
     assert find_fibres(image) == []
 
 
@@ -183,13 +183,13 @@ def test_a_picture_of_nothing_holds_no_fibre(image: np.ndarray) -> None:
         ([[0, 1], [1, 0]], "numpy array"),
     ],
 )
-def test_what_is_no_picture_is_refused(image: np.ndarray, reason: str) -> None:
+def test_what_is_no_image_is_refused(image: np.ndarray, reason: str) -> None:
     with pytest.raises(ConfigError, match=reason):
         find_fibres(image)
 
 
-def test_the_picture_is_left_as_it_was() -> None:
-    image = picture([BOW], [9.0])
+def test_the_image_is_left_as_it_was() -> None:
+    image = drawn_image([BOW], [9.0])
     image.flags.writeable = False
     before = image.copy()
     find_fibres(image)
@@ -197,14 +197,14 @@ def test_the_picture_is_left_as_it_was() -> None:
 
 
 def test_a_painted_fibre_covers_what_was_drawn() -> None:
-    image = picture([LOOP], [12.0], noise=0.0)
+    image = drawn_image([LOOP], [12.0], noise=0.0)
     painted = fibre_mask(only(image), image.shape) > 0
     drawn = image < 120
     assert 2.0 * (painted & drawn).sum() / (painted.sum() + drawn.sum()) > 0.97
 
 
 def test_every_value_has_an_uncertainty_or_a_reason() -> None:
-    fibre = only(picture([BOW], [9.0]))
+    fibre = only(drawn_image([BOW], [9.0]))
     for name in ("length_px", "projected_length_px", "width_px", "curl", "orientation_deg"):
         assert 0.0 < float(fibre.uncertainties[name]) < 0.05 * max(1.0, getattr(fibre, name))
     assert isinstance(fibre.uncertainties["kink"], str)
@@ -223,7 +223,7 @@ def test_a_certain_length_is_right(angle: float, turn: float, width: float, leng
     line = line - line.mean(axis=0) + (200.3, 199.6)
     if line.min() < 20.0 or line.max() > 380.0:
         return
-    for fibre in find_fibres(picture([line], [width], shape=(400, 400))):
+    for fibre in find_fibres(drawn_image([line], [width], shape=(400, 400))):
         assert not fibre.certain or fibre.length_px == pytest.approx(length, rel=0.01)
 
 
@@ -237,7 +237,7 @@ def test_importing_the_api_loads_no_vision_library() -> None:
 
 def test_dirt_less_dark_than_the_fibre_at_its_end_makes_the_length_doubtful() -> None:
     line = arc((100.0, 100.0), 0.2, 140.0, 0.2)
-    image = picture([line], [7.7], shape=(240, 340), noise=0.0, blur_px=0.3).astype(np.float32)
+    image = drawn_image([line], [7.7], shape=(240, 340), noise=0.0, blur_px=0.3).astype(np.float32)
     x, y = line[-1] + (5.0, 2.0)
     dirty = image.copy()
     cv2.ellipse(dirty, (round(x), round(y)), (5, 3), 20.0, 0, 360, 108.0, -1)
@@ -257,7 +257,7 @@ def test_points_of_which_too_few_count_determine_no_curve() -> None:
     np.testing.assert_allclose(smooth(line, np.ones(120), 60.0), line, atol=1e-3)
 
 
-def test_what_nobody_foresaw_of_a_picture_is_told_and_no_error_of_numpy(
+def test_what_nobody_foresaw_of_a_image_is_told_and_no_error_of_numpy(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def broken(*_: object) -> None:

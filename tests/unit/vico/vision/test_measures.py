@@ -3,7 +3,7 @@ import pytest
 
 from cosmic.vico.api import find_fibres
 from cosmic.vico.core.vision.measures import kink_angles_deg, kink_index, longest_extent
-from unit.vico.vision.drawn_fibres import arc, picture
+from unit.vico.vision.drawn_fibres import arc, drawn_image
 
 
 def bent(angle_deg: float, length: float = 200.0) -> np.ndarray:
@@ -13,7 +13,7 @@ def bent(angle_deg: float, length: float = 200.0) -> np.ndarray:
 
 
 def test_a_straight_fibre_has_no_curl_and_no_kink() -> None:
-    fibre = find_fibres(picture([arc((100.0, 200.0), 0.3, 400.0, 0.0)], [9.0]))[0]
+    fibre = find_fibres(drawn_image([arc((100.0, 200.0), 0.3, 400.0, 0.0)], [9.0]))[0]
     assert fibre.curl == pytest.approx(0.0, abs=0.001)
     assert fibre.kinks == 0
     assert fibre.kink == 0.0
@@ -22,7 +22,7 @@ def test_a_straight_fibre_has_no_curl_and_no_kink() -> None:
 
 
 def test_half_a_circle_has_the_curl_of_geometry() -> None:
-    fibre = find_fibres(picture([arc((320.0, 100.0), 0.0, 400.0, np.pi)], [9.0]))[0]
+    fibre = find_fibres(drawn_image([arc((320.0, 100.0), 0.0, 400.0, np.pi)], [9.0]))[0]
     assert fibre.curl == pytest.approx(np.pi / 2.0 - 1.0, rel=0.005)
     assert fibre.kinks == 0
 
@@ -42,7 +42,7 @@ def test_the_projected_length_is_the_largest_distance_and_not_that_of_the_ends()
 
 
 def test_grasp_points_lie_on_the_fibre_near_its_two_ends() -> None:
-    fibre = find_fibres(picture([arc((120.0, 200.0), 0.2, 400.0, 0.5)], [9.0]))[0]
+    fibre = find_fibres(drawn_image([arc((120.0, 200.0), 0.2, 400.0, 0.5)], [9.0]))[0]
     assert fibre.grasp_points_px.shape == (2, 2)
     for point in fibre.grasp_points_px:
         assert np.linalg.norm(fibre.centre_line_px - point, axis=1).min() < 0.1
@@ -52,5 +52,5 @@ def test_grasp_points_lie_on_the_fibre_near_its_two_ends() -> None:
 def test_no_grasp_point_lies_beside_another_fibre() -> None:
     long = arc((100.0, 200.0), 0.0, 440.0, 0.0)
     near = arc((100.0, 216.0), 0.0, 150.0, 0.0)
-    fibres = find_fibres(picture([long, near], [8.0, 8.0]))
+    fibres = find_fibres(drawn_image([long, near], [8.0, 8.0]))
     assert all(point[0] > 250.0 for point in fibres[0].grasp_points_px)

@@ -1,4 +1,4 @@
-"""The card of one fibre: picture, curves, numbers with their intervals, and what was doubtful."""
+"""The card of one fibre: image, curves, numbers with their intervals, and what was doubtful."""
 
 import math
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ from cosmic.autonomy.campaign.formatting import (
     width_words,
     with_interval,
 )
-from cosmic.autonomy.campaign.records import Picture
+from cosmic.autonomy.campaign.records import FibreImage
 from cosmic.autonomy.campaign.snapshot import FibreCardData, Mask, SpanCurve
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, push_button, tipped
@@ -42,8 +42,8 @@ from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
 from cosmic.frame.overrides import override
 
 
-class FibrePicture(QWidget):
-    """Shows a `Picture` with a bar that tells its scale; GUI thread."""
+class FibreImageView(QWidget):
+    """Shows a `FibreImage` with a bar that tells its scale; GUI thread."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -55,18 +55,18 @@ class FibrePicture(QWidget):
 
     @property
     def shown(self) -> QSize:
-        """Size of the picture in its own pixels; empty where there is none."""
+        """Size of the image in its own pixels; empty where there is none."""
         return self._pixmap.size()
 
-    def show_picture(self, picture: Picture | None, words: str = "no image was saved") -> None:
-        """Show `picture`, or `words` where there is none."""
+    def show_image(self, image: FibreImage | None, words: str = "no image was saved") -> None:
+        """Show `image`, or `words` where there is none."""
         self._words = words
-        if picture is None:
+        if image is None:
             self._pixmap = QPixmap()
         else:
-            self._pixmap = QPixmap.fromImage(_image(picture))
-            self._scale_um_px = picture.scale_um_px
-            self.setAccessibleName(picture.name)
+            self._pixmap = QPixmap.fromImage(_qimage(image))
+            self._scale_um_px = image.scale_um_px
+            self.setAccessibleName(image.name)
         self.update()
 
     @override
@@ -94,7 +94,7 @@ class FibrePicture(QWidget):
         self._paint_bar(painter, place)
 
     def _paint_bar(self, painter: QPainter, place: QRect) -> None:
-        """Draw a bar of a round length, light on dark, which any picture shows."""
+        """Draw a bar of a round length, light on dark, which any image shows."""
         width_um = self._scale_um_px * self._pixmap.width()
         if not 0.0 < width_um < 1e7:
             return
@@ -117,13 +117,13 @@ def round_below(value: float) -> float:
     return float(next(digit for digit in (5.0, 2.0, 1.0) if digit * size <= value) * size)
 
 
-def _image(picture: Picture) -> QImage:
-    pixels = picture.pixels
+def _qimage(image: FibreImage) -> QImage:
+    pixels = image.pixels
     eight_bit = (pixels >> 8).astype(np.uint8) if pixels.dtype == np.uint16 else pixels
     grey = np.ascontiguousarray(eight_bit)
     height, width = grey.shape[:2]
-    image = QImage(grey.data, width, height, grey.strides[0], QImage.Format.Format_Grayscale8)
-    return image.copy()  # the array may go
+    shown = QImage(grey.data, width, height, grey.strides[0], QImage.Format.Format_Grayscale8)
+    return shown.copy()  # the array may go
 
 
 _OUT: Final = OKABE_ITO["sky blue"]
@@ -197,7 +197,7 @@ def _points(curve: SpanCurve, which: Mask, colour: str, *, hollow: bool) -> pg.S
 
 
 _WIDE_PX: Final = 90 * STEP_PX
-"""From this width on picture and curves stand side by side."""
+"""From this width on image and curves stand side by side."""
 
 
 class FibreCard(QWidget):
@@ -226,9 +226,9 @@ class FibreCard(QWidget):
         )
         self.replay.clicked.connect(self._on_replay)
         self.text = _words("cardText")
-        self.picture = FibrePicture()
-        self.pictures = named(tipped(QComboBox(), "Image that is shown"), "cardPictures")
-        self.pictures.currentIndexChanged.connect(self._on_picture_chosen)
+        self.image = FibreImageView()
+        self.images = named(tipped(QComboBox(), "Image that is shown"), "cardImages")
+        self.images.currentIndexChanged.connect(self._on_image_chosen)
         self.curves = FibreCurves()
         self.numbers = QGridLayout()
         self.spans = QGridLayout()
@@ -246,8 +246,8 @@ class FibreCard(QWidget):
         head.addWidget(self.replay)
         seen = QVBoxLayout()
         seen.setSpacing(STEP_PX // 2)
-        seen.addWidget(self.pictures)
-        seen.addWidget(self.picture, 1)
+        seen.addWidget(self.images)
+        seen.addWidget(self.image, 1)
         self._figures = QGridLayout()
         self._figures.setSpacing(STEP_PX)
         self._seen = QWidget()
@@ -301,10 +301,10 @@ class FibreCard(QWidget):
         self.outcome.show()
         self.replay.setEnabled(True)
         _say(self.text, card.text)
-        self.pictures.clear()
-        self.pictures.addItems([each.name for each in card.pictures])
-        self.pictures.setVisible(len(card.pictures) > 1)
-        self._on_picture_chosen(0)
+        self.images.clear()
+        self.images.addItems([each.name for each in card.images])
+        self.images.setVisible(len(card.images) > 1)
+        self._on_image_chosen(0)
         self.curves.show_curves(card.curves)
         self.curves.setVisible(bool(card.curves))
         _fill(self.numbers, [[name, text] for name, text in _numbers(card)])
@@ -321,9 +321,9 @@ class FibreCard(QWidget):
         self.title.setText("no fibre chosen")
         self.outcome.hide()
         self.replay.setEnabled(False)
-        self.pictures.clear()
-        self.pictures.hide()
-        self.picture.show_picture(None, "")
+        self.images.clear()
+        self.images.hide()
+        self.image.show_image(None, "")
         self.curves.show_curves(())
         self.curves.hide()
         for label in (self.text, self.doubts, self.failures):
@@ -331,11 +331,11 @@ class FibreCard(QWidget):
         for grid in (self.numbers, self.spans):
             _fill(grid, [])
 
-    def _on_picture_chosen(self, place: int) -> None:
+    def _on_image_chosen(self, place: int) -> None:
         if self._card is None:
             return
-        pictures = self._card.pictures
-        self.picture.show_picture(pictures[place] if 0 <= place < len(pictures) else None)
+        images = self._card.images
+        self.image.show_image(images[place] if 0 <= place < len(images) else None)
 
     def _on_replay(self) -> None:
         if self._card is not None:

@@ -1,1 +1,1 @@
-"""The picture of `UDaqPlotter`: history, columns, strip, axes, cursors."""
+"""The image of `UDaqPlotter`: history, columns, strip, axes, cursors."""

@@ -15,7 +15,7 @@ _GAP_PX: Final = 4
 
 
 class Axes:
-    """Keeps the axes of a layout; their widths are fixed, so that the picture does not jump."""
+    """Keeps the axes of a layout; their widths are fixed, so that the image does not jump."""
 
     def __init__(self, layout: pg.GraphicsLayout, box: pg.ViewBox) -> None:
         self._layout, self._box = layout, box

@@ -1,4 +1,4 @@
-"""`Chart`: the picture itself, live or frozen; knows samples, not the application."""
+"""`Chart`: the image itself, live or frozen; knows samples, not the application."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -116,7 +116,7 @@ class Chart(pg.GraphicsView):  # type: ignore[misc]
         self._apply_look()
 
     def set_span(self, span_s: float) -> None:
-        """Follow with that much time in the picture."""
+        """Follow with that much time in the image."""
         self.span_s = span_s
         self._frozen = None
         self.frozen_changed.emit(False)
@@ -189,14 +189,14 @@ class Chart(pg.GraphicsView):  # type: ignore[misc]
         self.show_time(fixed - share * width, fixed + (1.0 - share) * width)
 
     def pan_time(self, share: float) -> None:
-        """Pull the picture to the right by a part of its width."""
+        """Pull the image to the right by a part of its width."""
         begin, end = self.window_s()
         self.show_time(begin - share * (end - begin), end - share * (end - begin))
 
     # Painting
 
     def rebuild(self) -> None:
-        """Paint the whole picture from the history."""
+        """Paint the whole image from the history."""
         begin_s, end_s = self.window_s()
         self.box.setXRange(begin_s, end_s, padding=0.0)
         raster, view = self.raster, self.now_view()
@@ -215,7 +215,7 @@ class Chart(pg.GraphicsView):  # type: ignore[misc]
         self.time_changed.emit()
 
     def visible_columns(self) -> Columns:
-        """Return the extremes of what is in the picture, in any order."""
+        """Return the extremes of what is in the image, in any order."""
         return self.raster.ring
 
     def _look(self) -> Look:

@@ -1,4 +1,4 @@
-"""Lowest and highest value in each column of a picture: what keeps every spike visible."""
+"""Lowest and highest value in each column of an image: what keeps every spike visible."""
 
 from dataclasses import dataclass
 from typing import Any

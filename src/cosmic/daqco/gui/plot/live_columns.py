@@ -1,4 +1,4 @@
-"""Turns samples, as they come, into columns of a picture."""
+"""Turns samples, as they come, into columns of an image."""
 
 import numpy as np
 

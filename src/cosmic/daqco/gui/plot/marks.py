@@ -30,11 +30,11 @@ class Cursors(QObject):
 
     @property
     def shown(self) -> bool:
-        """True while they are in the picture."""
+        """True while they are in the image."""
         return bool(self.lines)
 
     def show(self, shown: bool) -> None:
-        """Put them into the picture, or take them out."""
+        """Put them into the image, or take them out."""
         if shown == self.shown:
             return
         for line in self.lines:
@@ -98,7 +98,7 @@ class LimitLines:
         self.lines: list[pg.InfiniteLine] = []
 
     def show(self, limits: Sequence[DaqLimit], ranges: dict[str, AxisRange]) -> None:
-        """Draw the limits of the channels that are in the picture."""
+        """Draw the limits of the channels that are in the image."""
         for line in self.lines:
             self._chart.box.removeItem(line)
         self.lines = []

@@ -28,7 +28,7 @@ class Look:
         One a channel, "#RRGGBB".
     shown : ndarray, shape (channels,), bool
     low, high : ndarray, shape (channels,), float64
-        Value at the bottom and at the top of the picture.
+        Value at the bottom and at the top of the image.
     grid : tuple of float
         Heights of the horizontal lines, 0 (bottom) to 1.
     ground, line : str
@@ -45,7 +45,7 @@ class Look:
 
 
 class Raster:
-    """A picture of the newest `width` columns; only new columns are painted.
+    """An image of the newest `width` columns; only new columns are painted.
 
     Column numbers count on without end; column `n` lies at pixel ``n % width``.
     """
@@ -59,7 +59,7 @@ class Raster:
         self.resize(width, height)
 
     def resize(self, width: int, height: int) -> None:
-        """Make the picture anew, without columns."""
+        """Make the image anew, without columns."""
         self.width, self.height = max(1, width), max(1, height)
         self.image = QImage(self.width, self.height, QImage.Format.Format_RGB32)
         self.clear()

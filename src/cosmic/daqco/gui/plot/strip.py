@@ -14,7 +14,7 @@ logger = logging.getLogger(__name__)
 
 
 class StripChartItem(pg.GraphicsObject):  # type: ignore[misc]
-    """Lies over a view box, in its pixels; paints two pieces of a picture and thin upright lines.
+    """Lies over a view box, in its pixels; paints two pieces of an image and thin upright lines.
 
     The newest column is at the right edge. Measured (32 channels, 15 kHz): a refresh takes
     1-2 ms, where curves of pyqtgraph take 26 ms at best.

@@ -15,14 +15,14 @@ _NOTCH: Final = 120.0
 class TimeBox(pg.ViewBox):  # type: ignore[misc]
     """Tells what the mouse asks for, and leaves it to the chart to do it.
 
-    Places are parts of the picture, 0 to 1, from the left and from the bottom.
+    Places are parts of the image, 0 to 1, from the left and from the bottom.
     """
 
     time_zoom_requested = Signal(float, float)
     """Factor of the new width to the old, and the place that stays."""
     value_zoom_requested = Signal(float, float)
     time_pan_requested = Signal(float)
-    """How far the picture is pulled to the right."""
+    """How far the image is pulled to the right."""
     live_requested = Signal()
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Which range each unit has, and how it follows what is in the picture."""
+"""Which range each unit has, and how it follows what is in the image."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -51,7 +51,7 @@ class UnitRanges:
         return True
 
     def fit(self, traces: Sequence[Trace], columns: Columns, *, at_once: bool = False) -> bool:
-        """Fit the ranges to what is in the picture; True when one changed."""
+        """Fit the ranges to what is in the image; True when one changed."""
         if columns.low.shape[0] != len(traces):
             return False
         changed = False

@@ -1,1 +1,1 @@
-"""Recordings of pictures, snaps and time-lapse (thesis 5.2)."""
+"""Recordings of images, snaps and time-lapse (thesis 5.2)."""

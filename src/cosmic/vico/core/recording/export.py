@@ -1,4 +1,4 @@
-"""Recordings of pictures in another format, for programs that do not read theirs."""
+"""Recordings of images in another format, for programs that do not read theirs."""
 
 import os
 import shutil
@@ -10,28 +10,28 @@ import numpy as np
 
 from cosmic.frame.errors import ExportCancelled, RecordingError, RecordingExistsError
 from cosmic.vico.core.recording.formats import (
-    PictureFormat,
+    ImageFormat,
     check_pixels,
     checked_path,
     recording_suffix,
     side_path_of,
 )
-from cosmic.vico.core.recording.picture_file import PictureFile
+from cosmic.vico.core.recording.image_file import ImageFile
 from cosmic.vico.core.recording.reading import (
-    PictureRecording,
-    RecordedPicture,
-    open_picture_recording,
+    ImageRecording,
+    RecordedImage,
+    open_image_recording,
 )
-from cosmic.vico.core.recording.sequence_writer import picture_files
+from cosmic.vico.core.recording.sequence_writer import image_files
 from cosmic.vico.core.recording.side_row import UNKNOWN, SideRow
 
 PART: Final = "being exported"
 Progress = Callable[[float], object]
 
 
-def export_pictures(
+def export_images(
     recording_path: "str | os.PathLike[str]",
-    to: PictureFormat | str,
+    to: ImageFormat | str,
     out_path: "str | os.PathLike[str] | None" = None,
     progress: Progress | None = None,
     *,
@@ -39,7 +39,7 @@ def export_pictures(
 ) -> Path:
     """Write a recording in format `to`, with a side file, and return the path of the new one.
 
-    The new side file has the rows of the pictures in it, with their columns as they were.
+    The new side file has the rows of the images in it, with their columns as they were.
 
     Parameters
     ----------
@@ -57,14 +57,14 @@ def export_pictures(
     ExportCancelled
         `progress` returned False.
     """
-    picture_format = _format(to)
-    with open_picture_recording(recording_path) as recording:
-        check_pixels(picture_format, recording.pixel_format)
-        target = _target(recording, picture_format, out_path)
+    image_format = _format(to)
+    with open_image_recording(recording_path) as recording:
+        check_pixels(image_format, recording.pixel_format)
+        target = _target(recording, image_format, out_path)
         _check_free(target, recording, overwrite=overwrite)
-        temporary = target.with_name(f"{_stem(target)}, {PART}{recording_suffix(picture_format)}")
+        temporary = target.with_name(f"{_stem(target)}, {PART}{recording_suffix(image_format)}")
         try:
-            _copy(recording, temporary, picture_format, target.name, progress)
+            _copy(recording, temporary, image_format, target.name, progress)
             _move(temporary, target)
         except OSError as exc:
             raise RecordingError(
@@ -77,26 +77,26 @@ def export_pictures(
     return target
 
 
-def _format(to: PictureFormat | str) -> PictureFormat:
+def _format(to: ImageFormat | str) -> ImageFormat:
     try:
-        return PictureFormat(to)
+        return ImageFormat(to)
     except ValueError as exc:
-        known = ", ".join(PictureFormat)
+        known = ", ".join(ImageFormat)
         raise RecordingError(f"cannot export to {to!r}; there are {known}") from exc
 
 
 def _target(
-    recording: PictureRecording,
-    picture_format: PictureFormat,
+    recording: ImageRecording,
+    image_format: ImageFormat,
     out_path: "str | os.PathLike[str] | None",
 ) -> Path:
     if out_path is not None:
-        return checked_path(Path(out_path), picture_format)
-    name = f"{_stem(recording.path)}_{picture_format}{recording_suffix(picture_format)}"
-    return checked_path(recording.path.with_name(name), picture_format)
+        return checked_path(Path(out_path), image_format)
+    name = f"{_stem(recording.path)}_{image_format}{recording_suffix(image_format)}"
+    return checked_path(recording.path.with_name(name), image_format)
 
 
-def _check_free(target: Path, recording: PictureRecording, *, overwrite: bool) -> None:
+def _check_free(target: Path, recording: ImageRecording, *, overwrite: bool) -> None:
     own = {recording.path.absolute(), recording.side_path.absolute()}
     for path in (target, side_path_of(target)):
         if path in own:
@@ -105,7 +105,7 @@ def _check_free(target: Path, recording: PictureRecording, *, overwrite: bool) -
             raise RecordingExistsError(
                 f"{path}: there is such a file; choose another name, or say that it may be replaced"
             )
-    if target.is_dir() and set(target.iterdir()) - set(picture_files(target, target.name).values()):
+    if target.is_dir() and set(target.iterdir()) - set(image_files(target, target.name).values()):
         raise RecordingError(
             f"{target}: there are other files in this directory, which would be lost; choose "
             "another name"
@@ -113,9 +113,9 @@ def _check_free(target: Path, recording: PictureRecording, *, overwrite: bool) -
 
 
 def _copy(
-    recording: PictureRecording,
+    recording: ImageRecording,
     path: Path,
-    picture_format: PictureFormat,
+    image_format: ImageFormat,
     stem: str,
     progress: Progress | None,
 ) -> None:
@@ -125,17 +125,17 @@ def _copy(
 
     told(0.0)
     total = len(recording)
-    target = PictureFile(
+    target = ImageFile(
         path,
-        picture_format,
+        image_format,
         axes=recording.axes,
         rate_hz=recording.rate_hz,
         overwrite=True,
         stem=stem,
     )
     try:
-        for picture in recording:
-            target.append(picture.data, picture.row or _unknown(recording, picture))
+        for image in recording:
+            target.append(image.data, image.row or _unknown(recording, image))
             told(min(1.0, target.count / max(1, total)))
     except BaseException:
         target.close(complete=False)
@@ -143,11 +143,11 @@ def _copy(
     target.close(complete=True)
 
 
-def _unknown(recording: PictureRecording, picture: RecordedPicture) -> SideRow:
-    """Return a row for a picture of which the side file does not tell."""
+def _unknown(recording: ImageRecording, image: RecordedImage) -> SideRow:
+    """Return a row for an image of which the side file does not tell."""
     known = recording.time_s[np.isfinite(recording.time_s)]
     end_s = float(known[-1]) if known.size else 0.0
-    time_s = end_s + (picture.index + 1 - known.size) / recording.rate_hz
+    time_s = end_s + (image.index + 1 - known.size) / recording.rate_hz
     return SideRow(
         frame_id=-1,
         device_ns=None,

@@ -1,7 +1,7 @@
-"""Whether a picture coded by FFV1 is as it was written.
+"""Whether an image coded by FFV1 is as it was written.
 
 FFmpeg finds damage by the checksum of each slice as well, but only writes it to its log and
-patches the picture.
+patches the image.
 """
 
 import zlib

@@ -1,4 +1,4 @@
-"""The formats that pictures are recorded in, and the names that recordings get."""
+"""The formats that images are recorded in, and the names that recordings get."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -16,8 +16,8 @@ from cosmic.vico.hw.interface import CameraSettings, PixelFormat, Pixels
 SIDE_SUFFIX: Final = ".csv"
 
 
-class PictureFormat(StrEnum):
-    """How pictures are recorded."""
+class ImageFormat(StrEnum):
+    """How images are recorded."""
 
     FFV1 = "ffv1"
     FAST = "fast"
@@ -35,9 +35,9 @@ class Traits:
     text : str
         What the operator reads.
     suffix : str
-        Of the file, or of each picture of a sequence.
+        Of the file, or of each image of a sequence.
     sequence : bool
-        A directory with a file a picture, not one file.
+        A directory with a file an image, not one file.
     lossless : bool
         Every pixel comes back as it was.
     ratio : float
@@ -64,7 +64,7 @@ class Traits:
     threads: str = "SLICE"
 
     def holds(self, pixel_format: PixelFormat) -> bool:
-        """Return whether pictures of `pixel_format` can be recorded."""
+        """Return whether images of `pixel_format` can be recorded."""
         return self.coded is None or pixel_format in self.coded
 
 
@@ -75,8 +75,8 @@ def _coded(mono8: str, mono16: str, rgb8: str) -> dict[PixelFormat, str]:
     return found | dict.fromkeys(deep, mono16) if mono16 else found
 
 
-FORMATS: Final[Mapping[PictureFormat, Traits]] = {
-    PictureFormat.FFV1: Traits(
+FORMATS: Final[Mapping[ImageFormat, Traits]] = {
+    ImageFormat.FFV1: Traits(
         text="FFV1 in Matroska, lossless",
         suffix=".mkv",
         lossless=True,
@@ -86,7 +86,7 @@ FORMATS: Final[Mapping[PictureFormat, Traits]] = {
         coded=_coded("gray", "gray16le", "bgr0"),
         options={"level": "3", "slices": "16", "slicecrc": "1", "g": "1"},
     ),
-    PictureFormat.FAST: Traits(
+    ImageFormat.FAST: Traits(
         text="Huffman in NUT, lossless, for high frame rates",
         suffix=".nut",
         lossless=True,
@@ -96,7 +96,7 @@ FORMATS: Final[Mapping[PictureFormat, Traits]] = {
         coded=_coded("gray", "gray16le", "gbrp"),
         threads="FRAME",
     ),
-    PictureFormat.SMALL: Traits(
+    ImageFormat.SMALL: Traits(
         text="Motion JPEG in Matroska, small, 8 bits, not lossless",
         suffix=".mkv",
         lossless=False,
@@ -105,15 +105,15 @@ FORMATS: Final[Mapping[PictureFormat, Traits]] = {
         container="matroska",
         coded=_coded("yuvj420p", "", "yuvj444p"),
     ),
-    PictureFormat.TIFF: Traits(
-        text="a TIFF a picture, uncompressed",
+    ImageFormat.TIFF: Traits(
+        text="a TIFF an image, uncompressed",
         suffix=".tif",
         lossless=True,
         ratio=1.0,
         sequence=True,
     ),
-    PictureFormat.PNG: Traits(
-        text="a PNG a picture, lossless, slow",
+    ImageFormat.PNG: Traits(
+        text="a PNG an image, lossless, slow",
         suffix=".png",
         lossless=True,
         ratio=0.65,
@@ -125,7 +125,7 @@ FORMATS: Final[Mapping[PictureFormat, Traits]] = {
 _MEANT: Final = {".mkv", ".nut", ".avi", ".mp4", ".mov", ".tif", ".tiff", ".png", SIDE_SUFFIX}
 
 
-def traits(picture_format: PictureFormat | str) -> Traits:
+def traits(image_format: ImageFormat | str) -> Traits:
     """Return what a format is like.
 
     Raises
@@ -134,15 +134,15 @@ def traits(picture_format: PictureFormat | str) -> Traits:
         There is no such format; the text lists those there are.
     """
     try:
-        return FORMATS[PictureFormat(picture_format)]
+        return FORMATS[ImageFormat(image_format)]
     except ValueError as exc:
-        known = ", ".join(PictureFormat)
+        known = ", ".join(ImageFormat)
         raise RecordingError(
-            f"there is no picture format {str(picture_format)!r}; choose one of {known}"
+            f"there is no image format {str(image_format)!r}; choose one of {known}"
         ) from exc
 
 
-def check_pixels(picture_format: PictureFormat, pixel_format: PixelFormat) -> None:
+def check_pixels(image_format: ImageFormat, pixel_format: PixelFormat) -> None:
     """Refuse pixels that a format cannot keep.
 
     Raises
@@ -150,23 +150,23 @@ def check_pixels(picture_format: PictureFormat, pixel_format: PixelFormat) -> No
     RecordingError
         It cannot; the text says which can.
     """
-    if not traits(picture_format).holds(pixel_format):
+    if not traits(image_format).holds(pixel_format):
         able = ", ".join(name for name, each in FORMATS.items() if each.holds(pixel_format))
         raise RecordingError(
-            f"format {picture_format} cannot keep {pixel_format} pictures; choose one of {able}"
+            f"format {image_format} cannot keep {pixel_format} images; choose one of {able}"
         )
 
 
-def picture_bytes_per_s(picture_format: PictureFormat, settings: CameraSettings) -> float:
+def image_bytes_per_s(image_format: ImageFormat, settings: CameraSettings) -> float:
     """Return how fast a recording grows, about."""
     sample_bytes = {PixelFormat.MONO8: 1, PixelFormat.RGB8: 3}.get(settings.pixel_format, 2)
     raw = settings.roi.width_px * settings.roi.height_px * sample_bytes * settings.rate_hz
-    return raw * traits(picture_format).ratio
+    return raw * traits(image_format).ratio
 
 
-def picture_file_name(
+def image_file_name(
     base: str,
-    picture_format: PictureFormat,
+    image_format: ImageFormat,
     option: NameOption = NameOption.NONE,
     *,
     when: datetime | None = None,
@@ -180,19 +180,19 @@ def picture_file_name(
     has it, since they share the name of the side file.
     """
     endings = {"", SIDE_SUFFIX, *(each.suffix for each in FORMATS.values())}
-    suffix = recording_suffix(picture_format)
+    suffix = recording_suffix(image_format)
     return file_name(
         base, option, suffix=suffix, when=when, directory=directory, taken_by=sorted(endings)
     )
 
 
-def recording_suffix(picture_format: PictureFormat) -> str:
+def recording_suffix(image_format: ImageFormat) -> str:
     """Return the ending of a recording's path; none for the directory of a sequence."""
-    found = traits(picture_format)
+    found = traits(image_format)
     return "" if found.sequence else found.suffix
 
 
-def checked_path(path: Path, picture_format: PictureFormat) -> Path:
+def checked_path(path: Path, image_format: ImageFormat) -> Path:
     """Return the absolute path of a recording, with the ending of its format.
 
     Raises
@@ -200,14 +200,14 @@ def checked_path(path: Path, picture_format: PictureFormat) -> Path:
     RecordingError
         Its name or its directory forbid it, or its ending is another format's.
     """
-    suffix = recording_suffix(picture_format)
+    suffix = recording_suffix(image_format)
     name = check_base_name(path.name)
     if name.lower().endswith(suffix or "/"):
         name = name[: len(name) - len(suffix)]
     other = Path(name).suffix.lower()
     if other in _MEANT:
         raise RecordingError(
-            f"name {path.name!r}: {other} is not the ending of format {picture_format}; leave it "
+            f"name {path.name!r}: {other} is not the ending of format {image_format}; leave it "
             f"out, or end it in {suffix or 'nothing, for it names a directory'}"
         )
     return check_directory(path.parent) / (check_base_name(name) + suffix)
@@ -215,13 +215,13 @@ def checked_path(path: Path, picture_format: PictureFormat) -> Path:
 
 def side_path_of(path: Path) -> Path:
     """Return where the side file of a recording lies."""
-    known = {recording_suffix(each) for each in PictureFormat} - {""}
+    known = {recording_suffix(each) for each in ImageFormat} - {""}
     stem = path.stem if path.suffix.lower() in known else path.name
     return path.with_name(stem + SIDE_SUFFIX)
 
 
 def kind_of(data: Pixels, pixel_format: PixelFormat) -> tuple[tuple[int, ...], str, PixelFormat]:
-    """Return what all pictures of a recording have in common.
+    """Return what all images of a recording have in common.
 
     Raises
     ------
@@ -232,7 +232,7 @@ def kind_of(data: Pixels, pixel_format: PixelFormat) -> tuple[tuple[int, ...], s
     layers = data.shape[2:] == (3,) if pixel_format is PixelFormat.RGB8 else data.ndim == 2
     if not layers or data.dtype != (np.uint16 if deep else np.uint8) or 0 in data.shape:
         raise RecordingError(
-            f"a picture said to be {pixel_format} has shape {data.shape} and type {data.dtype}; "
+            f"an image said to be {pixel_format} has shape {data.shape} and type {data.dtype}; "
             "it cannot be recorded"
         )
     return data.shape, str(data.dtype), pixel_format

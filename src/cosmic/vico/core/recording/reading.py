@@ -1,4 +1,4 @@
-"""`open_picture_recording`: reads recorded pictures, finished, running or left by a kill."""
+"""`open_image_recording`: reads recorded images, finished, running or left by a kill."""
 
 import os
 from collections.abc import Iterator, Mapping
@@ -12,20 +12,20 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.frame.errors import RecordingError
-from cosmic.vico.core.recording.formats import SIDE_SUFFIX, PictureFormat, recording_suffix
+from cosmic.vico.core.recording.formats import SIDE_SUFFIX, ImageFormat, recording_suffix
 from cosmic.vico.core.recording.formats import side_path_of as _side_path_of
 from cosmic.vico.core.recording.side_file import SideTable, read_side_file
 from cosmic.vico.core.recording.side_row import NOT_THERE, SideRow
-from cosmic.vico.core.recording.sources import PictureSource, SequenceSource, VideoSource
+from cosmic.vico.core.recording.sources import ImageSource, SequenceSource, VideoSource
 from cosmic.vico.core.recording.video_writer import TimeStamps
 from cosmic.vico.hw.interface import FrameStatus, PixelFormat, Pixels
 
-_ENDINGS: Final = tuple(dict.fromkeys(recording_suffix(each) for each in PictureFormat))
+_ENDINGS: Final = tuple(dict.fromkeys(recording_suffix(each) for each in ImageFormat))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RecordedPicture:
-    """One picture of a recording.
+class RecordedImage:
+    """One image of a recording.
 
     Attributes
     ----------
@@ -41,8 +41,8 @@ class RecordedPicture:
     row: SideRow | None
 
 
-def open_picture_recording(path: "str | os.PathLike[str]") -> "PictureRecording":
-    """Open a recording of pictures; use it with ``with``.
+def open_image_recording(path: "str | os.PathLike[str]") -> "ImageRecording":
+    """Open a recording of images; use it with ``with``.
 
     Parameters
     ----------
@@ -54,11 +54,11 @@ def open_picture_recording(path: "str | os.PathLike[str]") -> "PictureRecording"
     RecordingError
         There is no such recording, it is none, or it is damaged.
     """
-    return PictureRecording(_found(Path(path)))
+    return ImageRecording(_found(Path(path)))
 
 
-class PictureRecording:
-    """What was recorded. Pictures are read when asked for. One thread."""
+class ImageRecording:
+    """What was recorded. Images are read when asked for. One thread."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -82,15 +82,15 @@ class PictureRecording:
     def __len__(self) -> int:
         return self._count
 
-    def __iter__(self) -> Iterator[RecordedPicture]:
-        """Yield all pictures, in order."""
+    def __iter__(self) -> Iterator[RecordedImage]:
+        """Yield all images, in order."""
         if self._source is None:
             return
-        for index, data in enumerate(self._source.pictures()):
-            yield RecordedPicture(data, index, self._row(index))
+        for index, data in enumerate(self._source.images()):
+            yield RecordedImage(data, index, self._row(index))
 
-    def __getitem__(self, index: int) -> RecordedPicture:
-        """Return one picture; those that follow it are found fastest.
+    def __getitem__(self, index: int) -> RecordedImage:
+        """Return one image; those that follow it are found fastest.
 
         Raises
         ------
@@ -100,9 +100,9 @@ class PictureRecording:
             It cannot be read.
         """
         if not 0 <= index < self._count or self._source is None:
-            raise IndexError(f"{self._path}: has pictures 0 to {self._count - 1}, not {index}")
+            raise IndexError(f"{self._path}: has images 0 to {self._count - 1}, not {index}")
         stamp = self._stamps[index] if index < len(self._stamps) else None
-        return RecordedPicture(self._source.picture(index, stamp), index, self._row(index))
+        return RecordedImage(self._source.image(index, stamp), index, self._row(index))
 
     def close(self) -> None:
         """Give the files back; harmless the second time."""
@@ -126,12 +126,12 @@ class PictureRecording:
 
     @property
     def rows(self) -> tuple[SideRow, ...]:
-        """A row for every picture that came, in the file or not, in the order of coming."""
+        """A row for every image that came, in the file or not, in the order of coming."""
         return self._side.rows
 
     @property
     def time_s(self) -> npt.NDArray[np.float64]:
-        """Platform time of each picture, shape (n,); NaN where the side file was cut off."""
+        """Platform time of each image, shape (n,); NaN where the side file was cut off."""
         found = np.full(self._count, np.nan)
         times = [row.time_s for row in self._written[: self._count]]
         found[: len(times)] = times
@@ -139,7 +139,7 @@ class PictureRecording:
 
     @property
     def rate_hz(self) -> float:
-        """How often pictures came, by the middle one of the times between them; 15 without any."""
+        """How often images came, by the middle one of the times between them; 15 without any."""
         steps = np.diff(self.time_s)
         steps = steps[steps > 0.0]
         return 1.0 / float(np.median(steps)) if steps.size else 15.0
@@ -151,34 +151,34 @@ class PictureRecording:
 
     @property
     def camera(self) -> str:
-        """Which camera took the pictures; empty where no side file tells."""
+        """Which camera took the images; empty where no side file tells."""
         return self.rows[0].camera if self.rows else ""
 
     @property
     def pixel_format(self) -> PixelFormat:
-        """Of the pictures."""
+        """Of the images."""
         return PixelFormat(self._written[0].pixel_format) if self._written else PixelFormat.MONO8
 
     @property
     def dropped(self) -> int:
-        """Pictures that came and could not be written in time."""
+        """Images that came and could not be written in time."""
         return self.rows[-1].dropped if self.rows else 0
 
     @property
     def incomplete(self) -> int:
-        """Pictures that came with parts missing, and are not in the file."""
+        """Images that came with parts missing, and are not in the file."""
         return sum(row.status == FrameStatus.INCOMPLETE.value for row in self.rows)
 
     @property
     def lost(self) -> int:
-        """Frames that the camera lost between the pictures."""
+        """Frames that the camera lost between the images."""
         return sum(row.lost_before for row in self.rows)
 
     @cached_property
     def _count(self) -> int:
         if self._source is None:
             return 0
-        # After a kill the side file may know more pictures than reached the disk, or fewer.
+        # After a kill the side file may know more images than reached the disk, or fewer.
         return len(self._written) if self._side.complete else self._source.count()
 
     @cached_property
@@ -189,19 +189,19 @@ class PictureRecording:
     def _row(self, index: int) -> SideRow | None:
         return self._written[index] if index < len(self._written) else None
 
-    def _opened(self) -> PictureSource | None:
+    def _opened(self) -> ImageSource | None:
         if self._path.is_dir():
             return SequenceSource(self._path)
-        if not self._path.exists():  # nothing came: a video without a picture is not kept
+        if not self._path.exists():  # nothing came: a video without an image is not kept
             return None
         if self._side.rows and not self._written and not self._path.stat().st_size:
-            return None  # the first picture failed already
+            return None  # the first image failed already
         colour = self.pixel_format is PixelFormat.RGB8
         return VideoSource(self._path, colour=colour, whole=self._side.complete)
 
 
 def _found(path: Path) -> Path:
-    """Return the path of the pictures."""
+    """Return the path of the images."""
     if path.suffix.lower() != SIDE_SUFFIX:
         if not path.exists() and not _side_path_of(path).exists():
             raise RecordingError(f"{path}: there is no such recording")

@@ -1,35 +1,35 @@
-"""`PictureRecordingStats`: how a recording of pictures stands."""
+"""`ImageRecordingStats`: how a recording of images stands."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 
 @dataclass(frozen=True, slots=True)
-class PictureRecordingStats:
-    """How a recording of pictures stands.
+class ImageRecordingStats:
+    """How a recording of images stands.
 
     Attributes
     ----------
     path, side_path : Path
         Of the file or the directory, and of the side file.
     written : int
-        Pictures in the file.
+        Images in the file.
     dropped : int
-        Pictures that came while the queue was full, or that waited when writing failed.
+        Images that came while the queue was full, or that waited when writing failed.
     incomplete : int
-        Pictures with parts missing; never in the file.
+        Images with parts missing; never in the file.
     lost : int
-        Frames that the camera lost between the pictures that came.
+        Frames that the camera lost between the images that came.
     waiting, waiting_bytes : int
-        Pictures that wait to be written.
+        Images that wait to be written.
     duration_s : float
-        Platform time between the first and the last picture in the file.
+        Platform time between the first and the last image in the file.
     file_bytes : int
         Size of the file, or of all files of a sequence.
     left_s : float
         How long it may go on before the disk is full.
     paused : bool
-        Pictures that come now are not meant for the file.
+        Images that come now are not meant for the file.
     """
 
     path: Path

@@ -1,11 +1,11 @@
-"""`SequenceWriter`: pictures into a directory, a file each."""
+"""`SequenceWriter`: images into a directory, a file each."""
 
 import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from cosmic.vico.core.recording.formats import PictureFormat
+from cosmic.vico.core.recording.formats import ImageFormat
 from cosmic.vico.core.recording.side_row import SideRow
 from cosmic.vico.core.recording.tiff_png import details, encoded_png, encoded_tiff
 from cosmic.vico.hw.interface import Pixels
@@ -14,8 +14,8 @@ DIGITS: Final = 6
 PART: Final = ".part"
 
 
-def picture_files(directory: Path, stem: str | None = None) -> dict[int, Path]:
-    """Return the pictures of a sequence by their index, in order; those of any stem without one."""
+def image_files(directory: Path, stem: str | None = None) -> dict[int, Path]:
+    """Return the images of a sequence by their index, in order; those of any stem without one."""
     begin = ".*" if stem is None else re.escape(stem)
     pattern = re.compile(rf"{begin}_(\d{{{DIGITS},}})\.(tif|png)")
     found = {}
@@ -41,10 +41,10 @@ class SequenceWriter:
     """
 
     def __init__(
-        self, directory: Path, picture_format: PictureFormat, stem: str, axes: Mapping[str, str]
+        self, directory: Path, image_format: ImageFormat, stem: str, axes: Mapping[str, str]
     ) -> None:
         self._directory = directory
-        self._png = picture_format is PictureFormat.PNG
+        self._png = image_format is ImageFormat.PNG
         self._stem = stem
         self._axes = axes
         self._index = 0
@@ -56,7 +56,7 @@ class SequenceWriter:
         return self._size_bytes
 
     def write(self, data: Pixels, row: SideRow) -> None:
-        """Add a picture."""
+        """Add an image."""
         encoded = encoded_png if self._png else encoded_tiff
         coded = encoded(data, details(row, self._axes), row.circumstances.scale_um_px)
         ending = ".png" if self._png else ".tif"

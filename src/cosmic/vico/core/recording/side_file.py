@@ -1,4 +1,4 @@
-"""The side file: a CSV with a line for every picture that came."""
+"""The side file: a CSV with a line for every image that came."""
 
 import csv
 import io
@@ -131,7 +131,7 @@ def read_side_file(path: Path) -> SideTable:
     lines = csv.DictReader(io.StringIO(whole, newline=""))
     header = lines.fieldnames or ()
     if header and not set(COLUMNS) <= set(header):
-        raise RecordingError(f"{path}: is no side file of a recording of pictures")
+        raise RecordingError(f"{path}: is no side file of a recording of images")
     units = _axes(header)
     columns = {position_column(axis, unit): axis for axis, unit in units.items()}
     try:

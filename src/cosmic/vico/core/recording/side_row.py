@@ -1,4 +1,4 @@
-"""`SideRow`: what stands beside a picture in the side file."""
+"""`SideRow`: what stands beside an image in the side file."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -7,10 +7,10 @@ from types import MappingProxyType
 from typing import Final
 
 from cosmic.frame.errors import RecordingError
-from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.core.image import CameraImage, Circumstances
 
 NOT_THERE: Final = -1
-"""Index of a picture that is not in the file."""
+"""Index of an image that is not in the file."""
 DROPPED: Final = "dropped"
 UNKNOWN: Final = "unknown"
 END: Final = "end"
@@ -42,7 +42,7 @@ COLUMNS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class SideRow:
-    """One picture that came to a recorder, whether it is in the file or not.
+    """One image that came to a recorder, whether it is in the file or not.
 
     Attributes
     ----------
@@ -53,9 +53,9 @@ class SideRow:
     utc : datetime or None
         When it came to the recorder.
     lost_before : int
-        Frames that the camera lost since the picture before this one.
+        Frames that the camera lost since the image before this one.
     dropped : int
-        Pictures dropped since the beginning because the queue was full, with this one.
+        Images dropped since the beginning because the queue was full, with this one.
     status : str
         "complete", "incomplete" (not in the file), "dropped" (not in the file), "unknown" (from a
         file whose side file was cut off); in the last row, which repeats the one before, "end" or
@@ -89,9 +89,9 @@ class SideRow:
         return {name: _text(value) for name, value in found.items()}
 
 
-def row_of(picture: Picture, utc: datetime) -> SideRow:
-    """Return the row of a picture that came at `utc`, not yet in a file."""
-    frame = picture.frame
+def row_of(image: CameraImage, utc: datetime) -> SideRow:
+    """Return the row of an image that came at `utc`, not yet in a file."""
+    frame = image.frame
     return SideRow(
         frame_id=frame.frame_id,
         device_ns=frame.device_ns,
@@ -99,10 +99,10 @@ def row_of(picture: Picture, utc: datetime) -> SideRow:
         exposed_s=frame.exposed_s,
         utc=utc,
         status=frame.status.value,
-        camera=picture.camera,
+        camera=image.camera,
         pixel_format=frame.pixel_format.value,
-        circumstances=picture.circumstances,
-        lost_before=picture.lost_before,
+        circumstances=image.circumstances,
+        lost_before=image.lost_before,
     )
 
 

@@ -1,4 +1,4 @@
-"""`save_picture`: one picture into a TIFF or PNG, with scale and circumstances."""
+"""`save_image`: one image into a TIFF or PNG, with scale and circumstances."""
 
 from collections.abc import Mapping
 from datetime import UTC, datetime
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from cosmic.frame.errors import RecordingError, RecordingExistsError
 from cosmic.frame.file_names import check_base_name, check_directory
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.recording.formats import kind_of, words
 from cosmic.vico.core.recording.side_row import row_of
 from cosmic.vico.core.recording.tiff_png import details, encoded_png, encoded_tiff
@@ -15,15 +15,15 @@ from cosmic.vico.hw.interface import FrameStatus
 _ENCODED = {".tif": encoded_tiff, ".tiff": encoded_tiff, ".png": encoded_png}
 
 
-def save_picture(
-    picture: Picture,
+def save_image(
+    image: CameraImage,
     path: Path,
     *,
     axes: Mapping[str, str] | None = None,
     overwrite: bool = False,
     utc: datetime | None = None,
 ) -> Path:
-    """Write `picture` and return the absolute path of the file.
+    """Write `image` and return the absolute path of the file.
 
     Parameters
     ----------
@@ -39,21 +39,21 @@ def save_picture(
     RecordingExistsError
         There is such a file, and `overwrite` is False.
     RecordingError
-        The picture is incomplete, or name, directory or disk forbid it.
+        The image is incomplete, or name, directory or disk forbid it.
     """
     encoded = _ENCODED.get(path.suffix.lower())
     if encoded is None:
         raise RecordingError(f"{path.name!r} must end in one of {words(_ENCODED)}")
-    if picture.frame.status is not FrameStatus.COMPLETE:
-        raise RecordingError(f"{path.name!r}: parts of the picture are missing; take another")
-    kind_of(picture.data, picture.frame.pixel_format)
+    if image.frame.status is not FrameStatus.COMPLETE:
+        raise RecordingError(f"{path.name!r}: parts of the image are missing; take another")
+    kind_of(image.data, image.frame.pixel_format)
     whole = check_directory(path.parent) / check_base_name(path.name)
     if whole.exists() and not overwrite:
         raise RecordingExistsError(
             f"{whole}: there is such a file; choose another name, or say that it may be replaced"
         )
-    known = details(row_of(picture, utc or datetime.now(UTC)), axes or {})
-    coded = encoded(picture.data, known, picture.circumstances.scale_um_px)
+    known = details(row_of(image, utc or datetime.now(UTC)), axes or {})
+    coded = encoded(image.data, known, image.circumstances.scale_um_px)
     part = whole.with_name(whole.name + ".part")
     try:
         part.write_bytes(coded)

@@ -1,4 +1,4 @@
-"""Where the pictures of a recording are read from: a video file, or a directory."""
+"""Where the images of a recording are read from: a video file, or a directory."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,54 +9,54 @@ import numpy as np
 from cosmic.frame.errors import RecordingError
 from cosmic.vico.core.recording.ffv1_check import is_intact
 from cosmic.vico.core.recording.planes import from_video_frame
-from cosmic.vico.core.recording.sequence_writer import picture_files
+from cosmic.vico.core.recording.sequence_writer import image_files
 from cosmic.vico.hw.interface import Pixels
 
 if TYPE_CHECKING:
     import av
 
 
-class PictureSource(Protocol):
-    """Gives the pictures in their order."""
+class ImageSource(Protocol):
+    """Gives the images in their order."""
 
     def count(self) -> int:
-        """Return how many whole pictures there are; looks through the file."""
+        """Return how many whole images there are; looks through the file."""
 
-    def pictures(self) -> Iterator[Pixels]:
-        """Yield all pictures, from the first."""
+    def images(self) -> Iterator[Pixels]:
+        """Yield all images, from the first."""
 
-    def picture(self, index: int, stamp: int | None) -> Pixels:
-        """Return one picture; `stamp` says at which millisecond it lies, where that is known."""
+    def image(self, index: int, stamp: int | None) -> Pixels:
+        """Return one image; `stamp` says at which millisecond it lies, where that is known."""
 
     def close(self) -> None:
         """Give the files back; harmless the second time."""
 
 
 class SequenceSource:
-    """A directory with a file a picture."""
+    """A directory with a file an image."""
 
     def __init__(self, directory: Path) -> None:
-        self._files = list(picture_files(directory).values())
+        self._files = list(image_files(directory).values())
 
     def count(self) -> int:
-        """Return how many pictures there are."""
+        """Return how many images there are."""
         return len(self._files)
 
-    def pictures(self) -> Iterator[Pixels]:
-        """Yield all pictures."""
+    def images(self) -> Iterator[Pixels]:
+        """Yield all images."""
         for index in range(len(self._files)):
-            yield self.picture(index)
+            yield self.image(index)
 
-    def picture(self, index: int, stamp: int | None = None) -> Pixels:
-        """Return one picture; `stamp` is not needed."""
+    def image(self, index: int, stamp: int | None = None) -> Pixels:
+        """Return one image; `stamp` is not needed."""
         del stamp
-        return read_picture(self._files[index])
+        return read_image(self._files[index])
 
     def close(self) -> None:
         """Nothing is open."""
 
 
-def read_picture(path: Path) -> Pixels:
+def read_image(path: Path) -> Pixels:
     """Return the pixels of a TIFF or PNG.
 
     Raises
@@ -78,7 +78,7 @@ def read_picture(path: Path) -> Pixels:
     except (OSError, ValueError, cv2.error, tifffile.TiffFileError) as exc:
         raise RecordingError(f"{path}: cannot be read ({exc})") from exc
     if data is None:
-        raise RecordingError(f"{path}: is no picture, or damaged")
+        raise RecordingError(f"{path}: is no image, or damaged")
     found: Pixels = data
     return found
 
@@ -89,9 +89,9 @@ class VideoSource:
     Parameters
     ----------
     colour : bool
-        The pictures have three layers.
+        The images have three layers.
     whole : bool
-        The file was closed in order, so that damage in it is told; else the pictures end there.
+        The file was closed in order, so that damage in it is told; else the images end there.
     """
 
     def __init__(self, path: Path, *, colour: bool, whole: bool) -> None:
@@ -113,26 +113,26 @@ class VideoSource:
             self._stream.thread_type = "SLICE"
         except (av.FFmpegError, IndexError) as exc:
             raise RecordingError(
-                f"{self._path}: no picture in it can be read ({exc}); is it damaged, or was the "
-                "program ended before the first picture was written?"
+                f"{self._path}: no image in it can be read ({exc}); is it damaged, or was the "
+                "program ended before the first image was written?"
             ) from exc
 
     def count(self) -> int:
-        """Return how many whole pictures there are; looks through the file."""
+        """Return how many whole images there are; looks through the file."""
         self._open()
         try:
             return sum(1 for _ in self._packets())
         finally:
             self._open()
 
-    def pictures(self) -> Iterator[Pixels]:
-        """Yield all pictures."""
+    def images(self) -> Iterator[Pixels]:
+        """Yield all images."""
         self._open()
         for frame in self._frames():
             yield self._pixels(frame)
 
-    def picture(self, index: int, stamp: int | None) -> Pixels:
-        """Return one picture."""
+    def image(self, index: int, stamp: int | None) -> Pixels:
+        """Return one image."""
         if self._next is None or self._next[0] != index:
             found = self._sought(stamp) if stamp is not None else None
             if found is None:
@@ -141,12 +141,12 @@ class VideoSource:
         frames = self._next[1]
         frame = next(frames, None)
         if frame is None:
-            raise RecordingError(f"{self._path}: picture {index} cannot be read")
+            raise RecordingError(f"{self._path}: image {index} cannot be read")
         self._next = (index + 1, frames)
         return self._pixels(frame)
 
     def _counted(self, index: int) -> "Iterator[av.VideoFrame]":
-        """Return the pictures from `index` on, found by counting."""
+        """Return the images from `index` on, found by counting."""
         self._open()
         frames = self._frames()
         for _ in range(index):
@@ -154,7 +154,7 @@ class VideoSource:
         return frames
 
     def _sought(self, stamp: int) -> "Iterator[av.VideoFrame] | None":
-        """Return the pictures from the one at `stamp` on; None when it is not found there."""
+        """Return the images from the one at `stamp` on; None when it is not found there."""
         base = self._stream.time_base
         try:
             self._container.seek(round(stamp / 1000 / base), stream=self._stream)
@@ -185,7 +185,7 @@ class VideoSource:
         try:
             for packet in self._demuxed():
                 if packet.is_corrupt:
-                    self._tell("a picture is cut off")
+                    self._tell("an image is cut off")
                     return
                 if checked and packet.size and not is_intact(bytes(packet)):
                     self._tell("its checksum is wrong")
@@ -216,7 +216,7 @@ class VideoSource:
 
     def _tell(self, why: object) -> None:
         if self._whole:
-            raise RecordingError(f"{self._path}: is damaged; a picture cannot be read ({why})")
+            raise RecordingError(f"{self._path}: is damaged; an image cannot be read ({why})")
 
 
 def _with(first: "av.VideoFrame", rest: "Iterator[av.VideoFrame]") -> "Iterator[av.VideoFrame]":

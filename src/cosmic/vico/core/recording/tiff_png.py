@@ -1,4 +1,4 @@
-"""One picture as TIFF or PNG, with its scale and circumstances, for other programs to read.
+"""One image as TIFF or PNG, with its scale and circumstances, for other programs to read.
 
 TIFF is OME-TIFF with the resolution in pixels a centimetre besides; PNG has pixels a metre
 (pHYs) and the circumstances as texts.
@@ -24,7 +24,7 @@ SOFTWARE: Final = "CoSMic"
 
 
 def details(row: SideRow, axes: Mapping[str, str]) -> dict[str, str]:
-    """Return what is known about a picture, as texts by the names of the side file's columns."""
+    """Return what is known about an image, as texts by the names of the side file's columns."""
     positions = row.circumstances.positions
     units = {axis: axes.get(axis, "") for axis in positions}
     found = row.texts() | position_texts(row, units)
@@ -37,7 +37,7 @@ def encoded_tiff(data: Pixels, known: Mapping[str, str], scale_um_px: float | No
 
     metadata: dict[str, object] = {
         "axes": "YXS" if data.ndim == 3 else "YX",
-        "MapAnnotation": {"Namespace": "cosmic/picture", **known},
+        "MapAnnotation": {"Namespace": "cosmic/image", **known},
     }
     resolution = None
     if scale_um_px:
@@ -71,7 +71,7 @@ def encoded_png(data: Pixels, known: Mapping[str, str], scale_um_px: float | Non
         ".png", np.ascontiguousarray(pixels), [cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION]
     )
     if not done:
-        raise RecordingError(f"a picture of shape {data.shape} cannot be written as PNG")
+        raise RecordingError(f"an image of shape {data.shape} cannot be written as PNG")
     whole = coded.tobytes()
     extra = [_text_chunk(name, text) for name, text in {"Software": SOFTWARE, **known}.items()]
     if scale_um_px:

@@ -1,4 +1,4 @@
-"""`TimeLapse`: which pictures of a running camera belong to a time-lapse."""
+"""`TimeLapse`: which images of a running camera belong to a time-lapse."""
 
 import math
 from dataclasses import dataclass
@@ -8,16 +8,16 @@ from cosmic.frame.errors import ConfigError
 
 @dataclass(frozen=True, slots=True)
 class TimeLapsePlan:
-    """A picture every `interval_s` of platform time.
+    """An image every `interval_s` of platform time.
 
     Attributes
     ----------
     interval_s : float
-        Between two pictures.
+        Between two images.
     count : int or None
-        How many times a picture is due; None for no end.
+        How many times an image is due; None for no end.
     until_s : float or None
-        Platform time after which no picture is due; None for no end.
+        Platform time after which no image is due; None for no end.
 
     Raises
     ------
@@ -33,22 +33,22 @@ class TimeLapsePlan:
         if not 0.0 < self.interval_s < math.inf:
             raise ConfigError(f"time-lapse: interval {self.interval_s!r} s; it must be above 0")
         if self.count is not None and not self.count > 0:
-            raise ConfigError(f"time-lapse: {self.count!r} pictures; there must be one at least")
+            raise ConfigError(f"time-lapse: {self.count!r} images; there must be one at least")
         if self.until_s is not None and math.isnan(self.until_s):
             raise ConfigError("time-lapse: its end is not a number")
 
 
 class TimeLapse:
-    """Chooses pictures: the first one exposed at or after each time that is due; one thread.
+    """Chooses images: the first one exposed at or after each time that is due; one thread.
 
-    Times that are due keep to the grid from `start_s` on, so that a late picture delays no other.
+    Times that are due keep to the grid from `start_s` on, so that a late image delays no other.
 
     Parameters
     ----------
     start_s : float
-        Platform time at which the first picture is due.
+        Platform time at which the first image is due.
     late_after_s : float or None
-        A picture exposed later than this after its time counts as late; a tenth of the interval
+        An image exposed later than this after its time counts as late; a tenth of the interval
         without it.
     """
 
@@ -63,22 +63,22 @@ class TimeLapse:
 
     @property
     def taken(self) -> int:
-        """Pictures chosen so far."""
+        """Images chosen so far."""
         return self._taken
 
     @property
     def late(self) -> int:
-        """Pictures among them that were exposed late."""
+        """Images among them that were exposed late."""
         return self._late
 
     @property
     def missed(self) -> int:
-        """Times that were due and had no picture before the next one."""
+        """Times that were due and had no image before the next one."""
         return self._missed
 
     @property
     def due_s(self) -> float | None:
-        """Platform time at which the next picture is due; None when it is over."""
+        """Platform time at which the next image is due; None when it is over."""
         due_s = self._start_s + self._step * self._plan.interval_s
         counted = self._plan.count is not None and self._step >= self._plan.count
         over = self._plan.until_s is not None and due_s > self._plan.until_s
@@ -86,11 +86,11 @@ class TimeLapse:
 
     @property
     def done(self) -> bool:
-        """True when no picture is due any more."""
+        """True when no image is due any more."""
         return self.due_s is None
 
     def take(self, exposed_s: float) -> bool:
-        """Return whether the picture exposed at `exposed_s` belongs to it."""
+        """Return whether the image exposed at `exposed_s` belongs to it."""
         due_s = self.due_s
         if due_s is None or not exposed_s >= due_s:
             return False
@@ -98,7 +98,7 @@ class TimeLapse:
         for _ in range(passed):
             self._step += 1
             self._missed += 1
-            if self.done:  # the picture came after the end
+            if self.done:  # the image came after the end
                 return False
         due_s += passed * self._plan.interval_s
         self._late += exposed_s - due_s > self._late_after_s

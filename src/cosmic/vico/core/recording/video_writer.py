@@ -1,4 +1,4 @@
-"""`VideoWriter`: pictures into one video file, through PyAV."""
+"""`VideoWriter`: images into one video file, through PyAV."""
 
 import sys
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from cosmic.frame.errors import RecordingError
-from cosmic.vico.core.recording.formats import PictureFormat, Traits, traits
+from cosmic.vico.core.recording.formats import ImageFormat, Traits, traits
 from cosmic.vico.core.recording.planes import to_video_frame
 from cosmic.vico.core.recording.side_row import SideRow
 from cosmic.vico.hw.interface import PixelFormat, Pixels
@@ -29,7 +29,7 @@ CONTAINER_OPTIONS: Final = {
 }
 
 
-def check_codec(picture_format: PictureFormat, *, load: bool = True) -> None:
+def check_codec(image_format: ImageFormat, *, load: bool = True) -> None:
     """Refuse a format whose codec is not installed.
 
     Parameters
@@ -43,9 +43,9 @@ def check_codec(picture_format: PictureFormat, *, load: bool = True) -> None:
     RecordingError
         PyAV, or the codec in it, is missing.
     """
-    codec = traits(picture_format).codec
+    codec = traits(image_format).codec
     if codec and (load or "av" in sys.modules or not _has_pyav()):
-        _check_loaded(picture_format, codec)
+        _check_loaded(image_format, codec)
 
 
 @cache
@@ -53,26 +53,26 @@ def _has_pyav() -> bool:
     return find_spec("av") is not None
 
 
-def _check_loaded(picture_format: PictureFormat, codec: str) -> None:
+def _check_loaded(image_format: ImageFormat, codec: str) -> None:
     help_ = "choose format tiff or png, or install PyAV again"
     try:
         import av
     except ImportError as exc:
         raise RecordingError(
-            f"format {picture_format}: PyAV cannot be loaded ({exc}); {help_}"
+            f"format {image_format}: PyAV cannot be loaded ({exc}); {help_}"
         ) from exc
     try:
         av.Codec(codec, "w")
     except ValueError as exc:
         raise RecordingError(
-            f"format {picture_format}: PyAV {av.__version__} has no codec {codec!r}; {help_}"
+            f"format {image_format}: PyAV {av.__version__} has no codec {codec!r}; {help_}"
         ) from exc
 
 
 class TimeStamps:
-    """Milliseconds since the first picture, each greater than the one before.
+    """Milliseconds since the first image, each greater than the one before.
 
-    Two pictures of one millisecond, or of a clock that stands still, would be refused by the
+    Two images of one millisecond, or of a clock that stands still, would be refused by the
     container. The true times are in the side file.
     """
 
@@ -81,7 +81,7 @@ class TimeStamps:
         self._last = -1
 
     def next(self, time_s: float) -> int:
-        """Return the stamp of the next picture."""
+        """Return the stamp of the next image."""
         if self._first_s is None:
             self._first_s = time_s
         self._last = max(self._last + 1, round((time_s - self._first_s) / TICK))
@@ -94,7 +94,7 @@ class VideoWriter:
     Parameters
     ----------
     shape : tuple of int
-        Height and width, then layers, of all pictures.
+        Height and width, then layers, of all images.
     rate_hz : float
         Nominal rate, by which players and converters go; time stamps are true.
 
@@ -107,14 +107,14 @@ class VideoWriter:
     def __init__(
         self,
         path: Path,
-        picture_format: PictureFormat,
+        image_format: ImageFormat,
         shape: tuple[int, ...],
         pixel_format: PixelFormat,
         rate_hz: float,
     ) -> None:
         import av
 
-        found = traits(picture_format)
+        found = traits(image_format)
         self._path = path
         self._stamps = TimeStamps()
         self._coded = (found.coded or {})[pixel_format]
@@ -133,7 +133,7 @@ class VideoWriter:
             raise _as_os_error(exc) from exc
 
     def _added_stream(self, found: Traits, shape: tuple[int, ...], rate_hz: float) -> Any:
-        # Threads that share out whole pictures hold some back, which a kill takes.
+        # Threads that share out whole images hold some back, which a kill takes.
         threads = 1 if found.threads == "FRAME" and rate_hz <= ONE_THREAD_HZ else THREADS
         rate = Fraction(rate_hz if 0.0 < rate_hz < 1e4 else 15.0).limit_denominator(1000)
         stream = self._container.add_stream(found.codec, rate=rate)
@@ -149,7 +149,7 @@ class VideoWriter:
         return self._path.stat().st_size
 
     def write(self, data: Pixels, row: SideRow) -> None:
-        """Add a picture."""
+        """Add an image."""
         frame = to_video_frame(data, self._coded)
         frame.pts = self._stamps.next(row.time_s)
         frame.time_base = TICK
@@ -174,7 +174,7 @@ class VideoWriter:
 
 
 def _options(options: Mapping[str, str], shape: tuple[int, ...]) -> dict[str, str]:
-    # FFV1 cannot cut a picture of a few pixels into slices.
+    # FFV1 cannot cut an image of a few pixels into slices.
     small = min(shape[:2]) < SMALLEST_SLICED_PX
     return {name: value for name, value in options.items() if not (small and name == "slices")}
 

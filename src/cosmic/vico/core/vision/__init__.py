@@ -1,1 +1,1 @@
-"""Machine vision: what is measured on a picture."""
+"""Machine vision: what is measured on an image."""

@@ -8,7 +8,7 @@ import cv2
 
 from cosmic.frame.errors import ConfigError
 from cosmic.vico.core.focus import FocusMeasure, sharpness
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.vision.chain import ALGORITHMS, Chain, Results, Unavailable, algorithm
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.fibre_tracking import FibreTracker
@@ -17,7 +17,7 @@ from cosmic.vico.core.vision.tool_types import ExpectedTool
 from cosmic.vico.core.vision.tracking import TemplateTracker
 from cosmic.vico.hw.interface import Pixels, Roi
 
-NO_TOOL: Final = "no tool is expected on the picture: calibrate with it, and bring it there"
+NO_TOOL: Final = "no tool is expected on the image: calibrate with it, and bring it there"
 
 
 def make_chain(*, off: Iterable[str] = ()) -> Chain:
@@ -32,18 +32,18 @@ def make_chain(*, off: Iterable[str] = ()) -> Chain:
 
 
 def grey(data: Pixels) -> Pixels:
-    """Return a picture without its colours."""
+    """Return an image without its colours."""
     return data if data.ndim == 2 else cast("Pixels", cv2.cvtColor(data, cv2.COLOR_RGB2GRAY))
 
 
 @algorithm
 class Sharpness:
-    """How sharp the picture is; the result is a float.
+    """How sharp the image is; the result is a float.
 
     Attributes
     ----------
     region : Roi or None
-        Where; None: the whole picture. Any thread may set it.
+        Where; None: the whole image. Any thread may set it.
     """
 
     name = "focus"
@@ -52,31 +52,31 @@ class Sharpness:
         self.region: Roi | None = None
         self.measure = FocusMeasure.VARIANCE
 
-    def run(self, picture: Picture, results: Results) -> object:  # noqa: ARG002
+    def run(self, image: CameraImage, results: Results) -> object:  # noqa: ARG002
         """Measure it."""
         try:
-            return sharpness(picture.data, self.region, self.measure)
+            return sharpness(image.data, self.region, self.measure)
         except ConfigError as exc:
             return Unavailable(str(exc))
 
 
 @algorithm
 class FindFibres:
-    """Every fibre on the picture; the result is a tuple of `Fibre`."""
+    """Every fibre on the image; the result is a tuple of `Fibre`."""
 
     name = "fibres"
 
-    def run(self, picture: Picture, results: Results) -> object:  # noqa: ARG002
+    def run(self, image: CameraImage, results: Results) -> object:  # noqa: ARG002
         """Find them."""
         # Not at the top: it loads OpenCV and scipy, which a window without it need not.
         from cosmic.vico.core.vision.finding import find_fibres
 
-        return tuple(find_fibres(grey(picture.data)))
+        return tuple(find_fibres(grey(image.data)))
 
 
 @algorithm
 class TrackFibre:
-    """One of the fibres found, followed from picture to picture; the result is a `FibreTrack`."""
+    """One of the fibres found, followed from image to image; the result is a `FibreTrack`."""
 
     name = "fibre track"
 
@@ -86,14 +86,14 @@ class TrackFibre:
         self._end = False
 
     def follow(self, fibre: Fibre) -> None:
-        """Follow `fibre` from the next picture on; any thread."""
+        """Follow `fibre` from the next image on; any thread."""
         self._end, self._wish = False, fibre
 
     def end(self) -> None:
-        """Follow none from the next picture on; any thread."""
+        """Follow none from the next image on; any thread."""
         self._end, self._wish = True, None
 
-    def run(self, picture: Picture, results: Results) -> object:  # noqa: ARG002
+    def run(self, image: CameraImage, results: Results) -> object:  # noqa: ARG002
         """Say which it is among the fibres found."""
         wish, self._wish = self._wish, None
         if wish is not None:
@@ -104,13 +104,13 @@ class TrackFibre:
             return Unavailable("no fibre is followed")
         found = results.get("fibres")
         if not isinstance(found, tuple):
-            return Unavailable("no fibres were looked for on this picture")
+            return Unavailable("no fibres were looked for on this image")
         return self._tracker.follow([each for each in found if isinstance(each, Fibre)])
 
 
 @algorithm
 class TrackPlace:
-    """A place on the picture, followed by how it looks; the result is a `Track`."""
+    """A place on the image, followed by how it looks; the result is a `Track`."""
 
     name = "place track"
 
@@ -120,16 +120,16 @@ class TrackPlace:
         self._end = False
 
     def follow(self, at_px: tuple[float, float]) -> None:
-        """Follow what is there on the next picture; any thread."""
+        """Follow what is there on the next image; any thread."""
         self._end, self._wish = False, at_px
 
     def end(self) -> None:
-        """Follow nothing from the next picture on; any thread."""
+        """Follow nothing from the next image on; any thread."""
         self._end, self._wish = True, None
 
-    def run(self, picture: Picture, results: Results) -> object:  # noqa: ARG002
+    def run(self, image: CameraImage, results: Results) -> object:  # noqa: ARG002
         """Find it again."""
-        data = grey(picture.data)
+        data = grey(image.data)
         wish, self._wish = self._wish, None
         if self._end:
             self._tracker = None
@@ -152,10 +152,10 @@ class FindTools:
     Attributes
     ----------
     expected : mapping of str to ExpectedTool
-        Where each should be on the next picture, from the stages; replaced whole, by any thread.
+        Where each should be on the next image, from the stages; replaced whole, by any thread.
         One with a gap is a gripper.
     expect : callable or None
-        Tells it from each picture instead.
+        Tells it from each image instead.
     """
 
     name = "tools"
@@ -164,12 +164,12 @@ class FindTools:
         self.expected: Mapping[str, ExpectedTool] = MappingProxyType({})
         self.expect: Expect | None = None
 
-    def run(self, picture: Picture, results: Results) -> object:  # noqa: ARG002
+    def run(self, image: CameraImage, results: Results) -> object:  # noqa: ARG002
         """Find those expected."""
-        expected = self.expected if self.expect is None else self.expect(picture)
+        expected = self.expected if self.expect is None else self.expect(image)
         if not expected:
             return Unavailable(NO_TOOL if self.expect else "nobody says where the tools should be")
-        data = grey(picture.data)
+        data = grey(image.data)
         return MappingProxyType({name: find_tool(data, tool) for name, tool in expected.items()})
 
 
@@ -177,12 +177,12 @@ class FindTools:
 class FindTips:
     """The tips of grippers and probe in short, for the display; a tuple of `TipSeen`.
 
-    What the link "tools" found on the same picture is taken where it is on.
+    What the link "tools" found on the same image is taken where it is on.
 
     Attributes
     ----------
     expect : callable or None
-        Tells from a picture where the tools should be on it.
+        Tells from an image where the tools should be on it.
     """
 
     name = "tips"
@@ -190,14 +190,14 @@ class FindTips:
     def __init__(self) -> None:
         self.expect: Expect | None = None
 
-    def run(self, picture: Picture, results: Results) -> object:
+    def run(self, image: CameraImage, results: Results) -> object:
         """Find those expected."""
         found = results.get("tools")
         if not isinstance(found, Mapping):
-            expected = self.expect(picture) if self.expect is not None else {}
+            expected = self.expect(image) if self.expect is not None else {}
             if not expected:
                 return Unavailable(NO_TOOL)
-            data = grey(picture.data)
+            data = grey(image.data)
             found = {name: find_tool(data, tool) for name, tool in expected.items()}
         seen = (tip_seen(name, each) for name, each in found.items())
         return tuple(each for each in seen if each is not None)

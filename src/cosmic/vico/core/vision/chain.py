@@ -1,4 +1,4 @@
-"""The chain of named algorithms that is run on each picture before it is shown.
+"""The chain of named algorithms that is run on each image before it is shown.
 
 An algorithm of one's own is a class with `name` and `run`, and `@algorithm` above it, in a module
 that is imported before `algorithms.make_chain` is called::
@@ -7,8 +7,8 @@ that is imported before `algorithms.make_chain` is called::
     class Brightness:
         name = "brightness"
 
-        def run(self, picture: Picture, results: Results) -> object:
-            return float(picture.data.mean())
+        def run(self, image: CameraImage, results: Results) -> object:
+            return float(image.data.mean())
 """
 
 import logging
@@ -21,7 +21,7 @@ from typing import Final, Protocol, TypeVar
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import ConfigError
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 
 logger = logging.getLogger(__name__)
 
@@ -34,18 +34,18 @@ T = TypeVar("T")
 
 
 class Algorithm(Protocol):
-    """Something that is found on each picture. One thread runs it; it may keep what it likes."""
+    """Something that is found on each image. One thread runs it; it may keep what it likes."""
 
     name: str
 
     @abstractmethod
-    def run(self, picture: Picture, results: Results) -> object:
-        """Return what is found on `picture`, as an object that nobody changes afterwards.
+    def run(self, image: CameraImage, results: Results) -> object:
+        """Return what is found on `image`, as an object that nobody changes afterwards.
 
         Parameters
         ----------
         results : mapping of str to object
-            What the algorithms before it in the chain found on the same picture, by name. One
+            What the algorithms before it in the chain found on the same image, by name. One
             that is switched off or failed is missing.
 
         Returns
@@ -74,7 +74,7 @@ class Failure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Analysis:
-    """What the chain found on one picture.
+    """What the chain found on one image.
 
     Attributes
     ----------
@@ -83,10 +83,10 @@ class Analysis:
     durations_s : mapping of str to float
         Wall time of each.
     failures : mapping of str to Failure
-        Those that raised on this picture.
+        Those that raised on this image.
     """
 
-    picture: Picture
+    image: CameraImage
     results: Results
     durations_s: Mapping[str, float]
     duration_s: float
@@ -127,7 +127,7 @@ class _Link:
 
 
 class Chain:
-    """Runs algorithms in order on a picture; one that raises does not keep the rest from running.
+    """Runs algorithms in order on an image; one that raises does not keep the rest from running.
 
     `run` belongs to one thread; `switch` and `states` are for any.
 
@@ -172,7 +172,7 @@ class Chain:
             )
 
     def switch(self, name: str, *, on: bool) -> None:
-        """Switch an algorithm on or off, from the next picture on; its failures are forgotten.
+        """Switch an algorithm on or off, from the next image on; its failures are forgotten.
 
         Raises
         ------
@@ -187,7 +187,7 @@ class Chain:
         """Return an algorithm, for its own settings; raises `ConfigError` as `switch` does."""
         return self._link(name).algorithm
 
-    def run(self, picture: Picture) -> Analysis:
+    def run(self, image: CameraImage) -> Analysis:
         """Run all that are on."""
         began_s = WALL.now_s()
         results: dict[str, object] = {}
@@ -199,14 +199,14 @@ class Chain:
             if not link.on or start_s < link.due_s:
                 continue
             try:
-                results[name] = link.algorithm.run(picture, seen)
+                results[name] = link.algorithm.run(image, seen)
             except Exception as exc:  # noqa: BLE001 - said once, and it does not end the others
-                failures[name] = self._failed(link, exc, picture.frame.frame_id)
+                failures[name] = self._failed(link, exc, image.frame.frame_id)
             else:
                 self._succeeded(link)
             durations_s[name] = link.last_s = WALL.now_s() - start_s
         return Analysis(
-            picture,
+            image,
             seen,
             MappingProxyType(durations_s),
             WALL.now_s() - began_s,
@@ -226,7 +226,7 @@ class Chain:
                     f"{self._retry_s:g} s: {text}"
                 )
             first = link.failures == 1
-        if first:  # the same at every picture says nothing new
+        if first:  # the same at every image says nothing new
             logger.error(
                 "vision: %s failed on frame %d; it is tried again", name, frame, exc_info=exc
             )

@@ -19,12 +19,12 @@ LEAST_CONTRAST: Final = 0.25
 BODY_LEVEL: Final = 0.4
 CLIP_PX: Final = 0.3
 FEWEST_PROFILES: Final = 5
-# Neighbouring profiles share noise: the picture is blurred, and each is the mean of three.
+# Neighbouring profiles share noise: the image is blurred, and each is the mean of three.
 SHARED_NOISE: Final = 2.0
 
 
 class Frame(NamedTuple):
-    """A part of the picture turned so that the tool points to the right.
+    """A part of the image turned so that the tool points to the right.
 
     Columns go forward, rows to the tool's side; `origin_px` is where (0, 0) lies.
     """
@@ -34,8 +34,8 @@ class Frame(NamedTuple):
     forward: Floats
     side: Floats
 
-    def picture_px(self, forward: float, aside: float) -> Pair:
-        """Return where a point lies in the picture."""
+    def image_px(self, forward: float, aside: float) -> Pair:
+        """Return where a point lies in the image."""
         x, y = self.origin_px + forward * self.forward + aside * self.side
         return float(x), float(y)
 
@@ -125,7 +125,7 @@ class Body:
 def turned(
     image: Pixels, at_px: Pair, forward: Pair, *, back: float, ahead: float, aside: float
 ) -> Frame:
-    """Return the surroundings of a place, turned; beyond the picture its rim goes on."""
+    """Return the surroundings of a place, turned; beyond the image its rim goes on."""
     ahead_of, side = np.array(forward), np.array([-forward[1], forward[0]])
     origin = np.array(at_px) - back * ahead_of - aside * side
     columns, rows = math.ceil(back + ahead) + 1, math.ceil(2.0 * aside) + 1

@@ -15,7 +15,7 @@ class EndKind(StrEnum):
     """What an end of a fibre is."""
 
     FREE = "free"
-    BORDER = "the picture's border cuts it off"
+    BORDER = "the image's border cuts it off"
     BODY = "it runs into something wider"
     LOST = "an end cannot be found"
     HIDDEN = "hidden"

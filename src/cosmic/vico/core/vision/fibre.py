@@ -1,4 +1,4 @@
-"""What is known of one fibre on a picture."""
+"""What is known of one fibre on an image."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from cosmic.vico.core.vision.grey import Floats, Mask
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fibre:
-    """One fibre, in pixels of its picture; pixel (0, 0) has its centre at (0.0, 0.0).
+    """One fibre, in pixels of its image; pixel (0, 0) has its centre at (0.0, 0.0).
 
     Attributes
     ----------

@@ -143,7 +143,7 @@ class FibreTracker:
 
 def _why_none(alike: Sequence[_Likeness], reach_px: float) -> str:
     if not alike:
-        return "there is no fibre on the picture"
+        return "there is no fibre on the image"
     return min(alike, key=lambda each: each.distance_px).objection(reach_px)
 
 

@@ -1,4 +1,4 @@
-"""Fibres found on a picture and measured."""
+"""Fibres found on an image and measured."""
 
 from types import MappingProxyType
 
@@ -12,7 +12,7 @@ from cosmic.vico.core.vision import checks
 from cosmic.vico.core.vision.ends import EndKind
 from cosmic.vico.core.vision.fibre import Fibre, paint
 from cosmic.vico.core.vision.graph import build_graph, prune
-from cosmic.vico.core.vision.grey import Floats, Mask, grey_picture
+from cosmic.vico.core.vision.grey import Floats, Mask, grey_image
 from cosmic.vico.core.vision.joining import Strand, strands
 from cosmic.vico.core.vision.measures import (
     grasp_points,
@@ -38,18 +38,18 @@ MOST_FORKS = 400
 # A fibre is at least so many times longer than wide.
 SLENDER = 5.0
 LEAST_PX = 12.0
-LEAST_OF_PICTURE = 0.025
+LEAST_OF_IMAGE = 0.025
 # More cannot be told apart in time, nor in a network at all.
 MOST_STRANDS = 96
 
 
 def find_fibres(image: npt.NDArray[np.generic]) -> list[Fibre]:
-    """Find the fibres on a picture and measure them, the longest first.
+    """Find the fibres on an image and measure them, the longest first.
 
     Parameters
     ----------
     image : ndarray, shape (height, width), uint8 or uint16
-        Fibres darker or lighter than the ground. A picture of shape (height, width, 3) is taken
+        Fibres darker or lighter than the ground. An image of shape (height, width, 3) is taken
         as blue, green, red and turned to grey.
 
     Returns
@@ -60,16 +60,16 @@ def find_fibres(image: npt.NDArray[np.generic]) -> list[Fibre]:
     Raises
     ------
     ConfigError
-        The picture has another type or shape, or is smaller than 16 x 16.
+        The image has another type or shape, or is smaller than 16 x 16.
     NotAvailable
-        They cannot be looked for on this picture.
+        They cannot be looked for on this image.
     """
-    pixels = grey_picture(image)
+    pixels = grey_image(image)
     try:
         return _found(pixels)
     except (ValueError, ArithmeticError, IndexError) as exc:  # numpy's and scipy's among them
         raise NotAvailable(
-            f"fibres cannot be looked for on this picture ({type(exc).__name__}: {exc}); take "
+            f"fibres cannot be looked for on this image ({type(exc).__name__}: {exc}); take "
             "another, or change zoom, focus or light"
         ) from exc
 
@@ -88,7 +88,7 @@ def _found(pixels: Pixels) -> list[Fibre]:
         relief.factor,
         1.0 if relief.lighter else -1.0,
     )
-    least = max(LEAST_PX, LEAST_OF_PICTURE * float(np.hypot(*pixels.shape)))
+    least = max(LEAST_PX, LEAST_OF_IMAGE * float(np.hypot(*pixels.shape)))
     kept = [each for each in strands(graph) if long_enough(each, relief.factor, least)]
     kept.sort(key=lambda each: -float(arc_lengths(each.points)[-1]))
     courses = []
@@ -282,7 +282,7 @@ def judged(scene: Scene, courses: list[tuple[Strand, Course]], *, crowd: bool) -
 
 
 def touches_border(scene: Scene, course: Course) -> bool:
-    """Return whether a fibre lies partly beyond the picture's border."""
+    """Return whether a fibre lies partly beyond the image's border."""
     room = 0.5 * course.width - 0.5
     return bool((course.line < room).any() or (course.line > scene.corner - room).any())
 

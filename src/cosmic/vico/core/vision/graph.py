@@ -45,7 +45,7 @@ class Branch:
 
 @dataclass(slots=True, eq=False)
 class Graph:
-    """Branches and nodes of one picture.
+    """Branches and nodes of one image.
 
     Attributes
     ----------

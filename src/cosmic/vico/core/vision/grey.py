@@ -1,4 +1,4 @@
-"""Pictures as machine vision takes them: one layer, 8 or 16 bit."""
+"""Images as machine vision takes them: one layer, 8 or 16 bit."""
 
 from typing import cast
 
@@ -17,8 +17,8 @@ LEAST_SIDE_PX = 16
 LAYERS = 3
 
 
-def grey_picture(image: npt.NDArray[np.generic]) -> Pixels:
-    """Return a picture in one layer; three layers are weighed as blue, green, red.
+def grey_image(image: npt.NDArray[np.generic]) -> Pixels:
+    """Return an image in one layer; three layers are weighed as blue, green, red.
 
     Raises
     ------
@@ -26,19 +26,19 @@ def grey_picture(image: npt.NDArray[np.generic]) -> Pixels:
         It is no array of 8 or 16 bit pixels, or too small to hold a fibre.
     """
     if not isinstance(image, np.ndarray):
-        raise ConfigError(f"a picture is a numpy array, not {type(image).__name__}")
+        raise ConfigError(f"an image is a numpy array, not {type(image).__name__}")
     if image.dtype not in (np.uint8, np.uint16):
         raise ConfigError(
-            f"a picture has uint8 or uint16 pixels, not {image.dtype}; convert it first, so that "
+            f"an image has uint8 or uint16 pixels, not {image.dtype}; convert it first, so that "
             "its grey levels are whole numbers"
         )
     if image.ndim != 2 and not (image.ndim == LAYERS and image.shape[2] == LAYERS):
         raise ConfigError(
-            f"a picture has the shape (height, width) or (height, width, 3), not {image.shape}"
+            f"an image has the shape (height, width) or (height, width, 3), not {image.shape}"
         )
     if not min(image.shape[:2]) >= LEAST_SIDE_PX:
         raise ConfigError(
-            f"the picture of {image.shape[1]} x {image.shape[0]} pixels is too small; fibres are "
+            f"the image of {image.shape[1]} x {image.shape[0]} pixels is too small; fibres are "
             f"looked for from {LEAST_SIDE_PX} x {LEAST_SIDE_PX} on"
         )
     pixels = cast("Pixels", image)

@@ -34,7 +34,7 @@ class Strand:
     Attributes
     ----------
     points : ndarray, shape (n, 2)
-        In pixels of the reduced picture.
+        In pixels of the reduced image.
     half_width : float
         Likewise.
     joints : list of ndarray

@@ -1,4 +1,4 @@
-"""Where a small part of one picture is found on another, to a small part of a pixel."""
+"""Where a small part of one image is found on another, to a small part of a pixel."""
 
 import math
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class Match:
     std_px : float
         Standard deviation in the direction known least: large on a straight edge, along it.
     score : float
-        Normalised cross-correlation there; 1 for the same picture.
+        Normalised cross-correlation there; 1 for the same image.
     rival : float
         The best score away from there.
     at_rim : bool
@@ -50,7 +50,7 @@ class Match:
 
 
 class Template:
-    """A part of a picture to be found again.
+    """A part of an image to be found again.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Template:
     Raises
     ------
     ConfigError
-        The region is not within the picture, too small, or shows nothing to go by.
+        The region is not within the image, too small, or shows nothing to go by.
     """
 
     def __init__(self, image: Pixels, region: Roi) -> None:
@@ -70,7 +70,7 @@ class Template:
         if not (inside and min(region.width_px, region.height_px) >= SMALLEST_TEMPLATE_PX):
             raise ConfigError(
                 f"tracking: the region of {region.width_px} x {region.height_px} px at "
-                f"{region.x_px}, {region.y_px} must lie within the picture of {width} x {height} "
+                f"{region.x_px}, {region.y_px} must lie within the image of {width} x {height} "
                 f"px and be {SMALLEST_TEMPLATE_PX} px or more; choose another"
             )
         self.pixels: Floats32 = image[region.y_px : bottom, region.x_px : right].astype(np.float32)
@@ -88,7 +88,7 @@ class Template:
         self._slope_noise = SLOPE_NOISE * _noise_variance(self.pixels) * self.pixels.size
 
     def find(self, image: Pixels, around_px: Pair, reach_px: float) -> Match | None:
-        """Look for the template's centre within `reach_px` of a place; None off the picture."""
+        """Look for the template's centre within `reach_px` of a place; None off the image."""
         rows, columns = self.pixels.shape
         left, right = _span(around_px[0], reach_px, columns, image.shape[1])
         top, bottom = _span(around_px[1], reach_px, rows, image.shape[0])
@@ -139,7 +139,7 @@ class Template:
         return (float(place[0]), float(place[1])), math.hypot(std_px, FLOOR_PX)
 
     def _error(self, window: Floats32, place: Floats) -> Floats:
-        """Return the picture there less the template, at the template's brightness."""
+        """Return the image there less the template, at the template's brightness."""
         rows, columns = self.pixels.shape
         there = cv2.getRectSubPix(window, (columns, rows), (float(place[0]), float(place[1])))
         away = there - there.mean()
@@ -162,16 +162,16 @@ def displacement(before: Pixels, after: Pixels, region: Roi, reach_px: float) ->
 
 
 def drift_px(before: Pixels, after: Pixels) -> tuple[Pair, float]:
-    """Return how far a whole picture went, by phase correlation, and how clearly, 0 to 1.
+    """Return how far a whole image went, by phase correlation, and how clearly, 0 to 1.
 
     Raises
     ------
     ConfigError
-        The pictures are of different sizes.
+        The images are of different sizes.
     """
     if before.shape != after.shape or before.ndim != 2:
         raise ConfigError(
-            f"tracking: pictures of {before.shape} and {after.shape} cannot be compared; "
+            f"tracking: images of {before.shape} and {after.shape} cannot be compared; "
             "take both with the same ROI and binning, in grey"
         )
     rows, columns = before.shape

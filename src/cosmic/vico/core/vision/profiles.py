@@ -68,14 +68,14 @@ def sample(image: Floats32, x: Floats32, y: Floats32) -> Floats32:
 
 
 def within(scene: "Scene", x: Floats32, y: Floats32) -> Flags:
-    """Return which places lie on the picture."""
+    """Return which places lie on the image."""
     right, bottom = scene.corner + 0.5
     return np.asarray((x >= -0.5) & (x <= right) & (y >= -0.5) & (y <= bottom))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A picture at full size with what was found on it at reduced size.
+    """An image at full size with what was found on it at reduced size.
 
     Attributes
     ----------
@@ -98,15 +98,15 @@ class Scene:
         return np.array([columns - 1.0, rows - 1.0])
 
     def full(self, points: Floats) -> Floats:
-        """Return places of the reduced picture in full-size pixels."""
+        """Return places of the reduced image in full-size pixels."""
         return points * self.factor + 0.5 * (self.factor - 1)
 
     def reduced(self, places: Floats) -> Floats:
-        """Return full-size places in pixels of the reduced picture."""
+        """Return full-size places in pixels of the reduced image."""
         return (places - 0.5 * (self.factor - 1)) / self.factor
 
     def reduced_by_axis(self, places: Floats32) -> Floats32:
-        """Return full-size x, or y, in pixels of the reduced picture."""
+        """Return full-size x, or y, in pixels of the reduced image."""
         shift, factor = np.float32(0.5 * (self.factor - 1)), np.float32(self.factor)
         return np.asarray((places - shift) / factor)
 

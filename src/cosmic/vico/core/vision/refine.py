@@ -1,4 +1,4 @@
-"""A strand of the skeleton made exact on the full-size picture."""
+"""A strand of the skeleton made exact on the full-size image."""
 
 from dataclasses import dataclass, field
 
@@ -55,7 +55,7 @@ class Course:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Neighbours:
-    """The other strands of the picture, to keep out of the way of."""
+    """The other strands of the image, to keep out of the way of."""
 
     tree: cKDTree | None
     margins: Floats
@@ -124,7 +124,7 @@ def excluded(course: Course, neighbours: Neighbours) -> Flags:
 
 
 def centre_roughly(scene: Scene, course: Course, neighbours: Neighbours) -> None:
-    """Move a line onto its fibre, from where the skeleton of the reduced picture lies."""
+    """Move a line onto its fibre, from where the skeleton of the reduced image lies."""
     reach = 1.1 * course.width + 2 * scene.factor + 4
     profiles = cross_sections(scene, course.line, course.width, reach)
     most = scene.factor + 0.35 * course.width

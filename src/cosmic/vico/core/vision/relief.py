@@ -1,4 +1,4 @@
-"""Where a picture is darker or lighter than its ground, found at a quarter of its size."""
+"""Where an image is darker or lighter than its ground, found at a quarter of its size."""
 
 from dataclasses import dataclass
 
@@ -11,14 +11,14 @@ from cosmic.vico.hw.interface import Pixels
 
 # Wider bodies are tools, not fibres: the ground is what remains of them. Full-size pixels.
 WIDEST_PX = 64
-WIDEST_OF_PICTURE = 0.04
+WIDEST_OF_IMAGE = 0.04
 QUARTER = 4
 SMALL_PX = 420
 # Of 8-bit levels: less cannot be told from the steps of the converter.
 LEAST_LEVELS = 1.5
 NOISE_TIMES = 6.0
 OF_STRONGEST = 0.05
-# A network fills the picture, a fibre does not.
+# A network fills the image, a fibre does not.
 CROWDED = 0.25
 
 
@@ -83,12 +83,12 @@ class Pieces:
 
 
 def reduction(shape: tuple[int, ...]) -> int:
-    """Return by how much a picture is reduced to look for fibres."""
+    """Return by how much an image is reduced to look for fibres."""
     return int(np.clip(round(max(shape) / SMALL_PX), 1, QUARTER))
 
 
 def reduced(image: Pixels, factor: int) -> Floats32:
-    """Return a picture at reduced size, smoothed where the reduction does not do it."""
+    """Return an image at reduced size, smoothed where the reduction does not do it."""
     rows, columns = (side // factor for side in image.shape)
     part = image[: rows * factor, : columns * factor]
     small = cv2.resize(part, (columns, rows), interpolation=cv2.INTER_AREA)
@@ -105,7 +105,7 @@ def find_relief(image: Pixels) -> Relief:
     """Return what stands out, choosing between darker and lighter by what looks like fibres."""
     factor = reduction(image.shape)
     small = reduced(image, factor)
-    widest = max(WIDEST_PX, WIDEST_OF_PICTURE * max(image.shape))
+    widest = max(WIDEST_PX, WIDEST_OF_IMAGE * max(image.shape))
     side = int(min(widest, 0.3 * min(image.shape)) / factor) | 1
     hats = [
         (lighter, stands_out(hat(small, max(3, side), kind)))
@@ -133,7 +133,7 @@ def hat(small: Floats32, side: int, kind: int) -> Floats32:
 
 
 def level_step(image: Pixels) -> float:
-    """Return how many levels of a 16-bit picture make one of 256 over the range it uses."""
+    """Return how many levels of a 16-bit image make one of 256 over the range it uses."""
     low, high = (float(value) for value in np.percentile(image[::8, ::8], (0.5, 99.5)))
     return max(1.0, (high - low) / 256.0)
 

@@ -2,7 +2,7 @@
 
 Half of the height is where the edge of a wide bar lies, but not that of a narrow hollow one: blur
 fills the hollow first, and what is left looks like a wider bar without one. So the bar, its hollow
-and the blur are fitted together, with weak beliefs of what fibres are. Where a picture does not
+and the blur are fitted together, with weak beliefs of what fibres are. Where an image does not
 tell them apart the beliefs decide, and the deviation grows.
 """
 
@@ -37,9 +37,9 @@ LUMEN_PART: Final = (0.55, 0.15)
 BLUR_PX: Final = 1.0
 BLUR_LN: Final = 0.6
 SHARED_LN: Final = 0.02
-"""What fibres on one picture do not tell better of its blur, however many they are."""
+"""What fibres on one image do not tell better of its blur, however many they are."""
 APERTURE_PX: Final = 0.29
-"""Blur of the square of a pixel: no picture is sharper."""
+"""Blur of the square of a pixel: no image is sharper."""
 
 HEIGHT, DEPTH, GROUND, CENTRE, HALF, PART, BLUR = range(7)
 
@@ -259,7 +259,7 @@ def _bar(x: Floats, half: float, blur: float) -> tuple[Floats, Floats, Floats, F
 
 
 def pooled(sections: list[Section]) -> list[Section]:
-    """Return sections from one picture, which is blurred alike where it is in focus.
+    """Return sections from one image, which is blurred alike where it is in focus.
 
     One whose own blur disagrees lies at another height, and is left as it is.
     """

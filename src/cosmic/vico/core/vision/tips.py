@@ -38,7 +38,7 @@ LARGEST_STEP_PX: Final = 1.5
 
 
 def find_probe(image: Pixels, expected: ExpectedTool) -> ToolEnd | NotSeen:
-    """Find the tip of a probe on a grey picture."""
+    """Find the tip of a probe on a grey image."""
     looked = _look(image, expected)
     if isinstance(looked, NotSeen):
         return looked
@@ -52,7 +52,7 @@ def find_probe(image: Pixels, expected: ExpectedTool) -> ToolEnd | NotSeen:
 
 
 def find_gripper(image: Pixels, expected: ExpectedTool) -> GripperTips | NotSeen:
-    """Find both jaws of a gripper on a grey picture."""
+    """Find both jaws of a gripper on a grey image."""
     looked = _look(image, expected)
     if isinstance(looked, NotSeen):
         return looked
@@ -71,11 +71,11 @@ def find_gripper(image: Pixels, expected: ExpectedTool) -> GripperTips | NotSeen
 
 def _look(image: Pixels, expected: ExpectedTool) -> tuple[Frame, Levels, list[Blob]] | NotSeen:
     if image.ndim != 2:
-        raise ConfigError(f"tool tips: a grey picture is needed, not the shape {image.shape}")
+        raise ConfigError(f"tool tips: a grey image is needed, not the shape {image.shape}")
     height, width = image.shape
     x, y = expected.tip_px
     if not (0.0 <= x <= width - 1.0 and 0.0 <= y <= height - 1.0):
-        return NotSeen(f"its tip is expected at {x:.0f}, {y:.0f} px, off the picture")
+        return NotSeen(f"its tip is expected at {x:.0f}, {y:.0f} px, off the image")
     frame = turned(
         image,
         expected.tip_px,
@@ -88,7 +88,7 @@ def _look(image: Pixels, expected: ExpectedTool) -> tuple[Frame, Levels, list[Bl
     found = [] if greys is None else blobs(frame, greys, expected.width_px)
     if greys is None or not found:
         return NotSeen(
-            "no large dark body comes into the part of the picture where it is expected; look "
+            "no large dark body comes into the part of the image where it is expected; look "
             "whether it is there, lit and in focus"
         )
     return frame, greys, found
@@ -122,12 +122,12 @@ def _body(frame: Frame, greys: Levels, blob: Blob, expected: ExpectedTool) -> Bo
 
 
 def _tool_end(frame: Frame, body: Body, expected: ExpectedTool, *, inner_is_high: bool) -> ToolEnd:
-    corners = (frame.picture_px(*body.corner(body.low)), frame.picture_px(*body.corner(body.high)))
+    corners = (frame.image_px(*body.corner(body.low)), frame.image_px(*body.corner(body.high)))
     lean = 0.5 * (body.low.slope + body.high.slope)
     ahead = frame.forward + lean * frame.side
     x, y = ahead / np.linalg.norm(ahead)
     return ToolEnd(
-        frame.picture_px(*body.tip),
+        frame.image_px(*body.tip),
         (corners[1], corners[0]) if inner_is_high else corners,
         (float(x), float(y)),
         body.width,
@@ -190,7 +190,7 @@ def _gripper(
     )
     ahead_std = math.hypot(first.front.std_at(one[1]), second.front.std_at(other[1]))
     return GripperTips(
-        frame.picture_px(0.5 * (one[0] + other[0]), 0.5 * (one[1] + other[1])),
+        frame.image_px(0.5 * (one[0] + other[0]), 0.5 * (one[1] + other[1])),
         max(0.0, other[1] - one[1]),
         gap_std,
         0.5 * max(gap_std, ahead_std),

@@ -3,18 +3,18 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.vision.tips import find_gripper, find_probe
 from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen, ToolEnd
 from cosmic.vico.hw.interface import Pixels
 
-Expect = Callable[[Picture], Mapping[str, ExpectedTool]]
+Expect = Callable[[CameraImage], Mapping[str, ExpectedTool]]
 Found = GripperTips | ToolEnd | NotSeen
 
 
 @dataclass(frozen=True, slots=True)
 class TipSeen:
-    """The tip of a tool on a picture.
+    """The tip of a tool on an image.
 
     Attributes
     ----------

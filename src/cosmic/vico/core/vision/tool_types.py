@@ -1,4 +1,4 @@
-"""Where a tool is expected on the picture, and what was seen of it."""
+"""Where a tool is expected on the image, and what was seen of it."""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ class ExpectedTool:
     tip_px : (float, float)
         Middle of the front; of a gripper, between its jaws.
     forward : (float, float)
-        Direction in the picture from its body out over the tip; made a unit vector.
+        Direction in the image from its body out over the tip; made a unit vector.
     width_px : float
         Of the probe, or of one jaw.
     gap_px : float

@@ -1,4 +1,4 @@
-"""Follow a part of the picture from frame to frame, and say when it is lost."""
+"""Follow a part of the image from frame to frame, and say when it is lost."""
 
 import math
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class TrackState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Where a part of the picture went.
+    """Where a part of the image went.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Track:
 
 
 class TemplateTracker:
-    """Follows one place on the picture by how its surroundings look.
+    """Follows one place on the image by how its surroundings look.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class TemplateTracker:
             `start` has not been called.
         """
         if self._template is None:
-            raise NotAvailable("tracking: nothing is followed yet; start on a picture")
+            raise NotAvailable("tracking: nothing is followed yet; start on an image")
         around = self.expected_px if expected_px is None else expected_px
         centre = around[0] - self._offset_px[0], around[1] - self._offset_px[1]
         reach_px = self._reach_px * min(WIDEST_SEARCH, 1.0 + 0.5 * self._missed)
@@ -143,7 +143,7 @@ class TemplateTracker:
 
 def _why_lost(match: Match | None) -> str:
     if match is None:
-        return "it left the picture"
+        return "it left the image"
     if not match.score >= LOST_BELOW:
         return f"nothing there looks like it (score {match.score:.2f}, {LOST_BELOW:g} is needed)"
     return ""

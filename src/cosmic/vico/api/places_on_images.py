@@ -9,33 +9,33 @@ from cosmic.frame.errors import NotAvailable
 from cosmic.frame.operation import Task
 from cosmic.frame.threads import may_wait_here
 from cosmic.vico.api.places import CalibrationShown, Pixel, Places, RotationShown
-from cosmic.vico.api.sent_picture import NOT_HOSTED, ReceivedPicture
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.api.sent_image import NOT_HOSTED, ReceivedImage
+from cosmic.vico.core.image import CameraImage
 
 if TYPE_CHECKING:
     from cosmic.vico.api.vico import Vico
 
 
-class PlacesOnPictures(Places):
-    """What each picture brings along of its place; movements are begun there. Any thread."""
+class PlacesOnImages(Places):
+    """What each image brings along of its place; movements are begun there. Any thread."""
 
     def __init__(self, vico: "Vico") -> None:
         self._vico = vico
 
     @override
     def scale_um_px(self, camera: str, zoom_counts: float | None) -> float | None:
-        return None  # it stands on every picture
+        return None  # it stands on every image
 
     @override
-    def problem(self, picture: Picture) -> str:
-        return picture.plate_problem if isinstance(picture, ReceivedPicture) else NOT_HOSTED
+    def problem(self, image: CameraImage) -> str:
+        return image.plate_problem if isinstance(image, ReceivedImage) else NOT_HOSTED
 
     @override
-    def platform_um(self, picture: Picture, place_px: Pixel) -> tuple[float, float]:
-        if not isinstance(picture, ReceivedPicture) or picture.plate is None:
-            raise NotAvailable(self.problem(picture))
+    def platform_um(self, image: CameraImage, place_px: Pixel) -> tuple[float, float]:
+        if not isinstance(image, ReceivedImage) or image.plate is None:
+            raise NotAvailable(self.problem(image))
         x, y = place_px
-        return picture.plate.to_um((float(x), float(y)))
+        return image.plate.to_um((float(x), float(y)))
 
     @property
     @override
@@ -43,10 +43,10 @@ class PlacesOnPictures(Places):
         return self._vico.tools
 
     @override
-    def move_to(self, picture: Picture, place_px: Pixel, what: str) -> str:
-        there_um = self.platform_um(picture, place_px)
+    def move_to(self, image: CameraImage, place_px: Pixel, what: str) -> str:
+        there_um = self.platform_um(image, place_px)
         clicked_px = (float(place_px[0]), float(place_px[1]))
-        camera = self._vico.camera(picture.camera)
+        camera = self._vico.camera(image.camera)
         if may_wait_here():
             return camera.click(clicked_px, there_um, what)
         camera.click_aside(clicked_px, there_um, what)

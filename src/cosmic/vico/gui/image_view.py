@@ -1,4 +1,4 @@
-"""`PictureView`: a picture that can be panned and zoomed, with layers drawn over it."""
+"""`CameraImageView`: an image that can be panned and zoomed, with layers drawn over it."""
 
 from abc import abstractmethod
 from collections.abc import Callable
@@ -21,19 +21,19 @@ from PySide6.QtWidgets import QToolTip, QWidget
 from cosmic.frame.gui.theme import current_palette
 from cosmic.frame.overrides import override
 from cosmic.vico.api.places import Pixel
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
+from cosmic.vico.gui.image_item import CameraImageItem
 from cosmic.vico.gui.levels import Levels
-from cosmic.vico.gui.picture_item import PictureItem
 
 
 class Layer(Protocol):
-    """Something drawn over the picture; it never takes a click."""
+    """Something drawn over the image; it never takes a click."""
 
     @abstractmethod
-    def paint(self, painter: QPainter, view: "PictureView") -> None:
+    def paint(self, painter: QPainter, view: "CameraImageView") -> None:
         """Draw, in coordinates of the screen; `view.to_screen` brings pixels there."""
 
-    def tip(self, place: QPointF, view: "PictureView") -> str:  # noqa: ARG002 - for those who say
+    def tip(self, place: QPointF, view: "CameraImageView") -> str:  # noqa: ARG002 - for those who say
         """Return what to say when the operator points there; empty for nothing."""
         return ""
 
@@ -60,8 +60,8 @@ class Tool(Protocol):
         """Forget what is half done."""
 
 
-class PictureView(pg.GraphicsView):  # type: ignore[misc]
-    """Shows the picture it was given last; the view stays when the next one comes.
+class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
+    """Shows the image it was given last; the view stays when the next one comes.
 
     Signals
     -------
@@ -86,9 +86,9 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         self.layers: list[Layer] = []
         self.paints = 0
         self.tool: Tool | None = None
-        self.picture: Picture | None = None
+        self.image: CameraImage | None = None
         self._fitted = True
-        self._pixels = PictureItem()
+        self._pixels = CameraImageItem()
         self.box = pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False, defaultPadding=0)
         self.box.disableAutoRange()
         self.setCentralItem(self.box)
@@ -96,7 +96,7 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         self.box.sigRangeChangedManually.connect(self._on_moved_by_hand)
         self.box.sigTransformChanged.connect(self.zoom_changed)
         self.setMouseTracking(True)
-        self.setAccessibleName("Live picture")
+        self.setAccessibleName("Live image")
 
     @override
     def sizeHint(self) -> QSize:
@@ -112,7 +112,7 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
 
     @property
     def full(self) -> int:
-        """Brightness of an over-exposed pixel of the picture shown."""
+        """Brightness of an over-exposed pixel of the image shown."""
         return self._pixels.full
 
     def set_levels(self, levels: Levels) -> None:
@@ -124,13 +124,13 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         self._pixels.set_marks(marks)
 
     def set_greyed(self, greyed: bool) -> None:
-        """Show that the picture is old."""
+        """Show that the image is old."""
         self._pixels.set_greyed(greyed)
 
-    def show_picture(self, picture: Picture) -> None:
-        """Show `picture` instead of the one before."""
-        self.picture = picture
-        if self._pixels.show(picture) and self._fitted:
+    def show_image(self, image: CameraImage) -> None:
+        """Show `image` instead of the one before."""
+        self.image = image
+        if self._pixels.show(image) and self._fitted:
             self.fit()
         self.redraw()  # the layers lie over the margins as well
 
@@ -138,12 +138,12 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
 
     @property
     def size_px(self) -> tuple[int, int]:
-        """Width and height of the picture shown; (0, 0) before the first."""
-        return (0, 0) if self.picture is None else self.picture.data.shape[1::-1]
+        """Width and height of the image shown; (0, 0) before the first."""
+        return (0, 0) if self.image is None else self.image.data.shape[1::-1]
 
     @property
     def to_screen(self) -> QTransform:
-        """From pixels of the picture to those of the widget."""
+        """From pixels of the image to those of the widget."""
         self.box.updateMatrix()  # else as it was when last painted
         inner: QTransform = self.box.childGroup.sceneTransform()
         outer: QTransform = self.viewportTransform()
@@ -151,30 +151,30 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
 
     @property
     def zoom(self) -> float:
-        """Pixels of the screen for one of the picture."""
+        """Pixels of the screen for one of the image."""
         return abs(self.to_screen.m11()) * float(self.devicePixelRatioF())
 
     def pixel_at(self, place: QPointF) -> Pixel:
-        """Return the pixel below a place of the widget; it may lie outside the picture."""
+        """Return the pixel below a place of the widget; it may lie outside the image."""
         inverse, _ = self.to_screen.inverted()
         there = inverse.map(place)
         return there.x(), there.y()
 
     def is_inside(self, place_px: Pixel) -> bool:
-        """Tell whether the picture has such a pixel."""
+        """Tell whether the image has such a pixel."""
         width, height = self.size_px
         x, y = place_px
         return -0.5 <= x < width - 0.5 and -0.5 <= y < height - 0.5
 
     def fit(self) -> None:
-        """Show all of the picture, and keep to it when the window changes."""
+        """Show all of the image, and keep to it when the window changes."""
         self._fitted = True
         width, height = self.size_px
         if width:
             self.box.setRange(QRectF(-0.5, -0.5, width, height), padding=0.0)
 
     def one_to_one(self) -> None:
-        """Show a pixel of the picture by one of the screen, around the middle of the view."""
+        """Show a pixel of the image by one of the screen, around the middle of the view."""
         self._fitted = False
         middle = self.pixel_at(QPointF(self.width() / 2, self.height() / 2))
         if not self.is_inside(middle):
@@ -192,7 +192,7 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
 
     @override
     def resizeEvent(self, event: QResizeEvent) -> None:
-        if getattr(self, "picture", None) is None:  # pyqtgraph calls it while it is being made
+        if getattr(self, "image", None) is None:  # pyqtgraph calls it while it is being made
             super().resizeEvent(event)
             return
         before = event.oldSize()

@@ -7,28 +7,28 @@ from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.theme import State, state_look
 from cosmic.vico.api.camera import CameraHandle
 from cosmic.vico.api.places import Pixel
+from cosmic.vico.gui.image_view import CameraImageView, Layer, Tool
 from cosmic.vico.gui.measures import MeasureLayer
-from cosmic.vico.gui.picture_view import Layer, PictureView, Tool
 from cosmic.vico.gui.tool_row import ToolRow
 from cosmic.vico.gui.tools import AngleTool, ClickTool, DistanceTool, RoiLayer, RoiTool
 
 
-class PictureTools(QObject):
-    """Joins the buttons to the picture.
+class ImageTools(QObject):
+    """Joins the buttons to the image.
 
     Signals
     -------
     told(str)
         One line for the operator: what was begun, or why not.
     region_chosen(int, int, int, int)
-        x, y, width and height of the part to be read, in pixels of the picture shown.
+        x, y, width and height of the part to be read, in pixels of the image shown.
     """
 
     told = Signal(str)
     region_chosen = Signal(int, int, int, int)
 
     def __init__(
-        self, view: PictureView, row: ToolRow, camera: CameraHandle, parent: QObject
+        self, view: CameraImageView, row: ToolRow, camera: CameraHandle, parent: QObject
     ) -> None:
         super().__init__(parent)
         self._view, self._row, self._camera = view, row, camera
@@ -50,9 +50,9 @@ class PictureTools(QObject):
         self._roi.chosen.connect(self._on_region)
 
     def _scale(self) -> float | None:
-        """Return the scale that was in force when the picture shown was taken."""
-        picture = self._view.picture
-        return None if picture is None else picture.circumstances.scale_um_px
+        """Return the scale that was in force when the image shown was taken."""
+        image = self._view.image
+        return None if image is None else image.circumstances.scale_um_px
 
     def refresh(self) -> None:
         """Put the tool away that can no longer be used."""
@@ -77,7 +77,7 @@ class PictureTools(QObject):
 
     def _on_clicked(self, place_px: Pixel) -> None:
         if not self._view.is_inside(place_px):
-            self._refuse("that is outside the picture")
+            self._refuse("that is outside the image")
             return
         try:
             self.told.emit(self._camera.click_to_move(place_px, self._target))

@@ -1,4 +1,4 @@
-"""Pictures, settings and recorders for the tests of recordings."""
+"""Images, settings and recorders for the tests of recordings."""
 
 from collections.abc import Iterator
 from types import MappingProxyType
@@ -6,7 +6,7 @@ from types import MappingProxyType
 import numpy as np
 
 from cosmic.frame.clock import WALL
-from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.hw.interface import CameraSettings, Frame, FrameStatus, PixelFormat, Roi
 
 AXES = {"left.x": "um", "table.rotation": "deg"}
@@ -19,7 +19,7 @@ def noise(
     height: int = 23,
     seed: int = 0,
 ) -> np.ndarray:
-    """Return a picture in which every value of a pixel occurs, as nothing is harder to code."""
+    """Return an image in which every value of a pixel occurs, as nothing is harder to code."""
     shape = (height, width, 3) if pixel_format is PixelFormat.RGB8 else (height, width)
     high = 1 << BITS.get(pixel_format, 8)
     dtype = np.uint16 if pixel_format in BITS else np.uint8
@@ -39,8 +39,8 @@ def settings(
     return CameraSettings(0.01, 0.0, rate_hz, Roi(0, 0, width, height), pixel_format=pixel_format)
 
 
-def picture(number: int = 0, data: np.ndarray | None = None, **how: object) -> Picture:
-    """Return picture `number` of a camera with 20 frames a second; `how` overrides parts."""
+def image(number: int = 0, data: np.ndarray | None = None, **how: object) -> CameraImage:
+    """Return image `number` of a camera with 20 frames a second; `how` overrides parts."""
     status = how.pop("status", FrameStatus.COMPLETE)
     pixel_format = how.pop("pixel_format", PixelFormat.MONO8)
     time_s = how.pop("time_s", 100.0 + number / 20.0)
@@ -64,13 +64,13 @@ def picture(number: int = 0, data: np.ndarray | None = None, **how: object) -> P
         scale_um_px=how.pop("scale_um_px", 0.8),
         positions=MappingProxyType({"left.x": 10.0 + number, "table.rotation": -1.5}),
     )
-    return Picture("cam", frame, around, how.pop("lost_before", 0))
+    return CameraImage("cam", frame, around, how.pop("lost_before", 0))
 
 
-def pictures(count: int, **how: object) -> Iterator[Picture]:
-    """Yield pictures in their order."""
+def images(count: int, **how: object) -> Iterator[CameraImage]:
+    """Yield images in their order."""
     for number in range(count):
-        yield picture(number, **how)
+        yield image(number, **how)
 
 
 def wait_until(condition, timeout_s: float = 10.0) -> None:

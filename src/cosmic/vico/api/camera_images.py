@@ -1,4 +1,4 @@
-"""Where a camera's handle gets its pictures: from the camera here, or from another station."""
+"""Where a camera's handle gets its images: from the camera here, or from another station."""
 
 from abc import abstractmethod
 from collections.abc import Callable
@@ -13,30 +13,30 @@ from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.threads import forbid_waiting_here, may_wait_here
 from cosmic.vico.api.camera_shown import Seen
 from cosmic.vico.api.places import Places
-from cosmic.vico.api.sent_picture import ReceivedPicture, SentPicture, SentSeen
+from cosmic.vico.api.sent_image import ReceivedImage, SentImage, SentSeen
 from cosmic.vico.core.camera_unit import CameraUnit
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 
 if TYPE_CHECKING:
     from cosmic.vico.api.application import VicoApplication
     from cosmic.vico.api.camera import CameraHandle
 
 IDLE_S: Final = 3.0
-"""Wall time after the last look when pictures of another station need not come any more."""
+"""Wall time after the last look when images of another station need not come any more."""
 MISSED_S: Final = 0.3
-"""Silence after which a picture that the station has did not come."""
+"""Silence after which an image that the station has did not come."""
 CLOSE_S: Final = 30.0
 """How long the end of a recording may make no progress."""
 LOOK_S: Final = 0.05
 
 
-class CameraPictures(Protocol):
+class CameraImages(Protocol):
     """What differs between a camera here and one elsewhere; any thread."""
 
     @property
     @abstractmethod
     def jobs(self) -> JobQueue:
-        """Takes the pictures of plans."""
+        """Takes the images of plans."""
 
     @property
     @abstractmethod
@@ -45,8 +45,8 @@ class CameraPictures(Protocol):
 
     @property
     @abstractmethod
-    def newest(self) -> Picture | None:
-        """The newest picture as it came."""
+    def newest(self) -> CameraImage | None:
+        """The newest image as it came."""
 
     @property
     @abstractmethod
@@ -54,27 +54,27 @@ class CameraPictures(Protocol):
         """The newest result of machine vision."""
 
     @abstractmethod
-    def latest(self) -> Picture | None:
-        """Return the newest whole picture as a view shows it."""
+    def latest(self) -> CameraImage | None:
+        """Return the newest whole image as a view shows it."""
 
     @abstractmethod
-    def since(self, since_s: float) -> Picture | None:
-        """Return the newest whole picture if it was exposed then or later."""
+    def since(self, since_s: float) -> CameraImage | None:
+        """Return the newest whole image if it was exposed then or later."""
 
     @abstractmethod
-    def next(self, timeout_s: float, since_s: float | None) -> Picture:
-        """Wait for a whole picture exposed from then on."""
+    def next(self, timeout_s: float, since_s: float | None) -> CameraImage:
+        """Wait for a whole image exposed from then on."""
 
     @abstractmethod
-    def on_picture(self, listener: Callable[[], object]) -> Callable[[], None]:
-        """Call `listener()` at each whole picture."""
+    def on_image(self, listener: Callable[[], object]) -> Callable[[], None]:
+        """Call `listener()` at each whole image."""
 
     @abstractmethod
     def wait_closed(self) -> None:
         """Wait until the recording is closed."""
 
 
-class PicturesHere(CameraPictures):
+class LocalImages(CameraImages):
     """Of a camera of this process."""
 
     def __init__(self, application: "VicoApplication", unit: CameraUnit) -> None:
@@ -92,7 +92,7 @@ class PicturesHere(CameraPictures):
 
     @property
     @override
-    def newest(self) -> Picture | None:
+    def newest(self) -> CameraImage | None:
         return self._unit.thread.newest
 
     @property
@@ -102,23 +102,23 @@ class PicturesHere(CameraPictures):
         return Seen.of(newest) if newest is not None else None
 
     @override
-    def latest(self) -> Picture | None:
+    def latest(self) -> CameraImage | None:
         return self._unit.shown()
 
     @override
-    def since(self, since_s: float) -> Picture | None:
+    def since(self, since_s: float) -> CameraImage | None:
         last = self._unit.thread.last
         if last is None or not last.frame.exposed_s >= since_s:
             return None
         return self._unit.corrected(last)
 
     @override
-    def next(self, timeout_s: float, since_s: float | None) -> Picture:
+    def next(self, timeout_s: float, since_s: float | None) -> CameraImage:
         since = self._application.clock.now_s() if since_s is None else since_s
-        return self._unit.thread.next_picture(since, timeout_s)
+        return self._unit.thread.next_image(since, timeout_s)
 
     @override
-    def on_picture(self, listener: Callable[[], object]) -> Callable[[], None]:
+    def on_image(self, listener: Callable[[], object]) -> Callable[[], None]:
         return self._unit.thread.on_newest(listener)
 
     @override
@@ -131,7 +131,7 @@ def always() -> bool:
     return True
 
 
-class PicturesElsewhere(CameraPictures):
+class RemoteImages(CameraImages):
     """Of a camera of another station; they come while somebody looks.
 
     Parameters
@@ -142,9 +142,9 @@ class PicturesElsewhere(CameraPictures):
 
     def __init__(self, camera: "CameraHandle", policy: FailurePolicy) -> None:
         self._camera = camera
-        self._jobs = JobQueue(f"pictures of {camera.name}", policy)
+        self._jobs = JobQueue(f"images of {camera.name}", policy)
         self._places: Places | None = None
-        self._shown: ReceivedPicture | None = None
+        self._shown: ReceivedImage | None = None
         self._seen: Seen | None = None
         self._looked: dict[str, float] = {}
         self._ends: dict[str, Callable[[], None]] = {}
@@ -153,7 +153,7 @@ class PicturesElsewhere(CameraPictures):
 
     @property
     def live(self) -> bool:
-        """Pictures are being sent, because somebody looks, and have come."""
+        """Images are being sent, because somebody looks, and have come."""
         return "shown" in self._ends and self._came_s > 0.0
 
     def join_places(self, places: Places) -> None:
@@ -174,7 +174,7 @@ class PicturesElsewhere(CameraPictures):
 
     @property
     @override
-    def newest(self) -> Picture | None:
+    def newest(self) -> CameraImage | None:
         return self.latest() if may_wait_here() else self._shown
 
     @property
@@ -184,7 +184,7 @@ class PicturesElsewhere(CameraPictures):
         return self._seen
 
     @override
-    def latest(self) -> Picture | None:
+    def latest(self) -> CameraImage | None:
         self._look("shown", self._camera.watch_shown, self._take_shown)
         if "shown" in self._ends and self._came_s > 0.0:
             return self._shown
@@ -194,26 +194,26 @@ class PicturesElsewhere(CameraPictures):
         return sent.received() if sent is not None else None
 
     @override
-    def since(self, since_s: float) -> Picture | None:
+    def since(self, since_s: float) -> CameraImage | None:
         newest = self.latest()
         return newest if newest is not None and newest.frame.exposed_s >= since_s else None
 
     @override
-    def next(self, timeout_s: float, since_s: float | None) -> Picture:
-        forbid_waiting_here("waiting for a picture")
-        wait = self._camera.await_picture(since_s)
+    def next(self, timeout_s: float, since_s: float | None) -> CameraImage:
+        forbid_waiting_here("waiting for an image")
+        wait = self._camera.await_image(since_s)
         try:
             return wait.wait(timeout_s).received()
         except DeviceTimeout:
             self._camera.carry_out(wait.cancel, lambda *_: None)
             camera = self._camera
             reason = camera.problem or ("none arrived" if camera.running else "it is stopped")
-            text = f"no picture of {camera.name} in {timeout_s:g} s: {reason}"
+            text = f"no image of {camera.name} in {timeout_s:g} s: {reason}"
             raise NotAvailable(text) from None
 
     @override
-    def on_picture(self, listener: Callable[[], object]) -> Callable[[], None]:
-        return lambda: None  # over a line, who waits for a picture looks again and again
+    def on_image(self, listener: Callable[[], object]) -> Callable[[], None]:
+        return lambda: None  # over a line, who waits for an image looks again and again
 
     @override
     def wait_closed(self) -> None:
@@ -230,7 +230,7 @@ class PicturesElsewhere(CameraPictures):
     # For whoever follows the station
 
     def tidy(self) -> None:
-        """End what nobody looks at, and ask for a picture that did not come; again and again."""
+        """End what nobody looks at, and ask for an image that did not come; again and again."""
         now_s = WALL.now_s()
         for name, looked_s in list(self._looked.items()):
             if now_s - looked_s > IDLE_S and name in self._ends:
@@ -254,7 +254,7 @@ class PicturesElsewhere(CameraPictures):
             self._take_shown(sent)
 
     def close(self) -> None:
-        """Take no more pictures; any state."""
+        """Take no more images; any state."""
         self._jobs.request_end()
         self._jobs.join()
 
@@ -269,7 +269,7 @@ class PicturesElsewhere(CameraPictures):
         if name not in self._ends:
             self._ends[name] = watch(take)
 
-    def _take_shown(self, sent: SentPicture) -> None:
+    def _take_shown(self, sent: SentImage) -> None:
         self._shown, self._came_s = sent.received(), WALL.now_s()
 
     def _take_seen(self, sent: SentSeen) -> None:

@@ -1,9 +1,9 @@
-"""The twin's picture: what one frame of 1600 x 1200 costs, beside drawing it plainly.
+"""The twin's image: what one frame of 1600 x 1200 costs, beside drawing it plainly.
 
 Naive is a frame of fibres and probe alone, without dust or uneven light, as one would draw it
 first: lines and a rectangle, the whole frame blurred for each height, fresh noise everywhere.
 Times are those of the processor, for the drawing thread and the threads of OpenCV. "Standing":
-nothing moves. "Moving": the probe goes through the picture and bends the held fibre. "Everything":
+nothing moves. "Moving": the probe goes through the image and bends the held fibre. "Everything":
 the table turns as well, so that nothing can be kept.
 """
 
@@ -21,7 +21,7 @@ from cosmic.twin.optics.optics import Optics
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import shipped_settings
 
-NAME = "twin_picture"
+NAME = "twin_image"
 PERIOD_S = 1.0 / 15.0
 MAGNIFICATIONS = (0.58, 2.0, 5.0)
 TARGET_MS = 15.0
@@ -89,19 +89,19 @@ def naive_ms(stage: Set, count: int) -> list[float]:
         view = stage.optics.projection(stage.now_s)
         tip = stage.scene.tips(stage.now_s)["probe"]
         began = time.process_time()
-        picture = np.full(size[::-1], 150.0, np.float32)
+        image = np.full(size[::-1], 150.0, np.float32)
         for height in (0.0, 700.0):
             for line in lines:
                 if (line[0, 2] > 300.0) == (height > 300.0):
-                    points = [np.round(view.picture_px(line) * 16).astype(np.int32)]
+                    points = [np.round(view.image_px(line) * 16).astype(np.int32)]
                     wide = max(1, round(34.0 * view.px_um))
-                    cv2.polylines(picture, points, False, 80.0, wide, cv2.LINE_AA, 4)
-            picture = cv2.GaussianBlur(picture, (0, 0), view.sigma_px(height))
-        x, y = np.round(view.picture_px(np.array([tip]))[0]).astype(int).tolist()
+                    cv2.polylines(image, points, False, 80.0, wide, cv2.LINE_AA, 4)
+            image = cv2.GaussianBlur(image, (0, 0), view.sigma_px(height))
+        x, y = np.round(view.image_px(np.array([tip]))[0]).astype(int).tolist()
         half = round(25.0 * view.px_um)
-        cv2.rectangle(picture, (x - half, 0), (x + half, y), 40.0, -1)
-        picture += rng.normal(0.0, 1.5, picture.shape)
-        np.clip(np.rint(picture), 0, 255).astype(np.uint8)
+        cv2.rectangle(image, (x - half, 0), (x + half, y), 40.0, -1)
+        image += rng.normal(0.0, 1.5, image.shape)
+        np.clip(np.rint(image), 0, 255).astype(np.uint8)
         spent.append(1e3 * (time.process_time() - began))
     return spent
 

@@ -1,4 +1,4 @@
-"""Tools over the picture: distance, angle, region, click to move."""
+"""Tools over the image: distance, angle, region, click to move."""
 
 from math import dist
 
@@ -87,8 +87,8 @@ def test_escape_forgets_what_is_half_measured_and_puts_the_tool_away(qtbot, show
 
 def test_without_a_scale_distances_are_in_pixels(qtbot, shown, mouse, camera):
     camera.scale_um_px = None
-    picture = camera.push()
-    qtbot.waitUntil(lambda: shown.view.picture is picture)
+    image = camera.push()
+    qtbot.waitUntil(lambda: shown.view.image is image)
     click(qtbot, shown.row.tools["distance"])
     mouse.drag((400, 300), (800, 300))
     (text,) = measured(shown)
@@ -100,8 +100,8 @@ def test_a_measurement_keeps_the_scale_it_was_made_at(qtbot, shown, mouse, camer
     mouse.drag((400, 300), (800, 300))
     before = measured(shown)
     camera.scale_um_px = 0.5
-    picture = camera.push()
-    qtbot.waitUntil(lambda: shown.view.picture is picture)
+    image = camera.push()
+    qtbot.waitUntil(lambda: shown.view.image is image)
     shown.grab()
     assert measured(shown) == before
 
@@ -144,7 +144,7 @@ def test_a_click_moves_what_was_chosen_and_says_so(qtbot, shown, mouse, camera):
     assert shown.message.text == "right gripper goes there"
 
 
-def test_a_refused_move_is_told_over_the_picture(qtbot, shown, mouse, camera):
+def test_a_refused_move_is_told_over_the_image(qtbot, shown, mouse, camera):
     camera.change(calibration_problem="")
     qtbot.waitUntil(shown.row.go.isEnabled)
     choose_target(qtbot, shown, "left gripper")
@@ -152,7 +152,7 @@ def test_a_refused_move_is_told_over_the_picture(qtbot, shown, mouse, camera):
     mouse.click((700, 400))
     assert shown.message.text == "◆ left jaw would come within 12 µm of the plate"
     mouse.click((-30, 400))
-    assert "outside the picture" in shown.message.text
+    assert "outside the image" in shown.message.text
     assert camera.calls == []
 
 

@@ -27,14 +27,14 @@ def box(tip: np.ndarray, forward: np.ndarray, width: float, blur: float) -> np.n
 
 
 @dataclass(frozen=True)
-class ToolPicture:
+class ToolImage:
     image: np.ndarray
     hold: np.ndarray
     forward: np.ndarray
     expected: ExpectedTool
 
 
-def tool_picture(
+def tool_image(
     seed: int,
     *,
     width: float = 45.0,
@@ -47,7 +47,7 @@ def tool_picture(
     off_px: float = 20.0,
     shift: tuple[float, float] = (0.0, 0.0),
     noise_seed: int | None = None,
-) -> ToolPicture:
+) -> ToolImage:
     """Draw a probe (no gap) or a gripper in a random pose, expected some pixels off."""
     rng = np.random.default_rng(seed)
     angle = rng.uniform(0.0, 2.0 * math.pi)
@@ -83,4 +83,4 @@ def tool_picture(
     expected = ExpectedTool(
         tuple((hold + away).tolist()), tuple(told.tolist()), width, gap, reach_px=40.0
     )
-    return ToolPicture(np.clip(np.rint(image), 0, 255).astype(np.uint8), hold, forward, expected)
+    return ToolImage(np.clip(np.rint(image), 0, 255).astype(np.uint8), hold, forward, expected)

@@ -1,4 +1,4 @@
-"""A picture that comes again and again is not taken for a new one."""
+"""An image that comes again and again is not taken for a new one."""
 
 from collections.abc import Callable
 from typing import Any, cast
@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from cosmic.autonomy.handling import sight
-from cosmic.autonomy.handling.sight import RESTARTS, LastSeen, LivePicture
+from cosmic.autonomy.handling.sight import RESTARTS, LastSeen, LiveImage
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.operation import Task
-from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.hw.interface import Frame, FrameStatus, PixelFormat
 
 
 class FakeCamera:
-    """Shows a noisy picture each time; frozen, the same one with a new time."""
+    """Shows a noisy image each time; frozen, the same one with a new time."""
 
     name = "microscope"
     problem = ""
@@ -34,18 +34,18 @@ class FakeCamera:
         self._count += 1
         return np.random.default_rng(self._count).integers(90, 160, (64, 64), dtype=np.uint8)
 
-    def picture_since(self, since_s: float) -> Picture:
+    def image_since(self, since_s: float) -> CameraImage:
         if not self.frozen:
             self._data = np.zeros((64, 64), np.uint8) if self.dark else self._noise()
         now_s = self._clock.now_s()
         data = self._data.copy()
         frame = Frame(data, 1, now_s, now_s, None, FrameStatus.COMPLETE, PixelFormat.MONO8)
-        return Picture("microscope", frame, Circumstances())
+        return CameraImage("microscope", frame, Circumstances())
 
-    def latest(self) -> Picture:
-        return self.picture_since(0.0)
+    def latest(self) -> CameraImage:
+        return self.image_since(0.0)
 
-    def on_picture(self, listener: Callable[[], object]) -> Callable[[], None]:
+    def on_image(self, listener: Callable[[], object]) -> Callable[[], None]:
         return lambda: None
 
     def stop(self) -> Task:
@@ -77,9 +77,9 @@ def camera(clock: ManualClock) -> FakeCamera:
     return FakeCamera(clock)
 
 
-def wanted(camera: FakeCamera, clock: ManualClock, last: LastSeen) -> LivePicture:
+def wanted(camera: FakeCamera, clock: ManualClock, last: LastSeen) -> LiveImage:
     clock.advance(0.1)
-    return LivePicture(cast("Any", camera), clock, last)
+    return LiveImage(cast("Any", camera), clock, last)
 
 
 def test_a_camera_that_works_is_left_alone(camera: FakeCamera, clock: ManualClock):
@@ -88,7 +88,7 @@ def test_a_camera_that_works_is_left_alone(camera: FakeCamera, clock: ManualCloc
     assert camera.told == []
 
 
-def test_a_frozen_camera_is_begun_anew_and_gives_a_new_picture(
+def test_a_frozen_camera_is_begun_anew_and_gives_a_new_image(
     camera: FakeCamera, clock: ManualClock
 ):
     last = LastSeen()
@@ -105,12 +105,12 @@ def test_one_that_stays_frozen_is_given_up_and_says_what_to_look_at(
     last = LastSeen()
     wanted(camera, clock, last).wait(5.0)
     camera.frozen, camera.thaws = True, False
-    with pytest.raises(NotAvailable, match=r"same picture again and again.*cable"):
+    with pytest.raises(NotAvailable, match=r"same image again and again.*cable"):
         wanted(camera, clock, last).wait(5.0)
     assert camera.told == ["stop", "start"] * RESTARTS
 
 
-def test_pictures_without_any_light_are_not_taken_for_a_frozen_camera(
+def test_images_without_any_light_are_not_taken_for_a_frozen_camera(
     camera: FakeCamera, clock: ManualClock
 ):
     last, camera.dark = LastSeen(), True
@@ -119,15 +119,15 @@ def test_pictures_without_any_light_are_not_taken_for_a_frozen_camera(
     assert camera.told == []
 
 
-def test_a_picture_that_is_no_longer_wanted_leaves_the_camera_running(
+def test_a_image_that_is_no_longer_wanted_leaves_the_camera_running(
     camera: FakeCamera, clock: ManualClock
 ):
     last = LastSeen()
     wanted(camera, clock, last).wait(5.0)
     camera.frozen, camera.thaws = True, False
-    picture = wanted(camera, clock, last)
+    image = wanted(camera, clock, last)
     while "stop" not in camera.told:
-        assert not picture.done
-    picture.cancel()
-    assert picture.done
+        assert not image.done
+    image.cancel()
+    assert image.done
     assert camera.told[-1] == "start"

@@ -1,4 +1,4 @@
-"""The live picture: what is shown, which part of it, and what is never shown."""
+"""The live image: what is shown, which part of it, and what is never shown."""
 
 import threading
 from dataclasses import replace
@@ -22,7 +22,7 @@ def click(qtbot, button):
 
 
 def colour_at(view, place_px):
-    """Return the colour on the screen in the middle of a pixel of the picture."""
+    """Return the colour on the screen in the middle of a pixel of the image."""
     view.row.scale.setChecked(False)
     QApplication.processEvents()
     there = view.view.to_screen.map(QPointF(*place_px)).toPoint()
@@ -30,23 +30,23 @@ def colour_at(view, place_px):
 
 
 def half(value, dtype=np.uint8, full=255):
-    """Return a picture that is `value` but for a quite black and an over-exposed quarter."""
+    """Return an image that is `value` but for a quite black and an over-exposed quarter."""
     data = np.full((HEIGHT, WIDTH), value, dtype)
     data[:600, :800] = 0
     data[600:, :800] = full
     return data
 
 
-def test_only_the_newest_picture_is_shown(qtbot, shown, camera):
+def test_only_the_newest_image_is_shown(qtbot, shown, camera):
     paints = shown.view.paints
     newest = [camera.push() for _ in range(20)][-1]
-    qtbot.waitUntil(lambda: shown.view.picture is newest)
+    qtbot.waitUntil(lambda: shown.view.image is newest)
     QApplication.processEvents()
     assert shown.view.paints <= paints + 2
 
 
-def test_the_window_waits_for_no_picture_that_is_still_drawn(qtbot, shown, camera):
-    before = shown.view.picture
+def test_the_window_waits_for_no_image_that_is_still_drawn(qtbot, shown, camera):
+    before = shown.view.image
     asked, drawn = [], threading.Event()
 
     class Slow:
@@ -60,35 +60,35 @@ def test_the_window_waits_for_no_picture_that_is_still_drawn(qtbot, shown, camer
     coming = camera.show_frame(frame)
     qtbot.waitUntil(lambda: bool(asked))
     shown.look()
-    assert shown.view.picture is before
+    assert shown.view.image is before
     drawn.set()
-    qtbot.waitUntil(lambda: shown.view.picture is coming)
+    qtbot.waitUntil(lambda: shown.view.image is coming)
     assert asked == [1]
 
 
-def test_an_incomplete_picture_is_not_shown_as_good(qtbot, shown, camera):
-    whole = shown.view.picture
+def test_an_incomplete_image_is_not_shown_as_good(qtbot, shown, camera):
+    whole = shown.view.image
     camera.push(status=FrameStatus.INCOMPLETE)
     camera.counters = replace(camera.counters, failed=1)
     qtbot.waitUntil(lambda: shown.status.failed.text() == "failed 1")
-    assert shown.view.picture is whole
+    assert shown.view.image is whole
 
 
 def test_nothing_is_drawn_while_nobody_looks(qtbot, own, port, shown, camera):
     other = CameraView(port, "top")
     own(other)
     other.show()
-    before = shown.view.picture
+    before = shown.view.image
     shown.hide()
     for _ in range(3):
         newest = camera.push()
-        qtbot.waitUntil(lambda newest=newest: other.view.picture is newest)
-    assert shown.view.picture is before
+        qtbot.waitUntil(lambda newest=newest: other.view.image is newest)
+    assert shown.view.image is before
     shown.show()
-    qtbot.waitUntil(lambda: shown.view.picture is newest)
+    qtbot.waitUntil(lambda: shown.view.image is newest)
 
 
-def test_the_whole_picture_is_shown_and_follows_the_window(shown):
+def test_the_whole_image_is_shown_and_follows_the_window(shown):
     def corners_inside():
         to, room = shown.view.to_screen, shown.view.rect().adjusted(-1, -1, 2, 2)
         ends = [QPointF(-0.5, -0.5), QPointF(WIDTH - 0.5, HEIGHT - 0.5)]
@@ -102,24 +102,24 @@ def test_the_whole_picture_is_shown_and_follows_the_window(shown):
     assert shown.view.zoom < before
 
 
-def test_one_to_one_is_kept_when_pictures_and_window_change(qtbot, shown, camera):
+def test_one_to_one_is_kept_when_images_and_window_change(qtbot, shown, camera):
     click(qtbot, shown.row.one_to_one)
     assert shown.view.zoom == pytest.approx(1.0, abs=0.01)
     newest = camera.push()
-    qtbot.waitUntil(lambda: shown.view.picture is newest)
+    qtbot.waitUntil(lambda: shown.view.image is newest)
     assert shown.view.zoom == pytest.approx(1.0, abs=0.01)
     click(qtbot, shown.row.fit)
     assert shown.view.zoom < 0.7
 
 
-def test_dragging_pans_and_the_part_stays_for_the_next_picture(qtbot, shown, mouse, camera):
+def test_dragging_pans_and_the_part_stays_for_the_next_image(qtbot, shown, mouse, camera):
     click(qtbot, shown.row.one_to_one)
     before = shown.view.pixel_at(QPointF(100, 100))
     mouse.drag((800, 600), (900, 650))
     after = shown.view.pixel_at(QPointF(100, 100))
     assert after[0] == pytest.approx(before[0] - 100, abs=8)
     newest = camera.push()
-    qtbot.waitUntil(lambda: shown.view.picture is newest)
+    qtbot.waitUntil(lambda: shown.view.image is newest)
     assert shown.view.pixel_at(QPointF(100, 100)) == pytest.approx(after)
 
 
@@ -141,7 +141,7 @@ def test_the_wheel_zooms_about_the_place_below_the_mouse(qtbot, shown, camera):
     assert shown.view.pixel_at(place) == pytest.approx(before, abs=2.0)
     zoom = shown.view.zoom
     newest = camera.push()
-    qtbot.waitUntil(lambda: shown.view.picture is newest)
+    qtbot.waitUntil(lambda: shown.view.image is newest)
     shown.resize(800, 600)
     QApplication.processEvents()
     assert shown.view.zoom == pytest.approx(zoom, rel=0.01)
@@ -159,8 +159,8 @@ def test_the_wheel_zooms_about_the_place_below_the_mouse(qtbot, shown, camera):
 def test_every_depth_is_shown_over_its_range_and_lost_pixels_are_marked(
     qtbot, view, camera, pixel_format, dtype, full
 ):
-    picture = camera.push(half(full // 2, dtype, full), pixel_format=pixel_format)
-    qtbot.waitUntil(lambda: view.view.picture is picture)
+    image = camera.push(half(full // 2, dtype, full), pixel_format=pixel_format)
+    qtbot.waitUntil(lambda: view.view.image is image)
     assert colour_at(view, (1200, 300)) == pytest.approx((127, 127, 127), abs=2)
     assert colour_at(view, (100, 300)) == (0, 0, 0)
     assert colour_at(view, (100, 900)) == (255, 255, 255)
@@ -173,8 +173,8 @@ def test_every_depth_is_shown_over_its_range_and_lost_pixels_are_marked(
 def test_a_pixel_is_where_its_number_says(qtbot, view, camera):
     data = np.zeros((30, 40), np.uint8)
     data[10, 20] = 200
-    picture = camera.push(data)
-    qtbot.waitUntil(lambda: view.view.picture is picture)
+    image = camera.push(data)
+    qtbot.waitUntil(lambda: view.view.image is image)
     bright = {
         (x, y) for x in (19, 20, 21) for y in (9, 10, 11) if colour_at(view, (x, y))[0] == 200
     }
@@ -186,37 +186,37 @@ def test_colours_are_shown_as_they_are(qtbot, view, camera):
     data = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     data[:] = (200, 100, 50)
     data[:600, :800] = (255, 10, 10)
-    picture = camera.push(data, pixel_format=PixelFormat.RGB8)
-    qtbot.waitUntil(lambda: view.view.picture is picture)
+    image = camera.push(data, pixel_format=PixelFormat.RGB8)
+    qtbot.waitUntil(lambda: view.view.image is image)
     assert colour_at(view, (1200, 300)) == (200, 100, 50)
     view.contrast.marks.click()
     assert colour_at(view, (100, 300)) == OVER_RGB
     assert colour_at(view, (1200, 300)) == (200, 100, 50)
 
 
-def test_a_lost_camera_leaves_its_last_picture_greyed_and_says_since_when(qtbot, shown, camera):
+def test_a_lost_camera_leaves_its_last_image_greyed_and_says_since_when(qtbot, shown, camera):
     bright = colour_at(shown, (1400, 300))
     camera.change(problem="the camera does not answer")
     qtbot.waitUntil(lambda: shown.status.badge.state is State.ERROR)
     assert "the camera does not answer" in shown.note.text
-    assert "no picture since 12:16:40" in shown.note.text
+    assert "no image since 12:16:40" in shown.note.text
     assert colour_at(shown, (1400, 300)) != bright
     camera.change(problem="")
     newest = camera.push()
-    qtbot.waitUntil(lambda: shown.view.picture is newest)
+    qtbot.waitUntil(lambda: shown.view.image is newest)
     assert shown.note.text == ""
     assert colour_at(shown, (1400, 300)) == bright
 
 
-def test_a_picture_that_is_not_live_is_greyed_with_its_age(qtbot, shown, camera):
+def test_a_image_that_is_not_live_is_greyed_with_its_age(qtbot, shown, camera):
     bright = colour_at(shown, (1400, 300))
     camera.change(running=False)
-    qtbot.waitUntil(lambda: "not live: picture of 12:16:40, " in shown.note.text)
+    qtbot.waitUntil(lambda: "not live: image of 12:16:40, " in shown.note.text)
     assert shown.note.text.endswith("s ago")
     assert colour_at(shown, (1400, 300)) != bright
     camera.change(running=True)
     newest = camera.push()
-    qtbot.waitUntil(lambda: shown.view.picture is newest)
+    qtbot.waitUntil(lambda: shown.view.image is newest)
     qtbot.waitUntil(lambda: shown.note.text == "")
     assert colour_at(shown, (1400, 300)) == bright
 
@@ -228,7 +228,7 @@ def test_a_camera_that_says_nothing_is_told_after_a_while(qtbot, shown, monkeypa
         "settings",
         replace(SETTINGS, rate_hz=1e6),
     )
-    qtbot.waitUntil(lambda: "no picture since" in shown.note.text)
+    qtbot.waitUntil(lambda: "no image since" in shown.note.text)
     assert shown.status.badge.state is State.ERROR
 
 
@@ -270,23 +270,23 @@ def test_the_pixel_below_the_mouse_is_told_with_its_place_on_the_platform(shown,
     assert shown.pointer.text == ""
 
 
-def test_the_scale_bar_goes_by_the_scale_when_the_picture_was_taken(qtbot, shown, camera):
+def test_the_scale_bar_goes_by_the_scale_when_the_image_was_taken(qtbot, shown, camera):
     shown.grab()
     bar, pixel = shown.scale_bar, abs(shown.view.to_screen.m11())
     number, unit = bar.text.split()
     assert unit == "µm"
     assert bar.length_px == pytest.approx(float(number) / 1.25 * pixel)
-    camera.scale_um_px = 0.5  # the lens has zoomed, yet no picture shows it
+    camera.scale_um_px = 0.5  # the lens has zoomed, yet no image shows it
     shown.grab()
     assert bar.text == f"{number} µm"
-    picture = camera.push()
-    qtbot.waitUntil(lambda: shown.view.picture is picture)
+    image = camera.push()
+    qtbot.waitUntil(lambda: shown.view.image is image)
     shown.grab()
     number, unit = bar.text.split()
     assert bar.length_px == pytest.approx(float(number) / 0.5 * pixel)
     camera.scale_um_px = None
-    picture = camera.push()
-    qtbot.waitUntil(lambda: shown.view.picture is picture)
+    image = camera.push()
+    qtbot.waitUntil(lambda: shown.view.image is image)
     shown.grab()
     assert bar.text.endswith("px")
 
@@ -302,10 +302,10 @@ def test_the_crosshair_can_be_toggled_and_takes_no_click(qtbot, shown, mouse):
 
 
 def test_fibres_found_are_drawn_with_their_measures_and_doubts(qtbot, shown, camera):
-    picture = camera.push()
+    image = camera.push()
     crossed = Seen(certain=False, doubts=("it crosses itself at a shallow angle",))
-    camera.analysis = Found(picture, (Seen(), crossed), (SeenTip(),))
-    qtbot.waitUntil(lambda: shown.view.picture is picture)
+    camera.analysis = Found(image, (Seen(), crossed), (SeenTip(),))
+    qtbot.waitUntil(lambda: shown.view.image is image)
     shown.grab()
     sure, doubtful, tip = (text for _, text in shown.seen.labels)
     assert sure == "Fibre, certain"
@@ -319,10 +319,10 @@ def test_fibres_found_are_drawn_with_their_measures_and_doubts(qtbot, shown, cam
     assert QColor(*colour_at(shown, line)).saturation() == 0
 
 
-def test_findings_in_a_picture_of_another_size_are_not_drawn(qtbot, shown, camera):
+def test_findings_in_a_image_of_another_size_are_not_drawn(qtbot, shown, camera):
     camera.analysis = Found(camera.push(), (Seen(),))
     small = camera.push(np.full((600, 800), 100, np.uint8))
-    qtbot.waitUntil(lambda: shown.view.picture is small)
+    qtbot.waitUntil(lambda: shown.view.image is small)
     shown.grab()
     assert shown.seen.labels == []
 

@@ -1,4 +1,4 @@
-"""`PictureRecorder`: writes the pictures of one camera, in a thread of its own."""
+"""`ImageRecorder`: writes the images of one camera, in a thread of its own."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -16,14 +16,14 @@ from cosmic.frame.errors import CosmicError, RecordingError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.file_names import check_directory, check_space, space_left
 from cosmic.frame.threads import WorkerThread
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.recording.formats import (
-    PictureFormat,
+    ImageFormat,
     check_pixels,
-    picture_bytes_per_s,
+    image_bytes_per_s,
 )
-from cosmic.vico.core.recording.picture_file import PictureFile
-from cosmic.vico.core.recording.recording_stats import PictureRecordingStats
+from cosmic.vico.core.recording.image_file import ImageFile
+from cosmic.vico.core.recording.recording_stats import ImageRecordingStats
 from cosmic.vico.core.recording.side_row import DROPPED, SideRow, row_of
 from cosmic.vico.hw.interface import CameraSettings, FrameStatus, Pixels
 
@@ -32,18 +32,18 @@ logger = logging.getLogger(__name__)
 FLUSH_S: Final = 0.25
 QUEUE_BYTES: Final = 256 * 1024 * 1024
 LONGEST_QUEUE: Final = 10_000
-"""Rows of pictures dropped wait in the queue as well, and take memory."""
+"""Rows of images dropped wait in the queue as well, and take memory."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Came:
-    """A picture in the queue; without pixels when it is not to be written."""
+    """An image in the queue; without pixels when it is not to be written."""
 
     row: SideRow
     data: Pixels | None
 
 
-class PictureRecorder(WorkerThread):
+class ImageRecorder(WorkerThread):
     """Writes one recording; made for it, and gone with it.
 
     The files are created at once, so that what forbids them is raised here. Then `start`; `put`
@@ -59,7 +59,7 @@ class PictureRecorder(WorkerThread):
     axes : mapping of str to str
         Unit of each axis, "um" or "deg", by its name.
     queue_bytes : int
-        How many bytes of pictures may wait before pictures are dropped.
+        How many bytes of images may wait before images are dropped.
 
     Raises
     ------
@@ -71,7 +71,7 @@ class PictureRecorder(WorkerThread):
 
     Notes
     -----
-    Signals: ``recorded`` (`PictureRecordingStats`, some four times a second), ``failed``
+    Signals: ``recorded`` (`ImageRecordingStats`, some four times a second), ``failed``
     (`CosmicError`; the recording ends early, the camera goes on), ``closed`` (`Path`).
     """
 
@@ -82,7 +82,7 @@ class PictureRecorder(WorkerThread):
     def __init__(
         self,
         path: Path,
-        picture_format: PictureFormat,
+        image_format: ImageFormat,
         settings: CameraSettings,
         policy: FailurePolicy,
         *,
@@ -90,12 +90,12 @@ class PictureRecorder(WorkerThread):
         overwrite: bool = False,
         queue_bytes: int = QUEUE_BYTES,
     ) -> None:
-        check_pixels(picture_format, settings.pixel_format)
-        self._bytes_per_s = picture_bytes_per_s(picture_format, settings)
+        check_pixels(image_format, settings.pixel_format)
+        self._bytes_per_s = image_bytes_per_s(image_format, settings)
         space = check_space(check_directory(path.parent), self._bytes_per_s)
         super().__init__(f"recorder {path.name}", policy)
-        self._file = PictureFile(
-            path, picture_format, axes=axes, rate_hz=settings.rate_hz, overwrite=overwrite
+        self._file = ImageFile(
+            path, image_format, axes=axes, rate_hz=settings.rate_hz, overwrite=overwrite
         )
         self._left_s = space.left_s
         self._queue: SimpleQueue[_Came | None] = SimpleQueue()
@@ -128,12 +128,12 @@ class PictureRecorder(WorkerThread):
         return self._error
 
     @property
-    def stats(self) -> PictureRecordingStats:
+    def stats(self) -> ImageRecordingStats:
         """How it stands now; any thread."""
         first_s, last_s = self._times_s or (0.0, 0.0)
         left, left_bytes = self._given - self._taken, self._given_bytes - self._taken_bytes
         ended = self._ended
-        return PictureRecordingStats(
+        return ImageRecordingStats(
             path=self._file.path,
             side_path=self._file.side_path,
             written=self._file.count,
@@ -149,21 +149,21 @@ class PictureRecorder(WorkerThread):
         )
 
     def pause(self) -> None:
-        """Let the pictures that come from now on pass; any thread."""
+        """Let the images that come from now on pass; any thread."""
         self._paused = True
 
     def resume(self) -> None:
-        """Write pictures again; any thread."""
+        """Write images again; any thread."""
         self._paused = False
 
-    def put(self, picture: Picture) -> bool:
-        """Have `picture` written; returns at once whether it will be. One thread."""
+    def put(self, image: CameraImage) -> bool:
+        """Have `image` written; returns at once whether it will be. One thread."""
         if self._paused or self._ended or self._error is not None or self.end_requested:
             return False
-        self._lost += picture.lost_before
-        row = row_of(picture, datetime.now(UTC))
-        good = picture.frame.status is FrameStatus.COMPLETE
-        room = not good or self._has_room(picture.data.nbytes)
+        self._lost += image.lost_before
+        row = row_of(image, datetime.now(UTC))
+        good = image.frame.status is FrameStatus.COMPLETE
+        room = not good or self._has_room(image.data.nbytes)
         if not good:
             self._incomplete += 1
         elif not room:
@@ -173,14 +173,14 @@ class PictureRecorder(WorkerThread):
         accepted = good and room
         if accepted:
             self._given += 1
-            self._given_bytes += picture.data.nbytes
-            self._queue.put(_Came(row, picture.data))
+            self._given_bytes += image.data.nbytes
+            self._queue.put(_Came(row, image.data))
         elif self._queue.qsize() < LONGEST_QUEUE:
             self._queue.put(_Came(row, None))
         return accepted
 
     def _has_room(self, size_bytes: int) -> bool:
-        """Return whether a picture may wait; one always may, however large."""
+        """Return whether an image may wait; one always may, however large."""
         waiting = self._given_bytes - self._taken_bytes
         few = self._queue.qsize() < LONGEST_QUEUE
         return waiting == 0 or (few and waiting + size_bytes <= self._limit_bytes)
@@ -258,7 +258,7 @@ class PictureRecorder(WorkerThread):
         check_space(directory, self._bytes_per_s * FLUSH_S)
         if self._dropped > self._told_dropped:
             logger.warning(
-                "%s: %d pictures dropped so far, for they come faster than they can be written",
+                "%s: %d images dropped so far, for they come faster than they can be written",
                 self.path,
                 self._dropped,
             )
@@ -266,7 +266,7 @@ class PictureRecorder(WorkerThread):
         self.recorded.emit(self.stats)
 
     def _abandon(self) -> None:
-        """Say of the pictures that wait that they are not in the file."""
+        """Say of the images that wait that they are not in the file."""
         left = [self._in_hand, *(self._queue.get() for _ in range(self._queue.qsize()))]
         abandoned = 0
         for came in left:

@@ -13,7 +13,7 @@ from cosmic.twin.settings import TwinSettings, shipped_settings
 Grey = npt.NDArray[np.float64]
 
 
-def clean_settings(**picture: float) -> TwinSettings:
+def clean_settings(**image: float) -> TwinSettings:
     """Return the shipped constants without dirt, noise and uneven light, unless told otherwise."""
     shipped = shipped_settings()
     clean = {
@@ -22,7 +22,7 @@ def clean_settings(**picture: float) -> TwinSettings:
         "sensor_specks": 0,
         "uneven": 0.0,
         "slanted": 0.0,
-        **picture,
+        **image,
     }
     optics = shipped.optics.model_copy(
         update={
@@ -35,7 +35,7 @@ def clean_settings(**picture: float) -> TwinSettings:
     return shipped.model_copy(update={"optics": optics})
 
 
-class PictureBench:
+class ImageBench:
     """A scene whose time goes on with each movement."""
 
     def __init__(self, twin: TwinSettings | None = None, seed: int = 0) -> None:
@@ -48,13 +48,13 @@ class PictureBench:
         self.light = self.scene.light
         self.now_s = 1.0
 
-    def zoom(self, magnification: float) -> "PictureBench":
+    def zoom(self, magnification: float) -> "ImageBench":
         view = self.optics.settings.views["microscope"]
         low, high = view.magnification_low, view.magnification_high
         self._turn("zoom", math.log(magnification / low) / math.log(high / low))
         return self
 
-    def focus(self, height_um: float) -> "PictureBench":
+    def focus(self, height_um: float) -> "ImageBench":
         view = self.optics.settings.views["microscope"]
         way = view.focus_high_um - view.focus_low_um
         self._turn("focus", (height_um - view.focus_low_um) / way)
@@ -66,7 +66,7 @@ class PictureBench:
         there = self.lens.position_counts(axis, self.now_s)
         self.lens.turn_by_hand(axis, part * high - there, self.now_s)
 
-    def go(self, **target: float) -> "PictureBench":
+    def go(self, **target: float) -> "ImageBench":
         """Move stages one after another and wait for each; left_x is left.x."""
         for name, place in target.items():
             stage = self.scene.stages[name.replace("_", ".", 1)]
@@ -76,24 +76,24 @@ class PictureBench:
             self.now_s = route.end_s + 0.002
         return self
 
-    def picture(self, **how: float) -> Grey:
+    def image(self, **how: float) -> Grey:
         """Return what the microscope sees now."""
         return self.optics.render(self.now_s, **how).astype(np.float64)
 
     def px(self, *point_um: float) -> npt.NDArray[np.float64]:
-        """Return where a point truly lies in the picture."""
-        return self.optics.world_to_picture_px(point_um, self.now_s)  # type: ignore[arg-type]
+        """Return where a point truly lies in the image."""
+        return self.optics.world_to_image_px(point_um, self.now_s)  # type: ignore[arg-type]
 
 
-def along(picture: Grey, start_px: Grey, end_px: Grey, samples: int = 400) -> tuple[Grey, Grey]:
-    """Return distances from `start_px` towards `end_px` and the picture there, between pixels."""
+def along(image: Grey, start_px: Grey, end_px: Grey, samples: int = 400) -> tuple[Grey, Grey]:
+    """Return distances from `start_px` towards `end_px` and the image there, between pixels."""
     parts = np.linspace(0.0, 1.0, samples)
     x = start_px[0] + parts * (end_px[0] - start_px[0])
     y = start_px[1] + parts * (end_px[1] - start_px[1])
     i, j = np.floor(y).astype(int), np.floor(x).astype(int)
     v, u = y - i, x - j
-    value = (1 - v) * ((1 - u) * picture[i, j] + u * picture[i, j + 1]) + v * (
-        (1 - u) * picture[i + 1, j] + u * picture[i + 1, j + 1]
+    value = (1 - v) * ((1 - u) * image[i, j] + u * image[i, j + 1]) + v * (
+        (1 - u) * image[i + 1, j] + u * image[i + 1, j + 1]
     )
     return parts * math.hypot(*(end_px - start_px)), value
 

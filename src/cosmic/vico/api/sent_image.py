@@ -1,4 +1,4 @@
-"""Pictures, and what machine vision found on them, as they travel between stations."""
+"""Images, and what machine vision found on them, as they travel between stations."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.api.camera_shown import Seen
 from cosmic.vico.api.places import Pixel, Places
-from cosmic.vico.core.picture import Circumstances, Picture
+from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.tool_tips import TipSeen
 from cosmic.vico.hw.interface import Frame, FrameStatus, PixelFormat
@@ -20,7 +20,7 @@ NOT_HOSTED = "micromanipulation is not hosted there"
 
 @dataclass(frozen=True, slots=True)
 class PlateMap:
-    """Where the pixels of one picture lie on the plate: an affine map.
+    """Where the pixels of one image lie on the plate: an affine map.
 
     Attributes
     ----------
@@ -35,12 +35,12 @@ class PlateMap:
     down_um: Pixel
 
     @classmethod
-    def of(cls, picture: Picture, places: Places) -> "PlateMap":
-        """Return the map of a picture; raises `NotAvailable` where it was not calibrated."""
-        height, width = picture.data.shape[:2]
-        corner = places.platform_um(picture, (0.0, 0.0))
-        right = places.platform_um(picture, (float(width), 0.0))
-        down = places.platform_um(picture, (0.0, float(height)))
+    def of(cls, image: CameraImage, places: Places) -> "PlateMap":
+        """Return the map of an image; raises `NotAvailable` where it was not calibrated."""
+        height, width = image.data.shape[:2]
+        corner = places.platform_um(image, (0.0, 0.0))
+        right = places.platform_um(image, (float(width), 0.0))
+        down = places.platform_um(image, (0.0, float(height)))
         return cls(corner, _step(corner, right, width), _step(corner, down, height))
 
     def to_um(self, place_px: Pixel) -> Pixel:
@@ -55,8 +55,8 @@ def _step(start: Pixel, end: Pixel, count: int) -> Pixel:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ReceivedPicture(Picture):
-    """A picture that came from another station.
+class ReceivedImage(CameraImage):
+    """An image that came from another station.
 
     Attributes
     ----------
@@ -69,8 +69,8 @@ class ReceivedPicture(Picture):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SentPicture:
-    """A picture on its way; see `Picture`, `Frame` and `Circumstances`."""
+class SentImage:
+    """An image on its way; see `CameraImage`, `Frame` and `Circumstances`."""
 
     camera: str
     data: NDArray[Any]
@@ -97,12 +97,12 @@ class SentPicture:
         return int(self.data.nbytes)
 
     @classmethod
-    def of(cls, picture: Picture, places: Places | None) -> "SentPicture":
-        """Return what is sent of a picture; a simulated camera draws it here."""
-        plate, problem = _plate(picture, places)
-        frame, known = picture.frame, picture.circumstances
+    def of(cls, image: CameraImage, places: Places | None) -> "SentImage":
+        """Return what is sent of an image; a simulated camera draws it here."""
+        plate, problem = _plate(image, places)
+        frame, known = image.frame, image.circumstances
         return cls(
-            picture.camera,
+            image.camera,
             frame.data,
             int(frame.frame_id),
             frame.time_s,
@@ -110,7 +110,7 @@ class SentPicture:
             frame.device_ns,
             frame.status,
             frame.pixel_format,
-            int(picture.lost_before),
+            int(image.lost_before),
             known.exposure_s,
             known.gain_db,
             known.zoom_counts,
@@ -122,8 +122,8 @@ class SentPicture:
             problem,
         )
 
-    def received(self) -> ReceivedPicture:
-        """Return the picture as handles give it."""
+    def received(self) -> ReceivedImage:
+        """Return the image as handles give it."""
         frame = Frame(
             self.data,
             self.frame_id,
@@ -142,28 +142,28 @@ class SentPicture:
             self.scale_um_px,
             self.positions,
         )
-        return ReceivedPicture(
+        return ReceivedImage(
             self.camera, frame, known, self.lost_before, self.plate, self.plate_problem
         )
 
 
-def _plate(picture: Picture, places: Places | None) -> tuple[PlateMap | None, str]:
+def _plate(image: CameraImage, places: Places | None) -> tuple[PlateMap | None, str]:
     if places is None:
         return None, NOT_HOSTED
-    problem = places.problem(picture)
+    problem = places.problem(image)
     if problem:
         return None, problem
     try:
-        return PlateMap.of(picture, places), ""
+        return PlateMap.of(image, places), ""
     except NotAvailable as exc:
         return None, str(exc)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SentSeen:
-    """What machine vision found, with the picture's circumstances but not its pixels."""
+    """What machine vision found, with the image's circumstances but not its pixels."""
 
-    picture: SentPicture
+    image: SentImage
     shape: tuple[int, ...]
     fibres: tuple[Fibre, ...]
     tips: tuple[TipSeen, ...]
@@ -171,18 +171,18 @@ class SentSeen:
     @classmethod
     def of(cls, seen: Seen) -> "SentSeen":
         """Return what is sent."""
-        data = seen.picture.data
-        bare = replace(seen.picture.frame, data=np.zeros((0,), np.uint8))
+        data = seen.image.data
+        bare = replace(seen.image.frame, data=np.zeros((0,), np.uint8))
         return cls(
-            SentPicture.of(replace(seen.picture, frame=bare), None),
+            SentImage.of(replace(seen.image, frame=bare), None),
             tuple(data.shape),
             tuple(_plain(each) for each in seen.fibres),
             tuple(_plain_tip(each) for each in seen.tips),
         )
 
     def received(self) -> Seen:
-        """Return what a view shows; its picture is empty."""
-        bare = self.picture.received()
+        """Return what a view shows; its image is empty."""
+        bare = self.image.received()
         nothing = np.broadcast_to(np.zeros((), np.uint8), self.shape)
         return Seen(replace(bare, frame=replace(bare.frame, data=nothing)), self.fibres, self.tips)
 
@@ -196,9 +196,9 @@ def _plain_tip(tip: TipSeen) -> TipSeen:
     return TipSeen(tip.name, (float(x), float(y)), tip.certain)
 
 
-def received(sent: object) -> ReceivedPicture | None:
-    """Return a picture that came, where it is one."""
-    return sent.received() if isinstance(sent, SentPicture) else None
+def received(sent: object) -> ReceivedImage | None:
+    """Return an image that came, where it is one."""
+    return sent.received() if isinstance(sent, SentImage) else None
 
 
 def received_seen(sent: object) -> Seen | None:

@@ -1,4 +1,4 @@
-"""`PictureFile`: a recording of pictures being written, without a thread of its own."""
+"""`ImageFile`: a recording of images being written, without a thread of its own."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -7,38 +7,38 @@ from typing import Protocol
 
 from cosmic.frame.errors import RecordingError, RecordingExistsError
 from cosmic.vico.core.recording.formats import (
-    PictureFormat,
+    ImageFormat,
     checked_path,
     kind_of,
     recording_suffix,
     side_path_of,
     traits,
 )
-from cosmic.vico.core.recording.sequence_writer import SequenceWriter, picture_files
+from cosmic.vico.core.recording.sequence_writer import SequenceWriter, image_files
 from cosmic.vico.core.recording.side_file import SideFile
 from cosmic.vico.core.recording.side_row import SideRow
 from cosmic.vico.core.recording.video_writer import VideoWriter, check_codec
 from cosmic.vico.hw.interface import PixelFormat, Pixels
 
 
-class PictureWriter(Protocol):
-    """What writes pictures in one format; methods raise `OSError`."""
+class ImageWriter(Protocol):
+    """What writes images in one format; methods raise `OSError`."""
 
     @property
     def size_bytes(self) -> int:
         """How much is written."""
 
     def write(self, data: Pixels, row: SideRow) -> None:
-        """Add a picture."""
+        """Add an image."""
 
     def close(self) -> None:
         """Finish."""
 
 
-class PictureFile:
-    """A video file, or a directory of pictures, with its side file; one thread.
+class ImageFile:
+    """A video file, or a directory of images, with its side file; one thread.
 
-    Both are created at once; what a video begins with is written with the first picture.
+    Both are created at once; what a video begins with is written with the first image.
 
     Parameters
     ----------
@@ -62,21 +62,21 @@ class PictureFile:
     def __init__(
         self,
         path: Path,
-        picture_format: PictureFormat,
+        image_format: ImageFormat,
         *,
         axes: Mapping[str, str] | None = None,
         rate_hz: float = 15.0,
         overwrite: bool = False,
         stem: str = "",
     ) -> None:
-        check_codec(picture_format)
-        self._path = checked_path(path, picture_format)
-        self._format = picture_format
+        check_codec(image_format)
+        self._path = checked_path(path, image_format)
+        self._format = image_format
         self._stem = stem or self._path.name
         self._axes = dict(axes or {})
         self._rate_hz = rate_hz
         self._kind: tuple[tuple[int, ...], str, PixelFormat] | None = None
-        self._writer: PictureWriter | None = None
+        self._writer: ImageWriter | None = None
         self._count = 0
         if not overwrite and self._path.exists():
             raise _exists(self._path)
@@ -102,7 +102,7 @@ class PictureFile:
 
     @property
     def count(self) -> int:
-        """How many pictures are in it."""
+        """How many images are in it."""
         return self._count
 
     @property
@@ -111,7 +111,7 @@ class PictureFile:
         return self._writer.size_bytes if self._writer is not None else 0
 
     def append(self, data: Pixels, row: SideRow) -> None:
-        """Add a picture.
+        """Add an image.
 
         Raises
         ------
@@ -125,7 +125,7 @@ class PictureFile:
             self._kind, self._writer = kind, self._opened(kind)
         if kind != self._kind:
             raise RecordingError(
-                f"{self._path}: picture {row.frame_id} is {_said(kind)}, where the recording was "
+                f"{self._path}: image {row.frame_id} is {_said(kind)}, where the recording was "
                 f"begun with {_said(self._kind)}; a recording keeps one size and one pixel format, "
                 "so it ends here. Start another"
             )
@@ -134,7 +134,7 @@ class PictureFile:
         self._count += 1
 
     def note(self, row: SideRow) -> None:
-        """Add the row of a picture that is not in the file; raises `OSError`."""
+        """Add the row of an image that is not in the file; raises `OSError`."""
         self._side.add(row)
 
     def flush(self) -> None:
@@ -147,7 +147,7 @@ class PictureFile:
             if self._writer is not None:
                 self._writer.close()
             elif not traits(self._format).sequence:
-                self._path.unlink(missing_ok=True)  # a video without a picture is none
+                self._path.unlink(missing_ok=True)  # a video without an image is none
             self._side.close(complete=complete)
         finally:
             self._side.close(complete=False)
@@ -156,7 +156,7 @@ class PictureFile:
         try:
             if traits(self._format).sequence:
                 self._path.mkdir(exist_ok=overwrite)
-                for each in picture_files(self._path, self._stem).values():
+                for each in image_files(self._path, self._stem).values():
                     each.unlink()
             else:
                 self._path.touch(exist_ok=overwrite)
@@ -167,12 +167,12 @@ class PictureFile:
                 f"{self._path}: cannot be created ({exc.strerror or exc}); choose another directory"
             ) from exc
 
-    def _opened(self, kind: tuple[tuple[int, ...], str, PixelFormat]) -> PictureWriter:
+    def _opened(self, kind: tuple[tuple[int, ...], str, PixelFormat]) -> ImageWriter:
         shape, _, pixel_format = kind
         found = traits(self._format)
         if not found.holds(pixel_format):
             raise RecordingError(
-                f"{self._path}: format {self._format} cannot keep {pixel_format} pictures"
+                f"{self._path}: format {self._format} cannot keep {pixel_format} images"
             )
         if found.sequence:
             return SequenceWriter(self._path, self._format, self._stem, self._axes)
@@ -181,9 +181,9 @@ class PictureFile:
 
 def _check_alone(path: Path, side_path: Path) -> None:
     """Refuse to take the side file of a recording in another format."""
-    for suffix in {recording_suffix(each) for each in PictureFormat}:
+    for suffix in {recording_suffix(each) for each in ImageFormat}:
         other = side_path.with_name(side_path.stem + suffix)
-        there = picture_files(other, other.name) if other.is_dir() else other.is_file()
+        there = image_files(other, other.name) if other.is_dir() else other.is_file()
         if other != path and there:
             raise RecordingError(
                 f"{other} is a recording in another format, which {side_path.name} belongs to; "

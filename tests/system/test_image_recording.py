@@ -1,4 +1,4 @@
-"""Programs that are not ours read the pictures we record: ffprobe, ffmpeg, OpenCV, tifffile."""
+"""Programs that are not ours read the images we record: ffprobe, ffmpeg, OpenCV, tifffile."""
 
 import hashlib
 import json
@@ -12,12 +12,12 @@ import pytest
 import tifffile
 
 from cosmic.frame.failure import FailurePolicy
-from cosmic.vico.core.recording.formats import FORMATS, PictureFormat
-from cosmic.vico.core.recording.picture_recorder import PictureRecorder
+from cosmic.vico.core.recording.formats import FORMATS, ImageFormat
+from cosmic.vico.core.recording.image_recorder import ImageRecorder
 from cosmic.vico.core.recording.side_row import COLUMNS
 from cosmic.vico.hw.interface import PixelFormat
 from system.docs_blocks import ROOT, table_rows
-from unit.vico.recording.picture_helpers import AXES, noise, picture, settings
+from unit.vico.recording.image_helpers import AXES, image, noise, settings
 
 COUNT, RATE_HZ = 30, 25.0
 LOSSLESS_VIDEO = [each for each, found in FORMATS.items() if found.lossless and found.codec]
@@ -30,9 +30,9 @@ needs_ffmpeg = pytest.mark.skipif(
 
 @pytest.fixture
 def recorded(tmp_path):
-    def record(picture_format, pixel_format=PixelFormat.MONO8, *, width=131, height=77):
+    def record(image_format, pixel_format=PixelFormat.MONO8, *, width=131, height=77):
         shots = [
-            picture(
+            image(
                 number,
                 noise(pixel_format, width, height, seed=number),
                 pixel_format=pixel_format,
@@ -41,9 +41,7 @@ def recorded(tmp_path):
             for number in range(COUNT)
         ]
         how = settings(pixel_format, width, height, RATE_HZ)
-        recorder = PictureRecorder(
-            tmp_path / "run", picture_format, how, FailurePolicy(), axes=AXES
-        )
+        recorder = ImageRecorder(tmp_path / "run", image_format, how, FailurePolicy(), axes=AXES)
         recorder.start()
         for shot in shots:
             assert recorder.put(shot)
@@ -59,14 +57,14 @@ def run(*command):
 
 
 @needs_ffmpeg
-@pytest.mark.parametrize("picture_format", [*LOSSLESS_VIDEO, PictureFormat.SMALL])
-def test_ffprobe_counts_every_picture_with_its_time(recorded, picture_format):
-    path, _ = recorded(picture_format)
+@pytest.mark.parametrize("image_format", [*LOSSLESS_VIDEO, ImageFormat.SMALL])
+def test_ffprobe_counts_every_image_with_its_time(recorded, image_format):
+    path, _ = recorded(image_format)
     entries = "stream=codec_name,width,height,nb_read_frames:frame=pts_time"
     command = ["-v", "error", "-count_frames", "-show_entries", entries, "-of", "json"]
     said = json.loads(run("ffprobe", *command, str(path)))
     (stream,) = said["streams"]
-    assert stream["codec_name"] == FORMATS[picture_format].codec
+    assert stream["codec_name"] == FORMATS[image_format].codec
     assert (stream["width"], stream["height"]) == (131, 77)
     assert int(stream["nb_read_frames"]) == COUNT
     times_s = [float(each["pts_time"]) for each in said["frames"]]
@@ -77,9 +75,9 @@ def test_ffprobe_counts_every_picture_with_its_time(recorded, picture_format):
 @pytest.mark.parametrize(
     "pixel_format", [PixelFormat.MONO8, PixelFormat.MONO12, PixelFormat.MONO16, PixelFormat.RGB8]
 )
-@pytest.mark.parametrize("picture_format", LOSSLESS_VIDEO)
-def test_ffmpeg_decodes_the_very_bytes_that_went_in(recorded, picture_format, pixel_format):
-    path, went_in = recorded(picture_format, pixel_format)
+@pytest.mark.parametrize("image_format", LOSSLESS_VIDEO)
+def test_ffmpeg_decodes_the_very_bytes_that_went_in(recorded, image_format, pixel_format):
+    path, went_in = recorded(image_format, pixel_format)
     raw = RAW.get(pixel_format, "gray16le")
     command = ["-v", "error", "-i", str(path), "-f", "rawvideo", "-pix_fmt", raw, "-"]
     came_out = run("ffmpeg", *command)
@@ -87,9 +85,9 @@ def test_ffmpeg_decodes_the_very_bytes_that_went_in(recorded, picture_format, pi
     assert hashlib.md5(came_out).digest() == hashlib.md5(expected).digest()
 
 
-@pytest.mark.parametrize("picture_format", LOSSLESS_VIDEO)
-def test_opencv_reads_the_same_pixels(recorded, picture_format):
-    path, went_in = recorded(picture_format)
+@pytest.mark.parametrize("image_format", LOSSLESS_VIDEO)
+def test_opencv_reads_the_same_pixels(recorded, image_format):
+    path, went_in = recorded(image_format)
     video = cv2.VideoCapture(str(path))
     try:
         assert video.get(cv2.CAP_PROP_FPS) == pytest.approx(RATE_HZ, rel=0.05)
@@ -104,7 +102,7 @@ def test_opencv_reads_the_same_pixels(recorded, picture_format):
 
 @pytest.mark.parametrize("pixel_format", PixelFormat)
 def test_tifffile_reads_a_sequence_with_its_scale(recorded, pixel_format):
-    path, went_in = recorded(PictureFormat.TIFF, pixel_format)
+    path, went_in = recorded(ImageFormat.TIFF, pixel_format)
     stack = tifffile.TiffSequence(str(path / "*.tif")).asarray()
     np.testing.assert_array_equal(stack, np.stack(went_in))
     with tifffile.TiffFile(path / "run_000003.tif") as file:
@@ -113,7 +111,7 @@ def test_tifffile_reads_a_sequence_with_its_scale(recorded, pixel_format):
 
 @pytest.mark.parametrize("pixel_format", [PixelFormat.MONO8, PixelFormat.MONO16])
 def test_opencv_reads_a_sequence_of_png(recorded, pixel_format):
-    path, went_in = recorded(PictureFormat.PNG, pixel_format)
+    path, went_in = recorded(ImageFormat.PNG, pixel_format)
     files = sorted(path.iterdir())
     assert len(files) == COUNT
     for file, data in zip(files, went_in, strict=True):
@@ -121,7 +119,7 @@ def test_opencv_reads_a_sequence_of_png(recorded, pixel_format):
 
 
 def test_pandas_reads_the_side_file_without_losing_a_digit(recorded):
-    path, _ = recorded(PictureFormat.FFV1)
+    path, _ = recorded(ImageFormat.FFV1)
     table = pd.read_csv(path.with_suffix(".csv"))
     there = table[table["index"] >= 0]
     assert there["frame_id"].tolist() == list(range(COUNT))
@@ -133,7 +131,7 @@ def test_pandas_reads_the_side_file_without_losing_a_digit(recorded):
 
 
 def test_the_page_of_the_reference_lists_every_format_and_column():
-    listed = [row[0].strip("`") for row in table_rows(ROOT / "docs/reference/picture-recording.md")]
-    assert listed[1 : 1 + len(PictureFormat)] == [each.value for each in PictureFormat]
+    listed = [row[0].strip("`") for row in table_rows(ROOT / "docs/reference/image-recording.md")]
+    assert listed[1 : 1 + len(ImageFormat)] == [each.value for each in ImageFormat]
     first = listed.index(COLUMNS[0])
     assert tuple(listed[first : first + len(COLUMNS)]) == COLUMNS

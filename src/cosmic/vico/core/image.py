@@ -32,13 +32,13 @@ class Circumstances:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Picture:
+class CameraImage:
     """One frame of one camera, as it goes to the display, the recorder and machine vision.
 
     Attributes
     ----------
     lost_before : int
-        Frames that the camera lost since the picture before this one.
+        Frames that the camera lost since the image before this one.
     """
 
     camera: str

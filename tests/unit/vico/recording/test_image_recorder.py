@@ -1,4 +1,4 @@
-"""`PictureRecorder`: never holds up the camera, and no picture is missing in silence."""
+"""`ImageRecorder`: never holds up the camera, and no image is missing in silence."""
 
 import logging
 import shutil
@@ -13,16 +13,16 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.errors import RecordingError, RecordingExistsError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.file_names import RESERVE_BYTES
-from cosmic.vico.core.recording.formats import PictureFormat
-from cosmic.vico.core.recording.picture_file import PictureFile
-from cosmic.vico.core.recording.picture_recorder import PictureRecorder
-from cosmic.vico.core.recording.reading import open_picture_recording
+from cosmic.vico.core.recording.formats import ImageFormat
+from cosmic.vico.core.recording.image_file import ImageFile
+from cosmic.vico.core.recording.image_recorder import ImageRecorder
+from cosmic.vico.core.recording.reading import open_image_recording
 from cosmic.vico.hw.interface import FrameStatus, PixelFormat
-from unit.vico.recording.picture_helpers import (
+from unit.vico.recording.image_helpers import (
     AXES,
+    image,
+    images,
     noise,
-    picture,
-    pictures,
     settings,
     wait_until,
 )
@@ -50,14 +50,14 @@ class Gate:
     def __init__(self, monkeypatch):
         self.open = threading.Event()
         self.reached = threading.Event()
-        append = PictureFile.append
+        append = ImageFile.append
 
         def slow(file, data, row):
             self.reached.set()
             assert self.open.wait(10.0)
             append(file, data, row)
 
-        monkeypatch.setattr(PictureFile, "append", slow)
+        monkeypatch.setattr(ImageFile, "append", slow)
 
 
 @pytest.fixture
@@ -74,9 +74,9 @@ def told(policy):
 def recorders(tmp_path, policy, told):
     made = []
 
-    def make(name="run", picture_format=PictureFormat.FFV1, *, start=True, **how):
+    def make(name="run", image_format=ImageFormat.FFV1, *, start=True, **how):
         how.setdefault("settings", settings())
-        recorder = PictureRecorder(tmp_path / name, picture_format, policy=policy, axes=AXES, **how)
+        recorder = ImageRecorder(tmp_path / name, image_format, policy=policy, axes=AXES, **how)
         told.listen(recorder)
         made.append(recorder)
         if start:
@@ -96,10 +96,10 @@ def end(recorder):
     assert recorder.join()
 
 
-@pytest.mark.parametrize("picture_format", PictureFormat)
-def test_everything_put_before_the_end_is_in_the_file(recorders, told, picture_format):
-    recorder = recorders("run", picture_format)
-    assert all(recorder.put(each) for each in pictures(40))
+@pytest.mark.parametrize("image_format", ImageFormat)
+def test_everything_put_before_the_end_is_in_the_file(recorders, told, image_format):
+    recorder = recorders("run", image_format)
+    assert all(recorder.put(each) for each in images(40))
     end(recorder)
     assert recorder.error is None
     assert told.errors == []
@@ -109,32 +109,32 @@ def test_everything_put_before_the_end_is_in_the_file(recorders, told, picture_f
     assert stats.duration_s == pytest.approx(39 / 20.0)
     assert stats.file_bytes > 0
     assert stats.left_s > 0.0
-    with open_picture_recording(recorder.path) as found:
+    with open_image_recording(recorder.path) as found:
         assert found.complete
         assert [each.row.frame_id for each in found] == list(range(40))
 
 
-def test_a_full_queue_drops_pictures_and_tells_which(recorders, told, monkeypatch, caplog):
+def test_a_full_queue_drops_images_and_tells_which(recorders, told, monkeypatch, caplog):
     gate = Gate(monkeypatch)
     data = noise()
     recorder = recorders(queue_bytes=3 * data.nbytes)
-    assert recorder.put(picture(0, data))
+    assert recorder.put(image(0, data))
     assert gate.reached.wait(10.0)
     with caplog.at_level(logging.WARNING):
         began_s = WALL.now_s()
-        taken = [recorder.put(picture(number, data)) for number in range(1, 10)]
+        taken = [recorder.put(image(number, data)) for number in range(1, 10)]
         assert WALL.now_s() - began_s < 1.0
         assert taken == [True, True] + [False] * 7
         assert (recorder.stats.dropped, recorder.stats.waiting) == (7, 3)
         assert recorder.stats.waiting_bytes == 3 * data.nbytes
         gate.open.set()
         wait_until(lambda: recorder.stats.waiting == 0)
-        assert recorder.put(picture(10, data))
-        wait_until(lambda: any("7 pictures dropped" in each for each in caplog.messages))
+        assert recorder.put(image(10, data))
+        wait_until(lambda: any("7 images dropped" in each for each in caplog.messages))
     end(recorder)
     assert told.stats[-1].dropped == 7
     assert told.errors == []
-    with open_picture_recording(recorder.path) as found:
+    with open_image_recording(recorder.path) as found:
         assert found.complete
         assert [each.row.frame_id for each in found] == [0, 1, 2, 10]
         assert found.dropped == 7
@@ -144,27 +144,27 @@ def test_a_full_queue_drops_pictures_and_tells_which(recorders, told, monkeypatc
         assert len(status) == 11
 
 
-def test_a_picture_larger_than_the_queue_is_written_when_nothing_waits(recorders):
+def test_a_image_larger_than_the_queue_is_written_when_nothing_waits(recorders):
     recorder = recorders(queue_bytes=10)
     for number in range(3):
-        assert recorder.put(picture(number))
+        assert recorder.put(image(number))
         wait_until(lambda: recorder.stats.waiting == 0)
     end(recorder)
     assert recorder.stats.written == 3
 
 
-def test_incomplete_pictures_are_counted_and_kept_out_of_the_file(recorders):
+def test_incomplete_images_are_counted_and_kept_out_of_the_file(recorders):
     recorder = recorders()
     for number in range(6):
         status = FrameStatus.INCOMPLETE if number in {2, 3} else FrameStatus.COMPLETE
         lost = 4 if number == 5 else 0
-        assert recorder.put(picture(number, status=status, lost_before=lost)) is (
+        assert recorder.put(image(number, status=status, lost_before=lost)) is (
             status is FrameStatus.COMPLETE
         )
     end(recorder)
     stats = recorder.stats
     assert (stats.written, stats.incomplete, stats.dropped, stats.lost) == (4, 2, 0, 4)
-    with open_picture_recording(recorder.path) as found:
+    with open_image_recording(recorder.path) as found:
         assert [each.row.frame_id for each in found] == [0, 1, 4, 5]
         assert (found.incomplete, found.lost) == (2, 4)
         assert found.rows[2].status == "incomplete"
@@ -174,30 +174,30 @@ def test_incomplete_pictures_are_counted_and_kept_out_of_the_file(recorders):
 @pytest.mark.parametrize(
     ("other", "said"),
     [
-        (picture(3, noise(width=36)), "36 x 23 px Mono8, where .* begun with 37 x 23 px Mono8"),
-        (picture(3, pixel_format=PixelFormat.MONO12), "37 x 23 px Mono12, where"),
-        (picture(3, noise(PixelFormat.RGB8)), "cannot be recorded"),
+        (image(3, noise(width=36)), "36 x 23 px Mono8, where .* begun with 37 x 23 px Mono8"),
+        (image(3, pixel_format=PixelFormat.MONO12), "37 x 23 px Mono12, where"),
+        (image(3, noise(PixelFormat.RGB8)), "cannot be recorded"),
     ],
 )
 def test_another_size_or_pixel_format_ends_the_recording_in_good_order(
     recorders, told, other, said
 ):
     recorder = recorders()
-    for each in pictures(3):
+    for each in images(3):
         recorder.put(each)
     recorder.put(other)
     wait_until(lambda: recorder.error is not None)
-    assert not recorder.put(picture(4))
+    assert not recorder.put(image(4))
     end(recorder)
     with pytest.raises(RecordingError, match=said):
         raise told.errors[0]
     assert len(told.errors) == 1
     assert told.stops == []
-    with open_picture_recording(recorder.path) as found:
+    with open_image_recording(recorder.path) as found:
         assert not found.complete
         assert len(found) == 3
         assert found.rows[3].status == "dropped"
-        for shot, read in zip(pictures(3), found, strict=True):
+        for shot, read in zip(images(3), found, strict=True):
             np.testing.assert_array_equal(read.data, shot.data)
 
 
@@ -208,19 +208,19 @@ def test_a_disk_that_is_full_at_the_start_forbids_it(tmp_path, recorders, monkey
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("picture_format", [PictureFormat.FFV1, PictureFormat.TIFF])
+@pytest.mark.parametrize("image_format", [ImageFormat.FFV1, ImageFormat.TIFF])
 def test_a_disk_that_fills_ends_the_recording_in_good_order(
-    recorders, told, monkeypatch, picture_format
+    recorders, told, monkeypatch, image_format
 ):
-    recorder = recorders("run", picture_format)
-    for each in pictures(5):
+    recorder = recorders("run", image_format)
+    for each in images(5):
         assert recorder.put(each)
     wait_until(lambda: recorder.stats.written == 5)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(10**9, 0, RESERVE_BYTES))
     wait_until(lambda: told.closed)
     assert "the disk is full" in str(told.errors[0])
     assert told.stops == []
-    with open_picture_recording(recorder.path) as found:
+    with open_image_recording(recorder.path) as found:
         assert not found.complete
         assert len(found) == 5
 
@@ -228,7 +228,7 @@ def test_a_disk_that_fills_ends_the_recording_in_good_order(
 def test_what_waits_when_writing_fails_is_told_as_dropped(recorders, told, monkeypatch):
     gate = Gate(monkeypatch)
     recorder = recorders()
-    for each in pictures(5):
+    for each in images(5):
         assert recorder.put(each)
     assert gate.reached.wait(10.0)
 
@@ -240,27 +240,27 @@ def test_what_waits_when_writing_fails_is_told_as_dropped(recorders, told, monke
     wait_until(lambda: told.closed)
     assert "No space left on device" in str(told.errors[0])
     assert told.stats[-1].dropped == 5
-    with open_picture_recording(recorder.side_path) as found:
+    with open_image_recording(recorder.side_path) as found:
         assert [(row.status, row.dropped) for row in found.rows] == [
             ("dropped", number) for number in range(1, 6)
         ]
 
 
 @pytest.mark.parametrize(
-    ("picture_format", "taken"),
+    ("image_format", "taken"),
     [
-        (PictureFormat.FFV1, "run.mkv"),
-        (PictureFormat.FAST, "run.csv"),
-        (PictureFormat.PNG, "run"),
+        (ImageFormat.FFV1, "run.mkv"),
+        (ImageFormat.FAST, "run.csv"),
+        (ImageFormat.PNG, "run"),
     ],
 )
-def test_a_file_that_is_taken_away_is_told(tmp_path, recorders, told, picture_format, taken):
-    recorder = recorders("run", picture_format)
-    recorder.put(picture(0))
+def test_a_file_that_is_taken_away_is_told(tmp_path, recorders, told, image_format, taken):
+    recorder = recorders("run", image_format)
+    recorder.put(image(0))
     wait_until(lambda: recorder.stats.written == 1)
     path = tmp_path / taken
     shutil.rmtree(path) if path.is_dir() else path.unlink()
-    recorder.put(picture(1))
+    recorder.put(image(1))
     wait_until(lambda: told.closed)
     assert "taken away" in str(told.errors[0]) or "writing failed" in str(told.errors[0])
     assert told.stops == []
@@ -269,7 +269,7 @@ def test_a_file_that_is_taken_away_is_told(tmp_path, recorders, told, picture_fo
 def test_a_recording_that_is_there_stays_unless_it_may_go(recorders):
     for overwrite in (False, True):
         recorder = recorders(overwrite=overwrite)
-        recorder.put(picture(0))
+        recorder.put(image(0))
         end(recorder)
         with pytest.raises(RecordingExistsError):
             recorders(start=False)
@@ -277,29 +277,29 @@ def test_a_recording_that_is_there_stays_unless_it_may_go(recorders):
 
 def test_pixels_that_a_format_cannot_keep_are_refused_at_the_start(tmp_path, recorders):
     with pytest.raises(RecordingError, match=r"small cannot keep Mono12 .* ffv1, fast, tiff, png"):
-        recorders("run", PictureFormat.SMALL, settings=settings(PixelFormat.MONO12))
+        recorders("run", ImageFormat.SMALL, settings=settings(PixelFormat.MONO12))
     assert list(tmp_path.iterdir()) == []
 
 
-def test_pictures_pass_while_it_is_paused(recorders):
+def test_images_pass_while_it_is_paused(recorders):
     recorder = recorders()
-    recorder.put(picture(0))
+    recorder.put(image(0))
     recorder.pause()
     assert recorder.stats.paused
-    assert not recorder.put(picture(1))
+    assert not recorder.put(image(1))
     recorder.resume()
-    recorder.put(picture(2))
+    recorder.put(image(2))
     end(recorder)
-    with open_picture_recording(recorder.path) as found:
+    with open_image_recording(recorder.path) as found:
         assert [row.frame_id for row in found.rows] == [0, 2]
         assert found.complete
 
 
-@pytest.mark.parametrize("picture_format", PictureFormat)
-def test_a_recording_without_a_picture_is_complete_and_empty(recorders, picture_format):
-    recorder = recorders("run", picture_format)
+@pytest.mark.parametrize("image_format", ImageFormat)
+def test_a_recording_without_a_image_is_complete_and_empty(recorders, image_format):
+    recorder = recorders("run", image_format)
     end(recorder)
-    with open_picture_recording(recorder.path) as found:
+    with open_image_recording(recorder.path) as found:
         assert found.complete
         assert len(found) == 0
         assert list(found) == []
@@ -309,11 +309,11 @@ def test_a_running_recording_can_be_read(recorders, told):
     recorder = recorders()
     data = noise(width=400, height=300)
     for number in range(60):
-        recorder.put(picture(number, data))
+        recorder.put(image(number, data))
     wait_until(lambda: recorder.stats.written == 60)
     seen = len(told.stats)
     wait_until(lambda: len(told.stats) > seen)
-    with open_picture_recording(recorder.path) as found:
+    with open_image_recording(recorder.path) as found:
         assert not found.complete
         assert len(found) >= 55
         assert found.time_s.size == len(found)
@@ -323,9 +323,9 @@ def test_a_running_recording_can_be_read(recorders, told):
 
 def test_a_recorder_that_was_asked_to_end_takes_no_more(recorders):
     recorder = recorders(start=False)
-    recorder.put(picture(0))
+    recorder.put(image(0))
     recorder.request_end()
-    assert not recorder.put(picture(1))
+    assert not recorder.put(image(1))
     recorder.start()
     assert recorder.join()
     assert recorder.stats.written == 1

@@ -2,10 +2,10 @@
 
 import pyqtgraph as pg
 
-from cosmic.vico.core.picture import Picture
+from cosmic.vico.core.image import CameraImage
 from cosmic.vico.gui.levels import (
     Levels,
-    colour_picture,
+    colour_image,
     full_scale,
     index_table,
     indices,
@@ -16,8 +16,8 @@ from cosmic.vico.hw.interface import Pixels
 _PLAIN = Levels(0.0, 255.0)
 
 
-class PictureItem:
-    """Drives pyqtgraph's item; grey pictures go there as bytes with a palette.
+class CameraImageItem:
+    """Drives pyqtgraph's item; grey images go there as bytes with a palette.
 
     Attributes
     ----------
@@ -48,16 +48,16 @@ class PictureItem:
         self._look_changed()
 
     def set_greyed(self, greyed: bool) -> None:
-        """Show that the picture is old."""
+        """Show that the image is old."""
         if greyed != self._greyed:
             self._greyed = greyed
             self._look_changed()
 
-    def show(self, picture: Picture) -> bool:
-        """Show a picture; True when it has another shape than the one before."""
-        before, self._data = self._data, picture.data
-        reshaped = before is None or before.shape != picture.data.shape
-        full = full_scale(picture.frame.pixel_format)
+    def show(self, image: CameraImage) -> bool:
+        """Show an image; True when it has another shape than the one before."""
+        before, self._data = self._data, image.data
+        reshaped = before is None or before.shape != image.data.shape
+        full = full_scale(image.frame.pixel_format)
         if full != self.full:
             share = full / self.full
             self.full, self._index = full, index_table(full)
@@ -66,7 +66,7 @@ class PictureItem:
         elif reshaped:
             self._look_changed()
         else:
-            self._put(picture.data)
+            self._put(image.data)
         return reshaped
 
     def _look_changed(self) -> None:
@@ -83,5 +83,5 @@ class PictureItem:
         elif self.levels == _PLAIN and not self._marks and not self._greyed:
             shown = data
         else:
-            shown = colour_picture(data, self.levels, marks=self._marks, greyed=self._greyed)
+            shown = colour_image(data, self.levels, marks=self._marks, greyed=self._greyed)
         self.item.setImage(shown, autoLevels=False)

@@ -1,11 +1,11 @@
-"""Recordings of pictures: how fast, at what cost of the processor, and whether all comes back.
+"""Recordings of images: how fast, at what cost of the processor, and whether all comes back.
 
-Pictures of 1600 x 1200 px with an uneven ground and noise of sigma 2.5 go through the whole
+Images of 1600 x 1200 px with an uneven ground and noise of sigma 2.5 go through the whole
 recorder as fast as it takes them; the side file is written as well. The time includes closing the
 file; the processor's is that of the whole process, the loop that hands over and listens included.
 Reading the file again, which compares every pixel, is not counted. Raw is one unbuffered write a
-picture into the same directory, and the bare codec is PyAV's own loop without a thread or a side
-file, both in turn with the recording. At the end pictures come three times
+image into the same directory, and the bare codec is PyAV's own loop without a thread or a side
+file, both in turn with the recording. At the end images come three times
 as fast as FFV1 can take them, with a queue of 64 MB.
 """
 
@@ -22,24 +22,24 @@ import numpy as np
 
 from benchmarks.figures import Figure, main
 from cosmic.frame.failure import FailurePolicy
-from cosmic.vico.core.picture import Circumstances, Picture
-from cosmic.vico.core.recording.formats import FORMATS, PictureFormat, Traits
-from cosmic.vico.core.recording.picture_recorder import PictureRecorder
-from cosmic.vico.core.recording.reading import open_picture_recording
+from cosmic.vico.core.image import CameraImage, Circumstances
+from cosmic.vico.core.recording.formats import FORMATS, ImageFormat, Traits
+from cosmic.vico.core.recording.image_recorder import ImageRecorder
+from cosmic.vico.core.recording.reading import open_image_recording
 from cosmic.vico.hw.interface import CameraSettings, Frame, Roi
 
-NAME = "picture_recorder"
+NAME = "image_recorder"
 WIDTH, HEIGHT, RATE_HZ, SIGMA = 1600, 1200, 60.0, 2.5
 SEEDS = 8
 WAITING = 12
 # Frames a second that issue 5 asks for.
-WANTED = {PictureFormat.FFV1: 50.0, PictureFormat.FAST: 200.0}
+WANTED = {ImageFormat.FFV1: 50.0, ImageFormat.FAST: 200.0}
 SETTINGS = CameraSettings(0.001, 0.0, RATE_HZ, Roi(0, 0, WIDTH, HEIGHT))
 AXES = {f"{stage}.{axis}": "um" for stage in ("left", "right") for axis in "xyz"}
 
 
 def frames() -> list[np.ndarray]:
-    """Return pictures of noise on an uneven ground."""
+    """Return images of noise on an uneven ground."""
     rng = np.random.default_rng(0)
     x, y = np.meshgrid(np.linspace(-1, 1, WIDTH), np.linspace(-1, 1, HEIGHT))
     ground = 150.0 - 30.0 * (x * x + y * y)
@@ -51,11 +51,11 @@ def frames() -> list[np.ndarray]:
     return found
 
 
-def picture(data: np.ndarray, number: int, rate_hz: float = RATE_HZ) -> Picture:
-    """Return one picture."""
+def image(data: np.ndarray, number: int, rate_hz: float = RATE_HZ) -> CameraImage:
+    """Return one image."""
     time_s = number / rate_hz
     around = Circumstances(0.01, 0.0, 1.0, 2.0, 50.0, 0.5, dict.fromkeys(AXES, 1.25))
-    return Picture("bench", Frame(data, number, time_s, time_s - 0.01, number), around)
+    return CameraImage("bench", Frame(data, number, time_s, time_s - 0.01, number), around)
 
 
 def size_of(path: Path) -> int:
@@ -74,7 +74,7 @@ def remove(path: Path) -> None:
 
 
 def raw_s(folder: Path, parts: list[np.ndarray], count: int) -> float:
-    """Return the time of writing the bytes of `count` pictures."""
+    """Return the time of writing the bytes of `count` images."""
     path = folder / "raw"
     os.sync()
     began = time.perf_counter()
@@ -107,49 +107,49 @@ def bare_s(folder: Path, parts: list[np.ndarray], count: int, found: Traits) -> 
 
 
 def recorded(
-    folder: Path, parts: list[np.ndarray], count: int, picture_format: PictureFormat
+    folder: Path, parts: list[np.ndarray], count: int, image_format: ImageFormat
 ) -> tuple[float, float, float, bool]:
     """Return seconds, seconds of the processor, share of the raw size, and whether it is exact."""
     os.sync()
     began, cpu = time.perf_counter(), time.process_time()
-    settings = replace(SETTINGS, rate_hz=WANTED.get(picture_format, RATE_HZ))
-    recorder = PictureRecorder(folder / "run", picture_format, settings, FailurePolicy(), axes=AXES)
+    settings = replace(SETTINGS, rate_hz=WANTED.get(image_format, RATE_HZ))
+    recorder = ImageRecorder(folder / "run", image_format, settings, FailurePolicy(), axes=AXES)
     recorder.start()
     for number in range(count):
         while recorder.stats.waiting > WAITING:
             time.sleep(0.002)
-        recorder.put(picture(parts[number % SEEDS], number))
+        recorder.put(image(parts[number % SEEDS], number))
     recorder.request_end()
     recorder.join(120.0)
     spent, cpu = time.perf_counter() - began, time.process_time() - cpu
     if recorder.error is not None or recorder.stats.written != count:
-        raise RuntimeError(f"pictures were lost: {recorder.error or recorder.stats}")
+        raise RuntimeError(f"images were lost: {recorder.error or recorder.stats}")
     share = size_of(recorder.path) / (count * parts[0].nbytes)
-    with open_picture_recording(recorder.path) as found:
+    with open_image_recording(recorder.path) as found:
         same = [np.array_equal(each.data, parts[each.index % SEEDS]) for each in found]
     remove(recorder.path)
     return spent, cpu, share, len(same) == count and all(same)
 
 
 def throughput(
-    folder: Path, parts: list[np.ndarray], picture_format: PictureFormat, count: int, runs: int
+    folder: Path, parts: list[np.ndarray], image_format: ImageFormat, count: int, runs: int
 ) -> list[Figure]:
     """Compare one format with raw writing, taking turns."""
     raw, bare, found = [], [], []
-    traits = FORMATS[picture_format]
+    traits = FORMATS[image_format]
     for _ in range(runs):
-        if picture_format in WANTED:
+        if image_format in WANTED:
             bare.append(bare_s(folder, parts, count, traits) / count)
         raw.append(raw_s(folder, parts, count) / count)
-        found.append(recorded(folder, parts, count, picture_format))
+        found.append(recorded(folder, parts, count, image_format))
     spent = [each[0] / count for each in found]
-    wanted = WANTED.get(picture_format)
-    title = picture_format.value
+    wanted = WANTED.get(image_format)
+    title = image_format.value
     figures = [
-        Figure(NAME, f"{title}: pictures a second", 1.0 / statistics.median(spent), "1/s"),
+        Figure(NAME, f"{title}: images a second", 1.0 / statistics.median(spent), "1/s"),
         Figure(
             NAME,
-            f"{title}: a picture",
+            f"{title}: an image",
             1e3 * statistics.median(spent),
             "ms",
             1e3 / wanted if wanted else None,
@@ -158,7 +158,7 @@ def throughput(
         ),
         Figure(
             NAME,
-            f"{title}: processor, a picture",
+            f"{title}: processor, an image",
             1e3 * statistics.median(each[1] / count for each in found),
             "ms",
         ),
@@ -181,41 +181,41 @@ def throughput(
 
 def overload(folder: Path, parts: list[np.ndarray], seconds: float) -> list[Figure]:
     """Hand over more than can be written."""
-    recorder = PictureRecorder(
+    recorder = ImageRecorder(
         folder / "run",
-        PictureFormat.FFV1,
+        ImageFormat.FFV1,
         SETTINGS,
         FailurePolicy(),
         axes=AXES,
         queue_bytes=64 * 1024 * 1024,
     )
     recorder.start()
-    rate_hz, began, longest = 3.0 * WANTED[PictureFormat.FFV1], time.perf_counter(), 0.0
+    rate_hz, began, longest = 3.0 * WANTED[ImageFormat.FFV1], time.perf_counter(), 0.0
     count = round(seconds * rate_hz)
     for number in range(count):
         time.sleep(max(0.0, began + number / rate_hz - time.perf_counter()))
         asked = time.thread_time()
-        recorder.put(picture(parts[number % SEEDS], number, rate_hz))
+        recorder.put(image(parts[number % SEEDS], number, rate_hz))
         longest = max(longest, time.thread_time() - asked)
     recorder.request_end()
     recorder.join(120.0)
     stats = recorder.stats
-    with open_picture_recording(recorder.path) as found:
+    with open_image_recording(recorder.path) as found:
         told = sum(row.status == "dropped" for row in found.rows)
         wrong = sum(
             not np.array_equal(p.data, parts[p.row.frame_id % SEEDS]) for p in found if p.row
         )
     remove(recorder.path)
     return [
-        Figure(NAME, "overload: pictures dropped", 100.0 * stats.dropped / count, "%"),
+        Figure(NAME, "overload: images dropped", 100.0 * stats.dropped / count, "%"),
         Figure(
             NAME,
-            "overload: pictures neither written nor told as dropped",
+            "overload: images neither written nor told as dropped",
             abs(count - stats.written - stats.dropped) + abs(stats.dropped - told),
             "",
             0.0,
         ),
-        Figure(NAME, "overload: pictures with a wrong row", wrong, "", 0.0),
+        Figure(NAME, "overload: images with a wrong row", wrong, "", 0.0),
         Figure(NAME, "overload: longest put, processor", 1e3 * longest, "ms"),
     ]
 
@@ -225,19 +225,19 @@ def measure(quick: bool) -> list[Figure]:
     home = os.environ.get("COSMIC_BENCHMARK_DIRECTORY")
     parts = frames()
     counts = {
-        PictureFormat.FFV1: 300,
-        PictureFormat.FAST: 600,
-        PictureFormat.SMALL: 300,
-        PictureFormat.TIFF: 200,
-        PictureFormat.PNG: 40,
+        ImageFormat.FFV1: 300,
+        ImageFormat.FAST: 600,
+        ImageFormat.SMALL: 300,
+        ImageFormat.TIFF: 200,
+        ImageFormat.PNG: 40,
     }
     with tempfile.TemporaryDirectory(dir=home) as name:
         folder = Path(name)
         found = [
             figure
-            for picture_format, count in counts.items()
+            for image_format, count in counts.items()
             for figure in throughput(
-                folder, parts, picture_format, 10 if quick else count, 1 if quick else 3
+                folder, parts, image_format, 10 if quick else count, 1 if quick else 3
             )
         ]
         return found + overload(folder, parts, 0.5 if quick else 4.0)
