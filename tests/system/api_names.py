@@ -57,6 +57,7 @@ from cosmic.frame.network.errors import (
 )
 from cosmic.frame.operation import Operation, Progress, Task
 from cosmic.frame.plan_shape import PlanStatus
+from cosmic.frame.renamed import Renamed
 from cosmic.mico.api.axis import Axis, Jogging
 from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.axis_shape import AxisMovable
@@ -252,6 +253,7 @@ def names(title: str) -> dict[str, str]:
     if issubclass(cls, BaseModel):
         return {name: f"`{name}`" for name in cls.model_fields}
     found = {name: getattr(cls, name) for name in dir(cls) if not name.startswith("_")}
+    found = {name: each for name, each in found.items() if not isinstance(each, Renamed)}
     if cls is not Declared:  # what all that is declared have is listed once
         found = {
             name: each for name, each in found.items() if getattr(Declared, name, 0) is not each

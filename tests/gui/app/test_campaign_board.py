@@ -14,7 +14,7 @@ from pytestqt.qtbot import QtBot
 from cosmic.app.panels.campaign.board import CampaignBoard
 from cosmic.app.panels.campaign.fibre_card import FibreCard, round_below
 from cosmic.app.panels.campaign.table import CAUSE, EI, INTERVAL, NUMBER, OUTCOME, TIME
-from cosmic.autonomy.campaign.records import CameraImage, FibreRecord, Outcome, Shape
+from cosmic.autonomy.campaign.records import FibreImage, FibreRecord, Outcome, Shape
 from cosmic.autonomy.campaign.snapshot import CampaignSnapshot, FibreRow, card_of, snapshot_of
 from cosmic.autonomy.campaign.statistics import progress
 from cosmic.frame.gui.palette import LIGHT
@@ -235,7 +235,7 @@ def test_a_narrow_card_has_its_curves_below_the_image(card: FibreCard, qtbot: Qt
 
 
 def test_a_image_of_16_bit_is_shown(card: FibreCard) -> None:
-    deep = CameraImage("deep", np.full((80, 100), 0x8012, dtype=np.uint16), 0.0)
+    deep = FibreImage("deep", np.full((80, 100), 0x8012, dtype=np.uint16), 0.0)
     card.set_card(card_of(replace(good(1), images=(deep,))))
     assert (card.image.shown.width(), card.image.shown.height()) == (100, 80)
     middle = card.image.grab().toImage().pixelColor(card.image.rect().center())

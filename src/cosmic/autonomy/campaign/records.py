@@ -12,11 +12,11 @@ import numpy.typing as npt
 from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.span import Span
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.renamed import Renamed
 
 Floats = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 Value = str | int | float | bool | None
-
 
 TWIN: Final = "digital twin"
 """What a campaign without hardware was made on."""
@@ -169,6 +169,7 @@ class FibreRecord:
     bending: BendingResult | None = None
     spans: tuple[Span, ...] = ()
     images: tuple[FibreImage, ...] = ()
+    pictures = Renamed("images")
     operations: tuple[OperationRecord, ...] = ()
     series: tuple[Series, ...] = ()
 

@@ -32,6 +32,7 @@ from cosmic.autonomy.campaign.storage_format import (
     region_px,
 )
 from cosmic.frame.arguments import checked_class
+from cosmic.frame.renamed import Renamed
 
 
 @checked_class
@@ -150,6 +151,8 @@ class CampaignReader:
         return replace(
             record, bending=bending, spans=measured, series=series, images=self.images(fibre)
         )
+
+    pictures = Renamed("images")
 
     def images(self, fibre: int) -> tuple[FibreImage, ...]:
         """Return the images of one fibre."""

@@ -16,6 +16,7 @@ from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.network.caller import called_from_elsewhere
 from cosmic.frame.network.transport import Rule
 from cosmic.frame.operation import Task
+from cosmic.frame.renamed import Renamed
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.camera_images import (
     CameraImages,
@@ -52,6 +53,13 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
 
     It has the shape of a bluesky detector without importing bluesky.
     """
+
+    plan_pictures = Renamed("plan_images")
+    next_picture = Renamed("next_image")
+    picture_since = Renamed("image_since")
+    on_picture = Renamed("on_image")
+    await_picture = Renamed("await_image")
+    pictures = Renamed("images")
 
     def __init__(self, application: VicoApplication, name: str) -> None:
         self._application = application

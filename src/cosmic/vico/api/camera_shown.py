@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 from cosmic.frame.errors import CosmicError
+from cosmic.frame.renamed import Renamed
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.recording.formats import FORMATS, ImageFormat, recording_suffix
 from cosmic.vico.core.recording.video_writer import check_codec
@@ -61,6 +62,7 @@ class Seen:
     image: CameraImage
     fibres: tuple["Fibre", ...]
     tips: tuple[TipSeen, ...]
+    picture = Renamed("image")
 
     @classmethod
     def of(cls, newest: Analysis) -> Self:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from cosmic.frame.errors import NotAvailable
+from cosmic.frame.renamed import Renamed
 from cosmic.vico.api.places import Places
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.vision.algorithms import grey
@@ -32,6 +33,7 @@ class PlacedFibre(Fibre):
     centre_line_um: Floats | None
     ends_um: Floats | None
     grasp_points_um: Floats | None
+    picture = Renamed("image")
 
     @property
     def length_um(self) -> float | None:

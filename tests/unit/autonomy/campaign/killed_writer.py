@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cosmic.autonomy.campaign.records import CameraImage, FibreRecord, Outcome, Pose, Series
+from cosmic.autonomy.campaign.records import FibreImage, FibreRecord, Outcome, Pose, Series
 from cosmic.autonomy.campaign.resume import resume
 from cosmic.autonomy.campaign.store import CampaignStore
 
@@ -35,7 +35,7 @@ def write(folder: Path) -> None:
                 float(serial),
                 serial + 0.5,
                 peak_force_un=float(serial),
-                images=(CameraImage("fibre", pixels, 0.0),),
+                images=(FibreImage("fibre", pixels, 0.0),),
                 series=(Series("force", "uN", values, values),),
             )
         )

@@ -10,8 +10,8 @@ from cosmic.autonomy.bending.plan import plan_spans
 from cosmic.autonomy.bending.result import BendingResult
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.campaign.records import (
-    CameraImage,
     CampaignInfo,
+    FibreImage,
     FibreRecord,
     OperationRecord,
     Outcome,
@@ -51,7 +51,7 @@ def measured(ei_n_m2: float = 5e-11, seed: int = 0) -> tuple[tuple[Span, ...], B
     return spans, fit_bending(spans)
 
 
-def image(seed: int = 0, size: tuple[int, int] = (240, 320)) -> CameraImage:
+def image(seed: int = 0, size: tuple[int, int] = (240, 320)) -> FibreImage:
     """Return an image of a bow, dark on light."""
     rng = np.random.default_rng(seed)
     y, x = np.mgrid[: size[0], : size[1]].astype(float)
@@ -60,7 +60,7 @@ def image(seed: int = 0, size: tuple[int, int] = (240, 320)) -> CameraImage:
     grey = np.where(inside, 70.0, 165.0) + 3.0 * rng.standard_normal(size)
     pixels = grey.astype(np.uint8)
     region = (40, int(bow.min()) - 5, size[1] - 80, int(np.ptp(bow)) + 10)
-    return CameraImage("before grasp", pixels, 12.0, 7.6, 0.58, 0.0, 50.0, region)
+    return FibreImage("before grasp", pixels, 12.0, 7.6, 0.58, 0.0, 50.0, region)
 
 
 def good(

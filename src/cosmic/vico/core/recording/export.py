@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from cosmic.frame.errors import ExportCancelled, RecordingError, RecordingExistsError
+from cosmic.frame.renamed import renamed_in
 from cosmic.vico.core.recording.formats import (
     ImageFormat,
     check_pixels,
@@ -27,6 +28,9 @@ from cosmic.vico.core.recording.side_row import UNKNOWN, SideRow
 
 PART: Final = "being exported"
 Progress = Callable[[float], object]
+
+
+__getattr__ = renamed_in(__name__, {"export_pictures": "export_images"})
 
 
 def export_images(

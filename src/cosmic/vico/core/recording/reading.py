@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.frame.errors import RecordingError
+from cosmic.frame.renamed import renamed_in
 from cosmic.vico.core.recording.formats import SIDE_SUFFIX, ImageFormat, recording_suffix
 from cosmic.vico.core.recording.formats import side_path_of as _side_path_of
 from cosmic.vico.core.recording.side_file import SideTable, read_side_file
@@ -39,6 +40,9 @@ class RecordedImage:
     data: Pixels
     index: int
     row: SideRow | None
+
+
+__getattr__ = renamed_in(__name__, {"open_picture_recording": "open_image_recording"})
 
 
 def open_image_recording(path: "str | os.PathLike[str]") -> "ImageRecording":

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from cosmic.frame.errors import RecordingError, RecordingExistsError
 from cosmic.frame.file_names import check_base_name, check_directory
+from cosmic.frame.renamed import renamed_in
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.recording.formats import kind_of, words
 from cosmic.vico.core.recording.side_row import row_of
@@ -13,6 +14,9 @@ from cosmic.vico.core.recording.tiff_png import details, encoded_png, encoded_ti
 from cosmic.vico.hw.interface import FrameStatus
 
 _ENCODED = {".tif": encoded_tiff, ".tiff": encoded_tiff, ".png": encoded_png}
+
+
+__getattr__ = renamed_in(__name__, {"save_picture": "save_image"})
 
 
 def save_image(
