@@ -297,7 +297,7 @@ def is_live(camera: CameraHandle) -> bool:
     return camera.images.live
 
 
-def test_a_image_that_the_line_dropped_is_asked_for(
+def test_an_image_that_the_line_dropped_is_asked_for(
     away: VicoRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     camera = away.vico.camera()
@@ -573,7 +573,7 @@ def test_pixels_are_places_on_the_platform(rig: VicoRig) -> None:
     assert rig.vico.rotation_centre() is None
 
 
-def test_a_click_into_a_image_that_has_changed_moves_nothing(away: VicoRig) -> None:
+def test_a_click_into_an_image_that_has_changed_moves_nothing(away: VicoRig) -> None:
     take_lease(away)
     camera, places = away.vico.camera(), away.home.places
     away.home.camera.push(noise(1))

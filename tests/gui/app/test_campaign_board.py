@@ -234,7 +234,7 @@ def test_a_narrow_card_has_its_curves_below_the_image(card: FibreCard, qtbot: Qt
     qtbot.waitUntil(lambda: card.curves.x() < 50)
 
 
-def test_a_image_of_16_bit_is_shown(card: FibreCard) -> None:
+def test_an_image_of_16_bit_is_shown(card: FibreCard) -> None:
     deep = FibreImage("deep", np.full((80, 100), 0x8012, dtype=np.uint16), 0.0)
     card.set_card(card_of(replace(good(1), images=(deep,))))
     assert (card.image.shown.width(), card.image.shown.height()) == (100, 80)

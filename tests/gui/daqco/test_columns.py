@@ -139,7 +139,7 @@ def test_a_slow_signal_is_a_line_without_steps_or_holes(qapp):
     assert lows == pytest.approx(np.arange(100) * 0.1, abs=1e-5)
 
 
-def test_a_image_made_anew_looks_as_the_live_one_did(qapp):
+def test_an_image_made_anew_looks_as_the_live_one_did(qapp):
     rng = np.random.default_rng(4)
     values = rng.normal(0.0, 3.0, (2, 32_000))
     live, image, history = LiveColumns(64.0), raster(2), History(2, RATE_HZ)

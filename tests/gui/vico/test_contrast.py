@@ -97,7 +97,7 @@ def test_the_share_of_lost_pixels_is_told(qtbot, panel, view, camera):
     assert panel.share.text().startswith("over-exposed 25.00 %, black 12.")
 
 
-def test_a_image_of_one_grey_is_not_stretched_to_noise():
+def test_an_image_of_one_grey_is_not_stretched_to_noise():
     levels = histogram(np.full((600, 800), 100, np.uint8), 255).levels()
     assert levels.low < 100 < levels.high
     assert levels.high - levels.low >= 4

@@ -208,7 +208,7 @@ def test_a_lost_camera_leaves_its_last_image_greyed_and_says_since_when(qtbot, s
     assert colour_at(shown, (1400, 300)) == bright
 
 
-def test_a_image_that_is_not_live_is_greyed_with_its_age(qtbot, shown, camera):
+def test_an_image_that_is_not_live_is_greyed_with_its_age(qtbot, shown, camera):
     bright = colour_at(shown, (1400, 300))
     camera.change(running=False)
     qtbot.waitUntil(lambda: "not live: image of 12:16:40, " in shown.note.text)
@@ -319,7 +319,7 @@ def test_fibres_found_are_drawn_with_their_measures_and_doubts(qtbot, shown, cam
     assert QColor(*colour_at(shown, line)).saturation() == 0
 
 
-def test_findings_in_a_image_of_another_size_are_not_drawn(qtbot, shown, camera):
+def test_findings_in_an_image_of_another_size_are_not_drawn(qtbot, shown, camera):
     camera.analysis = Found(camera.push(), (Seen(),))
     small = camera.push(np.full((600, 800), 100, np.uint8))
     qtbot.waitUntil(lambda: shown.view.image is small)

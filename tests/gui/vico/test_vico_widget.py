@@ -74,7 +74,7 @@ def test_the_drawer_takes_its_room_from_the_image_and_gives_it_back(qtbot, shown
     assert shown.view.width() == width
 
 
-def test_the_theme_can_change_under_a_image(qtbot, qapp, shown, camera):
+def test_the_theme_can_change_under_an_image(qtbot, qapp, shown, camera):
     image = camera.push(fibre_image(800, 600))
     camera.analysis = Found(image, (Seen(),))
     qtbot.waitUntil(lambda: shown.view.image is image)

@@ -338,7 +338,7 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize("command", [pytest.param([], marks=pytest.mark.slow), ["mico"]])
-def test_a_image_of_the_window_is_saved_without_a_display(
+def test_an_image_of_the_window_is_saved_without_a_display(
     tmp_path: Path, command: list[str]
 ) -> None:
     image = tmp_path / "window.png"
@@ -351,7 +351,7 @@ def test_a_image_of_the_window_is_saved_without_a_display(
     assert size == (1366, 768)
 
 
-def test_a_image_that_cannot_be_saved_is_an_error(tmp_path: Path) -> None:
+def test_an_image_that_cannot_be_saved_is_an_error(tmp_path: Path) -> None:
     done = run("mico", "--offscreen", "0.2", "--screenshot", str(tmp_path / "no" / "window.png"))
     assert done.returncode == 1
     assert "cannot be saved" in done.stderr

@@ -52,7 +52,7 @@ def test_a_colour_that_is_over_exposed_is_marked() -> None:
 
 
 @pytest.mark.parametrize("value", [0, 117, 255])
-def test_a_image_of_one_grey_can_still_be_shown(value: int) -> None:
+def test_an_image_of_one_grey_can_still_be_shown(value: int) -> None:
     low, high = measure_levels(np.full((30, 30), value, np.uint8), PixelFormat.MONO8).stretch()
     assert high >= low + 1.0 - 1e-9
     assert low <= value + 1.0
@@ -162,7 +162,7 @@ def test_incomplete_frames_are_not_taken() -> None:
     assert background.missing == 1
 
 
-def test_a_image_changed_meanwhile_begins_the_collection_anew() -> None:
+def test_an_image_changed_meanwhile_begins_the_collection_anew() -> None:
     background = Background()
     background.collect(3)
     background.add(frame())

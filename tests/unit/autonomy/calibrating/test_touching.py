@@ -166,7 +166,7 @@ def test_steps_that_are_too_long_to_be_safe_are_noticed_before_anything_is_touch
     assert bench.peak_un == 0.0
 
 
-def test_without_a_image_of_both_nothing_is_touched() -> None:
+def test_without_an_image_of_both_nothing_is_touched() -> None:
     bench = Bench()
     del bench.calibration.made[PROBE]
     with pytest.raises(OperationFailed, match="see probe and gripper"):

@@ -119,7 +119,7 @@ def test_images_without_any_light_are_not_taken_for_a_frozen_camera(
     assert camera.told == []
 
 
-def test_a_image_that_is_no_longer_wanted_leaves_the_camera_running(
+def test_an_image_that_is_no_longer_wanted_leaves_the_camera_running(
     camera: FakeCamera, clock: ManualClock
 ):
     last = LastSeen()

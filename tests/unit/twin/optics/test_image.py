@@ -110,7 +110,7 @@ def test_a_fibre_that_is_let_go_is_seen_on_the_plate() -> None:
     assert np.ptp(bench.image()[y - 8 : y + 9, x]) > 20.0
 
 
-def test_a_image_shows_its_own_time_though_the_force_side_was_asked_later() -> None:
+def test_an_image_shows_its_own_time_though_the_force_side_was_asked_later() -> None:
     ends = []
     for ahead_s in (0.0, 0.08):
         bench = ImageBench().go(left_z=LEFT_LOWERED, left_x=3000.0, probe_x=-500.0)
@@ -258,7 +258,7 @@ def test_noise_grows_with_the_gain() -> None:
 # --- what the camera may ask for --------------------------------------------------------------
 
 
-def test_a_image_is_fresh_and_may_be_written_to() -> None:
+def test_an_image_is_fresh_and_may_be_written_to() -> None:
     bench = ImageBench()
     first = bench.optics.render(1.0)
     kept = first.copy()

@@ -142,7 +142,7 @@ def test_what_is_no_film_is_named_with_the_reason(tmp_path: Path) -> None:
             opened(VideoSource(str(tmp_path / name)))
 
 
-def test_a_image_of_another_size_ends_the_reception(tmp_path: Path) -> None:
+def test_an_image_of_another_size_ends_the_reception(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "a.png"), pattern(0))
     cv2.imwrite(str(tmp_path / "b.png"), pattern(0)[:50])
     camera = opened(VideoSource(str(tmp_path), paced=False))

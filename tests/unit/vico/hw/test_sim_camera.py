@@ -328,7 +328,7 @@ def test_nan_is_no_exposure(stand: Stand) -> None:
     assert camera.settings == before
 
 
-def test_a_image_that_nobody_looks_at_is_not_drawn(
+def test_an_image_that_nobody_looks_at_is_not_drawn(
     stand: Stand, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     camera = stand.open()

@@ -144,7 +144,7 @@ def test_a_full_queue_drops_images_and_tells_which(recorders, told, monkeypatch,
         assert len(status) == 11
 
 
-def test_a_image_larger_than_the_queue_is_written_when_nothing_waits(recorders):
+def test_an_image_larger_than_the_queue_is_written_when_nothing_waits(recorders):
     recorder = recorders(queue_bytes=10)
     for number in range(3):
         assert recorder.put(image(number))
@@ -296,7 +296,7 @@ def test_images_pass_while_it_is_paused(recorders):
 
 
 @pytest.mark.parametrize("image_format", ImageFormat)
-def test_a_recording_without_a_image_is_complete_and_empty(recorders, image_format):
+def test_a_recording_without_an_image_is_complete_and_empty(recorders, image_format):
     recorder = recorders("run", image_format)
     end(recorder)
     with open_image_recording(recorder.path) as found:

@@ -102,7 +102,7 @@ def test_times_that_stand_still_or_jump_lose_no_image(tmp_path, image_format):
             np.testing.assert_array_equal(found[index].data, shots[index].data)
 
 
-def test_what_stands_beside_a_image_comes_back_exactly(tmp_path):
+def test_what_stands_beside_an_image_comes_back_exactly(tmp_path):
     shots = [image(0, device_ns=None), image(1, lost_before=3), image(2, scale_um_px=None)]
     file = record(tmp_path / "run", ImageFormat.FFV1, shots)
     with open_image_recording(tmp_path / "run.csv") as found:

@@ -12,7 +12,7 @@ def chosen(lapse, times_s):
     return [time_s for time_s in times_s if lapse.take(time_s)]
 
 
-def test_a_image_is_taken_at_each_interval_so_many_times():
+def test_an_image_is_taken_at_each_interval_so_many_times():
     lapse = TimeLapse(TimeLapsePlan(interval_s=2.0, count=3), start_s=10.0)
     assert chosen(lapse, [9.0 + 0.5 * step for step in range(20)]) == [10.0, 12.0, 14.0]
     assert (lapse.taken, lapse.late, lapse.missed) == (3, 0, 0)
@@ -39,7 +39,7 @@ def test_a_late_image_is_counted_and_delays_no_other():
     assert lapse.late == 1
 
 
-def test_times_that_pass_without_a_image_are_counted_as_missed():
+def test_times_that_pass_without_an_image_are_counted_as_missed():
     lapse = TimeLapse(TimeLapsePlan(interval_s=1.0, count=6), start_s=0.0)
     assert chosen(lapse, [0.0, 3.05, 3.5, 4.0]) == [0.0, 3.05, 4.0]
     assert (lapse.taken, lapse.late, lapse.missed) == (3, 0, 2)
@@ -48,7 +48,7 @@ def test_times_that_pass_without_a_image_are_counted_as_missed():
     assert lapse.done
 
 
-def test_a_image_of_no_known_time_is_not_taken():
+def test_an_image_of_no_known_time_is_not_taken():
     assert not TimeLapse(TimeLapsePlan(interval_s=1.0), start_s=0.0).take(math.nan)
 
 

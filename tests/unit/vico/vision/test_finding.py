@@ -114,7 +114,7 @@ def test_an_end_that_lies_on_another_fibre_is_doubted() -> None:
     assert not shorter.certain
 
 
-def test_a_image_out_of_focus_is_doubted() -> None:
+def test_an_image_out_of_focus_is_doubted() -> None:
     fibre = only(drawn_image([BOW], [12.0], blur_px=7.0))
     assert not fibre.certain
     assert any("focus" in doubt for doubt in fibre.doubts)
@@ -166,7 +166,7 @@ def test_a_network_holds_no_fibre_that_is_certain() -> None:
     ],
     ids=["black", "saturated", "constant", "noise", "ramp", "tiny"],
 )
-def test_a_image_of_nothing_holds_no_fibre(image: np.ndarray) -> None:
+def test_an_image_of_nothing_holds_no_fibre(image: np.ndarray) -> None:
     assert find_fibres(image) == []
 
 
@@ -257,7 +257,7 @@ def test_points_of_which_too_few_count_determine_no_curve() -> None:
     np.testing.assert_allclose(smooth(line, np.ones(120), 60.0), line, atol=1e-3)
 
 
-def test_what_nobody_foresaw_of_a_image_is_told_and_no_error_of_numpy(
+def test_what_nobody_foresaw_of_an_image_is_told_and_no_error_of_numpy(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def broken(*_: object) -> None:
