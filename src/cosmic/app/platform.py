@@ -1,5 +1,6 @@
 """A platform as its files describe it: configuration in, running applications out."""
 
+import logging
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -24,11 +25,14 @@ from cosmic.frame.clock import Clock, RatedClock
 from cosmic.frame.errors import ArgumentError, ConfigError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.application import RemoteApplication
+from cosmic.frame.platform_services import tick_finely
 from cosmic.frame.threads import share_interpreter
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.twin.scene import Scene
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.vico import Vico
+
+logger = logging.getLogger(__name__)
 
 LARGEST_SEED: Final = 2**63 - 1
 """How long a station may take to say what it has."""
@@ -184,6 +188,8 @@ def build_platform(
         A station does not answer.
     """
     share_interpreter()
+    if not tick_finely():
+        logger.warning("Windows keeps its tick of 15.6 ms: waits end that late")
     file, path = load_platform(config)
     _check_simulation(file, path, rate=rate, only_simulated=cold or bool(sample or truth))
     if not 0 <= seed <= LARGEST_SEED:

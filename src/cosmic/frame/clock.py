@@ -4,6 +4,7 @@ Physics, procedures, time stamps and motion time-outs use the platform's clock, 
 faster than the wall. Dead-man, lease, stale-data and thread limits use `WALL`.
 """
 
+import sys
 import threading
 import time
 from abc import abstractmethod
@@ -14,6 +15,12 @@ from typing import Final, Protocol
 from typing_extensions import override
 
 from cosmic.frame.pace import Horizon, Pace, PacedHorizon, PacedWorker, Worker
+
+
+def wall_now_s() -> float:
+    """Return the seconds since some moment; never goes back."""
+    # On Windows Python's monotonic time moves in steps of 15.6 ms before 3.13.
+    return time.perf_counter() if sys.platform == "win32" else time.monotonic()
 
 
 class Clock(Protocol):
@@ -41,7 +48,7 @@ class Clock(Protocol):
 
     def wall_s(self) -> float:
         """Return the time of the wall, for what is done so often by it; a test moves both."""
-        return time.monotonic()
+        return wall_now_s()
 
     @property
     def rate_reached(self) -> float:
@@ -97,11 +104,11 @@ class RatedClock(Clock):
         if not 0.0 < rate < 1e6:
             raise ValueError(f"a clock's rate must lie between 0 and 1e6, got {rate!r}")
         self._rate = rate
-        self._start_s = time.monotonic()
+        self._start_s = wall_now_s()
         self._waits = waits
         # Nobody can be hurried by a clock that is no faster than the wall.
         self._hurries = rate > 1.0
-        self._pace = Pace(rate, time.monotonic) if waits or self._hurries else None
+        self._pace = Pace(rate, wall_now_s) if waits or self._hurries else None
 
     @property
     @override
@@ -112,7 +119,7 @@ class RatedClock(Clock):
     def now_s(self) -> float:
         if self._pace is not None:
             return self._pace.now_s()
-        return (time.monotonic() - self._start_s) * self._rate
+        return (wall_now_s() - self._start_s) * self._rate
 
     @override
     def wait(self, condition: threading.Condition, until_s: float) -> None:

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Self
+from typing import Self
 
-_START_FIELD: Final = 19
-"""Of /proc/PID/stat, counted after the name of the program, which may hold anything."""
-_PROC: Final = Path("/proc")
+from cosmic.frame.platform_services import lock_file, process_exists, process_start
 
 
 class Life(Enum):
@@ -49,36 +47,20 @@ class ProcessMark:
         """Whether it lives; unknown on another computer, and where the system does not say."""
         if not self.is_here or self.pid <= 0:
             return Life.UNKNOWN
-        if _PROC.is_dir():
+        start = process_start(self.pid)
+        if start is not None:
             if not self.start:
                 return Life.UNKNOWN
-            return Life.LIVES if _start_of(self.pid) == self.start else Life.GONE
-        if os.name != "posix":  # Windows ends a process that is asked so
+            return Life.LIVES if start == self.start else Life.GONE
+        exists = process_exists(self.pid)
+        if exists is None:
             return Life.UNKNOWN
-        try:
-            os.kill(self.pid, 0)
-        except ProcessLookupError:
-            return Life.GONE
-        except OSError:
-            return Life.LIVES
-        return Life.LIVES
+        return Life.LIVES if exists else Life.GONE
 
 
 def own_mark() -> ProcessMark:
     """Return the mark of this process."""
-    return ProcessMark(platform.node(), os.getpid(), _start_of(os.getpid()))
-
-
-def _start_of(pid: int) -> str:
-    """Return when a process began, with the start of the system that it counts from."""
-    try:
-        boot = (_PROC / "sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
-        stat = (_PROC / str(pid) / "stat").read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        return ""
-    state, *fields = stat.rpartition(")")[2].split()
-    ended = state in ("Z", "X")  # it holds nothing any more, whoever has not asked for its end yet
-    return "" if ended else f"{boot}:{fields[_START_FIELD - 1]}"
+    return ProcessMark(platform.node(), os.getpid(), process_start(os.getpid()) or "")
 
 
 class FileHold:
@@ -103,18 +85,7 @@ class FileHold:
 
     def take(self, *, alone: bool) -> bool:
         """Hold it otherwise than before; returns False where somebody else has it."""
-        try:
-            import fcntl
-        except ImportError:
-            return True
-        try:
-            kind = fcntl.LOCK_EX if alone else fcntl.LOCK_SH
-            fcntl.flock(self._file, kind | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
-        except OSError:  # a disk without locks
-            return True
-        return True
+        return lock_file(self._file.fileno(), alone=alone)
 
     def release(self) -> None:
         """Let others have it; harmless the second time."""

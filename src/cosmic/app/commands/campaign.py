@@ -3,10 +3,9 @@
 import argparse
 import logging
 import math
-import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Final, TextIO
 
@@ -18,6 +17,7 @@ from cosmic.autonomy.campaign.recipe import Recipe
 from cosmic.autonomy.campaign.records import TWIN
 from cosmic.frame.clock import WALL
 from cosmic.frame.log import set_up_logging
+from cosmic.frame.platform_services import ending_signals
 
 logger = logging.getLogger(__name__)
 
@@ -54,7 +54,7 @@ def run_campaign(chosen: argparse.Namespace) -> int:
         at_end.callback(_log_to(chosen.out / LOG))  # after this is known to be its own folder
         if rig.simulated:
             sys.stderr.write(f"{recipe.name}: {TWIN}, seed {seed}, {rate:g} times\n")
-        with _ended_by_signals(campaign):
+        with ending_signals(lambda name: campaign.abort(f"ended by {name}")):
             campaign.start()
             Bar(campaign, recipe, sys.stderr).follow()
             campaign.join()
@@ -120,18 +120,3 @@ class Bar:
             parts.append(f"{left_s / 60.0:.0f} min left")
         parts.append(self._campaign.operation or str(self._campaign.phase))
         return ", ".join(parts)
-
-
-@contextmanager
-def _ended_by_signals(campaign: Campaign) -> Iterator[None]:
-    """End the campaign in order when the terminal or the system ends the program."""
-
-    def on_signal(number: int, _frame: object) -> None:
-        campaign.abort(f"ended by {signal.Signals(number).name}")
-
-    before = {each: signal.signal(each, on_signal) for each in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

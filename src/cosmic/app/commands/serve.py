@@ -1,12 +1,9 @@
 """``cosmic serve``: a station without a window."""
 
 import logging
-import signal
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from threading import Event
-from typing import Final
 
 from cosmic.app.configuration.network import Serving, serving
 from cosmic.app.configuration.platform_file import check_applications, load_platform
@@ -16,10 +13,9 @@ from cosmic.app.stations.options import ServeOptions
 from cosmic.frame.errors import ConfigError, NotConnectedError
 from cosmic.frame.hooks import install_hooks
 from cosmic.frame.log import set_up_logging
+from cosmic.frame.platform_services import ending_signals
 
 logger = logging.getLogger(__name__)
-
-_ENDING: Final = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 
 def serve(options: ServeOptions) -> int:
@@ -46,7 +42,8 @@ def serve(options: ServeOptions) -> int:
     )
     with ExitStack() as at_end:
         at_end.callback(set_up_logging(console=True))
-        ended = at_end.enter_context(_ending_signals())
+        ended = Event()
+        at_end.enter_context(ending_signals(lambda name: _end(ended, name)))
         platform = _build(options, how, options.applications or file.platform.applications)
         at_end.callback(platform.shut_down)
         at_end.callback(install_hooks(platform.policy))
@@ -78,19 +75,6 @@ def _build(options: ServeOptions, how: Serving, hosted: tuple[str, ...]) -> Plat
     return platform
 
 
-@contextmanager
-def _ending_signals() -> Iterator[Event]:
-    """Give what is set when the terminal or the system ends the program."""
-    ended = Event()
-
-    def on_signal(number: int, _frame: object) -> None:
-        logger.info("ends: %s", signal.Signals(number).name)
-        ended.set()
-
-    known = [getattr(signal, name) for name in _ENDING if hasattr(signal, name)]
-    before = {each: signal.signal(each, on_signal) for each in known}
-    try:
-        yield ended
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+def _end(ended: Event, name: str) -> None:
+    logger.info("ends: %s", name)
+    ended.set()

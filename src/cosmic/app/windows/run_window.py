@@ -2,7 +2,6 @@
 
 import logging
 import os
-import signal
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -26,6 +25,7 @@ from cosmic.frame.errors import ConfigError
 from cosmic.frame.gui.palette import ThemeName
 from cosmic.frame.hooks import install_hooks
 from cosmic.frame.log import RingBufferHandler, set_up_logging
+from cosmic.frame.platform_services import ending_signals
 from cosmic.frame.threads import declare_gui_thread
 from cosmic.mico.gui.mico_widget import make_mico_gui
 from cosmic.vico.gui.vico_gui import make_vico_gui
@@ -187,20 +187,14 @@ def _host(options: WindowOptions, platform: Platform) -> StationHost | None:
 @contextmanager
 def _closed_by_signals(close: Callable[[], object]) -> Iterator[None]:
     """Close the window in order when the terminal or the system ends the program."""
-
-    def on_signal(_number: int, _frame: object) -> None:
-        close()
-
-    before = {each: signal.signal(each, on_signal) for each in (signal.SIGINT, signal.SIGTERM)}
     wake = QTimer(interval=_SIGNAL_POLL_MS)  # Python sees a signal only when it runs
     wake.timeout.connect(wake.interval)
     wake.start()
     try:
-        yield
+        with ending_signals(lambda _name: close()):
+            yield
     finally:
         wake.stop()
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 class _Photographer(QObject):

@@ -42,6 +42,7 @@ from cosmic.autonomy.campaign.storage_format import (
     update,
 )
 from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.frame.platform_services import sync_folder
 
 LOCK: Final = "campaign.lock"
 PART: Final = ".part"
@@ -83,14 +84,8 @@ def write_through(folder: Path) -> None:
     NotWrittenError
         They cannot be written.
     """
-    if os.name != "posix":
-        return
     try:
-        opened = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(opened)
-        finally:
-            os.close(opened)
+        sync_folder(folder)
     except OSError as exc:
         raise NotWrittenError(f"{folder} cannot be written: {exc.strerror or exc}") from exc
 

@@ -1,7 +1,6 @@
 """A fixed period on the wall clock: absolute deadlines, and how well they are kept."""
 
 import math
-import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.frame.clock import WALL, Clock
+from cosmic.frame.platform_services import run_thread_first
 
 BIN_S: Final = 1e-4
 HALF_BINS: Final = 50
@@ -151,14 +151,8 @@ def ask_real_time(priority: int) -> str:
 
     What the thread starts runs as usual again.
     """
-    if not hasattr(os, "sched_setscheduler"):
-        return "this system gives Python no real-time priority"
-    try:
-        policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
-        os.sched_setscheduler(0, policy, os.sched_param(priority))
-    except OSError as exc:
-        return f"real-time priority was refused ({exc.strerror}); periods may be missed under load"
-    return ""
+    reason = run_thread_first(priority)
+    return reason and f"no real-time priority ({reason}); periods may be missed under load"
 
 
 _switching = Lock()

@@ -4,7 +4,6 @@
 It ends when the pipe closes.
 """
 
-import os
 import pickle
 import signal
 import sys
@@ -15,6 +14,7 @@ import cv2
 
 from cosmic.frame.garbage import freeze_what_is_loaded
 from cosmic.frame.helper_process import READY, End, encode
+from cosmic.frame.platform_services import run_in_background
 from cosmic.twin.optics.drawing import Pixels, make_views
 
 if TYPE_CHECKING:
@@ -65,8 +65,7 @@ def serve(pipe: End) -> None:
 def main(arguments: list[str]) -> int:
     """Say that it is ready, and draw; returns the exit code."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C in a console is meant for the parent
-    if sys.platform != "win32":  # there it is started so
-        os.nice(NICE)
+    run_in_background(NICE)
     cv2.setNumThreads(1)  # the other cores belong to whoever commands the platform
     pipe = End(int(arguments[0]))
     try:

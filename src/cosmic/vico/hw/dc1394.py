@@ -221,7 +221,7 @@ class Dc1394Camera(BaseCamera):
         settings, rate = self._settings, self._clock.rate
         free = settings.trigger is Trigger.FREE_RUN
         self._underrun += taken.ring_full
-        now_s, real_us = self._clock.now_s(), time.clock_gettime_ns(time.CLOCK_REALTIME) // 1000
+        now_s, real_us = self._clock.now_s(), time.time_ns() // 1000
         age_s = min(max(0.0, (real_us - taken.received_us) / 1e6), _OLDEST_S)
         # On the bus a frame takes up to a period.
         begun_s = age_s + settings.exposure_s + 1.0 / settings.rate_hz

@@ -6,7 +6,7 @@ a camera makes of them is one floor up in `dc1394`.
 
 import ctypes
 import logging
-import select
+import selectors
 from ctypes import (
     POINTER,
     byref,
@@ -407,14 +407,14 @@ class Dc1394Ring:
         self._buffers = buffers_for(settings.rate_hz, 0)
         flags = DC1394_CAPTURE_FLAGS_DEFAULT
         handle.call("dc1394_capture_setup", self._buffers, flags)
-        self._poll = select.poll()
+        self._arrivals = selectors.DefaultSelector()
         file = handle.calls.plain("dc1394_capture_get_fileno", handle.pointer)
-        self._poll.register(file, select.POLLIN)
+        self._arrivals.register(file, selectors.EVENT_READ)
 
     def take(self, timeout_s: float) -> Taken | None:
         """Return the next frame, None after a while; raises `DeviceError`."""
         frame = self._dequeued()
-        if frame is None and self._poll.poll(timeout_s * 1000.0):
+        if frame is None and self._arrivals.select(timeout_s):
             frame = self._dequeued()
         if frame is None:
             return None
@@ -425,6 +425,7 @@ class Dc1394Ring:
 
     def close(self) -> None:
         """Give the ring, the channel and the bandwidth back."""
+        self._arrivals.close()
         # The answer says nothing of use: it fails for a camera that is gone.
         self._handle.calls.plain("dc1394_capture_stop", self._handle.pointer)
 

@@ -15,6 +15,7 @@ from typing import Any, Final
 
 from cosmic.frame.garbage import freeze_what_is_loaded
 from cosmic.frame.helper_process import READY, End, encode
+from cosmic.frame.platform_services import end_process_after
 from cosmic.mico.core.collision.answer import Approach, SweepAnswer
 from cosmic.mico.core.collision.free_way import free_way
 from cosmic.mico.core.collision.helper_wire import unpack_spans
@@ -66,19 +67,13 @@ def serve(pipe: End, sweep: Sweep, handlers: Mapping[str, Handler]) -> None:
         import_module("scipy.spatial")  # seldom needed, slow to load: now nobody waits for it
     while True:
         number, kind, payload, limit_s = pickle.loads(pipe.recv_bytes())
-        _end_after(limit_s + ORPHAN_S)
+        end_process_after(limit_s + ORPHAN_S)
         try:
             message = encode((number, True, handlers[kind](sweep, payload)))
         except Exception as exc:  # noqa: BLE001 - told to the one who asked, who refuses
             message = encode((number, False, f"{type(exc).__name__}: {exc}"))
-        _end_after(0.0)
+        end_process_after(0.0)
         pipe.send_bytes(message)
-
-
-def _end_after(limit_s: float) -> None:
-    """End this process by a signal after `limit_s`; 0 takes it back."""
-    if sys.platform != "win32":  # there only the client ends a process that hangs
-        signal.setitimer(signal.ITIMER_REAL, limit_s)
 
 
 def main(arguments: Sequence[str]) -> int:
