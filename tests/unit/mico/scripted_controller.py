@@ -84,7 +84,7 @@ class ScriptedController(Controller):
 
     def _kind(self, channel: Channel) -> str:
         letters = self.layout[self.opened[channel.device] - 100]
-        letter = f"{letters}xxx"[channel.channel]
+        letter = letters.ljust(18, "x")[channel.channel]
         if letter == "x":
             raise DeviceError("no such channel", fault=DeviceFault.NO_CHANNEL)
         return letter

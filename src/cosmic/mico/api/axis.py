@@ -16,7 +16,7 @@ from cosmic.mico.api.jogging import Jogging
 from cosmic.mico.api.linked import linked_movement
 from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.orders import FREQUENCY_HZ, Motion, MoveBy, MoveTo
+from cosmic.mico.core.motion.orders import Motion, MoveBy, MoveTo
 from cosmic.mico.core.motion.positioner import Confidence, class_for
 from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.hw.interface import Direction
@@ -158,14 +158,16 @@ class Axis(AxisFacts):
         wait: bool = True,
         consent: bool = False,
     ) -> float | Movement | None:
-        """Make steps without looking at a sensor, -29999 to 29999; otherwise as `move_to`.
+        """Make steps without looking at a sensor, up to what the controller takes.
+
+        Otherwise as `move_to`.
 
         Parameters
         ----------
         amplitude_v : float
-            15 to 100 V; the configured default where it is not given.
+            Of an SCU 15 to 100 V; the configured default where it is not given.
         frequency_hz : int
-            1 to 18500 Hz; the configured default where it is not given.
+            Of an SCU 1 to 18500 Hz; the configured default where it is not given.
         """
         defaults = self._manager.settings.defaults
         volts = defaults.amplitude_v if amplitude_v is None else amplitude_v
@@ -200,7 +202,7 @@ class Axis(AxisFacts):
         unit = "Hz" if by_steps else state.unit
         usual = {"um": jog.speed_um_s, "deg": jog.speed_deg_s, "Hz": float(jog.frequency_hz)}
         wanted = usual[unit] if speed is None else as_number(speed, unit, self._name)
-        if direction not in (1, -1) or not 0.0 < wanted <= FREQUENCY_HZ[1]:
+        if direction not in (1, -1) or not 0.0 < wanted <= state.frequency_range_hz[1]:
             text = f"{self._name}: jog in direction 1 or -1 with a speed above 0"
             raise refusal(refuse(Reason.NOT_FINITE, text, axis=self._name))
         order = self.commander.jog(self._channel, direction, wanted, consent=consent)
@@ -301,7 +303,7 @@ class Axis(AxisFacts):
         self._manager.device(self._name).set_estimate(self._channel, where, std)
 
     def set_closed_loop_frequency(self, frequency_hz: Number) -> None:
-        """Limit the speed of movements to a position, 1 to 18500 Hz.
+        """Limit the speed of movements to a position, of an SCU 1 to 18500 Hz.
 
         Raises
         ------
@@ -313,7 +315,7 @@ class Axis(AxisFacts):
             text = f"{self._name}: it has no sensor; give the frequency with the steps"
             raise refusal(refuse(Reason.WRONG_KIND, text, axis=self._name))
         hertz = as_whole(frequency_hz, "Hz", self._name)
-        low, high = FREQUENCY_HZ
+        low, high = state.frequency_range_hz
         if not low <= hertz <= high:
             text = f"{self._name}: frequency {hertz} Hz is outside {low} to {high} Hz"
             limit = float(high if hertz > high else low)

@@ -12,13 +12,14 @@ from cosmic.mico.core.link_settings import LinkSettings, link_misfits
 from cosmic.mico.core.sequence.settings import InitialisationSettings, misfits
 from cosmic.mico.core.teleoperation.settings import TeleoperationSettings
 from cosmic.mico.core.trajectory.settings import MirrorSettings
-from cosmic.mico.hw.interface import Channel, PositionerKind
+from cosmic.mico.hw.interface import Channel, PositionerKind, Serial
 
 Range = Annotated[tuple[float, float], Field(strict=False)]
 Names = Annotated[tuple[str, ...], Field(strict=False)]
 Text = Annotated[str, Field(min_length=1)]
 
 
+LAST_SCU_CHANNEL: Final = 2
 _COUNTED: Final = ("travel_um", "step_std", "end_std_um")
 
 
@@ -92,7 +93,7 @@ class PositionerSettings(StrictModel):
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)?$")
     title: str = ""
     device: int = Field(ge=0)
-    channel: int = Field(ge=0, le=2)
+    channel: int = Field(ge=0, le=17)
     kind: Literal["linear", "rotary", "open-loop"]
     limits_um: Range | None = None
     limits_deg: Range | None = None
@@ -189,7 +190,7 @@ class MicoSettings(StrictModel):
 
     backend: Literal["simulated", "scu3d"] = "simulated"
     library: str = ""
-    serials: Annotated[tuple[int, ...], Field(strict=False)] = ()
+    serials: Annotated[tuple[Serial, ...], Field(strict=False)] = ()
     defaults: MotionDefaults = MotionDefaults()
     jog: JogSettings = JogSettings()
     undo: UndoSettings = UndoSettings()
@@ -207,6 +208,7 @@ class MicoSettings(StrictModel):
         wrong = [
             *self._twice("name", [each.name for each in self.positioner]),
             *self._same_channel(),
+            *self._beyond_channels(),
             *self._twice("key", self._keys()),
             *self._twice("serial", [str(serial) for serial in self.serials]),
             *self._unknown_names(),
@@ -254,6 +256,15 @@ class MicoSettings(StrictModel):
             f"{' and '.join(group)} are both on device {where.device} channel {where.channel}"
             for where, group in names.items()
             if len(group) > 1
+        ]
+
+    def _beyond_channels(self) -> list[str]:
+        if self.backend != "scu3d":
+            return []
+        return [
+            f"{each.name}: channel {each.channel}: an SCU has the channels 0 to 2"
+            for each in self.positioner
+            if each.channel > LAST_SCU_CHANNEL
         ]
 
     def _unknown_names(self) -> list[str]:

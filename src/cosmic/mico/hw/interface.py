@@ -85,12 +85,16 @@ class PositionerType:
     reference: ReferenceKind
 
 
+Serial = int | str
+"""What is printed on a controller unit: a number of an SCU, such as "MCS2-00000412" of an MCS2."""
+
+
 @dataclass(frozen=True, slots=True)
 class DeviceIdentity:
     """One controller unit: its place in the list, its serial number and its firmware."""
 
     index: int
-    serial: int
+    serial: Serial
     firmware: str
 
 
@@ -106,11 +110,23 @@ class Capabilities:
         A speed can be set in um/s; otherwise only the closed-loop frequency limit.
     position_known : bool
         The controller can tell whether a position is referenced.
+    channels : int
+        How many channels a device has at most; each is asked whether it is there.
+    most_steps : int
+        The most steps of one command that come to an end by themselves.
+    frequency_hz : tuple of int
+        The fewest and the most steps a second, in open and in closed loop.
+    amplitude_v : tuple of float
+        The lowest and the highest amplitude of a step.
     """
 
     group_start: bool
     velocity: bool
     position_known: bool
+    channels: int = 3
+    most_steps: int = 29_999
+    frequency_hz: tuple[int, int] = (1, 18_500)
+    amplitude_v: tuple[float, float] = (15.0, 100.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,12 +239,17 @@ class Controller(Protocol):
     def capabilities(self) -> Capabilities:
         """What this controller can do."""
 
+    def device_capabilities(self, device: int) -> Capabilities:
+        """Return what one device can do; after `open`."""
+        del device  # most controllers are all alike
+        return self.capabilities
+
     @abstractmethod
-    def find_devices(self) -> tuple[int, ...]:
+    def find_devices(self) -> tuple[Serial, ...]:
         """Return the serial numbers of the devices connected; before `open`."""
 
     @abstractmethod
-    def open(self, serials: Sequence[int] = ()) -> tuple[DeviceIdentity, ...]:
+    def open(self, serials: Sequence[Serial] = ()) -> tuple[DeviceIdentity, ...]:
         """Initialise the devices named, or all, for asynchronous work.
 
         Raises

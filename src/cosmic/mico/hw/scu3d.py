@@ -19,6 +19,7 @@ from cosmic.mico.hw.interface import (
     DeviceIdentity,
     Direction,
     Event,
+    Serial,
 )
 from cosmic.mico.hw.scu3d_errors import nothing_found, place, require_serials, status_error
 from cosmic.mico.hw.scu3d_events import event_from_packet
@@ -62,7 +63,7 @@ class Scu3dController(Controller):
         self._simulated = simulated
         self._lifecycle = threading.Lock()
         self._opened = False
-        self._serials: dict[int, int] = {}
+        self._serials: dict[int, Serial] = {}
         self._position_known = self._library.has("SA_GetPhysicalPositionKnown_A")
         self._library.has("SA_Stop_A")  # bound now, so that the first stop is not the slowest
 
@@ -85,7 +86,7 @@ class Scu3dController(Controller):
         return Capabilities(group_start=False, velocity=False, position_known=self._position_known)
 
     @override
-    def find_devices(self) -> tuple[int, ...]:
+    def find_devices(self) -> tuple[Serial, ...]:
         size = _FIRST_LIST_SIZE
         while True:
             serials, count = (c_uint32 * size)(), c_uint32(size)
@@ -99,11 +100,11 @@ class Scu3dController(Controller):
         return tuple(serials[: min(count.value, size)])
 
     @override
-    def open(self, serials: Sequence[int] = ()) -> tuple[DeviceIdentity, ...]:
+    def open(self, serials: Sequence[Serial] = ()) -> tuple[DeviceIdentity, ...]:
         with self._lifecycle:
             if self._opened:
                 raise DeviceError("SCU3DControl is open already", fault=DeviceFault.STATE)
-            self._select(serials)
+            self._select(convert.serial_numbers(serials))
             self._call("SA_InitDevices", sa.SA_ASYNCHRONOUS_COMMUNICATION)
             try:
                 devices = self._identify()
@@ -258,8 +259,7 @@ class Scu3dController(Controller):
         serial = None if device is None else self._serials.get(device)
         raise status_error(status, asked, device=device, channel=channel, serial=serial)
 
-    def _select(self, serials: Sequence[int]) -> None:
-        wanted = [convert.index(serial, "serial number") for serial in serials]
+    def _select(self, wanted: Sequence[int]) -> None:
         found = self.find_devices()
         if not found:
             raise nothing_found("SA_GetAvailableDevices()")

@@ -12,11 +12,12 @@ written nowhere. A reading is taken as it comes, plus 360 degrees for each revol
 
 import math
 import operator
-from typing import Final
+from collections.abc import Sequence
+from typing import Final, SupportsIndex, cast
 
 from cosmic.frame.errors import DeviceError
 from cosmic.frame.units import AxisUnit
-from cosmic.mico.hw.interface import Channel
+from cosmic.mico.hw.interface import Channel, Serial
 from cosmic.mico.hw.scu3d_errors import refused
 
 COUNTS_PER_UM: Final = 10
@@ -140,14 +141,19 @@ def index(number: int, what: str) -> int:
     return _whole(number, 0, _UINT32_MAX, what, None)
 
 
+def serial_numbers(serials: Sequence[Serial]) -> list[int]:
+    """Return serial numbers as the library takes them; raises `DeviceError` for any other."""
+    return [_whole(serial, 0, _UINT32_MAX, "serial number", None) for serial in serials]
+
+
 def version_text(code: int) -> str:
     """Return a version, packed as 8, 8 and 16 bit, as text such as "1.5.16"."""
     return f"{code >> 24 & 0xFF}.{code >> 16 & 0xFF}.{code & 0xFFFF}"
 
 
-def _whole(value: int, low: int, high: int, what: str, at: Channel | None) -> int:
+def _whole(value: SupportsIndex | str, low: int, high: int, what: str, at: Channel | None) -> int:
     try:
-        number = operator.index(value)
+        number = operator.index(cast("SupportsIndex", value))
     except TypeError:
         raise _refused(f"{what} must be a whole number, got {value!r}", at) from None
     if not low <= number <= high:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from cosmic.frame.errors import DeviceError, DeviceFault, DeviceTimeout, NotConnectedError
+from cosmic.mico.hw.interface import Serial
 from cosmic.mico.hw.scu3d_ctypes import SA_DEVICE_NOT_FOUND_ERROR, SA_NO_DEVICES_FOUND_ERROR
 
 
@@ -107,7 +108,7 @@ STATUS: Final[dict[int, Status]] = {
 }
 
 
-def place(device: int | None, channel: int | None = None, *, serial: int | None = None) -> str:
+def place(device: int | None, channel: int | None = None, *, serial: Serial | None = None) -> str:
     """Return where something happened, such as "device 1 (serial 4711), channel 2"."""
     if device is None:
         return "SCU3DControl"
@@ -121,7 +122,7 @@ def status_error(
     *,
     device: int | None = None,
     channel: int | None = None,
-    serial: int | None = None,
+    serial: Serial | None = None,
 ) -> DeviceError:
     """Return the exception for the status `code`, also for a code that nobody documented.
 
@@ -159,7 +160,7 @@ def nothing_found(call: str) -> DeviceError:
     return status_error(SA_NO_DEVICES_FOUND_ERROR, call)
 
 
-def require_serials(wanted: Sequence[int], found: Sequence[int]) -> None:
+def require_serials(wanted: Sequence[Serial], found: Sequence[Serial]) -> None:
     """Raise `NotConnectedError` where one of the serial numbers `wanted` was not found."""
     missing = [serial for serial in wanted if serial not in found]
     if missing:

@@ -16,6 +16,7 @@ from cosmic.mico.hw.interface import (
     PositionRead,
     SafeDirectionRead,
     SensorPresentRead,
+    Serial,
     TypeRead,
 )
 from cosmic.mico.hw.scu3d_convert import angle_deg, position_from_counts
@@ -51,7 +52,7 @@ _NO_CHANNEL: Final = 255
 
 
 def event_from_packet(
-    device: int, packet: sa.SA_PACKET, *, serial: int | None = None
+    device: int, packet: sa.SA_PACKET, *, serial: Serial | None = None
 ) -> Event | None:
     """Return what `packet`, received from `device`, says; None for the empty one of a timeout."""
     kind, at, value = packet.packetType, Channel(device, packet.channelIndex), packet.data1
@@ -79,7 +80,7 @@ def event_from_packet(
             return _seldom(at, packet)
 
 
-def _failed(at: Channel, code: int, serial: int | None) -> Event:
+def _failed(at: Channel, code: int, serial: Serial | None) -> Event:
     channel = None if at.channel >= _NO_CHANNEL else at.channel
     if code == sa.SA_OK:
         # Not documented for the SCU; no error is no reason to end a movement.

@@ -30,7 +30,6 @@ from cosmic.mico.core.motion.lease import Guard
 from cosmic.mico.core.motion.messages import Departed, MovementBegun
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.orders import (
-    FREQUENCY_HZ,
     Grant,
     Jog,
     Motion,
@@ -372,7 +371,7 @@ class ChannelSpeed:
     def top_speed(self) -> float:
         """What the axis can do at its frequency limit, a second; without a sensor, in Hz."""
         if not self._positioner.has_sensor:
-            return float(FREQUENCY_HZ[1])
+            return float(self._positioner.state.frequency_range_hz[1])
         return self._usual_hz * self._nominal_step
 
     def limit_jog(self, jog: JogRun) -> None:
@@ -380,7 +379,9 @@ class ChannelSpeed:
         step = self._nominal_step
         glide = jog.glide(step) if isinstance(jog, SteerRun) else GLIDE
         wanted_hz = math.ceil(glide * jog.speed / step)
-        self._limit(max(FREQUENCY_HZ[0], min(wanted_hz, self._usual_hz)))
+        self._limit(
+            max(self._positioner.state.frequency_range_hz[0], min(wanted_hz, self._usual_hz))
+        )
 
     @property
     def _nominal_step(self) -> float:

@@ -13,8 +13,6 @@ from cosmic.mico.core.collision.checker import CollisionChecker
 from cosmic.mico.core.motion.lease import Guard
 from cosmic.mico.core.motion.orders import (
     AMPLITUDE_V,
-    FREQUENCY_HZ,
-    LARGEST_STEPS,
     MOTION_WORDS,
     Interval,
     Jog,
@@ -244,9 +242,9 @@ def _step_range(motion: Motion, state: PositionerState) -> MoveVerdict | None:
     if not isinstance(motion, Step):
         return None
     checks = (
-        ("steps", motion.steps, -LARGEST_STEPS, LARGEST_STEPS, "steps"),
-        ("amplitude", motion.amplitude_v, *AMPLITUDE_V, "V"),
-        ("frequency", motion.frequency_hz, *FREQUENCY_HZ, "Hz"),
+        ("steps", motion.steps, -state.most_steps, state.most_steps, "steps"),
+        ("amplitude", motion.amplitude_v, *state.amplitude_range_v, "V"),
+        ("frequency", motion.frequency_hz, *state.frequency_range_hz, "Hz"),
     )
     for what, value, low, high, unit in checks:
         if not low <= value <= high:

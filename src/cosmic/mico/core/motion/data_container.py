@@ -8,6 +8,7 @@ from typing import Final
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceFault, NotAvailable
+from cosmic.mico.core.motion.orders import COMMON
 from cosmic.mico.core.motion.positioner import (
     Confidence,
     CountedTravel,
@@ -19,6 +20,7 @@ from cosmic.mico.core.motion.positioner import (
 from cosmic.mico.core.settings import PositionerSettings
 from cosmic.mico.hw.interface import (
     ActivityRead,
+    Capabilities,
     Channel,
     Event,
     Failed,
@@ -66,6 +68,8 @@ class DeviceDataContainer:
         How long closed-loop positions are held; inf for ever.
     library_index : int
         Index under which the library knows the device, which depends on what else is connected.
+    capabilities : Capabilities
+        What the device can do.
     """
 
     def __init__(
@@ -74,8 +78,10 @@ class DeviceDataContainer:
         configured: Mapping[int, PositionerSettings],
         hold_s: float,
         library_index: int,
+        capabilities: Capabilities = COMMON,
     ) -> None:
         self.device = device
+        self.capabilities = capabilities
         self.library_index = library_index
         self._configured = dict(configured)
         self._hold_s = hold_s
@@ -135,6 +141,11 @@ class DeviceDataContainer:
             return
         wanted = settings.positioner_kind
         positioner = class_for(wanted, found)(settings, self.address(channel), found, self._hold_s)
+        positioner.update(
+            most_steps=self.capabilities.most_steps,
+            frequency_range_hz=self.capabilities.frequency_hz,
+            amplitude_range_v=self.capabilities.amplitude_v,
+        )
         memory = self._memories.get(settings.name)
         if memory is not None:
             positioner.frequency_hz = memory.frequency_hz
@@ -180,6 +191,10 @@ class DeviceDataContainer:
         """Return the state of the positioner on `channel`, or None where there is none."""
         positioner = self._positioners.get(channel)
         return positioner.state if positioner else None
+
+    def possible_channels(self) -> list[int]:
+        """Return the channels that the device can have, and those that are configured."""
+        return sorted({*range(self.capabilities.channels), *self._configured})
 
     def channels(self) -> list[int]:
         """Return the channels that have a positioner."""

@@ -65,8 +65,6 @@ from cosmic.mico.hw.interface import (
 
 logger = logging.getLogger(__name__)
 
-CHANNELS: Final = range(3)
-
 
 class ChannelDiscovery:
     """Asks each channel what it has and makes a pilot for what answers; device thread.
@@ -97,9 +95,10 @@ class ChannelDiscovery:
     def begin(self) -> None:
         """Ask every channel whether it has a sensor."""
         container, controller = self._context.container, self._context.controller
-        for channel in CHANNELS:
+        channels = container.possible_channels()
+        for channel in channels:
             container.expect(channel)
-        for channel in CHANNELS:
+        for channel in channels:
             address = container.address(channel)
             try:
                 controller.report_completion(address)

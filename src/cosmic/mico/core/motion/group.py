@@ -36,12 +36,15 @@ class Leg:
         What its slow end costs, as a way in its unit gone at full speed.
     top_hz : int
         The most steps per second that it may make.
+    low_hz : int
+        The fewest that its controller can be told.
     """
 
     way: float
     step: float
     approach: float
     top_hz: int
+    low_hz: int = FREQUENCY_HZ[0]
 
     @property
     def steps(self) -> float:
@@ -56,9 +59,8 @@ def matched_frequencies(legs: Mapping[str, Leg]) -> dict[str, int]:
     """
     moving = {name: leg for name, leg in legs.items() if leg.way > 0.0}
     longest_s = max((leg.steps / leg.top_hz for leg in moving.values()), default=0.0)
-    low, _ = FREQUENCY_HZ
     return {
-        name: max(low, min(leg.top_hz, math.ceil(leg.steps / longest_s - 1e-9)))
+        name: max(leg.low_hz, min(leg.top_hz, math.ceil(leg.steps / longest_s - 1e-9)))
         for name, leg in moving.items()
     }
 
@@ -232,6 +234,7 @@ def _frequencies(
             step=defaults.nominal_step_deg if rotary else defaults.nominal_step_um,
             approach=defaults.approach_deg if rotary else defaults.approach_um,
             top_hz=usual_hz(name),
+            low_hz=state.frequency_range_hz[0],
         )
     return matched_frequencies(legs)
 

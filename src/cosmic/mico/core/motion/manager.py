@@ -27,7 +27,7 @@ from cosmic.mico.core.collision.model import BodyPair
 from cosmic.mico.core.mode import Mode
 from cosmic.mico.core.motion.checks import Limits
 from cosmic.mico.core.motion.data_container import NO_DEVICE, DeviceDataContainer, Memory
-from cosmic.mico.core.motion.device import CHANNELS, Device
+from cosmic.mico.core.motion.device import Device
 from cosmic.mico.core.motion.device_commander import CommanderType, DeviceCommander, join
 from cosmic.mico.core.motion.device_listener import DeviceListener
 from cosmic.mico.core.motion.gate import Gate
@@ -40,7 +40,7 @@ from cosmic.mico.core.motion.orders import Interval, Motion, Order
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.core.motion.stop_latch import StopLatch
 from cosmic.mico.core.settings import MicoSettings, WatchSettings
-from cosmic.mico.hw.interface import Channel, Controller, DeviceIdentity
+from cosmic.mico.hw.interface import Capabilities, Channel, Controller, DeviceIdentity, Serial
 
 logger = logging.getLogger(__name__)
 
@@ -105,7 +105,8 @@ class DeviceMaker:
         for number in sorted({each.device for each in positioners} | set(library_index)):
             here = {each.channel: each for each in positioners if each.device == number}
             at = library_index.get(number, number)
-            container = DeviceDataContainer(number, here, hold_s, library_index=at)
+            can = self._capabilities(at if number in library_index else None)
+            container = DeviceDataContainer(number, here, hold_s, at, can)
             container.remember(memories)
             if number not in library_index:
                 for channel in here:
@@ -117,6 +118,11 @@ class DeviceMaker:
             for positioner in here.values():
                 addresses[positioner.name] = positioner.address
         return Inventory(devices, addresses, tuple(missing))
+
+    def _capabilities(self, at: int | None) -> Capabilities:
+        if at is None:
+            return self._controller.capabilities
+        return self._controller.device_capabilities(at)
 
     def _make(self, container: DeviceDataContainer) -> Device:
         device = Device(
@@ -131,7 +137,7 @@ class DeviceMaker:
         return device
 
 
-def open_devices(controller: Controller, wanted: Sequence[int]) -> dict[int, int]:
+def open_devices(controller: Controller, wanted: Sequence[Serial]) -> dict[int, int]:
     """Open the devices with the serial numbers `wanted`, or all where none are.
 
     Returns
@@ -143,7 +149,7 @@ def open_devices(controller: Controller, wanted: Sequence[int]) -> dict[int, int
     return _library_indices(controller, wanted, identities)
 
 
-def _serials_to_open(controller: Controller, wanted: Sequence[int]) -> tuple[int, ...]:
+def _serials_to_open(controller: Controller, wanted: Sequence[Serial]) -> tuple[Serial, ...]:
     """Return those of the configured serial numbers that are connected; none wanted opens all.
 
     Raises
@@ -164,7 +170,7 @@ def _serials_to_open(controller: Controller, wanted: Sequence[int]) -> tuple[int
 
 
 def _library_indices(
-    controller: Controller, wanted: Sequence[int], identities: Sequence[DeviceIdentity]
+    controller: Controller, wanted: Sequence[Serial], identities: Sequence[DeviceIdentity]
 ) -> dict[int, int]:
     """Return the library's index of each device by its number in the configuration.
 
@@ -178,7 +184,7 @@ def _library_indices(
     return {each.index: each.index for each in identities}
 
 
-def _listed(serials: Collection[int]) -> str:
+def _listed(serials: Collection[Serial]) -> str:
     return ", ".join(map(str, serials)) or "none"
 
 
@@ -205,7 +211,7 @@ class DeviceThreads:
 
     def start(self, devices: Collection[Device]) -> None:
         """Start a listener and the thread of each of `devices`."""
-        channels = len(devices) * len(CHANNELS)
+        channels = sum(device.container.capabilities.channels for device in devices)
         for device in devices:
             device.set_poll_period(
                 max(1 / self._watch.poll_hz, channels / self._watch.poll_total_hz)

@@ -8,13 +8,15 @@ from cosmic.frame.units import AxisUnit
 from cosmic.mico.core.motion.group_start import GroupStart
 from cosmic.mico.core.motion.lease import Guard
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.hw.interface import Direction
+from cosmic.mico.hw.interface import Capabilities, Direction
 
 _numbers: Final = count(1)
 
-LARGEST_STEPS: Final = 29999
-FREQUENCY_HZ: Final = (1, 18500)
-AMPLITUDE_V: Final = (15.0, 100.0)
+COMMON: Final = Capabilities(group_start=False, velocity=False, position_known=True)
+"""What is taken of a controller that has not been asked yet."""
+LARGEST_STEPS: Final = COMMON.most_steps
+FREQUENCY_HZ: Final = COMMON.frequency_hz
+AMPLITUDE_V: Final = COMMON.amplitude_v
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,9 @@ from cosmic.frame.errors import DeviceError, DeviceFault, NotAvailable, refusal
 from cosmic.frame.units import AxisUnit, format_quantity
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.motion.orders import (
+    AMPLITUDE_V,
+    FREQUENCY_HZ,
+    LARGEST_STEPS,
     MOTION_WORDS,
     Calibrate,
     Interval,
@@ -77,6 +80,8 @@ class PositionerState:
     std : float
         Standard deviation of an estimated position, in `unit`; infinite where nobody knows, 0 of a
         measured one.
+    most_steps, frequency_range_hz, amplitude_range_v : int, tuple of int, tuple of float
+        What its controller takes: steps of one command, steps a second, volts.
     """
 
     name: str
@@ -95,6 +100,9 @@ class PositionerState:
     present: bool = True
     safe_direction: Direction | None = None
     std: float = 0.0
+    most_steps: int = LARGEST_STEPS
+    frequency_range_hz: tuple[int, int] = FREQUENCY_HZ
+    amplitude_range_v: tuple[float, float] = AMPLITUDE_V
 
     @property
     def status(self) -> Status:
