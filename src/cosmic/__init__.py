@@ -8,6 +8,8 @@ import logging
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from cosmic.frame.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from cosmic.app.connect import connect
     from cosmic.app.rig import Rig
@@ -35,7 +37,6 @@ if TYPE_CHECKING:
     from cosmic.mico.api.mico import Mico
     from cosmic.mico.core.motion.movement import Movement
 
-__version__ = "0.1.0"
 
 # A script decides itself whether it wants to see the log.
 logging.getLogger(__name__).addHandler(logging.NullHandler())

@@ -9,8 +9,8 @@ import pytest
 import cosmic
 from cosmic.app.commands import campaign as campaign_command
 from cosmic.app.commands import serve as serving
+from cosmic.app.commands.serve import ServeOptions
 from cosmic.app.rig import Rig
-from cosmic.app.stations.options import ServeOptions
 from cosmic.frame.garbage import GARBAGE, NEVER
 from unit.mico.rigs import wait_until
 
@@ -65,7 +65,7 @@ def test_a_campaign_without_a_window_has_it(
     monkeypatch.setattr(campaign_command, "gui_application", lambda: None)
     unset = dict.fromkeys(("rate", "seed", "sample", "config", "truth"))
     with pytest.raises(Seen):
-        campaign_command.run_campaign(
+        campaign_command.run(
             Namespace(recipe=Path("quick"), out=tmp_path / "out", cold=False, **unset)
         )
     assert_put_back()

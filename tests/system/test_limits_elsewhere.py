@@ -10,8 +10,8 @@ from contract.station_rig import free_port, wait_until
 from cosmic.app.configuration.network import NetworkSettings, serving
 from cosmic.app.platform import Platform, Uses, build_platform
 from cosmic.app.rig import Rig
+from cosmic.app.stations.address import StationAddress
 from cosmic.app.stations.host import StationHost
-from cosmic.app.stations.options import StationAddress
 from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.failure import Failure
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from cosmic.app.configuration.platform_file import KNOWN_APPLICATIONS, check_applications
 from cosmic.app.platform import Uses, build_platform
 from cosmic.app.rig import Rig
-from cosmic.app.stations.options import StationAddress
+from cosmic.app.stations.address import StationAddress
 from cosmic.frame.arguments import check_path, checked
 from cosmic.frame.errors import NotConnectedError
 

@@ -14,9 +14,9 @@ from cosmic.app.configuration.references import misnamed
 from cosmic.app.faults import SimulationFaults
 from cosmic.app.garbage_watch import GarbageWatch
 from cosmic.app.simulation import make_scene
+from cosmic.app.stations.address import StationAddress
 from cosmic.app.stations.hosting import Site, build_applications
 from cosmic.app.stations.joins import join_here, join_stations
-from cosmic.app.stations.options import StationAddress
 from cosmic.app.stations.remote_applications import Elsewhere, open_stations
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco
@@ -35,7 +35,7 @@ from cosmic.vico.api.vico import Vico
 logger = logging.getLogger(__name__)
 
 LARGEST_SEED: Final = 2**63 - 1
-"""How long a station may take to say what it has."""
+RESET_SINCE: Final = "it was stopped, and the stop was reset since"
 
 
 @dataclass(frozen=True)
@@ -260,3 +260,24 @@ def _connect(
         certificates=own_certificates(file.network, path.parent, uses.certificates),
         wanted=KNOWN_APPLICATIONS if uses.every else applications,
     )
+
+
+def stopped_since(mico: MicoApplicationBase | None) -> Callable[[], str | None]:
+    """Return what gives the reason of a stop that is latched or was since the first call, or None.
+
+    A reset allows motion again, but what was stopped before it does not go on by itself.
+    """
+    epoch: int | None = None
+
+    def stopped() -> str | None:
+        nonlocal epoch
+        if mico is None:
+            return None
+        state = mico.manager.latch.state
+        if epoch is None:
+            epoch = state.epoch
+        if state.reason is not None:
+            return state.reason
+        return RESET_SINCE if state.epoch != epoch else None
+
+    return stopped

@@ -11,9 +11,8 @@ from weakref import WeakSet
 from typing_extensions import override
 
 from cosmic.app.faults import SimulationFaults
-from cosmic.app.platform import Platform
+from cosmic.app.platform import Platform, stopped_since
 from cosmic.app.stations.remote_station import RemoteStation, StationControl
-from cosmic.app.stop_watch import stopped_since
 from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.procedures.run import ProcedureRun
@@ -118,7 +117,7 @@ class Rig:
         NotAvailable
             An application is not hosted here.
         """
-        from cosmic.app.campaigns import campaign_on  # loads statistics, which takes a second
+        from cosmic.app.procedures import campaign_on  # loads statistics, which takes a second
 
         campaign = campaign_on(self, self._platform, recipe, folder)
         self._runs.add(campaign)
@@ -133,7 +132,7 @@ class Rig:
         NotAvailable
             Cameras and axes do not run in this program.
         """
-        from cosmic.app.calibrating import registry_of
+        from cosmic.app.procedures import registry_of
 
         return registry_of(self)
 
@@ -162,9 +161,17 @@ class Rig:
         ConfigError
             The platform has not what `settings` names, or there is no such calibration.
         """
-        from cosmic.app.calibrating import calibration_on
+        from cosmic.app.procedures import calibration_on
 
-        return calibration_on(self, settings, anew, zooms=zooms)
+        procedure, work = calibration_on(self, settings, anew, zooms=zooms)
+        run = self.procedure(procedure, work)
+
+        def close() -> None:
+            if run.over:
+                work.close()
+
+        run.on_change(close)
+        return run
 
     def procedure(self, procedure: Procedure[W], work: W) -> ProcedureRun[W]:
         """Return a run of `procedure` that is ready to begin, in the platform's time.
@@ -183,7 +190,7 @@ class Rig:
             work,
             self._platform.clock,
             self._platform.policy,
-            stopped=stopped_since(self._platform),
+            stopped=stopped_since(self._platform.mico),
         )
         self._runs.add(cast("ProcedureRun[object]", run))
         return run

@@ -12,8 +12,8 @@ from contract.station_rig import free_port
 from cosmic.app.configuration.network import NetworkSettings, serving
 from cosmic.app.panels.instruments import DAQCO
 from cosmic.app.platform import Platform, Uses, build_platform
+from cosmic.app.stations.address import StationAddress
 from cosmic.app.stations.host import StationHost
-from cosmic.app.stations.options import StationAddress
 from cosmic.app.windows.operator_window import MICO, OperatorWindow
 from cosmic.daqco.gui.main_widget import make_daqco_gui
 from cosmic.mico.gui.mico_widget import make_mico_gui

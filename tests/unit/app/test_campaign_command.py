@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
-from cosmic.app import left_open
 from cosmic.app.cli import main
 from cosmic.app.commands import calibrate as calibrate_command
 from cosmic.app.commands import campaign as campaign_command
+from cosmic.app.commands import repair as repair_command
 from cosmic.autonomy.campaign.campaign import CampaignPhase
 from cosmic.autonomy.campaign.records import CampaignInfo
 from cosmic.autonomy.campaign.statistics import progress
@@ -166,7 +166,7 @@ def test_a_flood_of_warnings_is_folded_by_every_command_without_a_window(
         raise RecordingError("and that was all")
 
     monkeypatch.setattr(calibrate_command, "connect", flood)
-    monkeypatch.setattr(left_open, "close_one", flood)
+    monkeypatch.setattr(repair_command, "close_left_open", flood)
     assert main([command, *([str(tmp_path / "push.h5")] if command == "repair" else [])]) == 1
     told = capsys.readouterr().err
     assert 1 <= told.count("is late") < 100

@@ -148,7 +148,7 @@ def test_init_copies_the_configuration_and_never_overwrites(
     platform = folder / "platform.toml"
     platform.write_text("mine", encoding="utf-8")
     assert main(["init", str(folder)]) == 1
-    assert any("is there already" in line for line in complaints(capsys))
+    assert any("exists already" in line for line in complaints(capsys))
     assert platform.read_text(encoding="utf-8") == "mine"
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from cosmic.app.configuration.network import NetworkSettings, serving
-from cosmic.app.stations.options import StationAddress
+from cosmic.app.stations.address import StationAddress
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.certificates import make_certificates

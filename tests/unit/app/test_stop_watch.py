@@ -5,7 +5,7 @@ from typing import Any, cast
 
 import pytest
 
-from cosmic.app.stop_watch import RESET_SINCE, stopped_since
+from cosmic.app.platform import RESET_SINCE, stopped_since
 from cosmic.mico.core.motion.stop_latch import StopLatch
 
 
@@ -14,12 +14,12 @@ def latch() -> StopLatch:
     return StopLatch()
 
 
-def platform(latch: StopLatch) -> Any:
-    return cast("Any", SimpleNamespace(mico=SimpleNamespace(manager=SimpleNamespace(latch=latch))))
+def mico(latch: StopLatch) -> Any:
+    return cast("Any", SimpleNamespace(manager=SimpleNamespace(latch=latch)))
 
 
-def test_a_stop_is_told_with_its_reason_and_after_its_reset_too(latch: StopLatch) -> None:
-    stopped = stopped_since(platform(latch))
+def test_a_stop_is_reported_with_its_reason_and_after_its_reset_too(latch: StopLatch) -> None:
+    stopped = stopped_since(mico(latch))
     assert stopped() is None
     latch.set("a hand on the button")
     assert stopped() == "a hand on the button"
@@ -27,8 +27,8 @@ def test_a_stop_is_told_with_its_reason_and_after_its_reset_too(latch: StopLatch
     assert stopped() == RESET_SINCE
 
 
-def test_a_stop_that_nobody_looked_at_before_its_reset_is_told(latch: StopLatch) -> None:
-    stopped = stopped_since(platform(latch))
+def test_a_stop_that_nobody_looked_at_before_its_reset_is_reported(latch: StopLatch) -> None:
+    stopped = stopped_since(mico(latch))
     assert stopped() is None
     latch.set("quick")
     latch.reset()
@@ -38,13 +38,13 @@ def test_a_stop_that_nobody_looked_at_before_its_reset_is_told(latch: StopLatch)
 def test_a_stop_that_was_reset_before_it_began_does_not_concern_it(latch: StopLatch) -> None:
     latch.set("long ago")
     latch.reset()
-    assert stopped_since(platform(latch))() is None
+    assert stopped_since(mico(latch))() is None
 
 
-def test_one_that_begins_while_stopped_is_told_why(latch: StopLatch) -> None:
+def test_one_that_begins_while_stopped_is_reported_why(latch: StopLatch) -> None:
     latch.set("still")
-    assert stopped_since(platform(latch))() == "still"
+    assert stopped_since(mico(latch))() == "still"
 
 
 def test_where_nothing_moves_nothing_is_stopped() -> None:
-    assert stopped_since(cast("Any", SimpleNamespace(mico=None)))() is None
+    assert stopped_since(None)() is None

@@ -16,7 +16,7 @@ from cosmic.frame.errors import CosmicError
 _ENDS: Final = {NodeState.DONE, NodeState.FAILED}
 
 
-def run_calibrate(chosen: argparse.Namespace) -> int:
+def run(chosen: argparse.Namespace) -> int:
     """Calibrate, and return the exit code.
 
     Raises

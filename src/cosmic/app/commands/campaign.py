@@ -27,7 +27,7 @@ _BAR: Final = 24
 _CODES: Final = {CampaignPhase.ENDED: 0, CampaignPhase.FAILED: 1, CampaignPhase.STOPPED: 3}
 
 
-def run_campaign(chosen: argparse.Namespace) -> int:
+def run(chosen: argparse.Namespace) -> int:
     """Run a campaign to its end, and return the exit code.
 
     Raises

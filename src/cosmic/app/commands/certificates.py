@@ -1,5 +1,7 @@
-"""What ``cosmic certificates`` does: make what stations prove themselves with."""
+"""``cosmic certificates``: what stations prove their identity with."""
 
+import argparse
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -7,8 +9,15 @@ from cosmic.app.configuration.network import require_network
 from cosmic.frame.errors import ConfigError
 
 
+def run(chosen: argparse.Namespace) -> int:
+    """Make certificates and print where they are; see `make`."""
+    for line in make(chosen.folder, chosen.stations, chosen.address):
+        sys.stdout.write(f"{line}\n")
+    return 0
+
+
 def make(folder: Path, stations: Sequence[str], addresses: Sequence[str]) -> list[str]:
-    """Make certificates and return what to tell, a line each.
+    """Make certificates and return what to print, a line each.
 
     Parameters
     ----------

@@ -1,8 +1,26 @@
-"""What `cosmic scene check` and `cosmic scene decompose` say."""
+"""``cosmic scene``: the check of a collision scene, and the split of a concave mesh."""
 
+import argparse
+import sys
 from pathlib import Path
 
+from cosmic.frame.errors import ConfigError
 from cosmic.mico.core.collision.scene_loader import find_scene_mistakes
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Check a scene or split a mesh; raises `ConfigError` with a line for each mistake."""
+    if chosen.task == "decompose":
+        for line in decompose(chosen.mesh, chosen.folder):
+            sys.stdout.write(f"{line}\n")
+        return 0
+    mistakes, warnings = check_scene(chosen.scene)
+    for line in warnings:
+        sys.stderr.write(f"cosmic: warning: {line}\n")
+    if mistakes:
+        raise ConfigError("\n".join(mistakes))
+    sys.stdout.write(f"{chosen.scene}: ok\n")
+    return 0
 
 
 def check_scene(path: Path) -> tuple[list[str], list[str]]:
@@ -11,7 +29,7 @@ def check_scene(path: Path) -> tuple[list[str], list[str]]:
 
 
 def decompose(mesh: Path, out_dir: Path) -> list[str]:
-    """Write convex pieces of a concave mesh and return what to tell about them, a line each.
+    """Write convex pieces of a concave mesh and return what to print about them, a line each.
 
     Raises
     ------

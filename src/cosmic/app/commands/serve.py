@@ -1,21 +1,70 @@
 """``cosmic serve``: a station without a window."""
 
+import argparse
 import logging
 import sys
 from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
 from threading import Event
 
 from cosmic.app.configuration.network import Serving, serving
 from cosmic.app.configuration.platform_file import check_applications, load_platform
 from cosmic.app.platform import Platform, Uses, build_platform
+from cosmic.app.stations.address import StationAddress, stations_of
 from cosmic.app.stations.host import StationHost
-from cosmic.app.stations.options import ServeOptions
 from cosmic.frame.errors import ConfigError, NotConnectedError
 from cosmic.frame.hooks import install_hooks
 from cosmic.frame.log import set_up_logging
 from cosmic.frame.platform_services import ending_signals
 
 logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class ServeOptions:
+    """What the command line says about a station.
+
+    Attributes
+    ----------
+    applications : tuple of str
+        Which to host; empty: all of the platform file.
+    listen, name, certificates
+        In place of what the platform file says in ``[network]``.
+    stations : tuple of StationAddress
+        Others that this one uses, so that a force limit here stops the motion there.
+    """
+
+    applications: tuple[str, ...] = ()
+    config: Path | None = None
+    listen: str | None = None
+    name: str | None = None
+    certificates: Path | None = None
+    stations: tuple[StationAddress, ...] = ()
+    rate: float = 1.0
+    seed: int = 0
+    cold: bool = False
+    sample: str | None = None
+    truth: Path | None = None
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Serve by the options of the command line; see `serve`."""
+    return serve(
+        ServeOptions(
+            applications=chosen.applications,
+            config=chosen.config,
+            listen=chosen.listen,
+            name=chosen.name,
+            certificates=chosen.certificates,
+            stations=stations_of(chosen),
+            rate=1.0 if chosen.rate is None else chosen.rate,
+            seed=chosen.seed,
+            cold=chosen.cold,
+            sample=chosen.sample,
+            truth=chosen.truth,
+        )
+    )
 
 
 def serve(options: ServeOptions) -> int:

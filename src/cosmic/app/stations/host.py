@@ -4,7 +4,6 @@ import logging
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-import cosmic
 from cosmic.app.configuration.network import Serving
 from cosmic.app.platform import Platform
 from cosmic.app.stations.facts import ITSELF, StationFacts, StationSide
@@ -15,6 +14,7 @@ from cosmic.frame.network.errors import StationAway
 from cosmic.frame.network.host import Host
 from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.station import Station
+from cosmic.frame.version import __version__
 from cosmic.mico.api.application import MicoApplication
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.vico import Vico
@@ -123,5 +123,5 @@ def _facts(platform: Platform, applications: tuple[str, ...]) -> StationFacts:
         simulated=platform.simulated,
         rate=platform.clock.rate,
         applications=applications,
-        software=f"CoSMic {cosmic.__version__}",
+        software=f"CoSMic {__version__}",
     )

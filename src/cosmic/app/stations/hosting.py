@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import cosmic
 from cosmic.app.configuration.platform_file import PlatformFile
 from cosmic.app.configuration.scene_fit import load_checker
 from cosmic.app.faults import SimulationFaults
@@ -16,6 +15,7 @@ from cosmic.daqco.hw.sim_signal import Source
 from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import Clock
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.version import __version__
 from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.hw.factory import make_controller, make_simulated
 from cosmic.mico.hw.interface import Controller
@@ -106,7 +106,7 @@ def _build_daqco(
         settings,
         clock=site.clock,
         policy=site.policy,
-        software=f"CoSMic {cosmic.__version__}",
+        software=f"CoSMic {__version__}",
         configuration=site.path.read_text(encoding="utf-8"),
         notes=notes,
         gui_factory=gui_factory,

@@ -1,6 +1,5 @@
 """Joins what one application does to another, in this process or over a line."""
 
-import cosmic
 from cosmic.app.stations.hosting import Hosted, Site
 from cosmic.app.stations.remote_applications import Elsewhere
 from cosmic.autonomy.couplings import join_teleoperation
@@ -15,6 +14,7 @@ from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco, daqco_of
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.application import RemoteApplication
+from cosmic.frame.version import __version__
 from cosmic.mico.api.application_base import MicoApplicationBase
 
 
@@ -30,7 +30,7 @@ def join_here(own: Hosted, site: Site) -> None:
         join_stage_positions(vico, mico)
         kept_in = vico.settings.calibration
         folder = site.path.parent / kept_in if kept_in else None
-        join_places(vico, mico, folder, cosmic.__version__)
+        join_places(vico, mico, folder, __version__)
 
 
 def join_stations(

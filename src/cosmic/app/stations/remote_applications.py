@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 from cosmic.app.configuration.platform_file import KNOWN_APPLICATIONS
-from cosmic.app.stations.options import StationAddress
+from cosmic.app.stations.address import StationAddress
 from cosmic.app.stations.remote_station import RemoteStation
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.application import GuiFactory

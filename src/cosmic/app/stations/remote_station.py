@@ -7,8 +7,8 @@ from threading import Lock
 from typing import TYPE_CHECKING, Final
 
 from cosmic.app.configuration.network import require_network
+from cosmic.app.stations.address import StationAddress
 from cosmic.app.stations.facts import ITSELF, StationFacts
-from cosmic.app.stations.options import StationAddress
 from cosmic.frame.errors import ConfigError, CosmicError, ProtocolError
 from cosmic.frame.events import Event, Unsubscribe, notify
 from cosmic.frame.failure import FailurePolicy

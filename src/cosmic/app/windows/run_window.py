@@ -17,8 +17,8 @@ from cosmic.app.configuration.check import key_mistakes
 from cosmic.app.configuration.network import serving
 from cosmic.app.configuration.platform_file import KNOWN_APPLICATIONS
 from cosmic.app.platform import Platform, Uses, build_platform
+from cosmic.app.stations.address import StationAddress
 from cosmic.app.stations.host import StationHost
-from cosmic.app.stations.options import StationAddress
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.daqco.gui.main_widget import make_daqco_gui
 from cosmic.frame.errors import ConfigError

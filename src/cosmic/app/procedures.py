@@ -1,0 +1,67 @@
+"""Campaigns and calibrations on a platform, as a rig offers them; loads all procedures."""
+
+import platform as computer
+from collections.abc import Sequence
+from pathlib import Path
+
+from cosmic.app.platform import Platform, stopped_since
+from cosmic.autonomy.calibrating.registry import CalibrationRegistry
+from cosmic.autonomy.campaign.campaign import Campaign
+from cosmic.autonomy.campaign.opening import CampaignHost, open_campaign, read_recipe
+from cosmic.autonomy.campaign.recipe import Recipe
+from cosmic.autonomy.campaign.records import TWIN
+from cosmic.autonomy.handling.context import Applications, HandlingContext
+from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.places import PlatformPlaces
+from cosmic.autonomy.procedures.procedure import Procedure
+from cosmic.autonomy.shipped.calibrate import build_calibrate
+from cosmic.frame.arguments import check_path, checked
+from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.frame.version import __version__
+from cosmic.vico.api.application import VicoApplication
+
+
+@checked
+def campaign_on(
+    rig: Applications, platform: Platform, recipe: Recipe | str | Path, folder: str | Path
+) -> Campaign:
+    """Return a campaign that is ready to start; see `Rig.campaign`."""
+    for name, value in (("recipe", recipe), ("folder", folder)):
+        if not isinstance(value, Recipe):
+            check_path(name, value)
+    read = recipe if isinstance(recipe, Recipe) else read_recipe(Path(recipe))
+    host = CampaignHost(
+        rig=rig,
+        policy=platform.policy,
+        stopped=stopped_since(platform.mico),
+        hardware=TWIN if platform.simulated else platform.file.platform.name,
+        rate=platform.clock.rate,
+        seed=platform.seed if platform.simulated else 0,
+        versions={"CoSMic": __version__, "Python": computer.python_version()},
+    )
+    return open_campaign(read, Path(folder), host)
+
+
+def registry_of(rig: Applications) -> CalibrationRegistry:
+    """Return the calibration registry; see `Rig.calibrations`."""
+    application = rig.vico.application
+    places = application.places if isinstance(application, VicoApplication) else None
+    if not isinstance(places, PlatformPlaces):
+        raise NotAvailable("calibrations are kept where cameras and axes run in one program")
+    return places.registry
+
+
+@checked
+def calibration_on(
+    rig: Applications, settings: HandlingSettings | None, anew: Sequence[str], *, zooms: bool
+) -> tuple[Procedure[HandlingContext], HandlingContext]:
+    """Return a procedure that calibrates, and its context, to be closed; see `Rig.calibrate`."""
+    settings, registry = settings or HandlingSettings(), registry_of(rig)
+    known = {each.name for each in registry.entries}
+    if unknown := [each for each in anew if each not in known]:
+        listed = ", ".join(sorted(known)) or "none"
+        raise ConfigError(f"there is no calibration {unknown[0]!r}; known are: {listed}")
+    for entry in registry.entries:
+        if entry.name in anew:
+            registry.forget(*entry.key)
+    return build_calibrate(settings, zooms=zooms), HandlingContext.on(rig, settings)
