@@ -5,6 +5,7 @@ import runpy
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import pytest
@@ -410,6 +411,26 @@ def test_one_trajectory_runs_at_a_time(mico: Mico) -> None:
     with pytest.raises(MoveCancelled):
         player.wait(20.0)
     assert mico.trajectories.player is player
+
+
+def test_one_that_is_cancelled_before_its_turn_has_ended(mico: Mico) -> None:
+    before = mico.trajectories.run(written("wait 1 s\n"), wait=False)
+    busy, go_on = Event(), Event()
+
+    def keep_busy(progress: PlayProgress) -> None:
+        if progress.state is PlayState.ENDED:
+            busy.set()
+            go_on.wait(20.0)
+
+    before.subscribe(keep_busy)
+    assert busy.wait(20.0)
+    player = mico.trajectories.run(written("wait 500 s\n"), wait=False)
+    player.cancel()
+    with pytest.raises(MoveCancelled, match="before it began"):
+        player.wait(5.0)
+    assert player.state is PlayState.CANCELLED
+    go_on.set()
+    mico.trajectories.run(written("wait 1 s\n"))
 
 
 def test_an_axis_that_draws_another_one_along_is_refused(mico: Mico) -> None:

@@ -6,7 +6,13 @@ from threading import RLock
 from typing import Final
 
 from cosmic.frame.arguments import checked_class
-from cosmic.frame.errors import CosmicError, DeviceTimeout, MoveCancelled, NotAvailable
+from cosmic.frame.errors import (
+    CosmicError,
+    DeviceTimeout,
+    MoveCancelled,
+    NotAvailable,
+    OperationCancelled,
+)
 from cosmic.frame.events import Event, Unsubscribe, notify
 from cosmic.frame.operation import Task
 from cosmic.frame.threads import forbid_waiting_here
@@ -59,6 +65,7 @@ class TrajectoryPlayer:
         self._state = PlayState.READY
         self._failure: CosmicError | None = None
         self._task: Task | None = None
+        self._played: Task | None = None
         self._text = ""
         self.speed = speed
         self.loops = loops
@@ -232,13 +239,24 @@ class TrajectoryPlayer:
             self._failure, self._task = None, task
             self._set_state(PlayState.RUNNING)
         task.on_cancel(self._halt)
+        task.add_callback(self._on_end)
         self._tell()
+
+    def _on_end(self, task: Task) -> None:
+        """End with a task whose turn never came; any thread."""
+        with self._changed:
+            if self._played is task:
+                return
+        error = task.failure
+        cancelled = isinstance(error, OperationCancelled)
+        self._failure = MoveCancelled(str(error)) if cancelled else CosmicError(str(error))
+        self._leave(PlayState.CANCELLED if cancelled else PlayState.FAILED)
 
     # In the application's thread
 
     def _play(self, task: Task) -> None:
         with self._changed:  # whoever began it has noted everything then
-            pass
+            self._played = task
         try:
             ended = self._run.play(task, lambda text: self._say(task, text))
         except CosmicError as exc:
