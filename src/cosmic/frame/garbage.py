@@ -20,7 +20,7 @@ import gc
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
-from threading import RLock
+from threading import RLock, get_ident
 from typing import Final
 
 from cosmic.frame.clock import WALL
@@ -88,7 +88,7 @@ class Garbage:
         self._lock = RLock()  # a finalizer may end a platform
         self._users: dict[int, Callable[[], bool]] = {}
         self._count = 0
-        self._by_hand: set[int] = set()
+        self._by_hand: dict[int, int] = {}  # with the thread of the widgets
         self._before = gc.get_threshold()
         self._frozen_before = 0
         self._loaded = 0
@@ -109,7 +109,9 @@ class Garbage:
         moves : callable
             Tells whether anything moves that a pause could harm; called in `tick`.
         by_hand : bool
-            There are widgets: nothing is collected except in `tick` and `tick_young`.
+            There are widgets, which belong to this thread: nothing is collected except by its calls
+            of `tick` and `tick_young`. Those of other threads, such as that of a second platform
+            without a window, do nothing meanwhile: a painter must not go while it is painted with.
 
         Returns
         -------
@@ -124,8 +126,9 @@ class Garbage:
             self._count += 1
             number = self._count
             self._users[number] = moves
-            if by_hand and gc.isenabled():  # else a script has switched it off, for its reasons
-                self._by_hand.add(number)
+            # Else a script has switched it off, for its reasons.
+            if by_hand and (gc.isenabled() or self._by_hand):
+                self._by_hand[number] = get_ident()
                 gc.disable()
             gc.freeze()
             self._loaded = self._frozen = gc.get_freeze_count()
@@ -134,8 +137,7 @@ class Garbage:
 
     def _end(self, number: int) -> None:
         with self._lock:
-            if number in self._by_hand:
-                self._by_hand.discard(number)
+            if self._by_hand.pop(number, None) is not None and not self._by_hand:
                 gc.enable()
             if self._users.pop(number, None) is None or self._users:
                 return
@@ -147,10 +149,10 @@ class Garbage:
     def tick(self) -> Collection | None:
         """Look through old objects if it is time; to be called about twice a second.
 
-        In a program with widgets the window's thread must call it: what is found may be one.
+        In a program with widgets it does so in their thread only: what is found may be one.
         """
         with self._lock:
-            if not self._users or not (gc.isenabled() or self._by_hand):
+            if not self._users or not self._is_my_turn():
                 return None
             now_s = self._now_s()
             if any(moves() for moves in list(self._users.values())):
@@ -170,13 +172,17 @@ class Garbage:
     def tick_young(self) -> None:
         """Collect young objects where Python does not; the window's thread, ten times a second."""
         with self._lock:
-            if not self._by_hand or gc.isenabled():
+            if not self._by_hand or gc.isenabled() or not self._is_my_turn():
                 return
             young, passes, _ = gc.get_count()
             if passes >= PASSES:
                 gc.collect(1)
             elif young >= YOUNG:
                 gc.collect(0)
+
+    def _is_my_turn(self) -> bool:
+        """Return whether this thread may collect; locked."""
+        return get_ident() in self._by_hand.values() if self._by_hand else gc.isenabled()
 
     def _collect(self, *, at_rest: bool, whole: bool) -> Collection:
         before = gc.get_freeze_count()

@@ -2,7 +2,8 @@
 
 import gc
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from threading import Thread
 
 import pytest
 
@@ -183,3 +184,34 @@ def test_a_script_that_switched_collection_off_is_obeyed(bench: Bench) -> None:
         assert found() is not None
     finally:
         gc.enable()
+
+
+def in_another_thread(do: Callable[[], object]) -> None:
+    thread = Thread(target=do)
+    thread.start()
+    thread.join()
+
+
+def test_beside_a_window_only_its_own_thread_collects(bench: Bench) -> None:
+    end = bench.garbage.begin(lambda: False, by_hand=True)
+    kept, found = old_ring(WORTHWHILE)
+    kept.clear()
+    in_another_thread(lambda: bench.after(LONGEST_S))
+    young = weakref.ref(Ring(garbage.YOUNG))
+    in_another_thread(bench.garbage.tick_young)
+    assert found() is not None
+    assert young() is not None
+    bench.garbage.tick_young()
+    assert young() is None
+    bench.after(LONGEST_S)
+    assert found() is None
+    end()
+
+
+def test_of_two_windows_the_last_switches_collection_on_again(bench: Bench) -> None:
+    first = bench.garbage.begin(lambda: False, by_hand=True)
+    second = bench.garbage.begin(lambda: False, by_hand=True)
+    first()
+    assert not gc.isenabled()
+    second()
+    assert gc.isenabled()
