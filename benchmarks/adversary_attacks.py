@@ -11,7 +11,15 @@ from cosmic.app.rig import Rig
 from cosmic.daqco.core.scale import Scale
 from cosmic.frame.errors import CosmicError
 from cosmic.mico.api.axis import Axis
-from cosmic.mico.core.motion.orders import Calibrate, Grant, MoveBy, MoveTo, Order, Reference, Step
+from cosmic.mico.core.motion.orders import (
+    Calibrate,
+    MoveBy,
+    MoveTo,
+    Order,
+    Reference,
+    Reservation,
+    Step,
+)
 
 NONSENSE: Final[Sequence[Any]] = (
     None, "abc", "5 kg", b"5", float("nan"), float("inf"), -float("inf"), 1e308, 2**70, -1, 0,
@@ -211,7 +219,7 @@ class AxisAttack(Attack):
 
 
 class OrderAttack(Attack):
-    """Orders put together by hand, with grants that are stolen, made up, or meant for others."""
+    """Orders put together by hand, with reservations stolen, made up, or meant for others."""
 
     def __init__(self, rig: Rig, seed: int) -> None:
         super().__init__("orders", seed, 0.01)
@@ -248,21 +256,23 @@ class OrderAttack(Attack):
             )
         )
         names = self._rig.mico.names
-        grant: Any = None
+        reservation: Any = None
         if self.chance.random() < 0.7:
             try:
-                grant = Grant(
+                reservation = Reservation(
                     self.chance.choice(names), self.chance.randint(1, 5000), self._epoch(), None
                 )
             except TypeError:
-                grant = object()
+                reservation = object()
         token = self._seen[-1].token if self._seen and self.chance.random() < 0.5 else "mine"
-        self._submit(Order(self.chance.randint(0, 3), motion, token, "forged", grant=grant))
+        self._submit(
+            Order(self.chance.randint(0, 3), motion, token, "forged", reservation=reservation)
+        )
 
     def _steal(self) -> None:
-        granted = [order for order in self._seen if order.grant is not None]
-        if granted:
-            order = self.chance.choice(granted)
+        reserved = [order for order in self._seen if order.reservation is not None]
+        if reserved:
+            order = self.chance.choice(reserved)
             motion = MoveTo(self.chance.uniform(-7000.0, 7000.0), "um")  # type: ignore[arg-type]
             self._submit(replace(order, motion=motion))
 

@@ -5,10 +5,14 @@ import queue
 
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.failure import FailurePolicy
-from cosmic.mico.core.motion.channel import PilotContext
+from cosmic.frame.inbox import Inbox
+from cosmic.mico.core.motion.channel_context import AxisReports, ChannelContext
 from cosmic.mico.core.motion.data_container import DeviceDataContainer
-from cosmic.mico.core.motion.device import ChannelDiscovery
+from cosmic.mico.core.motion.device import Device
+from cosmic.mico.core.motion.discovery import ChannelDiscovery
+from cosmic.mico.core.motion.gate_queue import GateQueue
 from cosmic.mico.core.motion.manager import DeviceManager
+from cosmic.mico.core.motion.messages import Message
 from cosmic.mico.hw.interface import Event
 from unit.mico.rigs import settings
 from unit.mico.scripted_controller import ScriptedController
@@ -30,17 +34,21 @@ def test_a_device_is_not_introduced_before_each_of_its_axes_was_asked_where_it_i
     manager = DeviceManager(controller, mico, clock=clock, policy=FailurePolicy())
     configured = {each.channel: each for each in mico.positioner}
     container = DeviceDataContainer(0, configured, math.inf, library_index=0)
+    inbox: Inbox[Message] = Inbox(clock)
+    policy = FailurePolicy()
+    device = Device(
+        controller, container, gate=manager.gate, clock=clock, settings=mico, policy=policy
+    )
     discovery = ChannelDiscovery(
-        PilotContext(
+        ChannelContext(
             controller=controller,
             container=container,
             gate=manager.gate,
             clock=clock,
             settings=mico,
-            on_refused=lambda _verdict: None,
-            on_finished=lambda _name, _position: None,
-            on_failed=lambda _name, _error: None,
-            on_state=lambda _channel: None,
+            queries=GateQueue(manager.gate, clock=clock, inbox=inbox, policy=policy, device=0),
+            reports=AxisReports(device, container),
+            inbox=inbox,
         )
     )
 
@@ -48,11 +56,11 @@ def test_a_device_is_not_introduced_before_each_of_its_axes_was_asked_where_it_i
         for event in waiting(controller):
             container.apply(event)
             assert event.channel is not None
-            pilot = discovery.pilots.get(event.channel.channel)
-            if pilot is None:
+            axis = discovery.channels.get(event.channel.channel)
+            if axis is None:
                 discovery.take(event, event.channel.channel)
             else:
-                pilot.take(event)
+                axis.monitor.take(event)
             discovery.look()
 
     discovery.begin()
@@ -62,7 +70,7 @@ def test_a_device_is_not_introduced_before_each_of_its_axes_was_asked_where_it_i
     container.apply(second)
     discovery.take(first, 0)
     let_it_answer()
-    assert discovery.pilots[0].located
+    assert discovery.channels[0].monitor.located
     assert not discovery.wait(0.0)
     discovery.take(second, 1)
     let_it_answer()

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from cosmic.frame.verdict import ALLOWED, Reason, refuse
 from cosmic.mico.core.collision.answer import AxisSpan
 from cosmic.mico.core.collision.checker import NoCollisionModel
-from cosmic.mico.core.motion.checks import Limits, PlatformSnapshot, Request, judge
+from cosmic.mico.core.motion.checks import Limits, PlatformSnapshot, Request, check_move
 from cosmic.mico.core.motion.gate import Gate
 from cosmic.mico.core.motion.lease import Lease
 from cosmic.mico.core.motion.orders import Calibrate, Interval, MoveBy, MoveTo, Reference, Step
@@ -56,7 +56,7 @@ def picture(*states, **changes):
 
 def ask(motion, *states, token="t", consent=False, checker=None, **changes):
     request = Request("x", motion, token, consent)
-    return judge([request], picture(*states, **changes), checker or NoCollisionModel())
+    return check_move([request], picture(*states, **changes), checker or NoCollisionModel())
 
 
 def reason(*args, **changes):
@@ -202,9 +202,9 @@ def test_an_unknown_axis_may_be_wherever_it_was_driven_since():
     one = gate(checker, states={"x": state}, regions={"x": Interval(-20.0, 30.0)})
     token = one._lease.holder.token
     for _ in range(2):
-        verdict, grants = one.decide([Request("x", MoveBy(10.0, "um"), token, consent=True)])
+        verdict, reservations = one.decide([Request("x", MoveBy(10.0, "um"), token, consent=True)])
         assert verdict.allowed
-        one.release(grants["x"])
+        one.release(reservations["x"])
     assert checker.swept["x"] == AxisSpan(-20.0, 50.0, None, moving=True)
 
 
@@ -279,21 +279,21 @@ def test_a_check_or_a_refusal_holds_nothing():
     one = gate()
     token = one._lease.holder.token
     one.check([Request("x", MoveTo(50.0, "um"), token)])
-    verdict, grants = one.decide([Request("x", MoveTo(500.0, "um"), token)])
+    verdict, reservations = one.decide([Request("x", MoveTo(500.0, "um"), token)])
     assert not verdict.allowed
-    assert grants == {}
+    assert reservations == {}
     assert one.held() == {}
 
 
 def test_a_grant_is_void_after_a_stop_even_when_it_was_reset():
     latch = StopLatch()
     one = gate(latch=latch)
-    _, grants = one.decide([Request("x", MoveTo(50.0, "um"), one._lease.holder.token)])
-    assert one.still_valid(grants["x"])
+    _, reservations = one.decide([Request("x", MoveTo(50.0, "um"), one._lease.holder.token)])
+    assert one.still_valid(reservations["x"])
     latch.set("stop")
-    assert not one.still_valid(grants["x"])
+    assert not one.still_valid(reservations["x"])
     latch.reset()
-    assert not one.still_valid(grants["x"])
+    assert not one.still_valid(reservations["x"])
 
 
 def test_a_refused_collision_names_the_bodies():

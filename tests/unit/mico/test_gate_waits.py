@@ -16,7 +16,7 @@ from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.collision.helper_link import LateAnswerError
 from cosmic.mico.core.motion import gate as gate_module
 from cosmic.mico.core.motion.checks import Request
-from cosmic.mico.core.motion.gate import Question
+from cosmic.mico.core.motion.gate import GateQuery
 from cosmic.mico.core.motion.orders import MoveTo
 from cosmic.mico.hw.interface import Channel
 from unit.mico.rigs import listen, mico, wait_until
@@ -252,24 +252,24 @@ def test_what_is_ended_before_it_was_judged_ends_at_once_and_never_begins(how):
         assert not controller.of("move_to")
 
 
-@pytest.mark.parametrize("when", ["while it is judged", "when it was granted"])
+@pytest.mark.parametrize("when", ["while it is checked", "when it was reserved"])
 def test_a_question_that_is_taken_back_holds_nothing(when):
     with going() as (rig, _, checker):
         manager = rig.application.manager
-        gate, question = manager.gate, Question()
+        gate, query = manager.gate, GateQuery()
         request = Request("d0.c0", MoveTo(20.0, "um"), manager.lease.local_token)
         checker.go.clear()
         answers = []
-        asking = Thread(target=lambda: answers.append(gate.decide([request], question)))
+        asking = Thread(target=lambda: answers.append(gate.decide([request], query)))
         asking.start()
         wait_until(lambda: bool(checker.asked))
-        if when == "while it is judged":
-            gate.take_back(question)
+        if when == "while it is checked":
+            gate.withdraw_query(query)
         checker.go.set()
         asking.join(5.0)
-        if when == "when it was granted":
+        if when == "when it was reserved":
             assert gate.held()
-            gate.take_back(question)
+            gate.withdraw_query(query)
         assert not gate.held()
         assert not gate.targets()
         assert answers[0][0].allowed

@@ -9,7 +9,7 @@ import pytest
 import cosmic
 from cosmic.frame.verdict import Reason
 from cosmic.mico.core.motion.checks import Request
-from cosmic.mico.core.motion.orders import Grant, Jog, MoveBy, MoveTo, Order
+from cosmic.mico.core.motion.orders import Jog, MoveBy, MoveTo, Order, Reservation
 from cosmic.mico.hw.interface import Channel
 from unit.mico.rigs import listen, mico, wait_until
 
@@ -23,13 +23,13 @@ def platform(**options):
 
 
 def reserved(manager, motion, axis=NAME):
-    verdict, grants = manager.gate.decide([Request(axis, motion, manager.lease.local_token)])
+    verdict, reservations = manager.gate.decide([Request(axis, motion, manager.lease.local_token)])
     assert verdict.allowed
-    return grants[axis]
+    return reservations[axis]
 
 
-def submit(manager, motion, grant, channel=0):
-    order = Order(channel, motion, manager.lease.local_token, "attack", grant=grant)
+def submit(manager, motion, reservation, channel=0):
+    order = Order(channel, motion, manager.lease.local_token, "attack", reservation=reservation)
     manager.devices[0].submit(order)
     return order.movement
 
@@ -43,61 +43,63 @@ def refused(movement):
 def test_the_gates_own_reservation_moves_the_axis_once():
     with platform() as (manager, controller):
         motion = MoveTo(5.0, "um")
-        grant = reserved(manager, motion)
-        assert submit(manager, motion, grant).wait(2) == 5.0
+        reservation = reserved(manager, motion)
+        assert submit(manager, motion, reservation).wait(2) == 5.0
         manager.order_together({NAME: MoveTo(0.0, "um")}, source="test")[NAME].movement.wait(2)
-        verdict = refused(submit(manager, motion, grant))
+        verdict = refused(submit(manager, motion, reservation))
         assert verdict.reason is Reason.NO_LEASE
         assert "used" in str(verdict)
         assert [call[2] for call in controller.of("move_to")] == [5.0, 0.0]
 
 
 FORGED = {
-    "made up": lambda grant: Grant(NAME, 987654, 0, 90.0),
-    "made up with a number that was given": lambda grant: Grant(NAME, grant.number, 0, 90.0),
+    "made up": lambda reservation: Reservation(NAME, 987654, 0, 90.0),
+    "made up with a number that was given": lambda reservation: Reservation(
+        NAME, reservation.number, 0, 90.0
+    ),
     "a copy": replace,
-    "a copy with another target": lambda grant: replace(grant, target=90.0),
-    "no number": lambda grant: Grant(NAME, "x", 0, 90.0),
-    "no reservation at all": lambda grant: object(),
+    "a copy with another target": lambda reservation: replace(reservation, target=90.0),
+    "no number": lambda reservation: Reservation(NAME, "x", 0, 90.0),
+    "no reservation at all": lambda reservation: object(),
 }
 
 
 @pytest.mark.parametrize("forge", FORGED.values(), ids=FORGED)
 def test_what_the_gate_did_not_give_moves_nothing_and_spoils_nothing(forge, caplog):
     with platform() as (manager, controller):
-        told = listen(manager.devices[0].movement_refused)
+        refusals = listen(manager.devices[0].movement_refused)
         motion = MoveTo(5.0, "um")
-        grant = reserved(manager, motion)
-        verdict = refused(submit(manager, motion, forge(grant)))
+        reservation = reserved(manager, motion)
+        verdict = refused(submit(manager, motion, forge(reservation)))
         assert (verdict.reason, verdict.axis) == (Reason.NO_LEASE, NAME)
         assert "was not given" in verdict.text or "before" in verdict.text
         assert str(verdict) in caplog.text
-        wait_until(lambda: told == [verdict])
+        wait_until(lambda: refusals == [verdict])
         assert not controller.of("move_to")
         assert NAME in manager.gate.held(), "the true one still holds its interval"
-        assert submit(manager, motion, grant).wait(2) == 5.0
+        assert submit(manager, motion, reservation).wait(2) == 5.0
 
 
 def test_a_reservation_of_another_axis_or_motion_moves_nothing():
     with platform() as (manager, controller):
         motion = MoveTo(5.0, "um")
-        grant = reserved(manager, motion)
-        assert "is for d0.c0" in str(refused(submit(manager, motion, grant, channel=1)))
+        reservation = reserved(manager, motion)
+        assert "is for d0.c0" in str(refused(submit(manager, motion, reservation, channel=1)))
         for other in (MoveTo(4900.0, "um"), MoveTo(5.0, "um"), MoveBy(9.0, "um"), Jog(1, 50.0)):
-            assert "another motion" in str(refused(submit(manager, other, grant)))
+            assert "another motion" in str(refused(submit(manager, other, reservation)))
         assert not controller.of("move_to")
-        assert submit(manager, motion, grant).wait(2) == 5.0
+        assert submit(manager, motion, reservation).wait(2) == 5.0
 
 
 @pytest.mark.parametrize("reset", [False, True])
 def test_a_stop_ends_a_reservation(reset):
     with platform() as (manager, controller):
         motion = MoveTo(5.0, "um")
-        grant = reserved(manager, motion)
+        reservation = reserved(manager, motion)
         manager.stop("test")
         if reset:
             manager.reset_stop()
-        assert refused(submit(manager, motion, grant)).reason is Reason.STOPPED
+        assert refused(submit(manager, motion, reservation)).reason is Reason.STOPPED
         assert not controller.of("move_to")
         assert NAME not in manager.gate.held()
 
@@ -105,12 +107,12 @@ def test_a_stop_ends_a_reservation(reset):
 def test_a_release_and_a_rescan_end_a_reservation():
     with platform() as (manager, controller):
         motion = MoveTo(5.0, "um")
-        grant = reserved(manager, motion)
-        manager.gate.release(grant)
-        assert refused(submit(manager, motion, grant)).reason is Reason.NO_LEASE
-        grant = reserved(manager, motion)
+        reservation = reserved(manager, motion)
+        manager.gate.release(reservation)
+        assert refused(submit(manager, motion, reservation)).reason is Reason.NO_LEASE
+        reservation = reserved(manager, motion)
         manager.rescan()
-        assert not refused(submit(manager, motion, grant)).allowed
+        assert not refused(submit(manager, motion, reservation)).allowed
         assert not controller.of("move_to")
         assert manager.gate.held() == {}
 
@@ -120,14 +122,14 @@ def test_orders_cannot_give_back_what_a_movement_under_way_holds():
         motion = MoveTo(500.0, "um")
         orders = manager.order_together({NAME: motion}, source="test")
         wait_until(lambda: bool(controller.of("move_to")))
-        used = orders[NAME].grant
-        for grant in (used, replace(used)):
-            lost = Order(1, motion, manager.lease.local_token, grant=grant)
+        used = orders[NAME].reservation
+        for reservation in (used, replace(used)):
+            lost = Order(1, motion, manager.lease.local_token, reservation=reservation)
             lost.movement.cancel()
             manager.devices[0].submit(lost)
             assert lost.movement.exception(2)
             assert manager.gate.held()[NAME].high == 500.0
-            assert not refused(submit(manager, motion, grant)).allowed
+            assert not refused(submit(manager, motion, reservation)).allowed
             assert manager.gate.held()[NAME].high == 500.0
         assert len(controller.of("move_to")) == 1
         controller.end(Channel(0, 0), 500.0)
@@ -138,12 +140,12 @@ def test_of_many_threads_with_one_reservation_one_is_heard():
     with platform() as (manager, _):
         gate, motion = manager.gate, MoveTo(5.0, "um")
         for _round in range(50):
-            grant = reserved(manager, motion)
+            reservation = reserved(manager, motion)
             ready, claims = threading.Barrier(8), []
 
-            def claim(grant=grant, ready=ready, claims=claims):
+            def claim(reservation=reservation, ready=ready, claims=claims):
                 ready.wait()
-                claims.append(gate.claim(grant, NAME, motion))
+                claims.append(gate.claim(reservation, NAME, motion))
 
             threads = [threading.Thread(target=claim) for _ in range(8)]
             for thread in threads:
@@ -151,7 +153,7 @@ def test_of_many_threads_with_one_reservation_one_is_heard():
             for thread in threads:
                 thread.join()
             assert claims.count(None) == 1
-            gate.release(grant)
+            gate.release(reservation)
 
 
 def test_an_axis_that_was_elsewhere_meanwhile_is_judged_again():
@@ -160,11 +162,11 @@ def test_an_axis_that_was_elsewhere_meanwhile_is_judged_again():
         late = reserved(manager, motion)
         away = manager.order_together({NAME: MoveTo(1000.0, "um")}, source="test")
         away[NAME].movement.wait(2)
-        judged = []
+        checked = []
         real = gate.decide
-        gate.decide = lambda requests, *more: judged.append(requests) or real(requests, *more)
+        gate.decide = lambda requests, *more: checked.append(requests) or real(requests, *more)
         assert submit(manager, motion, late).wait(2) == 10.0
-        assert len(judged) == 1, "the way from 1000 um was never looked at"
+        assert len(checked) == 1, "the way from 1000 um was never looked at"
 
 
 class Keeps:
@@ -173,12 +175,12 @@ class Keeps:
     skew_ms = None
 
     def __init__(self):
-        self.departures = []
+        self.axes = []
 
-    def arrive(self, departure):
-        self.departures.append(departure)
-        departure.go()
-        departure.tell()
+    def arrive(self, axis):
+        self.axes.append(axis)
+        axis.go()
+        axis.report()
 
 
 def test_a_start_that_is_repeated_sends_nothing():
@@ -187,6 +189,6 @@ def test_a_start_that_is_repeated_sends_nothing():
         order = Order(0, motion, manager.lease.local_token, start=keeps)
         manager.devices[0].submit(order)
         assert order.movement.wait(2) == 5.0
-        assert keeps.departures[0].go() is False
-        keeps.departures[0].tell()
+        assert keeps.axes[0].go() is False
+        keeps.axes[0].report()
         assert len(controller.of("move_to")) == 1

@@ -217,7 +217,7 @@ def test_a_newer_move_gets_the_usual_speed_back():
 # Starting together
 
 
-def test_the_skew_of_a_start_is_measured_and_told():
+def test_the_skew_of_a_start_is_measured_and_published():
     with mico(TWO) as (rig, _):
         heard = listen(rig.application.manager.group_started)
         group = rig.move({LEFT: 1.0, RIGHT: 1.0, "d0.c1": 1.0}, wait=False)
@@ -368,11 +368,11 @@ class _Axis:
         self._log.append(("go", self.name))
         return self._sent
 
-    def tell(self):
-        self._log.append(("tell", self.name))
+    def report(self):
+        self._log.append(("report", self.name))
 
 
-def test_whoever_comes_last_starts_all_and_tells_afterwards():
+def test_whoever_comes_last_starts_all_and_reports_afterwards():
     log, heard = [], []
     start = GroupStart(3, heard.append)
     threads = [
@@ -381,7 +381,7 @@ def test_whoever_comes_last_starts_all_and_tells_afterwards():
     for thread in threads:
         thread.start()
         thread.join()
-    assert log == [(what, name) for what in ("go", "tell") for name in "abc"]
+    assert log == [(what, name) for what in ("go", "report") for name in "abc"]
     assert heard[0].names == ("a", "b", "c")
 
 

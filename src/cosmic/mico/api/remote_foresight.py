@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 from cosmic.frame.clock import WALL
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.core.collision.checker import NoCollisionModel
-from cosmic.mico.core.motion.checks import Limits, PlatformSnapshot, Request, judge
+from cosmic.mico.core.motion.checks import Limits, PlatformSnapshot, Request, check_move
 from cosmic.mico.core.motion.orders import Motion
 
 if TYPE_CHECKING:
@@ -31,5 +31,5 @@ def foreseen(
         rules=Limits.of(manager.settings),
     )
     requests = [Request(name, motion, _HERE, consent) for name, motion in motions.items()]
-    verdict = judge(requests, picture, NoCollisionModel(), advice=False).verdict
+    verdict = check_move(requests, picture, NoCollisionModel(), advice=False).verdict
     return replace(verdict, text=_TEXT) if verdict.allowed else verdict

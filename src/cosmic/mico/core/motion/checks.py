@@ -145,7 +145,7 @@ def swept_interval(
         return EVERYWHERE
     if target is not None:
         if state.confidence is not Confidence.UNKNOWN:
-            return place.hull(Interval(target, target))
+            return place.union(Interval(target, target))
         # The counter is somewhere; what it will count is known.
         return _extended(place, target - state.position)
     match motion:
@@ -314,7 +314,7 @@ def _limit(
         stands = 0.0 if state.position is None else state.position
         place = Interval(stands, stands)
         if held is not None:
-            place = place.hull(held)
+            place = place.union(held)
         swept = swept_interval(motion, state, None, place, rules)
         target = swept.high if motion.steps > 0 else swept.low
     if low - ROUNDING <= target <= high + ROUNDING or _returns(state, target):
@@ -338,7 +338,7 @@ STILL: Final = {"um": 0.1, "deg": 0.001}
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One axis' part of a question to the gate."""
+    """One axis' part of a query to the gate."""
 
     axis: str
     motion: Motion
@@ -388,11 +388,11 @@ class PlatformSnapshot:
         place = self.held.get(state.name)
         if state.confidence is Confidence.UNKNOWN:
             region = self.regions.get(state.name, EVERYWHERE)
-            return region if place is None else region.hull(place)
+            return region if place is None else region.union(place)
         if state.position is None:
             return EVERYWHERE
         here = Interval(state.position, state.position)
-        return here if place is None else here.hull(place)
+        return here if place is None else here.union(place)
 
 
 @dataclass(frozen=True, slots=True)
@@ -405,7 +405,7 @@ class Decision:
     headings: Mapping[str, int]
 
 
-def judge(
+def check_move(
     requests: Sequence[Request],
     snapshot: PlatformSnapshot,
     checker: CollisionChecker,
@@ -442,7 +442,7 @@ def judge(
 
 
 def still_true(requests: Sequence[Request], then: PlatformSnapshot, now: PlatformSnapshot) -> bool:
-    """Return whether what was judged by the snapshot `then` may be done by the snapshot `now`.
+    """Return whether what was checked by the snapshot `then` may be done by the snapshot `now`.
 
     Axes in flight may go on within what they hold; nothing else may have changed. Stops are
     counted by the reservations.
@@ -455,11 +455,11 @@ def still_true(requests: Sequence[Request], then: PlatformSnapshot, now: Platfor
     if any(_no_right(request, now) for request in requests):
         return False
     return all(
-        _as_judged(state, now.states[name], then, now) for name, state in then.states.items()
+        _unchanged(state, now.states[name], then, now) for name, state in then.states.items()
     )
 
 
-def _as_judged(
+def _unchanged(
     then: PositionerState, now: PositionerState, old: PlatformSnapshot, new: PlatformSnapshot
 ) -> bool:
     known = then.present, then.confidence, then.limits, then.std, then.position is None

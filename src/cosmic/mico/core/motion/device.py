@@ -3,10 +3,9 @@
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from queue import Empty
-from threading import Event as ThreadEvent
 from threading import Lock
 from typing import Final
 
@@ -20,158 +19,40 @@ from cosmic.frame.errors import (
     DeviceFault,
     MoveCancelled,
     NotConnectedError,
-    refusal,
 )
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.inbox import Inbox
-from cosmic.frame.job_queue import JobQueue
-from cosmic.frame.operation import Operation
 from cosmic.frame.threads import JOIN_TIMEOUT_S, WorkerThread
 from cosmic.frame.verdict import Reason, refuse
-from cosmic.mico.core.motion.channel import (
-    Asking,
-    ChannelController,
-    Judged,
-    OnAnswer,
-    PilotContext,
-)
+from cosmic.mico.core.motion.channel import ChannelController
+from cosmic.mico.core.motion.channel_context import AxisReports, ChannelContext
 from cosmic.mico.core.motion.data_container import DeviceDataContainer
-from cosmic.mico.core.motion.gate import Gate, Question
+from cosmic.mico.core.motion.discovery import ChannelDiscovery
+from cosmic.mico.core.motion.gate import Gate
+from cosmic.mico.core.motion.gate_queue import GateQueue
 from cosmic.mico.core.motion.messages import (
-    Departed,
     DeviceLost,
+    GateAnswer,
+    GroupMoveSent,
     Halt,
     Lost,
-    MovementEnded,
-    PositionChanged,
+    Message,
+    PublishState,
     SetFrequency,
     StopAll,
-    Tell,
     Wake,
 )
 from cosmic.mico.core.motion.orders import Order
 from cosmic.mico.core.motion.positioner import CountedTravel, PositionerState
 from cosmic.mico.core.settings import MicoSettings
-from cosmic.mico.hw.interface import (
-    Channel,
-    Controller,
-    Event,
-    Failed,
-    PositionerKind,
-    ReferenceKind,
-    SensorPresentRead,
-    TypeRead,
-)
+from cosmic.mico.hw.interface import Controller, Event, Failed
 
 logger = logging.getLogger(__name__)
-
-
-class ChannelDiscovery:
-    """Asks each channel what it has and makes a pilot for what answers; device thread.
-
-    It is over when every channel has answered, stands, and has told its position.
-    """
-
-    def __init__(self, context: PilotContext) -> None:
-        self._context = context
-        self._over = ThreadEvent()
-        self.pilots: dict[int, ChannelController] = {}
-
-    @property
-    def over(self) -> bool:
-        """True when everything is known; any thread."""
-        return self._over.is_set()
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait until it is over; False after `timeout_s` of wall time. Any thread."""
-        return self._over.wait(timeout_s)
-
-    def give_up(self) -> dict[int, ChannelController]:
-        """Part from all pilots, as of a device that is gone."""
-        pilots, self.pilots = self.pilots, {}
-        self._over.set()
-        return pilots
-
-    def begin(self) -> None:
-        """Ask every channel whether it has a sensor."""
-        container, controller = self._context.container, self._context.controller
-        channels = container.possible_channels()
-        for channel in channels:
-            container.expect(channel)
-        for channel in channels:
-            address = container.address(channel)
-            try:
-                controller.report_completion(address)
-                controller.ask_sensor_present(address)
-            except DeviceError as exc:
-                if exc.fault is not DeviceFault.NO_CHANNEL:
-                    raise
-                container.settle(channel, None, "no such channel")
-        self.look()
-
-    def take(self, event: Event, channel: int) -> None:
-        """Take an event of a channel that has no pilot yet."""
-        if isinstance(event, SensorPresentRead) and event.present:
-            self._context.controller.ask_type(event.channel)
-        elif isinstance(event, (SensorPresentRead, TypeRead)):
-            self._welcome(channel)
-        else:
-            logger.debug("device %d: %s", self._context.container.device, event)
-
-    def _welcome(self, channel: int) -> None:
-        positioner = self._context.container.positioner(channel)
-        if positioner is None or not positioner.state.present:
-            return
-        pilot = ChannelController(positioner, self._context)
-        self.pilots[channel] = pilot
-        if positioner.state.kind is not PositionerKind.OPEN_LOOP:
-            usual_hz = self._context.settings.defaults.closed_loop_frequency_hz
-            pilot.speed.set_usual(positioner.frequency_hz or usual_hz)
-            pilot.ask_position_known()
-            found = positioner.state.positioner
-            if found is not None and found.reference is ReferenceKind.END_STOP:
-                self._ask_safe_direction(positioner.state.address)
-        pilot.ask_activity()
-        pilot.ask_position()
-
-    def _ask_safe_direction(self, address: Channel) -> None:
-        """Ask which way a search for the reference goes; where unknown, it may go both."""
-        try:
-            self._context.controller.ask_safe_direction(address)
-        except DeviceError as exc:
-            if exc.fault is not DeviceFault.UNSUPPORTED:
-                raise
-
-    def look(self) -> None:
-        """See whether it is over."""
-        container = self._context.container
-        if self._over.is_set() or not container.clear:
-            return
-        # The listener settles a channel before its answer gets here, so that a pilot may lack.
-        present = {
-            channel
-            for channel in container.channels()
-            if (state := container.state(channel)) is not None and state.present
-        }
-        if present <= self.pilots.keys() and all(each.located for each in self.pilots.values()):
-            self._over.set()
-
 
 MOST_AT_ONCE: Final = 100
 """How many messages are taken before positions are polled again."""
 GUARD_LOOK_S: Final = 0.03
 """How often it is looked whether another process that commanded a motion is still there."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Answered:
-    """The gate has judged an order, or the next packet of a jog."""
-
-    judged: Judged
-    on_answer: OnAnswer
-
-
-_Message = _Answered | Departed | Order | Event | Halt | StopAll | Lost | SetFrequency | Tell | Wake
 
 
 class Device(WorkerThread):
@@ -210,32 +91,25 @@ class Device(WorkerThread):
         self._controller = controller
         self.container = container
         self._settings = settings
-        self._inbox: Inbox[_Message] = Inbox(clock)
+        self._inbox: Inbox[Message] = Inbox(clock)
         self._intake = Lock()
         self._open = False
-        self._closed = False
         self._nudged = False
         self._newest: dict[int, int] = {}
         self._void: dict[int, int] = {}
-        self._shown: dict[int, PositionerState] = {}
-        self._context = PilotContext(
+        self._queries = GateQueue(
+            gate, clock=clock, inbox=self._inbox, policy=policy, device=container.device
+        )
+        self._context = ChannelContext(
             controller=controller,
             container=container,
             gate=gate,
             clock=clock,
             settings=settings,
-            on_refused=self.movement_refused.emit,
-            on_finished=self._emit_finished,
-            on_failed=self._emit_failed,
-            on_state=self._emit_state,
-            on_begun=self.movement_begun.emit,
-            on_departed=self._inbox.put,
-            ask_gate=self._ask_gate,
-            on_unasked=self._take_back,
+            queries=self._queries,
+            reports=AxisReports(self, container),
+            inbox=self._inbox,
         )
-        self._asked: dict[int, tuple[Order, Question]] = {}
-        self._judges = JobQueue(f"gate of device {container.device}", policy)
-        self._judging = clock.worker()
         self._discovery = ChannelDiscovery(self._context)
         container.observe(lambda event, _state: self._inbox.put(event))
 
@@ -245,8 +119,8 @@ class Device(WorkerThread):
         return self.container.device
 
     @property
-    def _pilots(self) -> dict[int, ChannelController]:
-        return self._discovery.pilots
+    def _channels(self) -> dict[int, ChannelController]:
+        return self._discovery.channels
 
     # For any thread
 
@@ -257,12 +131,11 @@ class Device(WorkerThread):
     def begin(self) -> None:
         """Start the thread and take orders."""
         self._open = True
-        if not self._context.gate.prompt:
-            self._judges.start()
+        self._queries.start()
         self.start()
 
     def submit(self, order: Order) -> None:
-        """Queue `order`; how it goes is told by its movement and by signals."""
+        """Queue `order`; how it goes is reported by its movement and by signals."""
         stop = self._context.gate.stop_state
         if stop.latched:
             self._refuse_stopped(order, stop.reason or "")
@@ -279,14 +152,14 @@ class Device(WorkerThread):
 
     def renew_jog(self, order: Order) -> None:
         """Keep the jog started by `order` alive."""
-        pilot = self._pilots.get(order.channel)
-        if pilot is not None:
-            pilot.renew(order.number)
+        axis = self._channels.get(order.channel)
+        if axis is not None:
+            axis.renew(order.number)
 
     def steer_jog(self, order: Order, velocity: float) -> None:
         """Keep the movement started by `order` alive at a signed speed; only the newest counts."""
-        pilot = self._pilots.get(order.channel)
-        if pilot is not None and pilot.steer(order.number, velocity) and not self._nudged:
+        axis = self._channels.get(order.channel)
+        if axis is not None and axis.steer(order.number, velocity) and not self._nudged:
             self._nudged = True
             self._inbox.put(Wake())
 
@@ -307,8 +180,8 @@ class Device(WorkerThread):
         """Stop one movement; another one that has replaced it goes on."""
         error = MoveCancelled("cancelled")
         self._inbox.put(Halt(order.channel, error, order.movement))
-        pilot = self._pilots.get(order.channel)
-        active = pilot.active if pilot is not None else None
+        axis = self._channels.get(order.channel)
+        active = axis.monitor.active if axis is not None else None
         if active is None or active.order.movement is not order.movement:
             return  # not begun, or over: the device thread sees to the rest
         try:
@@ -321,10 +194,9 @@ class Device(WorkerThread):
         name = state.name if state else f"device {self.index} channel {order.channel}"
         text = f"{name}: motion is stopped ({reason}); reset the stop first"
         verdict = refuse(Reason.STOPPED, text, axis=name)
-        self._context.gate.withdraw(order.grant)
+        self._context.gate.withdraw(order.reservation)
         logger.warning("refused (%s): %s", order.source, verdict)
-        order.movement.fail(refusal(verdict))
-        self.movement_refused.emit(verdict)
+        self._context.reports.refused(order, verdict)
 
     def stop_later(self, error: CosmicError) -> None:
         """Have the device thread repeat the stop of all channels after the call it is in."""
@@ -341,10 +213,10 @@ class Device(WorkerThread):
     def set_zero(self, channel: int, zero: float) -> None:
         """Show the positions of one channel relative to `zero`, in gate coordinates."""
         self.container.update(channel, zero=zero)
-        self._inbox.put(Tell(channel))
+        self._inbox.put(PublishState(channel))
 
     def set_estimate(self, channel: int, position: float, std: float) -> None:
-        """Say where an axis without sensor stands, in gate coordinates, and how well that is known.
+        """Say where an axis without sensor is, in gate coordinates, and how well that is known.
 
         Raises
         ------
@@ -357,7 +229,7 @@ class Device(WorkerThread):
         counts = found is not None and not found.has_sensor
         travel = CountedTravel.of(found.settings, self._settings) if found and counts else None
         self.container.set_estimate(channel, travel, position, std)
-        self._inbox.put(Tell(channel))
+        self._inbox.put(PublishState(channel))
 
     def wait_until_discovered(self, timeout_s: float) -> bool:
         """Wait until types and positions are known; False after `timeout_s` of wall time."""
@@ -366,13 +238,13 @@ class Device(WorkerThread):
     @override
     def request_end(self) -> None:
         super().request_end()
-        self._judges.request_end()
+        self._queries.request_end()
         self._inbox.put(Wake())
 
     @override
     def join(self, timeout_s: float = JOIN_TIMEOUT_S) -> bool:
         ended = super().join(timeout_s)
-        return self._judges.join(timeout_s) and ended
+        return self._queries.join(timeout_s) and ended
 
     # The device thread
 
@@ -401,10 +273,13 @@ class Device(WorkerThread):
             timeout_s = 0.0
 
     def _pause_s(self) -> float:
-        moving = any(pilot.active is not None for pilot in self._pilots.values())
-        if not moving:
+        active_moves = [
+            active
+            for axis in self._channels.values()
+            if (active := axis.monitor.active) is not None
+        ]
+        if not active_moves:
             return self._settings.watch.idle_poll_s
-        active_moves = [pilot.active for pilot in self._pilots.values() if pilot.active is not None]
         jogs = [active.jog for active in active_moves if active.jog is not None]
         if jogs:
             rate = self._context.clock.rate or 1.0
@@ -422,14 +297,14 @@ class Device(WorkerThread):
             else:
                 logger.error("device %d: %s", self.index, exc)
 
-    def _take(self, message: _Message) -> None:
+    def _take(self, message: Message) -> None:
         match message:
             case Order():
                 self._on_order(message)
-            case _Answered():
-                self._on_answered(message)
-            case Departed():
-                self._on_departed(message)
+            case GateAnswer():
+                self._on_answer(message)
+            case GroupMoveSent():
+                self._on_group_move_sent(message)
             case StopAll():
                 self._stop_all(message.error)
             case Lost():
@@ -438,100 +313,58 @@ class Device(WorkerThread):
                 self._on_channel_message(message)
             case Wake():
                 self._nudged = False
-            case Tell():
-                self._emit_state(message.channel)
+            case PublishState():
+                self._context.reports.state(message.channel)
             case _:
                 self._on_event(message)
 
     def _stop_all(self, error: CosmicError) -> None:
-        for order, _ in list(self._asked.values()):
+        for order in self._queries.orders:
             if order.epoch != self._context.gate.stop_state.epoch:
                 self._drop(order, error)
-        for pilot in self._pilots.values():
-            pilot.halt(error)
+        for axis in self._channels.values():
+            axis.monitor.halt(error)
 
     def _on_channel_message(self, message: Halt | SetFrequency) -> None:
-        pilot = self._pilots.get(message.channel)
-        if pilot is None:
+        axis = self._channels.get(message.channel)
+        if axis is None:
             return
         if isinstance(message, Halt):
-            self._drop_asked(message)
-            active = pilot.active
+            self._drop_halted(message)
+            active = axis.monitor.active
             if message.only is None or (active and active.order.movement is message.only):
-                pilot.halt(message.error)
+                axis.monitor.halt(message.error)
         else:
-            pilot.set_frequency(message.frequency_hz)
+            axis.set_frequency(message.frequency_hz)
 
     def _on_order(self, order: Order) -> None:
-        pilot = self._pilots.get(order.channel)
-        if pilot is None or not self._discovery.over:
+        axis = self._channels.get(order.channel)
+        if axis is None or not self._discovery.over:
             self._turn_away(order, None)
             return
         if order.number <= self._void.get(order.channel, 0):
-            self._context.gate.withdraw(order.grant)
-            order.movement.fail(MoveCancelled(f"{pilot.name}: halted before it started"))
+            self._context.gate.withdraw(order.reservation)
+            order.movement.fail(MoveCancelled(f"{axis.name}: halted before it started"))
             return
-        with self._telling_of(order, pilot):
-            pilot.launch(order)
+        with self._failing(order, axis):
+            axis.launch(order)
 
-    def _ask_gate(self, order: Order, ask: Asking, on_answer: OnAnswer) -> None:
-        """Ask the gate without waiting for it: positions and dead men are looked at meanwhile."""
-        if self._context.gate.prompt:
-            on_answer(ask(Question()))
+    def _on_answer(self, answer: GateAnswer) -> None:
+        checked = answer.checked
+        order = checked.order
+        wanted = self._queries.take(answer)
+        axis = self._channels.get(order.channel)
+        active = axis.monitor.active if axis is not None else None
+        begun = active is not None and active.order is order
+        if not wanted or axis is None or (order.movement.done and not begun):
+            self._context.gate.withdraw(checked.reservation)
             return
-        question = Question()
-        self._asked[order.number] = order, question
-        self._judging.busy()  # a fast clock waits for the answer
+        with self._failing(order, axis):
+            answer.on_checked(checked)
 
-        def on_end(ended: Operation[None]) -> None:
-            if ended.failure is not None:
-                text = f"the check of the movement failed: {ended.failure}"
-                self._answer(
-                    _Answered(Judged(order, None, refuse(Reason.NO_ANSWER, text)), on_answer)
-                )
-
-        def judge() -> None:
-            self._answer(_Answered(ask(question), on_answer))
-
-        job = self._judges.submit(judge, f"check of order {order.number}")
-        job.add_callback(on_end)
-
-    def _answer(self, answered: _Answered) -> None:
-        """Give an answer of the gate to the device thread; any thread."""
-        with self._intake:
-            running = not self._closed
-            if running:
-                self._inbox.put(answered)
-        if not running:
-            self._context.gate.withdraw(answered.judged.grant)
-
-    def _on_answered(self, answered: _Answered) -> None:
-        judged = answered.judged
-        order = judged.order
-        asked = self._pop_asked(order)
-        pilot = self._pilots.get(order.channel)
-        begun = pilot is not None and pilot.active is not None and pilot.active.order is order
-        if asked is None or pilot is None or (order.movement.done and not begun):
-            self._context.gate.withdraw(judged.grant)
-            return
-        with self._telling_of(order, pilot):
-            answered.on_answer(judged)
-
-    def _pop_asked(self, order: Order) -> Question | None:
-        _, question = self._asked.pop(order.number, (order, None))
-        if not self._asked:
-            self._judging.idle()
-        return question
-
-    def _take_back(self, order: Order) -> None:
-        """Have the gate hold nothing for an order that is not wanted any more."""
-        question = self._pop_asked(order)
-        if question is not None:
-            self._context.gate.take_back(question)
-
-    def _drop_asked(self, halt: Halt) -> None:
-        """End the orders of a channel that was halted before the gate has judged them."""
-        for order, _ in list(self._asked.values()):
+    def _drop_halted(self, halt: Halt) -> None:
+        """End the orders of a channel that was halted before the gate has answered."""
+        for order in self._queries.orders:
             if halt.only is None:
                 meant = order.number <= self._void.get(order.channel, 0)
             else:
@@ -540,123 +373,97 @@ class Device(WorkerThread):
                 self._drop(order, halt.error)
 
     def _drop(self, order: Order, error: CosmicError) -> None:
-        """End an order that was not begun; one under way ends when it stands."""
-        pilot = self._pilots.get(order.channel)
-        if pilot is None or pilot.active is None or pilot.active.order is not order:
-            self._take_back(order)
+        """End an order that was not begun; one that was ends when the axis is stationary."""
+        axis = self._channels.get(order.channel)
+        if axis is None or axis.monitor.active is None or axis.monitor.active.order is not order:
+            self._queries.withdraw(order)
             order.movement.fail(error)
 
     @contextmanager
-    def _telling_of(self, order: Order, pilot: ChannelController) -> Iterator[None]:
+    def _failing(self, order: Order, axis: ChannelController) -> Iterator[None]:
         """Fail `order` with a mistake in the program that keeps it from being sent."""
         try:
             yield
         except DeviceError:
-            raise  # the end of a device that is lost is told by the pilot
+            raise  # the end of a device that is lost is reported by its channel
         except BaseException as exc:
-            order.movement.fail(DeviceError(f"{pilot.name}: {exc}"))
+            order.movement.fail(DeviceError(f"{axis.name}: {exc}"))
             raise
 
-    def _on_departed(self, departed: Departed) -> None:
-        pilot = self._pilots.get(departed.order.channel)
-        if pilot is not None:
-            pilot.depart(departed)
+    def _on_group_move_sent(self, sent: GroupMoveSent) -> None:
+        axis = self._channels.get(sent.order.channel)
+        if axis is not None:
+            axis.on_group_move_sent(sent)
 
     def _turn_away(self, order: Order, state: PositionerState | None) -> None:
         state = state or self.container.state(order.channel)
         name = state.name if state else f"device {self.index} channel {order.channel}"
         why = state.error if state and state.error else "it is not connected; check it, then rescan"
         verdict = refuse(Reason.DEVICE, f"{name}: {why}", axis=name)
-        self._context.gate.withdraw(order.grant)
-        order.movement.fail(refusal(verdict))
-        self.movement_refused.emit(verdict)
+        self._context.gate.withdraw(order.reservation)
+        self._context.reports.refused(order, verdict)
 
     def _poll(self) -> None:
-        for pilot in self._pilots.values():
-            pilot.poll()
+        for axis in self._channels.values():
+            axis.poll()
 
     def _on_event(self, event: Event) -> None:
         channel = event.channel.channel if event.channel else -1
-        pilot = self._pilots.get(channel)
+        axis = self._channels.get(channel)
         if event.channel is None:
             self._on_device_event(event)
-        elif pilot is None:
+        elif axis is None:
             self._discovery.take(event, channel)
         else:
-            pilot.take(event)
-            self._emit_state(channel)
+            axis.monitor.take(event)
+            self._context.reports.state(channel)
         self._discovery.look()
 
     def _on_device_event(self, event: Event) -> None:
         """Take what concerns the device as a whole, and so each of its channels."""
         if isinstance(event, Failed):
             logger.error("device %d: %s", self.index, event.error)
-        for channel, pilot in self._pilots.items():
-            pilot.take(event)
-            self._emit_state(channel)
+        for channel, axis in self._channels.items():
+            axis.monitor.take(event)
+            self._context.reports.state(channel)
 
     # Trouble and the end
 
     def _on_lost(self, error: DeviceError) -> None:
         self._open = False
         logger.error("device %d is lost: %s", self.index, error)
-        pilots = self._discovery.give_up()
+        axes = self._discovery.give_up()
         # What the gate is asked for belongs to a movement that goes on, such as that of a loop.
-        in_motion = any(each.active is not None for each in pilots.values()) or bool(self._asked)
+        moving = any(each.monitor.active is not None for each in axes.values())
+        in_motion = moving or bool(self._queries.orders)
         reason = f"device {self.index} does not answer: {error}; rescan when it is back"
         self.container.lose(reason)
         # Before anybody is woken: who sees the movement fail must find everything stopped.
         self.lost.emit(DeviceLost(self.index, reason, in_motion))
-        for channel, pilot in pilots.items():
-            pilot.lose(NotConnectedError(f"{pilot.name}: {reason}", fault=error.fault))
-            self._emit_state(channel)
-        self._fail_asked(NotConnectedError(reason, fault=error.fault))
+        for channel, axis in axes.items():
+            axis.monitor.lose(NotConnectedError(f"{axis.name}: {reason}", fault=error.fault))
+            self._context.reports.state(channel)
+        self._queries.fail_all(NotConnectedError(reason, fault=error.fault))
 
     def _close_intake(self) -> None:
         """Leave no order unanswered and nothing moving."""
         with self._intake:
-            self._open, self._closed = False, True
+            self._open = False
+        self._queries.close_intake()
         error = MoveCancelled(f"device {self.index} was closed")
-        for channel, pilot in self._pilots.items():
+        for channel, axis in self._channels.items():
             try:
                 self._controller.stop(self.container.address(channel))
             except DeviceError as exc:
-                logger.warning("%s: %s", pilot.name, exc)
-            pilot.lose(error)
-        self._fail_asked(error)
-        self._judging.close()
+                logger.warning("%s: %s", axis.name, exc)
+            axis.monitor.lose(error)
+        self._queries.fail_all(error)
+        self._queries.close()
         while not self._inbox.empty():
             message = self._inbox.get_nowait()
             if isinstance(message, Order):
-                self._context.gate.withdraw(message.grant)
+                self._context.gate.withdraw(message.reservation)
                 message.movement.fail(error)
-            elif isinstance(message, _Answered):
-                self._context.gate.withdraw(message.judged.grant)
+            elif isinstance(message, GateAnswer):
+                self._context.gate.withdraw(message.checked.reservation)
         self._inbox.close()
-
-    def _fail_asked(self, error: CosmicError) -> None:
-        """Fail what the gate was asked for; a reservation that still comes is given back."""
-        for order, _ in list(self._asked.values()):
-            self._take_back(order)
-            order.movement.fail(error)
-
-    # Telling
-
-    def _emit_state(self, channel: int) -> None:
-        state = self.container.state(channel)
-        if state is None:
-            return
-        before = self._shown.get(channel)
-        if before is not None and replace(before, read_wall_s=state.read_wall_s) == state:
-            return
-        self._shown[channel] = state
-        self.state_changed.emit(state)
-        moved = before is None or before.position != state.position
-        if moved and state.position is not None:
-            self.position_changed.emit(PositionChanged(state.name, state.position, state.unit))
-
-    def _emit_finished(self, name: str, position: float | None) -> None:
-        self.movement_ended.emit(MovementEnded(name, position, None))
-
-    def _emit_failed(self, name: str, error: CosmicError) -> None:
-        self.movement_ended.emit(MovementEnded(name, None, error))

@@ -17,25 +17,25 @@ from cosmic.mico.core.motion.checks import (
     Limits,
     PlatformSnapshot,
     Request,
-    judge,
+    check_move,
     origin,
     span_of,
     still_true,
 )
 from cosmic.mico.core.motion.lease import Lease, LeaseHolder
-from cosmic.mico.core.motion.orders import Grant, Interval, Motion
+from cosmic.mico.core.motion.orders import Interval, Motion, Reservation
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.core.motion.stop_latch import StopLatch, StopState
 
 SOON_S: Final = 0.05
 """An answer that took no longer is as new as the positions, which are asked for so often."""
-MOST_JUDGED: Final = 3
-"""How often movements are judged because the platform changed meanwhile."""
+MOST_TRIES: Final = 3
+"""How often movements are checked because the platform changed meanwhile."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Hold:
-    grant: Grant
+    reservation: Reservation
     interval: Interval
     target: float | None
     begun_at: float | None
@@ -46,30 +46,30 @@ class _Hold:
 class _Unused:
     """A reservation that was given and not used yet."""
 
-    grant: Grant
+    reservation: Reservation
     motion: Motion
 
 
 @dataclass(slots=True)
-class Question:
-    """What the gate is asked by one thread for another, which may take it back at any time."""
+class GateQuery:
+    """What one thread asks the gate for another, which may withdraw it at any time."""
 
-    taken_back: bool = False
-    grants: tuple[Grant, ...] = ()
+    withdrawn: bool = False
+    reservations: tuple[Reservation, ...] = ()
 
 
 class Gate:
-    """Keeps what is in flight and asks `judge`; any thread.
+    """Keeps what is in flight and asks `check_move`; any thread.
 
-    A reservation (`Grant`) covers one motion of one axis and is used once, with `claim`, at the
-    moment at which the motion is sent. Only the object that the gate gave counts, no copy of it.
+    A `Reservation` covers one motion of one axis and is used once, with `claim`, when the
+    motion is sent. Only the object that the gate gave counts, no copy of it.
 
     Parameters
     ----------
     states : callable
         Returns the state of every positioner by name.
     regions : mapping of Interval
-        Where each axis may stand at power-up; anywhere, where it has none.
+        Where each axis may be at power-up; anywhere, where it has none.
     links : callable
         Returns, by axis, those that must move with it.
     """
@@ -90,7 +90,7 @@ class Gate:
         self._checker = checker
         self._rules = rules
         self._states = states
-        self._judging = Lock()  # one decision at a time; what has ended is released meanwhile
+        self._deciding = Lock()  # one decision at a time; what has ended is released meanwhile
         self._lock = Lock()  # of the reservations; never held while somebody waits for an answer
         self._links = links
         self._numbers = count(1)
@@ -118,24 +118,24 @@ class Gate:
         `advice` is that of `CollisionChecker.check`.
         """
         holder = self._lease.holder
-        return judge(requests, self._snapshot(holder), self._checker, advice=advice).verdict
+        return check_move(requests, self._snapshot(holder), self._checker, advice=advice).verdict
 
     def decide(
-        self, requests: Sequence[Request], question: Question | None = None
-    ) -> tuple[MoveVerdict, dict[str, Grant]]:
-        """Decide `requests` together; when allowed, hold their intervals and grant each axis.
+        self, requests: Sequence[Request], query: GateQuery | None = None
+    ) -> tuple[MoveVerdict, dict[str, Reservation]]:
+        """Decide `requests` together; when allowed, hold their intervals and reserve each axis.
 
-        Nothing is held, or granted, for a `question` that was taken back meanwhile.
+        Nothing is held, or reserved, for a `query` that was withdrawn meanwhile.
         """
-        for _ in range(MOST_JUDGED):
-            holder = self._lease.holder  # first, for it may tell listeners that it has lapsed
+        for _ in range(MOST_TRIES):
+            holder = self._lease.holder  # first, for it may emit that it has lapsed
             before = holder.token, self._revision
-            verdict, grants = self._decide(requests, holder, question)
+            verdict, reservations = self._decide(requests, holder, query)
             # Looked at when the intervals are held: who changes it later finds them.
             if before == (self._lease.holder.token, self._revision):
-                return verdict, grants
-            for grant in grants.values():
-                self.release(grant)
+                return verdict, reservations
+            for reservation in reservations.values():
+                self.release(reservation)
         return words.changed(), {}
 
     @property
@@ -143,18 +143,18 @@ class Gate:
         return getattr(self._checker, "revision", None)
 
     def _decide(
-        self, requests: Sequence[Request], holder: LeaseHolder, question: Question | None
-    ) -> tuple[MoveVerdict, dict[str, Grant]]:
-        with self._judging:
+        self, requests: Sequence[Request], holder: LeaseHolder, query: GateQuery | None
+    ) -> tuple[MoveVerdict, dict[str, Reservation]]:
+        with self._deciding:
             epoch = self._latch.state.epoch
-            snapshot, decision = self._judge(requests, holder)
+            snapshot, decision = self._check(requests, holder)
             with self._lock:
-                if question is not None and question.taken_back:
+                if query is not None and query.withdrawn:
                     return decision.verdict, {}
-                grants = self._hold(requests, snapshot, decision, epoch)
-                if question is not None:
-                    question.grants = tuple(grants.values())
-                return decision.verdict, grants
+                reservations = self._hold(requests, snapshot, decision, epoch)
+                if query is not None:
+                    query.reservations = tuple(reservations.values())
+                return decision.verdict, reservations
 
     def _hold(
         self,
@@ -162,34 +162,34 @@ class Gate:
         snapshot: PlatformSnapshot,
         decision: Decision,
         epoch: int,
-    ) -> dict[str, Grant]:
+    ) -> dict[str, Reservation]:
         """Reserve what was decided; under both locks."""
-        grants: dict[str, Grant] = {}
+        reservations: dict[str, Reservation] = {}
         asked = {request.axis: request.motion for request in requests}
         for axis, interval in decision.intervals.items():
             target = decision.targets.get(axis)
-            grant = Grant(axis, next(self._numbers), epoch, target)
+            reservation = Reservation(axis, next(self._numbers), epoch, target)
             state = snapshot.states[axis]
             if state.confidence is Confidence.UNKNOWN:
                 self._regions[axis] = interval  # wherever that ends, it is somewhere there
             way = decision.headings.get(axis)
-            hold = _Hold(grant, interval, target, origin(state, snapshot.begun_at), way)
-            self._holds.setdefault(axis, {})[grant.number] = hold
-            self._given = grant.number
-            self._unused[id(grant)] = _Unused(grant, asked[axis])
-            grants[axis] = grant
-        return grants
+            hold = _Hold(reservation, interval, target, origin(state, snapshot.begun_at), way)
+            self._holds.setdefault(axis, {})[reservation.number] = hold
+            self._given = reservation.number
+            self._unused[id(reservation)] = _Unused(reservation, asked[axis])
+            reservations[axis] = reservation
+        return reservations
 
-    def _judge(
+    def _check(
         self, requests: Sequence[Request], holder: LeaseHolder
     ) -> tuple[PlatformSnapshot, Decision]:
-        """Judge `requests` by the platform as it still is when the answer comes.
+        """Check `requests` by the platform as it still is when the answer comes.
 
         Meanwhile reservations may be released, and none is added: only who decides adds any.
         """
         snapshot = self._snapshot(holder)
-        for _ in range(MOST_JUDGED):
-            decision = judge(requests, snapshot, self._checker)
+        for _ in range(MOST_TRIES):
+            decision = check_move(requests, snapshot, self._checker)
             soon = WALL.now_s() - snapshot.now_wall_s <= SOON_S
             if soon or not decision.verdict.allowed:
                 return snapshot, decision
@@ -205,24 +205,26 @@ class Gate:
         snapshot = self._snapshot(holder)
         return {name: span_of(state, None, snapshot) for name, state in snapshot.states.items()}
 
-    def still_valid(self, grant: Grant) -> bool:
-        """Return False when a stop came after `grant`; takes no lock."""
+    def still_valid(self, reservation: Reservation) -> bool:
+        """Return False when a stop came after `reservation`; takes no lock."""
         state = self._latch.state
-        return not state.latched and state.epoch == grant.epoch
+        return not state.latched and state.epoch == reservation.epoch
 
     # Reservations
 
-    def objection(self, grant: Grant, axis: str, motion: Motion) -> MoveVerdict | None:
-        """Return why `grant` does not cover sending `motion` to `axis` now; takes no lock."""
-        given = self._unused.get(id(grant))
+    def objection(self, reservation: Reservation, axis: str, motion: Motion) -> MoveVerdict | None:
+        """Return why `reservation` does not cover sending `motion` to `axis` now; takes no lock."""
+        given = self._unused.get(id(reservation))
         if given is None:
-            known = type(grant) is Grant and grant.number in range(1, self._given + 1)
+            known = type(reservation) is Reservation and reservation.number in range(
+                1, self._given + 1
+            )
             why = "was used or released before" if known else "was not given by the gate"
-        elif given.grant.axis != axis:
-            why = f"is for {given.grant.axis}"
+        elif given.reservation.axis != axis:
+            why = f"is for {given.reservation.axis}"
         elif given.motion is not motion:
             why = "is for another motion"
-        elif not self.still_valid(grant):
+        elif not self.still_valid(reservation):
             text = f"{axis}: stopped before it was sent; give the order again after the reset"
             return refuse(Reason.STOPPED, text, axis=axis)
         else:
@@ -230,69 +232,69 @@ class Gate:
         text = f"{axis}: its reservation {why}; nothing was sent. Give the order anew"
         return refuse(Reason.NO_LEASE, text, axis=axis)
 
-    def claim(self, grant: Grant, axis: str, motion: Motion) -> MoveVerdict | None:
-        """Use `grant` up at the moment at which `motion` is sent to `axis`; takes no lock.
+    def claim(self, reservation: Reservation, axis: str, motion: Motion) -> MoveVerdict | None:
+        """Use `reservation` up at the moment at which `motion` is sent to `axis`; takes no lock.
 
         Returns why it must not be sent, or None, which it does once for each reservation.
         """
-        refused = self.objection(grant, axis, motion)
-        if refused is None and self._unused.pop(id(grant), None) is None:
-            refused = self.objection(grant, axis, motion)  # another thread came first
+        refused = self.objection(reservation, axis, motion)
+        if refused is None and self._unused.pop(id(reservation), None) is None:
+            refused = self.objection(reservation, axis, motion)  # another thread came first
         if refused is None:
-            self._sent[axis] = grant.number
+            self._sent[axis] = reservation.number
         return refused
 
     def expire(self, axes: Set[str]) -> frozenset[str]:
         """End the unused reservations of `axes`; returns those that hold any. Takes no lock."""
         for key, given in list(self._unused.items()):
-            if given.grant.axis in axes:
+            if given.reservation.axis in axes:
                 self._unused.pop(key, None)
         return frozenset(axis for axis, holds in list(self._holds.items()) if holds) & axes
 
-    def superseded(self, grant: Grant) -> bool:
+    def superseded(self, reservation: Reservation) -> bool:
         """Return True when a movement decided later was sent to the axis; takes no lock."""
-        return self._sent.get(grant.axis, 0) > grant.number
+        return self._sent.get(reservation.axis, 0) > reservation.number
 
-    def withdraw(self, grant: Grant | None) -> None:
+    def withdraw(self, reservation: Reservation | None) -> None:
         """Release a reservation of an order that is not sent; harmless for any other.
 
         One in use keeps its interval, for orders come from anybody.
         """
-        if self._unused.pop(id(grant), None) is not None and grant is not None:
-            self.release(grant)
+        if self._unused.pop(id(reservation), None) is not None and reservation is not None:
+            self.release(reservation)
 
-    def take_back(self, question: Question) -> None:
-        """Give back what was granted to a question, or have it granted nothing."""
+    def withdraw_query(self, query: GateQuery) -> None:
+        """Release what a query has reserved, or have it reserve nothing."""
         with self._lock:
-            question.taken_back = True
-            grants = question.grants
-        for grant in grants:
-            self.withdraw(grant)
+            query.withdrawn = True
+            reservations = query.reservations
+        for reservation in reservations:
+            self.withdraw(reservation)
 
-    def release(self, grant: Grant) -> None:
-        """Give back the interval of a movement that has ended, its position read; or replaced.
+    def release(self, reservation: Reservation) -> None:
+        """Release the interval of a movement that has ended, its position read; or replaced.
 
         The interval of a movement that replaces another holds the other's as well.
         """
         with self._lock:
-            self._unused.pop(id(grant), None)
-            holds = self._holds.get(grant.axis, {})
-            hold = holds.get(grant.number)
-            if hold is not None and hold.grant is grant:
-                del holds[grant.number]
+            self._unused.pop(id(reservation), None)
+            holds = self._holds.get(reservation.axis, {})
+            hold = holds.get(reservation.number)
+            if hold is not None and hold.reservation is reservation:
+                del holds[reservation.number]
 
-    def abandon(self, grant: Grant) -> None:
+    def abandon(self, reservation: Reservation) -> None:
         """Keep the interval, but no longer count on the target: the movement will not get there."""
         with self._lock:
-            hold = self._holds.get(grant.axis, {}).get(grant.number)
-            if hold is not None and hold.grant is grant:
-                self._holds[grant.axis][grant.number] = replace(hold, target=None)
+            hold = self._holds.get(reservation.axis, {}).get(reservation.number)
+            if hold is not None and hold.reservation is reservation:
+                self._holds[reservation.axis][reservation.number] = replace(hold, target=None)
 
     def release_axis(self, axis: str) -> None:
-        """Give back all of an axis that stands and whose position has just been read."""
+        """Release all of an axis that is stationary and whose position has just been read."""
         with self._lock:
             for hold in self._holds.pop(axis, {}).values():
-                self._unused.pop(id(hold.grant), None)
+                self._unused.pop(id(hold.reservation), None)
 
     @property
     def stop_state(self) -> StopState:
@@ -311,7 +313,7 @@ class Gate:
 
     def _held(self) -> dict[str, Interval]:
         return {
-            axis: reduce(Interval.hull, (hold.interval for hold in holds.values()))
+            axis: reduce(Interval.union, (hold.interval for hold in holds.values()))
             for axis, holds in self._holds.items()
             if holds
         }
@@ -333,7 +335,7 @@ class Gate:
             known = state.present and state.confidence is not Confidence.UNKNOWN
             if known and state.position is not None and name in self._power_up:
                 here = Interval(state.position, state.position)
-                self._regions[name] = self._power_up[name].hull(here)
+                self._regions[name] = self._power_up[name].union(here)
         return dict(self._regions)
 
     def _snapshot(self, holder: LeaseHolder) -> PlatformSnapshot:

@@ -14,7 +14,7 @@ from cosmic.mico.core.motion.group_start import GroupStart, GroupStarted
 from cosmic.mico.core.motion.lease import Lease
 from cosmic.mico.core.motion.links import LinkTable
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.orders import FREQUENCY_HZ, Grant, Motion, Order
+from cosmic.mico.core.motion.orders import FREQUENCY_HZ, Motion, Order, Reservation
 from cosmic.mico.core.motion.positioner import PositionerState, class_for
 from cosmic.mico.core.settings import MicoSettings, MotionDefaults
 from cosmic.mico.hw.interface import Channel
@@ -144,8 +144,8 @@ class GroupOrders:
             match_arrival = match_arrival or len(motions) > named
         requests = self._requests(motions, consent=consent, alone=not linked)
         self._check_ready()
-        grants = self._granted(requests, source)
-        speeds = self._matched_speeds(grants) if match_arrival else {}
+        reservations = self._reserved(requests, source)
+        speeds = self._matched_speeds(reservations) if match_arrival else {}
         speeds |= {name: hertz for name, hertz in (slow_hz or {}).items() if name in motions}
         start = GroupStart(len(motions), self._on_started) if len(motions) > 1 else None
         token, guard = self._lease.local_token, self._lease.guard()
@@ -156,7 +156,7 @@ class GroupOrders:
                 token,
                 source,
                 consent,
-                grant=grants[name],
+                reservation=reservations[name],
                 follows=follows.get(name),
                 start=start,
                 frequency_hz=speeds.get(name),
@@ -194,43 +194,45 @@ class GroupOrders:
             for name, motion in motions.items()
         ]
 
-    def _granted(self, requests: list[Request], source: str) -> dict[str, Grant]:
-        verdict, grants = self._gate.decide(requests)
+    def _reserved(self, requests: list[Request], source: str) -> dict[str, Reservation]:
+        verdict, reservations = self._gate.decide(requests)
         if not verdict.allowed:
             logger.warning("refused (%s): %s", source, verdict)
             self._on_refused(verdict)
             raise refusal(verdict)
         self._links.sent(
-            {name: each.target for name, each in grants.items() if each.target is not None}
+            {name: each.target for name, each in reservations.items() if each.target is not None}
         )
-        return grants
+        return reservations
 
-    def _matched_speeds(self, grants: Mapping[str, Grant]) -> dict[str, int]:
+    def _matched_speeds(self, reservations: Mapping[str, Reservation]) -> dict[str, int]:
         axes = self._axes
-        return _frequencies(grants, axes.states(), axes.settings.defaults, axes.usual_frequency_hz)
+        return _frequencies(
+            reservations, axes.states(), axes.settings.defaults, axes.usual_frequency_hz
+        )
 
     def _submit(self, orders: Mapping[str, Order]) -> None:
-        _give_up_together(orders)
+        _fail_together(orders)
         for name, order in orders.items():
             self._axes.device(name).submit(order)
 
 
 def _frequencies(
-    grants: Mapping[str, Grant],
+    reservations: Mapping[str, Reservation],
     states: Mapping[str, PositionerState],
     defaults: MotionDefaults,
     usual_hz: Callable[[str], int],
 ) -> dict[str, int]:
     """Return the speed limit of every axis with which all arrive at the same time."""
     legs: dict[str, Leg] = {}
-    for name, grant in grants.items():
+    for name, reservation in reservations.items():
         state = states[name]
         sensed = class_for(state.kind, state.positioner).has_sensor
-        if not sensed or grant.target is None or state.position is None:
+        if not sensed or reservation.target is None or state.position is None:
             continue
         rotary = state.unit == "deg"
         legs[name] = Leg(
-            way=abs(grant.target - state.position),
+            way=abs(reservation.target - state.position),
             step=defaults.nominal_step_deg if rotary else defaults.nominal_step_um,
             approach=defaults.approach_deg if rotary else defaults.approach_um,
             top_hz=usual_hz(name),
@@ -239,7 +241,7 @@ def _frequencies(
     return matched_frequencies(legs)
 
 
-def _give_up_together(orders: Mapping[str, Order]) -> None:
+def _fail_together(orders: Mapping[str, Order]) -> None:
     """Have the failure of one of `orders` before the common start withdraw the others."""
 
     def on_end(ended: Movement) -> None:

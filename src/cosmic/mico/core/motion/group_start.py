@@ -14,7 +14,7 @@ _TURN_S: Final = 1e-6
 """A wait as short as this lets every thread that waits for the interpreter go first."""
 
 
-class Departure(Protocol):
+class StartingAxis(Protocol):
     """One axis that is ready to go; the methods may be called in any device's thread."""
 
     @property
@@ -24,8 +24,8 @@ class Departure(Protocol):
     def go(self) -> bool:
         """Send the movement to the controller; False where it was withdrawn before."""
 
-    def tell(self) -> None:
-        """Let its own device know that it was sent."""
+    def report(self) -> None:
+        """Report to its own device that it was sent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class GroupStart:
         self._count = count
         self._on_started = on_started
         self._lock = Lock()
-        self._ready: list[Departure] = []
+        self._ready: list[StartingAxis] = []
         self._skew_ms: float | None = None
 
     @property
@@ -68,10 +68,10 @@ class GroupStart:
         """From the first call to the last, in milliseconds; None before the start."""
         return self._skew_ms
 
-    def arrive(self, departure: Departure) -> None:
+    def arrive(self, axis: StartingAxis) -> None:
         """Say that an axis is ready; the last one starts them all. Device thread."""
         with self._lock:
-            self._ready.append(departure)
+            self._ready.append(axis)
             complete = len(self._ready) == self._count
         if complete:
             self._start()
@@ -81,14 +81,14 @@ class GroupStart:
         # With a fresh turn of the interpreter all calls are over before another thread may claim
         # it. A shorter turn would hand it over between two of them.
         WALL.sleep(_TURN_S)
-        for departure in self._ready:
+        for axis in self._ready:
             now_s = WALL.now_s()
-            if departure.go():
+            if axis.go():
                 stamps_s.append(now_s)
-        # Telling wakes the other devices' threads, which would only be in the way before.
-        for departure in self._ready:
-            departure.tell()
-        names = tuple(departure.name for departure in self._ready)
+        # A report wakes the other devices' threads, which would only be in the way before.
+        for axis in self._ready:
+            axis.report()
+        names = tuple(axis.name for axis in self._ready)
         self._ready = []
         if not stamps_s:
             return

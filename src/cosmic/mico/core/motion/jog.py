@@ -136,7 +136,7 @@ NEAR_STEPS: Final = 10.0
 GLIDE: Final = 1.5
 CREEPING_GLIDE: Final = 7.5
 _CHANGE: Final = 0.05
-"""Part of the speed by which it must change before the axis is told."""
+"""Part of the speed by which it must change before the axis gets a new limit."""
 _OLDEST_S: Final = 0.1
 
 
@@ -194,8 +194,8 @@ class SteerRun(JogRun):
     @override
     def must_look(self) -> bool:
         now_s = WALL.now_s()
-        told = abs(self.speed - self._limited_to) <= _CHANGE * self._limited_to
-        if told and now_s - self._looked_wall_s < LOOK_PERIOD_S:
+        limited = abs(self.speed - self._limited_to) <= _CHANGE * self._limited_to
+        if limited and now_s - self._looked_wall_s < LOOK_PERIOD_S:
             return False
         self._looked_wall_s = now_s
         return True

@@ -527,7 +527,7 @@ class DeviceManager(QObject):
 
     def _await_discovery(self, device: Device) -> None:
         if not device.wait_until_discovered(self.settings.watch.answer_s):
-            reason = f"device {device.index} did not tell what is connected to it"
+            reason = f"device {device.index} did not say what is connected to it"
             logger.error("%s", reason)
             self._note_missing(reason)
         self._note_channels(device)

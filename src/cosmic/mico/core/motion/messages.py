@@ -1,11 +1,15 @@
 """What goes into a `Device`'s queue, and what comes out of its signals."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from cosmic.frame.errors import CosmicError, DeviceError
 from cosmic.frame.units import AxisUnit
+from cosmic.frame.verdict import ALLOWED, MoveVerdict
+from cosmic.mico.core.motion.jog import JogRun
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.orders import Motion, Order
+from cosmic.mico.core.motion.orders import Motion, Order, Reservation
+from cosmic.mico.hw.interface import Event
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +71,37 @@ class DeviceLost:
 
 
 @dataclass(frozen=True, slots=True)
+class CheckedMove:
+    """What the gate says to an order, or to the next packet of a jog.
+
+    Attributes
+    ----------
+    motion : Motion or None
+        What may be sent; None where a jog has come to its end.
+    slowed : bool
+        The jog goes at another speed from now on.
+    """
+
+    order: Order
+    motion: Motion | None
+    verdict: MoveVerdict = ALLOWED
+    reservation: Reservation | None = None
+    jog: JogRun | None = None
+    slowed: bool = False
+
+
+OnChecked = Callable[[CheckedMove], None]
+
+
+@dataclass(frozen=True, slots=True)
+class GateAnswer:
+    """The gate has checked an order, or the next packet of a jog, in another thread."""
+
+    checked: CheckedMove
+    on_checked: OnChecked
+
+
+@dataclass(frozen=True, slots=True)
 class Halt:
     """Stop one channel again and fail its movement; with `only`, if it is that one."""
 
@@ -103,15 +138,30 @@ class Wake:
 
 
 @dataclass(frozen=True, slots=True)
-class Tell:
-    """Tell the state of one channel, which somebody else changed."""
+class PublishState:
+    """Publish the state of one channel, which somebody else changed."""
 
     channel: int
 
 
 @dataclass(frozen=True, slots=True)
-class Departed:
+class GroupMoveSent:
     """An order that waited for others was sent with them, or could not be."""
 
     order: Order
     error: CosmicError | None
+
+
+Message = (
+    GateAnswer
+    | GroupMoveSent
+    | Order
+    | Event
+    | Halt
+    | StopAll
+    | Lost
+    | SetFrequency
+    | PublishState
+    | Wake
+)
+"""What a `Device` takes from its queue."""

@@ -101,16 +101,16 @@ class Interval:
     low: float
     high: float
 
-    def hull(self, other: "Interval") -> "Interval":
+    def union(self, other: "Interval") -> "Interval":
         """Return the smallest interval that holds both."""
         return Interval(min(self.low, other.low), max(self.high, other.high))
 
 
 @dataclass(frozen=True, slots=True)
-class Grant:
-    """A reservation: the gate's leave to make one movement once, void after the next stop.
+class Reservation:
+    """The gate's leave to make one movement once, void after the next stop.
 
-    It holds the interval that the movement may sweep until it is given back (`Gate.release`).
+    It holds the interval that the movement may sweep until it is released (`Gate.release`).
     Only the object that the gate gave is worth anything; it is used up with `Gate.claim`.
     """
 
@@ -138,7 +138,7 @@ class Order:
         The operator agreed to move an axis whose position is unknown.
     movement : Movement
         Completed when the movement ends.
-    grant : Grant or None
+    reservation : Reservation or None
         Set where the gate has already decided, together with others.
     epoch : int or None
         Number of stops so far when it was submitted; a stop since then makes it void.
@@ -158,7 +158,7 @@ class Order:
     source: str = "script"
     consent: bool = False
     movement: Movement = field(default_factory=Movement)
-    grant: Grant | None = None
+    reservation: Reservation | None = None
     follows: Movement | None = None
     epoch: int | None = None
     start: GroupStart | None = None

@@ -76,7 +76,7 @@ class PositionerState:
     present : bool
         Its device answers.
     safe_direction : Direction or None
-        Which way a search for the reference begins; None where the controller has not told.
+        Which way a search for the reference begins; None where the controller did not say.
     std : float
         Standard deviation of an estimated position, in `unit`; infinite where nobody knows, 0 of a
         measured one.
@@ -278,7 +278,7 @@ class CountedTravel:
     step_std : float
         Part of the way counted by which the true one may differ, a standard deviation.
     end_std_um : float
-        How well a run against an end stop tells where the axis is.
+        How well a run against an end stop locates the axis.
     """
 
     low: float
@@ -330,7 +330,7 @@ class CountedTravel:
         here = state.position or 0.0
         place = self.around(here, state.std)
         if held is not None:
-            place = place.hull(Interval(max(self.low, held.low), min(self.high, held.high)))
+            place = place.union(Interval(max(self.low, held.low), min(self.high, held.high)))
         room = place.high - self.low if way < 0.0 else self.high - place.low
         least = abs(way) * (1.0 - TIMES_STD * self.step_std)
         if least <= (1.0 + OVER) * room + OVER_UM:

@@ -16,7 +16,7 @@ class StopState:
     reason : str or None
         Why, or None while motion is allowed.
     epoch : int
-        Number of stops so far. A grant is void when a stop came after it, even if it was reset.
+        Number of stops so far. A reservation is void after the next stop, also once that is reset.
     """
 
     reason: str | None
@@ -49,7 +49,7 @@ class StopLatch:
             self._state = StopState(reason=said, epoch=before.epoch + 1)
 
     def void_grants(self) -> None:
-        """Let nothing that was granted or queued so far start any more, without latching."""
+        """Let nothing that was reserved or queued so far start any more, without latching."""
         with self._lock:
             self._state = StopState(reason=self._state.reason, epoch=self._state.epoch + 1)
 
@@ -64,5 +64,5 @@ class StopLatch:
         return self._announced.subscribe(listener)
 
     def announce(self) -> None:
-        """Tell the listeners; apart from `set`, so that stopping comes before telling."""
+        """Notify the listeners; apart from `set`, so that stopping comes first."""
         self._announced.emit(self._state)

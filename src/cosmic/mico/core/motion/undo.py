@@ -228,13 +228,13 @@ class UndoHistory(QObject):
 
     def _on_touch(self, text: str) -> None:
         """Remember a touch with what moves, or else with what moved last; returns at once."""
-        told = f"since it began, {text}"
+        since = f"since it began, {text}"
         with self._lock:
             for group in self._open:
-                self._touches.setdefault(group, {})[told] = None
+                self._touches.setdefault(group, {})[since] = None
             moving = bool(self._open)
         if not moving:
-            self._add_to_newest((told,))
+            self._add_to_newest((since,))
 
     def _add_to_newest(self, texts: tuple[str, ...]) -> None:
         """Have going back before anything ask for what was touched: all ways lead by the newest."""

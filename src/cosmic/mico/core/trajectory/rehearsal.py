@@ -7,7 +7,7 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.errors import MoveCancelled
 from cosmic.frame.verdict import ALLOWED, MoveVerdict
 from cosmic.mico.core.collision.checker import CollisionChecker
-from cosmic.mico.core.motion.checks import Limits, PlatformSnapshot, Request, judge
+from cosmic.mico.core.motion.checks import Limits, PlatformSnapshot, Request, check_move
 from cosmic.mico.core.motion.orders import Motion, MoveBy, MoveTo, Step
 from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.core.trajectory.binding import Bound, BoundLeg, BoundSpeed, PlatformFacts
@@ -174,7 +174,7 @@ class _Play:
             now_wall_s=self._began_s,
             rules=self._stage.rules,
         )
-        verdict = judge(requests, picture, self._stage.checker).verdict
+        verdict = check_move(requests, picture, self._stage.checker).verdict
         if not verdict.allowed:
             return verdict
         self._wait_for(leg.at_s)
