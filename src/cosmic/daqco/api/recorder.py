@@ -1,30 +1,30 @@
 """`Recorder`: begins and ends recordings, and joins to them what belongs in the file."""
 
 import logging
+from abc import abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from threading import RLock
-from typing import TYPE_CHECKING, Final
+from typing import Final, Protocol
 
 from PySide6.QtCore import Qt
 
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.file_writer import RecordingStats, UDaqFileWriter
 from cosmic.daqco.core.left_behind import OpenRecordings
-from cosmic.daqco.core.limits import Crossing
+from cosmic.daqco.core.limits import Crossing, LimitGuard
 from cosmic.daqco.core.plan import restarts
 from cosmic.daqco.core.recording_format import AxisPosition, RecordedEvent, RecordingHeader
+from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings
+from cosmic.daqco.core.udaq_buffer import UDaqBuffer
 from cosmic.daqco.core.unclosed_file import is_unclosed
-from cosmic.frame.clock import WALL
+from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.events import Event
 from cosmic.frame.failure import FailurePolicy
-
-if TYPE_CHECKING:
-    from cosmic.daqco.api.application import DaqcoApplication
 
 logger = logging.getLogger(__name__)
 
@@ -66,6 +66,37 @@ class RecordingState:
     failure: str = ""
 
 
+class Acquisition(Protocol):
+    """What a recorder writes of."""
+
+    clock: Clock
+    buffer: UDaqBuffer
+    guard: LimitGuard
+
+    @property
+    @abstractmethod
+    def running(self) -> bool:
+        """Samples are being acquired."""
+
+    @property
+    @abstractmethod
+    def settings(self) -> DaqcoSettings:
+        """What is in force."""
+
+    @property
+    @abstractmethod
+    def rate_hz(self) -> float:
+        """The rate of each channel."""
+
+    @abstractmethod
+    def scales(self) -> dict[str, Scale]:
+        """Return the scale in force of every channel, by its name."""
+
+    @abstractmethod
+    def before_change(self, check: Callable[[DaqcoSettings], None]) -> None:
+        """Call `check(settings)` before they come into force; what it raises forbids them."""
+
+
 class Recorder:
     """One recording at a time of what an application acquires; any thread.
 
@@ -78,7 +109,7 @@ class Recorder:
 
     def __init__(
         self,
-        application: "DaqcoApplication",
+        application: Acquisition,
         policy: FailurePolicy,
         *,
         software: str = "",

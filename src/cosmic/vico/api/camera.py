@@ -20,6 +20,7 @@ from cosmic.frame.renamed import Renamed
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.camera_images import (
     CameraImages,
+    ImageWait,
     LocalImages,
     RemoteImages,
     always,
@@ -27,7 +28,6 @@ from cosmic.vico.api.camera_images import (
 from cosmic.vico.api.camera_places import CameraPlaces
 from cosmic.vico.api.camera_shape import CameraShape
 from cosmic.vico.api.camera_shown import FormatShown, LinkShown, Seen, formats_shown, links_shown
-from cosmic.vico.api.image_wait import ImageWait
 from cosmic.vico.api.places import Places, RotationShown
 from cosmic.vico.api.sent_image import SentImage, SentSeen
 from cosmic.vico.core.camera_recordings import ImageRecordingState

@@ -2,24 +2,25 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import Final, Protocol
 
 from typing_extensions import override
 
 from cosmic.frame.clock import WALL
-from cosmic.frame.errors import CosmicError, DeviceTimeout, NotAvailable
+from cosmic.frame.errors import CosmicError, DeviceTimeout, MoveCancelled, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.job_queue import JobQueue
+from cosmic.frame.operation import Operation
 from cosmic.frame.threads import forbid_waiting_here, may_wait_here
+from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.camera_shown import Seen
 from cosmic.vico.api.places import Places
 from cosmic.vico.api.sent_image import ReceivedImage, SentImage, SentSeen
+from cosmic.vico.core.camera_recordings import ImageRecordingState
+from cosmic.vico.core.camera_thread import CameraThread
 from cosmic.vico.core.camera_unit import CameraUnit
 from cosmic.vico.core.image import CameraImage
-
-if TYPE_CHECKING:
-    from cosmic.vico.api.application import VicoApplication
-    from cosmic.vico.api.camera import CameraHandle
+from cosmic.vico.hw.interface import FrameStatus
 
 IDLE_S: Final = 3.0
 """Wall time after the last look when images of another station need not come any more."""
@@ -77,7 +78,7 @@ class CameraImages(Protocol):
 class LocalImages(CameraImages):
     """Of a camera of this process."""
 
-    def __init__(self, application: "VicoApplication", unit: CameraUnit) -> None:
+    def __init__(self, application: VicoApplication, unit: CameraUnit) -> None:
         self._application, self._unit = application, unit
 
     @property
@@ -126,6 +127,86 @@ class LocalImages(CameraImages):
         self._unit.recordings.stop()
 
 
+class ImageWait(Operation[SentImage]):
+    """Ends with the first whole image exposed from `since_s` of platform time on; any thread."""
+
+    def __init__(self, thread: CameraThread, since_s: float, places: Places | None) -> None:
+        super().__init__(f"next image of {thread.camera_name}")
+        self._since_s = since_s
+        self._places = places
+        unsubscribe = thread.subscribe(self._on_image)
+        self.add_callback(lambda _ended: unsubscribe())
+        self.on_cancel(self._give_up)
+        newest = thread.last
+        if newest is not None:
+            self._on_image(newest)
+
+    def _give_up(self) -> None:
+        self.fail(MoveCancelled(f"{self.title}: nobody waits for it any more"))
+
+    def _on_image(self, image: CameraImage) -> None:
+        frame = image.frame
+        if self.done or frame.status is not FrameStatus.COMPLETE:
+            return
+        if frame.exposed_s >= self._since_s:
+            self.finish(SentImage.of(image, self._places))
+
+
+class SendingCamera(Protocol):
+    """A camera that can be asked for its images over a line."""
+
+    name: str
+
+    @property
+    @abstractmethod
+    def away(self) -> str:
+        """Why its station cannot be reached; empty while it can."""
+
+    @property
+    @abstractmethod
+    def running(self) -> bool:
+        """It takes images."""
+
+    @property
+    @abstractmethod
+    def problem(self) -> str:
+        """Why no images come."""
+
+    @property
+    @abstractmethod
+    def recording(self) -> ImageRecordingState:
+        """The recording that runs, or the last one."""
+
+    @property
+    @abstractmethod
+    def newest_id(self) -> int | None:
+        """Number of the newest whole frame."""
+
+    @abstractmethod
+    def sent_latest(self) -> SentImage | None:
+        """Return the newest whole image."""
+
+    @abstractmethod
+    def await_image(self, since_s: float | None = None) -> ImageWait:
+        """Begin to wait for a whole image."""
+
+    @abstractmethod
+    def watch_shown(self, receiver: Callable[[SentImage], object]) -> Callable[[], None]:
+        """Have whole images sent."""
+
+    @abstractmethod
+    def watch_seen(self, receiver: Callable[[SentSeen], object]) -> Callable[[], None]:
+        """Have what machine vision finds sent."""
+
+    @abstractmethod
+    def carry_out(
+        self,
+        action: Callable[[], None],
+        told: Callable[[None, CosmicError | None], object],
+    ) -> None:
+        """Do what may have to wait for the line."""
+
+
 def always() -> bool:
     """Return True: somebody wants it."""
     return True
@@ -136,11 +217,11 @@ class RemoteImages(CameraImages):
 
     Parameters
     ----------
-    camera : CameraHandle
+    camera : SendingCamera
         The proxy of the camera.
     """
 
-    def __init__(self, camera: "CameraHandle", policy: FailurePolicy) -> None:
+    def __init__(self, camera: SendingCamera, policy: FailurePolicy) -> None:
         self._camera = camera
         self._jobs = JobQueue(f"images of {camera.name}", policy)
         self._places: Places | None = None
