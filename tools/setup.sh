@@ -62,16 +62,11 @@ any_font() {
     return 1
 }
 
-# find_missing run|dev: sets $missing to the packages of the system that are not there.
+# find_missing FILE PACKAGE...: sets $missing to the packages whose file is not there.
 find_missing() {
     missing=
     on_linux && [ -x /sbin/ldconfig ] || return 0
     known=$(/sbin/ldconfig -p 2>/dev/null) || return 0
-    wanted=$QT_LIBRARIES
-    if [ "$1" = run ] && opens_window; then wanted="$wanted $WINDOW_LIBRARIES"; fi
-    # The words of the two lists are file, package, file, package, ...
-    # shellcheck disable=SC2086
-    set -- $wanted
     while [ $# -gt 1 ]; do
         case $known in
             *"$tab$1 ("*) ;;
@@ -79,8 +74,21 @@ find_missing() {
         esac
         shift 2
     done
-    any_font || missing="$missing fonts-dejavu-core"
     missing=${missing# }
+}
+
+# find_needed run|dev: sets $needed to the packages without which nothing works, and $offered to
+# those for windows, which a display that appears later needs.
+find_needed() {
+    # shellcheck disable=SC2086
+    find_missing $QT_LIBRARIES
+    needed=$missing
+    if on_linux && ! any_font; then needed="$needed fonts-dejavu-core"; fi
+    offered=
+    [ "$1" = run ] || return 0
+    # shellcheck disable=SC2086
+    find_missing $WINDOW_LIBRARIES
+    if opens_window; then needed="$needed $missing"; else offered=$missing; fi
 }
 
 # Installs packages with apt where that needs no password; otherwise ends with the command to give.
@@ -163,9 +171,9 @@ installation_key() {
 
 # prepare run|dev
 prepare() {
-    find_missing "$1"
+    find_needed "$1"
     # shellcheck disable=SC2086
-    [ -z "$missing" ] || install_packages $missing
+    [ -z "${needed# }" ] || install_packages $needed
 
     find_venv_version
     key=$(installation_key)
@@ -173,6 +181,11 @@ prepare() {
     if [ -n "$python_now" ] && [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$key" ]; then
         return 0
     fi
+
+    # Once, and no reason to end: there may never be a display here.
+    # shellcheck disable=SC2086
+    [ -z "$offered" ] || (install_packages $offered) ||
+        say "Without them no window opens, should there be a display some day; going on."
 
     venv_works || make_venv
     rm -f -- "$venv"/.cosmic-*

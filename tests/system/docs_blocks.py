@@ -8,9 +8,16 @@ from typing import Final
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 PAGES: Final = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+LINKED: Final = (
+    *PAGES,
+    *(ROOT / f"{name}.md" for name in ("CHANGELOG", "CONTRIBUTING", "SECURITY")),
+)
+"""Pages whose links are looked at: those of the project as well."""
 
 _FENCE: Final = re.compile(r"^```(\w*)\s*$")
 _SOURCE: Final = re.compile(r"^<!-- (example|excerpt): (\S+) -->$")
+_HEADING: Final = re.compile(r"^#+ (.+?)#*$", re.MULTILINE)
+_ELSEWHERE: Final = re.compile(r"\w+://|mailto:")
 _LINK: Final = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 
 
@@ -65,9 +72,38 @@ def is_in(block: Block, file_text: str) -> bool:
 
 def relative_links(page: Path) -> list[str]:
     """Return the links of `page` that name a file, without their fragments."""
-    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
-    links = [link.split("#")[0] for link in _LINK.findall(text)]
-    return [link for link in links if link and "://" not in link and not link.startswith("mailto:")]
+    return [name for name, _ in _links(page) if name]
+
+
+def links_to_headings(page: Path) -> list[tuple[Path, str]]:
+    """Return the links of `page` to a heading: its page, and the heading's anchor."""
+    return [
+        ((page.parent / name).resolve() if name else page, anchor)
+        for name, anchor in _links(page)
+        if anchor and not name.endswith(".py")
+    ]
+
+
+def anchors(page: Path) -> set[str]:
+    """Return the anchors of the headings of `page`, as the forges and the site make them."""
+    found: set[str] = set()
+    for heading in _HEADING.findall(_prose(page)):
+        words = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).strip().lower()
+        slug = re.sub(r"[^\w\- ]", "", words).replace(" ", "-")
+        number = 0
+        while (name := f"{slug}-{number}" if number else slug) in found:
+            number += 1
+        found.add(name)
+    return found
+
+
+def _links(page: Path) -> list[tuple[str, str]]:
+    links = [link for link in _LINK.findall(_prose(page)) if not _ELSEWHERE.match(link)]
+    return [(name, anchor) for name, _, anchor in (link.partition("#") for link in links)]
+
+
+def _prose(page: Path) -> str:
+    return re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
 
 
 def table_rows(page: Path) -> list[list[str]]:

@@ -1,6 +1,9 @@
 """The documentation is true: its code runs, its links lead somewhere, its lists are complete."""
 
 import functools
+import os
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -10,7 +13,16 @@ from PySide6.QtWidgets import QApplication
 
 import cosmic
 from cosmic.app import connect as connect_module
-from system.docs_blocks import PAGES, ROOT, blocks, is_in, relative_links
+from system.docs_blocks import (
+    LINKED,
+    PAGES,
+    ROOT,
+    anchors,
+    blocks,
+    is_in,
+    links_to_headings,
+    relative_links,
+)
 
 FASTEST = 20.0
 
@@ -74,10 +86,30 @@ def test_toml_in_a_page_is_toml(page: Path) -> None:
             tomllib.loads(block.text)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=ids)
-def test_links_of_a_page_lead_to_files(page: Path) -> None:
+@pytest.mark.parametrize("page", LINKED, ids=ids)
+def test_links_of_a_page_lead_to_files_and_headings(page: Path) -> None:
     for link in relative_links(page):
         assert (page.parent / link).exists(), f"{page}: {link} leads nowhere"
+    for target, anchor in links_to_headings(page):
+        assert anchor in anchors(target), f"{page}: {target.name} has no heading #{anchor}"
+
+
+def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+    subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", tmp_path],
+        cwd=ROOT,
+        env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
+        check=True,
+    )
+    first = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "reference/api.html" in first
+    assert (tmp_path / "examples" / "first_session.py").is_file()
+
+
+def test_the_version_is_the_same_everywhere() -> None:
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {cosmic.__version__}\n" in citation
+    assert f"## [{cosmic.__version__}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
 def test_every_page_is_listed_in_the_index() -> None:

@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Final
 
+from cosmic import __version__
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.log import set_up_logging
 
@@ -177,6 +178,7 @@ def _window_options(platform: argparse.ArgumentParser) -> argparse.ArgumentParse
     add("--screenshot", type=Path, metavar="FILE", help="with --offscreen: save an image")
     add("--size", type=_size, metavar="WxH", help="size of the window, such as 1600x1000")
     add("--theme", choices=("dark", "light"), help="colours of the window")
+    add("--version", action="version", version=f"cosmic {__version__}")
     return options
 
 

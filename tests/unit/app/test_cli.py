@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import cosmic
 from cosmic.app.cli import main
 
 
@@ -27,6 +28,13 @@ def complaints(capsys: pytest.CaptureFixture[str]) -> list[str]:
     said = capsys.readouterr().err.splitlines()
     assert not [line for line in said if "Traceback" in line]
     return said
+
+
+def test_it_tells_its_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out == f"cosmic {cosmic.__version__}\n"
 
 
 # check
