@@ -17,6 +17,7 @@ from cosmic.frame.log import set_up_logging
 _WINDOWS: Final = (None, "mico", "daqco", "vico")
 _LOG_THEMSELVES: Final = (*_WINDOWS, "serve")
 """Commands that run on, and log more than warnings."""
+_CONFIG: Final = "a platform.toml or its folder"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -83,6 +84,11 @@ def _add_file_commands(
     """Add the commands that read or write files and move nothing."""
     check = commands.add_parser("check", help="check a platform file and the twin it names")
     check.add_argument("platform", type=Path, metavar="PLATFORM.toml")
+    doctor = commands.add_parser(
+        "doctor", help="what is on this computer, what is missing, and what to do about it"
+    )
+    doctor.add_argument("--config", type=Path, default=None, metavar="PATH", help=_CONFIG)
+    doctor.add_argument("--json", action="store_true", help="for programs")
     init = commands.add_parser("init", help="copy the shipped configuration out, to change it")
     init.add_argument("folder", type=Path, metavar="FOLDER")
     scene = commands.add_parser("scene", help="check the scene of a collision model, and more")
@@ -160,7 +166,7 @@ def _platform_options() -> argparse.ArgumentParser:
     # Suppressed defaults, so that an option before the command is not reset by the command.
     options = argparse.ArgumentParser(add_help=False, argument_default=argparse.SUPPRESS)
     add = options.add_argument
-    add("--config", type=Path, metavar="PATH", help="a platform.toml or its folder")
+    add("--config", type=Path, metavar="PATH", help=_CONFIG)
     add("--rate", type=float, help="how many times faster than the wall the simulation runs")
     add("--cold", action="store_true", help="start the simulation at power-up, nothing referenced")
     add("--sample", metavar="NAME", help="what lies on the simulated plate, such as forty-dry")

@@ -1,0 +1,1 @@
+"""What is on this computer: the checks behind ``cosmic doctor``."""

@@ -1,0 +1,112 @@
+"""Vendors' libraries, the devices that they see, and the ports of this computer."""
+
+import os
+import socket
+import sys
+from collections.abc import Iterator
+from contextlib import closing
+from typing import get_args
+
+from cosmic.app.configuration.platform_file import PlatformFile
+from cosmic.app.diagnosis.finding import Finding, State, carry_out, missing
+from cosmic.daqco.hw.factory import make_library
+from cosmic.mico.hw.factory import make_controller
+from cosmic.mico.hw.sdl_input import SdlSource
+from cosmic.vico.hw.factory import Backend, make_camera_library
+from cosmic.vico.hw.serial_port import list_ports
+
+LIBRARIES = "Vendors' libraries"
+PORTS = "Ports"
+
+
+def hardware(file: PlatformFile) -> list[Finding]:
+    """Look for every library and its devices; what the platform file names is needed."""
+    cameras = {each.backend for each in file.vico.camera} if file.vico else set()
+    boards = file.daqco is not None and file.daqco.backend == "nidaqmx"
+    found = carry_out(
+        LIBRARIES, "scu3d", lambda: _controllers(file), needed=file.mico.backend == "scu3d"
+    )
+    found += carry_out(LIBRARIES, "nidaqmx", _boards, needed=boards)
+    for backend in get_args(Backend):
+        if backend != "simulated":
+            found += _cameras(backend, needed=backend in cameras)
+    found += carry_out(LIBRARIES, "gamepads", _gamepads, needed=False)
+    return found
+
+
+def _controllers(file: PlatformFile) -> Iterator[Finding]:
+    with closing(make_controller("scu3d", library_path=file.mico.library)) as controller:
+        serials = ", ".join(str(each) for each in controller.find_devices())
+        where = file.mico.library or "from where the system looks"
+        found = f"{controller.name}, {where}; devices: {serials or 'none'}"
+    advice = "" if serials else "Switch the controllers on and look at their USB cables."
+    state = State.GOOD if serials else missing(needed=file.mico.backend == "scu3d")
+    yield Finding(LIBRARIES, "scu3d", state, found, advice)
+
+
+def _boards() -> Iterator[Finding]:
+    library = make_library("nidaqmx")
+    names = ", ".join(each.name for each in library.list_boards())
+    yield Finding(LIBRARIES, "nidaqmx", State.GOOD, f"{library.name}; boards: {names or 'none'}")
+
+
+def _cameras(backend: Backend, *, needed: bool) -> list[Finding]:
+    def look() -> Iterator[Finding]:
+        with closing(make_camera_library(backend)) as library:
+            keys = ", ".join(each.key for each in library.cameras())
+            found = f"{library.name}; cameras: {keys or 'none'}"
+        state = State.GOOD if keys or not needed else State.PROBLEM
+        advice = "" if keys or not needed else "Look at cable, power and network of the camera."
+        yield Finding(LIBRARIES, backend, state, found, advice)
+
+    return carry_out(LIBRARIES, backend, look, needed=needed)
+
+
+def _gamepads() -> Iterator[Finding]:
+    with closing(SdlSource()) as source:
+        names = ", ".join(each.title for each in source.devices())
+    yield Finding(LIBRARIES, "gamepads", State.GOOD, names or "none connected")
+
+
+def serial_ports(file: PlatformFile) -> Iterator[Finding]:
+    """Look for serial ports, and whether they may be used."""
+    there = list_ports()
+    yield Finding(PORTS, "serial ports", State.GOOD, ", ".join(there) or "none")
+    if sys.platform != "win32":
+        for port in there:
+            if not os.access(port, os.R_OK | os.W_OK):
+                advice = (
+                    "Join the group that owns it: sudo usermod -a -G dialout USER; log in anew."
+                )
+                yield Finding(PORTS, port, State.NOTE, "may not be used", advice)
+    for name in _named_ports(file):
+        if name not in there and not os.path.lexists(name):
+            advice = "Look at the cable and its adapter, or change the port in the platform file."
+            yield Finding(PORTS, name, State.PROBLEM, "named in the platform file, missing", advice)
+
+
+def _named_ports(file: PlatformFile) -> list[str]:
+    if file.vico is None:
+        return []
+    wanted = ((file.vico.lens, "navitar"), (file.vico.light, "brightlight"))
+    return [each.port for each, backend in wanted if each.backend == backend]
+
+
+def network(file: PlatformFile) -> Iterator[Finding]:
+    """Look whether a station can listen where the platform file says."""
+    _, _, address = file.network.listen.partition("/")
+    host, _, number = address.rpartition(":")
+    host, port = host.strip("[]"), int(number)
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as listener:
+        try:
+            listener.bind((host, port))
+        except OSError as exc:
+            advice = (
+                "Another program listens there, or the address is not of this computer: name "
+                "another under [network] listen."
+            )
+            state = missing(needed=file.network.serve)
+            yield Finding(PORTS, "network", state, f"{file.network.listen}: {exc.strerror}", advice)
+            return
+    yield Finding(PORTS, "network", State.GOOD, f"{file.network.listen} is free")
