@@ -91,7 +91,7 @@ def _add_file_commands(
     doctor.add_argument("--json", action="store_true", help="for programs")
     init = commands.add_parser("init", help="copy the shipped configuration out, to change it")
     init.add_argument("folder", type=Path, metavar="FOLDER")
-    scene = commands.add_parser("scene", help="check the scene of a collision model, and more")
+    scene = commands.add_parser("scene", help="check or prepare the scene of a collision model")
     tasks = scene.add_subparsers(dest="task", metavar="TASK", required=True)
     look = tasks.add_parser("check", help="check a scene with its URDF, SRDF and meshes")
     look.add_argument("scene", type=Path, metavar="SCENE.toml")
@@ -100,12 +100,16 @@ def _add_file_commands(
     split.add_argument("folder", type=Path, metavar="FOLDER")
     export = commands.add_parser("export", help="write a recording as CSV or TDMS")
     export.add_argument("recording", type=Path, metavar="RECORDING")
-    export.add_argument("--to", choices=("csv", "tdms"), default="csv", help="format; CSV")
-    export.add_argument("--output", type=Path, metavar="FILE", help="beside the recording if none")
+    export.add_argument(
+        "--to", choices=("csv", "tdms"), default="csv", help="format (default: csv)"
+    )
+    export.add_argument(
+        "--output", type=Path, metavar="FILE", help="output file (default: beside the recording)"
+    )
     export.add_argument("--overwrite", action="store_true", help="replace a file that exists")
     repair = commands.add_parser("repair", help="close recordings that a killed process left open")
     repair.add_argument("recordings", type=Path, nargs="+", metavar="FILE")
-    repair.add_argument("--ended", action="store_true", help="take it that nothing writes them")
+    repair.add_argument("--ended", action="store_true", help="no program writes them any more")
 
 
 def _add_station_commands(
@@ -116,10 +120,14 @@ def _add_station_commands(
         "serve", help="a station without a window", parents=[platform, _line_options()]
     )
     serve.add_argument(
-        "--applications", type=_names, default=(), metavar="NAMES", help="such as mico,daqco; all"
+        "--applications",
+        type=_names,
+        default=(),
+        metavar="NAMES",
+        help="such as mico,daqco (default: all)",
     )
-    serve.add_argument("--seed", type=int, default=0, help="of all that is random in the twin")
-    made = commands.add_parser("certificates", help="make what stations prove who they are with")
+    serve.add_argument("--seed", type=int, default=0, help="seed of the simulation")
+    made = commands.add_parser("certificates", help="make the certificates of stations and clients")
     made.add_argument("folder", type=Path, metavar="FOLDER")
     made.add_argument(
         "--stations",
@@ -148,17 +156,21 @@ def _add_procedure_commands(
     )
     campaign.add_argument("recipe", type=Path, metavar="RECIPE", help="a file, or a shipped name")
     campaign.add_argument("--out", type=Path, required=True, metavar="FOLDER")
-    campaign.add_argument("--seed", type=int, help="of all that is random in the twin")
+    campaign.add_argument("--seed", type=int, help="seed of the simulation")
     calibrate = commands.add_parser(
         "calibrate",
-        help="calibrate what is not fresh, without a window",
+        help="renew expired calibrations, without a window",
         parents=[platform],
     )
     calibrate.add_argument(
-        "--anew", action="append", default=[], metavar="NAME", help="measure this one in any case"
+        "--anew",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="measure this one even if it is fresh",
     )
     calibrate.add_argument(
-        "--zooms", action="store_true", help="the map at every step of the lens as well"
+        "--zooms", action="store_true", help="map every zoom step of the lens as well"
     )
 
 
@@ -169,8 +181,8 @@ def _platform_options() -> argparse.ArgumentParser:
     add("--config", type=Path, metavar="PATH", help=_CONFIG)
     add("--rate", type=float, help="how many times faster than the wall the simulation runs")
     add("--cold", action="store_true", help="start the simulation at power-up, nothing referenced")
-    add("--sample", metavar="NAME", help="what lies on the simulated plate, such as forty-dry")
-    add("--truth", type=Path, metavar="FILE", help="write what truly happens in the simulation")
+    add("--sample", metavar="NAME", help="sample on the simulated plate, such as forty-dry")
+    add("--truth", type=Path, metavar="FILE", help="write the ground truth of the simulation")
     return options
 
 
@@ -180,7 +192,12 @@ def _window_options(platform: argparse.ArgumentParser) -> argparse.ArgumentParse
     )
     add = options.add_argument
     add("--serve", action="store_true", help="let other programs use what runs here")
-    add("--offscreen", type=_seconds, metavar="SECONDS", help="show nothing, close after SECONDS")
+    add(
+        "--offscreen",
+        type=_seconds,
+        metavar="SECONDS",
+        help="run without a display, close after SECONDS",
+    )
     add("--screenshot", type=Path, metavar="FILE", help="with --offscreen: save an image")
     add("--size", type=_size, metavar="WxH", help="size of the window, such as 1600x1000")
     add("--theme", choices=("dark", "light"), help="colours of the window")
@@ -193,9 +210,9 @@ def _line_options() -> argparse.ArgumentParser:
     # Suppressed defaults, so that an option before the command is not reset by the command.
     options = argparse.ArgumentParser(add_help=False, argument_default=argparse.SUPPRESS)
     add = options.add_argument
-    add("--listen", metavar="ENDPOINT", help="where to serve, such as tcp/127.0.0.1:7447")
-    add("--name", metavar="NAME", help="how others call this station")
-    add("--certificates", type=Path, metavar="FOLDER", help="with which to prove who this is")
+    add("--listen", metavar="ENDPOINT", help="endpoint to listen at, such as tcp/127.0.0.1:7447")
+    add("--name", metavar="NAME", help="name of this station for others")
+    add("--certificates", type=Path, metavar="FOLDER", help="certificates of this station")
     add(
         "--connect",
         action="append",

@@ -43,7 +43,7 @@ def connect(
     seed : int
         Of everything random in the simulated platform.
     certificates : path or None
-        Folder with which to prove who this is, for stations at ``tls/``; None: the one that the
+        Folder certificates of this station, for stations at ``tls/``; None: the one that the
         platform file names.
     sample : str or None
         What lies on the simulated plate, as twin.toml names it, such as "forty-dry"; None: the
@@ -68,7 +68,7 @@ def connect(
             check_path(name, path)
     for station, endpoint in (stations or {}).items():
         if not (isinstance(station, str) and isinstance(endpoint, str)):
-            raise TypeError(f"connect: stations must be texts by texts, not {endpoint!r}")
+            raise TypeError(f"connect: stations must map names to endpoints, not {endpoint!r}")
     if isinstance(applications, str):
         applications = (applications,)
     check_applications(applications, "applications")

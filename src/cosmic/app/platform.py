@@ -11,13 +11,12 @@ from typing import Final
 from cosmic.app.configuration.network import own_certificates
 from cosmic.app.configuration.platform_file import KNOWN_APPLICATIONS, PlatformFile, load_platform
 from cosmic.app.configuration.references import misnamed
-from cosmic.app.faults import SimulationFaults
 from cosmic.app.garbage_watch import GarbageWatch
-from cosmic.app.simulation import make_scene
+from cosmic.app.simulation import SimulationFaults, make_scene
 from cosmic.app.stations.address import StationAddress
 from cosmic.app.stations.hosting import Site, build_applications
 from cosmic.app.stations.joins import join_here, join_stations
-from cosmic.app.stations.remote_applications import Elsewhere, open_stations
+from cosmic.app.stations.remote_applications import RemoteApplications, open_stations
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.application import CosmicApplicationBase, GuiFactory
@@ -59,21 +58,19 @@ class Platform:
     faults: SimulationFaults | None = None
     daqco: DaqcoApplication | RemoteApplication[Daqco] | None = None
     vico: VicoApplication | RemoteApplication[Vico] | None = None
-    elsewhere: Elsewhere = field(default_factory=Elsewhere)
+    remote: RemoteApplications = field(default_factory=RemoteApplications)
     end: Callable[[], None] | None = None
 
     @property
     def simulated(self) -> bool:
         """True when no hardware moves, neither here nor at the stations used."""
         real_here = self.file.mico.backend != "simulated" and bool(self.own)
-        return not real_here and all(each.facts.simulated for each in self.elsewhere.stations)
+        return not real_here and all(each.facts.simulated for each in self.remote.stations)
 
     @property
     def own(self) -> dict[str, CosmicApplicationBase]:
         """The applications that run in this process, by name."""
-        return {
-            name: each for name, each in self._all.items() if name not in self.elsewhere.host_of
-        }
+        return {name: each for name, each in self._all.items() if name not in self.remote.host_of}
 
     @property
     def _all(self) -> dict[str, CosmicApplicationBase]:
@@ -85,12 +82,12 @@ class Platform:
         """Why MiCo, if it runs here, has no devices; empty when all is well."""
         return self.mico.failure if self.mico is not None and "mico" in self.own else ""
 
-    def begin_elsewhere(self) -> None:
+    def begin_remote(self) -> None:
         """Begin to use what other stations host; what they have is known when this returns."""
         for name, each in self._all.items():
-            if name in self.elsewhere.host_of:
+            if name in self.remote.host_of:
                 each.initialize()
-        join_stations(self.mico, self.daqco, self.elsewhere, self.policy)
+        join_stations(self.mico, self.daqco, self.remote, self.policy)
 
     @cached_property
     def garbage(self) -> GarbageWatch:
@@ -121,7 +118,7 @@ class Platform:
             if self.end is not None:
                 at_end.callback(self.end)
             at_end.callback(self.garbage.end)
-            at_end.callback(self.elsewhere.close)
+            at_end.callback(self.remote.close)
             for each in (self.vico, self.daqco, self.mico):
                 if each is not None:
                     at_end.callback(each.shut_down)
@@ -189,7 +186,7 @@ def build_platform(
     """
     share_interpreter()
     if not tick_finely():
-        logger.warning("Windows keeps its tick of 15.6 ms: waits end that late")
+        logger.warning("Windows keeps its timer resolution of 15.6 ms: waits end up to that late")
     file, path = load_platform(config)
     _check_simulation(file, path, rate=rate, only_simulated=cold or bool(sample or truth))
     if not 0 <= seed <= LARGEST_SEED:
@@ -202,12 +199,12 @@ def build_platform(
     policy = FailurePolicy()
     guis = {"mico": mico_gui, "daqco": daqco_gui, "vico": vico_gui}
     with ExitStack() as undo:
-        elsewhere = _connect(uses, applications, file, path, policy)
-        undo.callback(elsewhere.close)
+        remote = _connect(uses, applications, file, path, policy)
+        undo.callback(remote.close)
         hosted = [
             name
             for name in applications
-            if name in file.platform.applications and name not in elsewhere.host_of
+            if name in file.platform.applications and name not in remote.host_of
         ]
         if mistakes := misnamed(file, path, hosted):
             raise ConfigError("\n".join(mistakes))
@@ -218,7 +215,7 @@ def build_platform(
         site = Site(file, path, clock, policy, scene, seed)
         own = build_applications(site, hosted, guis)
         join_here(own, site)
-        used = {name: elsewhere.application(name, policy, guis[name]) for name in guis}
+        used = {name: remote.application(name, policy, guis[name]) for name in guis}
         platform = Platform(
             file=file,
             path=path,
@@ -229,11 +226,11 @@ def build_platform(
             faults=own.faults,
             daqco=own.daqco or used["daqco"],
             vico=own.vico or used["vico"],
-            elsewhere=elsewhere,
+            remote=remote,
             end=None if scene is None else scene.close,
         )
         undo.callback(platform.shut_down)
-        platform.begin_elsewhere()
+        platform.begin_remote()
         undo.pop_all()
     return platform
 
@@ -250,9 +247,9 @@ def _check_simulation(file: PlatformFile, path: Path, *, rate: float, only_simul
 
 def _connect(
     uses: Uses, applications: Sequence[str], file: PlatformFile, path: Path, policy: FailurePolicy
-) -> Elsewhere:
+) -> RemoteApplications:
     if not uses.stations:
-        return Elsewhere()
+        return RemoteApplications()
     return open_stations(
         uses.stations,
         policy,

@@ -47,7 +47,7 @@ def registry_of(rig: Applications) -> CalibrationRegistry:
     application = rig.vico.application
     places = application.places if isinstance(application, VicoApplication) else None
     if not isinstance(places, PlatformPlaces):
-        raise NotAvailable("calibrations are kept where cameras and axes run in one program")
+        raise NotAvailable("calibrations need cameras and axes in one program")
     return places.registry
 
 

@@ -10,8 +10,8 @@ from weakref import WeakSet
 
 from typing_extensions import override
 
-from cosmic.app.faults import SimulationFaults
 from cosmic.app.platform import Platform, stopped_since
+from cosmic.app.simulation import SimulationFaults
 from cosmic.app.stations.remote_station import RemoteStation, StationControl
 from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.procedures.procedure import Procedure
@@ -92,7 +92,7 @@ class Rig:
     def control(self) -> Control:
         """Control loops; raises `NotAvailable` where mico is not hosted."""
         if self._control is None:
-            raise NotAvailable("mico is not hosted here; a control loop has nothing to move")
+            raise NotAvailable("mico is not hosted here; a control loop needs axes")
         return self._control
 
     def campaign(self, recipe: "Recipe | str | Path", folder: str | Path) -> "Campaign":
@@ -198,7 +198,7 @@ class Rig:
     @property
     def stations(self) -> dict[str, StationControl]:
         """The other stations in use, by name, with who may move things there."""
-        return {each.name: each.control for each in self._platform.elsewhere.stations}
+        return {each.name: each.control for each in self._platform.remote.stations}
 
     def take_control(self, *stations: str) -> None:
         """Take the right to move things at the stations named, all without a name; or at none.
@@ -232,7 +232,7 @@ class Rig:
                 each.release_control()
 
     def _chosen(self, names: Sequence[str]) -> list[RemoteStation]:
-        known = {each.name: each for each in self._platform.elsewhere.stations}
+        known = {each.name: each for each in self._platform.remote.stations}
         for name in names:
             if name not in known:
                 used = ", ".join(known) or "none"
@@ -273,7 +273,7 @@ class Rig:
         NotAvailable
             The platform is real: it has troubles of its own.
         """
-        if self._platform.faults is None and "mico" in self._platform.elsewhere.host_of:
+        if self._platform.faults is None and "mico" in self._platform.remote.host_of:
             raise NotAvailable("mico runs at another station; inject faults there")
         if self._platform.faults is None:
             raise NotAvailable("faults can be injected into a simulated platform only")

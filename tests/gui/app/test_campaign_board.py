@@ -203,7 +203,7 @@ def test_a_card_of_a_failed_fibre_says_why(card: FibreCard) -> None:
     assert card.indicator.state is State.ERROR
     assert card.outcome.text() == "failed: missed grasp"
     assert "did not follow" in card.text.text()
-    assert card.failures.text() == "Failed on the way: close: missed grasp, close: missed grasp"
+    assert card.failures.text() == "Failed operations: close: missed grasp, close: missed grasp"
     assert not card.curves.isVisible()
     assert not any("N m²" in text for text in _texts(card))
 

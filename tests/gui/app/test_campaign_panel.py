@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 
 from cosmic.app.panels.campaign.panel import CampaignPanel
 from cosmic.app.panels.scene_replay import poses_of
-from cosmic.app.windows.control_mode import ACM, blocked_modes
+from cosmic.app.windows.top_bar import ACM, blocked_modes
 from cosmic.autonomy.campaign.campaign import CampaignPhase
 from cosmic.autonomy.campaign.recipe import load_recipe
 from cosmic.autonomy.campaign.records import CampaignInfo, FibreRecord, Series

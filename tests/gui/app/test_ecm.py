@@ -1,4 +1,4 @@
-"""Mode ECM: a move that something stands in the way of is led round it, on the word Go."""
+"""Mode ECM: a detour is planned for a blocked move, and driven after Go."""
 
 import logging
 from pathlib import Path
@@ -10,8 +10,7 @@ from PySide6.QtWidgets import QCheckBox, QPushButton, QToolButton
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.configuration.platform_file import load_platform
-from cosmic.app.panels.path_guide import poses_along
-from cosmic.app.panels.path_preview import Stage, WayBar, way_text
+from cosmic.app.panels.path_preview import PathPreview, PreviewState, path_text, poses_along
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.frame.config import shipped_config_dir
 from cosmic.mico.api.ways import Way
@@ -31,8 +30,8 @@ def blocked(window: OperatorWindow, qtbot: QtBot) -> OperatorWindow:
     return window
 
 
-def bar(window: OperatorWindow) -> WayBar:
-    return part(window, "wayBar", WayBar)
+def bar(window: OperatorWindow) -> PathPreview:
+    return part(window, "pathPreview", PathPreview)
 
 
 def place(window: OperatorWindow, qtbot: QtBot) -> None:
@@ -73,11 +72,11 @@ def platform_without_scene(folder: Path) -> Path:
     return folder
 
 
-def find(window: OperatorWindow, qtbot: QtBot, target: str = "2000") -> WayBar:
+def find(window: OperatorWindow, qtbot: QtBot, target: str = "2000") -> PathPreview:
     """Have a way found, as far as the offer."""
     go_to(window, qtbot, target)
     shown = bar(window)
-    qtbot.waitUntil(lambda: shown.stage is Stage.FOUND, timeout=8000)
+    qtbot.waitUntil(lambda: shown.state is PreviewState.FOUND, timeout=8000)
     return shown
 
 
@@ -96,7 +95,7 @@ def test_in_mcm_a_blocked_move_is_refused_with_a_hint(window: OperatorWindow, qt
     qtbot.waitUntil(lambda: bool(reason(window)))
     assert "right_" in reason(window)
     assert "In mode ECM a way round can be looked for" in reason(window)
-    assert bar(window).stage is Stage.NONE
+    assert bar(window).state is PreviewState.NONE
     assert position(card(window, "left.y")) == pytest.approx(-2000.0, abs=1.0)
 
 
@@ -119,10 +118,10 @@ def test_in_ecm_a_way_is_offered_and_gone_on_the_word_go(
     qtbot.wait(150)
     assert where(blocked) == pytest.approx(before, abs=1.0)
 
-    click(qtbot, shown, "wayGo")
-    assert shown.stage is Stage.GOING
+    click(qtbot, shown, "pathGo")
+    assert shown.state is PreviewState.MOVING
     wait_for_position(qtbot, card(blocked, "left.y"), 2000.0)
-    qtbot.waitUntil(lambda: shown.stage is Stage.NONE, timeout=8000)
+    qtbot.waitUntil(lambda: shown.state is PreviewState.NONE, timeout=8000)
     assert not shown.isVisible()
     assert scene(blocked, qtbot).content.planned == ()
     wanted = BLOCKED_FROM | {"left.y": 2000.0, "left.z": 0.0}
@@ -133,7 +132,7 @@ def test_in_ecm_a_way_is_offered_and_gone_on_the_word_go(
 def test_a_free_move_in_ecm_is_made_at_once(blocked: OperatorWindow, qtbot: QtBot) -> None:
     go_to(blocked, qtbot, "-1900")
     wait_for_position(qtbot, card(blocked, "left.y"), -1900.0)
-    assert bar(blocked).stage is Stage.NONE
+    assert bar(blocked).state is PreviewState.NONE
 
 
 def test_a_blocked_move_by_a_distance_leads_from_where_the_axis_stands(
@@ -144,11 +143,11 @@ def test_a_blocked_move_by_a_distance_leads_from_where_the_axis_stands(
     enter(qtbot, field(card(blocked, "left.y"), "MiCoCL_8"), "4000")
     click(qtbot, card(blocked, "left.y"), "MiCoCL_6")
     shown = bar(blocked)
-    qtbot.waitUntil(lambda: shown.stage is Stage.FOUND, timeout=8000)
-    click(qtbot, shown, "wayGo")
+    qtbot.waitUntil(lambda: shown.state is PreviewState.FOUND, timeout=8000)
+    click(qtbot, shown, "pathGo")
     wait_for_position(qtbot, card(blocked, "left.y"), 4000.0)
     assert card(blocked, "left.y").axis.details.position == pytest.approx(2000.0, abs=2.0)
-    qtbot.waitUntil(lambda: shown.stage is Stage.NONE, timeout=8000)
+    qtbot.waitUntil(lambda: shown.state is PreviewState.NONE, timeout=8000)
 
 
 def test_a_blocked_move_in_parts_is_led_round_as_well(
@@ -161,7 +160,7 @@ def test_a_blocked_move_in_parts_is_led_round_as_well(
 def test_cancel_leaves_everything_where_it_is(blocked: OperatorWindow, qtbot: QtBot) -> None:
     before = where(blocked)
     shown = find(blocked, qtbot)
-    click(qtbot, shown, "wayCancel")
+    click(qtbot, shown, "pathCancel")
     assert not shown.isVisible()
     assert scene(blocked, qtbot).content.planned == ()
     qtbot.wait(100)
@@ -172,30 +171,30 @@ def test_enter_presses_go_only_in_the_bar(blocked: OperatorWindow, qtbot: QtBot)
     shown = find(blocked, qtbot)
     assert not shown.isAncestorOf(blocked.focusWidget())
     assert blocked.focusWidget() is not shown
-    part(shown, "wayCancel", QPushButton).setFocus()
-    qtbot.keyClick(part(shown, "wayCancel", QPushButton), Qt.Key.Key_Return)
-    assert shown.stage is Stage.NONE
+    part(shown, "pathCancel", QPushButton).setFocus()
+    qtbot.keyClick(part(shown, "pathCancel", QPushButton), Qt.Key.Key_Return)
+    assert shown.state is PreviewState.NONE
     find(blocked, qtbot)
     shown.setFocus()
     qtbot.keyClick(shown, Qt.Key.Key_Return)
-    assert shown.stage is Stage.GOING
-    qtbot.waitUntil(lambda: shown.stage is Stage.NONE, timeout=8000)
+    assert shown.state is PreviewState.MOVING
+    qtbot.waitUntil(lambda: shown.state is PreviewState.NONE, timeout=8000)
 
 
 def test_no_way_says_what_blocks(blocked: OperatorWindow, qtbot: QtBot) -> None:
     before = where(blocked)
     go_to(blocked, qtbot, "-3000", "left.z")
     shown = bar(blocked)
-    qtbot.waitUntil(lambda: shown.stage is Stage.ENDED, timeout=8000)
-    assert "No way for left.z to -3000" in shown.text
+    qtbot.waitUntil(lambda: shown.state is PreviewState.ENDED, timeout=8000)
+    assert "No detour for left.z to -3000" in shown.text
     assert "plate" in shown.text
     assert "plate" in reason(blocked, "left.z")
     assert "ECM" not in reason(blocked, "left.z")
     assert "plate" in scene(blocked, qtbot).refused_text
     assert scene(blocked, qtbot).content.ghosts
-    assert not part(shown, "wayGo", QPushButton).isVisible()
+    assert not part(shown, "pathGo", QPushButton).isVisible()
     assert where(blocked) == pytest.approx(before, abs=1.0)
-    click(qtbot, shown, "wayCancel")
+    click(qtbot, shown, "pathCancel")
     assert not shown.isVisible()
 
 
@@ -203,11 +202,11 @@ def test_the_note_that_there_is_no_way_goes_when_the_axis_moves_again(
     blocked: OperatorWindow, qtbot: QtBot
 ) -> None:
     go_to(blocked, qtbot, "-3000", "left.z")
-    qtbot.waitUntil(lambda: bar(blocked).stage is Stage.ENDED, timeout=8000)
+    qtbot.waitUntil(lambda: bar(blocked).state is PreviewState.ENDED, timeout=8000)
     qtbot.wait(120)
     go_to(blocked, qtbot, "300", "left.z")
     wait_for_position(qtbot, card(blocked, "left.z"), 300.0)
-    qtbot.waitUntil(lambda: bar(blocked).stage is Stage.NONE)
+    qtbot.waitUntil(lambda: bar(blocked).state is PreviewState.NONE)
 
 
 def test_stop_on_the_way_ends_it(make: Make, stored: QSettings, qtbot: QtBot) -> None:
@@ -217,11 +216,11 @@ def test_stop_on_the_way_ends_it(make: Make, stored: QSettings, qtbot: QtBot) ->
     assert window.mode == "ECM"
     place(window, qtbot)
     shown = find(window, qtbot)
-    click(qtbot, shown, "wayGo")
+    click(qtbot, shown, "pathGo")
     qtbot.waitUntil(lambda: moving(window))
     qtbot.mousePress(part(window.top_bar, "stopButton", QPushButton), LEFT)
     qtbot.waitUntil(lambda: window.top_bar.latched and not moving(window))
-    qtbot.waitUntil(lambda: shown.stage is Stage.NONE, timeout=8000)
+    qtbot.waitUntil(lambda: shown.state is PreviewState.NONE, timeout=8000)
     stood = position(card(window, "left.y"))
     assert stood < 1990.0
     click(qtbot, window.top_bar, "resetButton")
@@ -233,7 +232,7 @@ def test_stop_on_the_way_ends_it(make: Make, stored: QSettings, qtbot: QtBot) ->
 def test_stop_takes_an_offer_away(blocked: OperatorWindow, qtbot: QtBot) -> None:
     shown = find(blocked, qtbot)
     blocked.stop("test")
-    qtbot.waitUntil(lambda: shown.stage is Stage.NONE)
+    qtbot.waitUntil(lambda: shown.state is PreviewState.NONE)
     assert scene(blocked, qtbot).content.planned == ()
 
 
@@ -243,10 +242,10 @@ def test_cancel_on_the_way_stops_there(make: Make, qtbot: QtBot) -> None:
     place(window, qtbot)
     choose_mode(window, qtbot, "ECM")
     shown = find(window, qtbot)
-    click(qtbot, shown, "wayGo")
+    click(qtbot, shown, "pathGo")
     qtbot.waitUntil(lambda: moving(window))
-    click(qtbot, shown, "wayCancel")
-    qtbot.waitUntil(lambda: shown.stage is Stage.NONE and not moving(window), timeout=8000)
+    click(qtbot, shown, "pathCancel")
+    qtbot.waitUntil(lambda: shown.state is PreviewState.NONE and not moving(window), timeout=8000)
     assert position(card(window, "left.y")) < 1990.0
     assert not window.top_bar.latched
 
@@ -256,14 +255,14 @@ def test_go_looks_again_when_an_axis_moved_since(blocked: OperatorWindow, qtbot:
     go_to(blocked, qtbot, "500", "left.z")
     wait_for_position(qtbot, card(blocked, "left.z"), 500.0)
     stood = position(card(blocked, "left.y"))
-    click(qtbot, shown, "wayGo")
-    assert shown.stage is Stage.SEARCHING
-    qtbot.waitUntil(lambda: shown.stage is Stage.FOUND, timeout=8000)
+    click(qtbot, shown, "pathGo")
+    assert shown.state is PreviewState.PLANNING
+    qtbot.waitUntil(lambda: shown.state is PreviewState.FOUND, timeout=8000)
     assert position(card(blocked, "left.y")) == pytest.approx(stood, abs=1.0)
-    click(qtbot, shown, "wayGo")
+    click(qtbot, shown, "pathGo")
     wait_for_position(qtbot, card(blocked, "left.y"), 2000.0)
     assert position(card(blocked, "left.z")) == pytest.approx(500.0, abs=1.0)
-    qtbot.waitUntil(lambda: shown.stage is Stage.NONE, timeout=8000)
+    qtbot.waitUntil(lambda: shown.state is PreviewState.NONE, timeout=8000)
 
 
 def test_a_way_that_is_blocked_meanwhile_is_left_with_the_reason(
@@ -272,9 +271,9 @@ def test_a_way_that_is_blocked_meanwhile_is_left_with_the_reason(
     shown = find(blocked, qtbot)
     go_to(blocked, qtbot, "200", "right.z")
     wait_for_position(qtbot, card(blocked, "right.z"), 200.0)
-    click(qtbot, shown, "wayGo")
-    qtbot.waitUntil(lambda: shown.stage is Stage.ENDED, timeout=8000)
-    assert "was left" in shown.text
+    click(qtbot, shown, "pathGo")
+    qtbot.waitUntil(lambda: shown.state is PreviewState.ENDED, timeout=8000)
+    assert "was abandoned" in shown.text
     assert "right_" in shown.text
     assert position(card(blocked, "left.y")) < 0.0
     assert scene(blocked, qtbot).content.planned == ()
@@ -290,13 +289,13 @@ def test_a_blocked_move_while_the_axis_moves_is_refused(
     qtbot.waitUntil(lambda: card(window, "left.z").axis.details.in_motion)
     go_to(window, qtbot, "-3000", "left.z")
     qtbot.waitUntil(lambda: "is moving" in reason(window, "left.z"))
-    assert bar(window).stage is Stage.NONE
+    assert bar(window).state is PreviewState.NONE
 
 
 def test_a_newer_move_replaces_the_offer(blocked: OperatorWindow, qtbot: QtBot) -> None:
     shown = find(blocked, qtbot)
     go_to(blocked, qtbot, "-3000", "left.z")
-    qtbot.waitUntil(lambda: shown.stage is Stage.ENDED, timeout=8000)
+    qtbot.waitUntil(lambda: shown.state is PreviewState.ENDED, timeout=8000)
     assert scene(blocked, qtbot).content.planned == ()
     find(blocked, qtbot, "2001")
     assert "2001" in shown.text
@@ -329,15 +328,15 @@ def test_back_in_mcm_an_offer_is_gone_and_moves_are_refused(
 ) -> None:
     shown = find(blocked, qtbot)
     choose_mode(blocked, qtbot, "MCM")
-    assert shown.stage is Stage.NONE
+    assert shown.state is PreviewState.NONE
     go_to(blocked, qtbot, "2000")
     qtbot.waitUntil(lambda: bool(reason(blocked)))
-    assert shown.stage is Stage.NONE
+    assert shown.state is PreviewState.NONE
 
 
 def test_a_way_is_told_in_one_line() -> None:
     way = Way({"a": 0.0}, ({"a": 1.0}, {"a": 2.0}), "detour", 9230.0, 400.0, 3.14)
-    assert way_text(way) == "detour, 9.2 mm instead of 400 µm, about 3.1 s, 2 parts"
+    assert path_text(way) == "detour, 9.2 mm instead of 400 µm, about 3.1 s, 2 waypoints"
     assert poses_along(way, {"a": 9.0, "b": 5.0}) == [
         {"a": 0.0, "b": 5.0},
         {"a": 1.0, "b": 5.0},

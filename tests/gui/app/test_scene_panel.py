@@ -5,7 +5,7 @@ from PySide6.QtCore import QSettings, Qt
 from PySide6.QtWidgets import QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
-from cosmic.app.panels.scene_facts import bodies_moved_by
+from cosmic.app.panels.scene import bodies_moved_by
 from cosmic.app.platform import build_platform
 from cosmic.app.windows.operator_window import SCENE, OperatorWindow
 from cosmic.frame.gui.elided_label import ElidedLabel

@@ -130,7 +130,7 @@ def test_a_mistake_in_the_scene_is_named(folder: Path, capsys: pytest.CaptureFix
     assert main(["check", str(folder)]) == 1
     said = complaints(capsys)
     assert any("left.q moves nothing" in line for line in said), said
-    assert any("drives left.x, which is no positioner" in line for line in said)
+    assert any("drives left.x, which is not a positioner" in line for line in said)
     edit(scene, 'joint = "left_x"', 'joint = "nowhere"')
     assert main(["scene", "check", str(scene)]) == 1
     assert any("nowhere" in line for line in complaints(capsys))
@@ -258,7 +258,7 @@ def test_certificates_are_made_for_each_station(
     ("arguments", "wanted"),
     [
         (["--stations", ","], "name at least one"),
-        (["--stations", "one,one"], "stands there twice"),
+        (["--stations", "one,one"], "is listed twice"),
         (["--stations", "one/two"], "letters, digits, - and _"),
         (["--stations", "one", "--address", "192.168.1.5"], "it reads STATION=HOST"),
         (["--stations", "one", "--address", "two=192.168.1.5"], "not among the stations"),

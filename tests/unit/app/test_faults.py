@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from cosmic.app.faults import SimulationFaults
+from cosmic.app.simulation import SimulationFaults
 from cosmic.twin.twin_faults import TwinFaults
 
 

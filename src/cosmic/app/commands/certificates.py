@@ -40,7 +40,7 @@ def make(folder: Path, stations: Sequence[str], addresses: Sequence[str]) -> lis
     if not stations:
         raise ConfigError("--stations: name at least one, such as fiberstation,fibervision")
     if len(stations) != len(set(stations)):
-        raise ConfigError(f"--stations: a name stands there twice: {', '.join(stations)}")
+        raise ConfigError(f"--stations: a name is listed twice: {', '.join(stations)}")
     try:
         made = make_certificates(folder, *stations, addresses=_by_station(addresses))
     except OSError as exc:
@@ -48,7 +48,7 @@ def make(folder: Path, stations: Sequence[str], addresses: Sequence[str]) -> lis
     lines = [f"{files.certificate.parent}: for {name}" for name, files in made.items()]
     return [
         *lines,
-        "Carry each folder to its own computer, by hand, and name it there in the platform file: "
+        "Copy each folder to its own computer and name it there in the platform file: "
         '[network] certificates = "FOLDER".',
         f"Keep {folder / 'authority'} where no station runs: its key makes further certificates.",
     ]

@@ -125,5 +125,5 @@ def _build(options: ServeOptions, how: Serving, hosted: tuple[str, ...]) -> Plat
 
 
 def _end(ended: Event, name: str) -> None:
-    logger.info("ends: %s", name)
+    logger.info("ended by %s", name)
     ended.set()

@@ -98,7 +98,7 @@ def key_mistakes(file: PlatformFile, path: Path) -> list[str]:
             lines.append(f"{path}: {where}: the key {key!r} is taken by {used[key]}")
         used.setdefault(key, where)
     if not file.platform.stop_key:
-        lines.append(f"{path}: platform.stop_key: a platform needs a stop key")
+        lines.append(f"{path}: platform.stop_key: is empty; a platform needs a stop key")
     return lines
 
 

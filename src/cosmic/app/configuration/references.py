@@ -40,7 +40,7 @@ def _table_mistakes(vico: VicoSettings, kinds: dict[str, str]) -> list[str]:
     axis = vico.table_axis
     if not axis or kinds.get(axis) == "rotary":
         return []
-    wrong = f"{axis} is {kinds[axis]}: it turns nothing" if axis in kinds else ""
+    wrong = f"{axis} is {kinds[axis]}: it does not rotate" if axis in kinds else ""
     return [f"vico.table_axis: {wrong or not_there('positioner', axis, kinds)}"]
 
 

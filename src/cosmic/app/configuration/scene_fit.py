@@ -37,7 +37,7 @@ def misfits(file: PlatformFile, path: Path, scene: SceneModel) -> list[str]:
     """Return where a scene and the positioners do not fit together, a line each."""
     positioners = {each.name: each for each in file.mico.positioner}
     lines = [
-        f"{path}: platform.scene: {file.platform.scene} drives {axis}, which is no positioner"
+        f"{path}: platform.scene: {file.platform.scene} drives {axis}, which is not a positioner"
         for axis in scene.axes
         if axis not in positioners
     ]

@@ -78,17 +78,20 @@ class CalibrationPanel(QWidget):
         self.list.setIconSize(QSize(INDICATOR_PX, INDICATOR_PX))
         self.list.itemSelectionChanged.connect(self._on_selection)
         self.anew = named(
-            push_button("Measure anew", "What is selected is measured by the next run in any case"),
+            push_button(
+                "Measure again",
+                "Measure the selected calibrations in the next run even if they are fresh",
+            ),
             "calibrationAnew",
         )
         self.anew.clicked.connect(self._on_anew)
         self.zooms = named(QCheckBox("every zoom"), "calibrationZooms")
-        tipped(self.zooms, "The map at every step of the lens as well; it takes a minute")
+        tipped(self.zooms, "Map every zoom step of the lens as well (about one minute)")
         self.run = ProcedureTreePanel(lambda: calibrate(zooms=self.zooms.isChecked()))
         row = QHBoxLayout()
         row.addWidget(self.anew)
         row.addWidget(self.zooms)
-        self.none = named(ElidedLabel("Nothing yet: Start measures all"), "calibrationNone")
+        self.none = named(ElidedLabel("None yet. Start measures all"), "calibrationNone")
         row.addWidget(self.none, 9)
         row.addStretch(1)
         column = QVBoxLayout(self)
@@ -184,7 +187,7 @@ def texts(registry: CalibrationRegistry, entry: CalibrationEntry) -> Sequence[st
 
 def _told(entry: CalibrationEntry) -> str:
     made = entry.made.astimezone().strftime("%Y-%m-%d %H:%M")
-    seen = entry.checked.astimezone().strftime("; seen to hold %H:%M") if entry.checked else ""
+    seen = entry.checked.astimezone().strftime("; last confirmed %H:%M") if entry.checked else ""
     return f"made {made}{seen}; with {entry.made_with}; CoSMic {entry.version}"
 
 

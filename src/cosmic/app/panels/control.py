@@ -4,7 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from PySide6.QtCore import QTimer
+import pyqtgraph as pg
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QHideEvent, QShowEvent
 from PySide6.QtWidgets import (
     QComboBox,
@@ -16,34 +17,100 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from cosmic.app.panels.control_plot import SPAN_S, ControlPlot
+from cosmic.app.panels.curve_frame import CurveFrame
 from cosmic.app.rig import Rig
 from cosmic.autonomy.control.control import Control
 from cosmic.autonomy.control.handle import ControlHandle
 from cosmic.autonomy.control.law import ControlState
 from cosmic.autonomy.control.pid import PidGains
+from cosmic.autonomy.control.trace import ControlTrace
 from cosmic.daqco.gui.plot.units import display_unit
 from cosmic.daqco.gui.value_field import ValueField
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.palette import OKABE_ITO, Palette
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, number_font
 from cosmic.frame.overrides import override
+
+SPAN_S: Final = 10.0
+_AXIS_PX: Final = 56
+_WIDTH: Final = 2
+_MOST_POINTS: Final = 1000
+_VALUE: Final = OKABE_ITO["orange"]
+_OUTPUT: Final = OKABE_ITO["sky blue"]
+
+
+class ControlPlot(CurveFrame):
+    """Draws a `ControlTrace`; GUI thread."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(_AXIS_PX, parent)
+        self.value_box, self._value_axis = self._add_field("value", share=3)
+        self.output_box, self._output_axis = self._add_field("output", share=2)
+        for box in (self.value_box, self.output_box):
+            box.setXRange(-SPAN_S, 0.0, padding=0.0)
+            box.enableAutoRange(y=True)
+        self._add_axis_below("time before now, s")
+        self.value, self.set_point = pg.PlotCurveItem(), pg.PlotCurveItem()
+        self.output = pg.PlotCurveItem()
+        for box, curve in (
+            (self.value_box, self.value),
+            (self.value_box, self.set_point),
+            (self.output_box, self.output),
+        ):
+            box.addItem(curve)
+        self._units = ("", "")
+        self.setMinimumSize(30 * STEP_PX, 20 * STEP_PX)
+        self._restyle()
+
+    def set_units(self, unit: str, axis_unit: str) -> None:
+        """Write the units of value and axis at the axes."""
+        if (unit, axis_unit) != self._units:
+            self._units = (unit, axis_unit)
+            shown, axis_shown = display_unit(unit), display_unit(axis_unit)
+            self._names[self._value_axis] = f"value, {shown}" if shown else "value"
+            self._names[self._output_axis] = f"output, {axis_shown}/s" if axis_shown else "output"
+            self._restyle()
+
+    def show_trace(self, trace: ControlTrace) -> None:
+        """Draw a trace; its end is now."""
+        if not trace.wall_s.size:
+            self.clear()
+            return
+        every = slice(None, None, 1 + trace.wall_s.size // _MOST_POINTS)
+        before_s = (trace.wall_s - trace.wall_s[-1])[every]
+        self.value.setData(before_s, trace.measured[every])
+        self.set_point.setData(before_s, trace.set_point[every])
+        self.output.setData(before_s, trace.output[every])
+
+    def clear(self) -> None:
+        """Draw nothing."""
+        for curve in (self.value, self.set_point, self.output):
+            curve.setData([], [])
+
+    @override
+    def _colour(self, palette: Palette) -> None:
+        self.value.setPen(pg.mkPen(_VALUE, width=_WIDTH))
+        self.output.setPen(pg.mkPen(_OUTPUT, width=_WIDTH))
+        # The set point is the text's colour and dashed: told apart without colour, too.
+        self.set_point.setPen(pg.mkPen(palette.text, width=1, style=Qt.PenStyle.DashLine))
+
 
 PERIOD_MS: Final = 50
 _FORCE: Final = "uN"
 _SET_POINT_UN: Final = 50.0
 _USUAL_AXIS: Final = "probe.y"
 _PACE: Final = (
-    "Median period, the longest but one in a hundred, how far it is off but once in a hundred, "
+    "Median period, 99th percentile, jitter (99th percentile), "
     "periods missed, moves sent to the axis"
 )
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class ControlRequest:
     """What the fields say."""
 
     channel: str
@@ -61,16 +128,18 @@ class ControlForm(QWidget):
     def __init__(self, control: Control, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._control = control
-        self.channel = tipped(named(QComboBox(), "controlChannel"), "What is to be held")
-        self.axis = tipped(named(QComboBox(), "controlAxis"), "The axis that moves")
+        self.channel = tipped(named(QComboBox(), "controlChannel"), "Controlled channel")
+        self.axis = tipped(named(QComboBox(), "controlAxis"), "Axis that moves")
         self.direction = named(QComboBox(), "controlDirection")
-        tipped(self.direction, "Which way of the axis makes the force rise")
+        tipped(self.direction, "Direction of the axis that increases the force")
         self.direction.addItem("force rises forward (+)", 1)
         self.direction.addItem("force rises backward (-)", -1)
         self.set_point = _field("Force to hold", _FORCE, _SET_POINT_UN, "controlSetPoint")
-        self.limit = named(ValueField("Force that ends it", _FORCE, empty=True), "controlLimit")
+        self.limit = named(
+            ValueField("Force limit that ends the loop", _FORCE, empty=True), "controlLimit"
+        )
         self.travel = _field(
-            "Most travel either way", "um", control.settings.travel_um, "controlTravel"
+            "Largest travel in either direction", "um", control.settings.travel_um, "controlTravel"
         )
         self.gain = named(ValueField("Gain kp", "µm/s/µN", empty=True), "controlGain")
         self.limit.setPlaceholderText("as configured")
@@ -82,7 +151,7 @@ class ControlForm(QWidget):
             ("Channel", self.channel),
             ("Axis", self.axis),
             ("Direction", self.direction),
-            ("Set point", self.set_point),
+            ("Setpoint", self.set_point),
             ("Limit", self.limit),
             ("Travel", self.travel),
             ("Gain", self.gain),
@@ -106,13 +175,13 @@ class ControlForm(QWidget):
                 box.addItems(names)
                 box.setCurrentText(chosen)
 
-    def wish(self) -> Wish | None:
+    def request(self) -> ControlRequest | None:
         """Return what the fields say; None where one of them says nothing that makes sense."""
         fields = (self.set_point, self.limit, self.travel, self.gain)
         taken = [each.take() for each in fields]  # all of them, so that each says what is wrong
         if not all(taken):
             return None
-        return Wish(
+        return ControlRequest(
             channel=self.channel.currentText(),
             axis=self.axis.currentText(),
             set_point=self.set_point.value(),
@@ -148,9 +217,9 @@ class ControlPanel(QWidget):
         self.form = ControlForm(control)
         self.start = named(push_button("Hold", "Approach, then hold the force"), "controlStart")
         self.stop = named(push_button("End", "End the loop; the axis stops"), "controlStop")
-        self.aim = named(push_button("Change", "Go for the new set point"), "controlAim")
+        self.aim = named(push_button("Change", "Apply the new setpoint"), "controlAim")
         self.badge = StateBadge(State.UNKNOWN)
-        self.state = Chip("no loop", tip="What the loop is at")
+        self.state = Chip("no loop", tip="State of the loop")
         self.reason = named(ElidedLabel(), "controlReason")
         self.readout = named(QLabel("value -"), "controlReadout")
         self.pace = named(ElidedLabel("period -", hint=_PACE), "controlPace")
@@ -191,7 +260,7 @@ class ControlPanel(QWidget):
     # What the operator does
 
     def _on_start(self) -> None:
-        wish = self.form.wish()
+        wish = self.form.request()
         if wish is None:
             return
         try:
@@ -211,7 +280,7 @@ class ControlPanel(QWidget):
         self.refresh()
 
     def _on_aim(self) -> None:
-        wish, handle = self.form.wish(), self._control.newest
+        wish, handle = self.form.request(), self._control.newest
         if wish is None or handle is None:
             return
         try:

@@ -1,46 +1,60 @@
-"""The bar above the scene that offers a way round: what it is like, Go, and Cancel."""
+"""ECM in the window: a detour for a blocked move is planned, previewed, and driven after Go."""
 
+import logging
 import math
+from dataclasses import replace
 from enum import StrEnum
+from functools import partial
 from typing import Final
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QVBoxLayout, QWidget
 
+from cosmic.app.panels.scene import ScenePanel
+from cosmic.frame.errors import NotAvailable
 from cosmic.frame.gui.build import named, push_button
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, ui_font
+from cosmic.frame.operation import Progress, Task
 from cosmic.frame.overrides import override
+from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.ways import Way
+from cosmic.mico.gui.mico_widget import MicoWidget
+from cosmic.mico.gui.way_request import WayRequest
+
+logger = logging.getLogger(__name__)
 
 _ENTER: Final = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 _MILLIMETRE_UM: Final = 1000.0
 _TENTHS_BELOW_S: Final = 10.0
+_AT_START: Final = 1.0
+"""How far, um or deg, an axis may be from where a path starts."""
 
 
-class Stage(StrEnum):
-    """What the bar is at."""
+class PreviewState(StrEnum):
+    """What the preview shows."""
 
     NONE = "none"
-    SEARCHING = "searching"
+    PLANNING = "planning"
     FOUND = "found"
-    GOING = "going"
+    MOVING = "moving"
     ENDED = "ended"
 
 
-class WayBar(QWidget):
-    """Says what becomes of a move that something stands in the way of; it decides nothing.
+class PathPreview(QWidget):
+    """The bar above the scene that shows what becomes of a blocked move; it decides nothing.
 
-    It takes no focus by itself: Enter presses Go only after the operator went there.
+    It takes no focus by itself: Enter presses Go only after the operator has moved the focus there.
 
     Signals
     -------
     go_requested()
-        The operator wants to go the way shown.
+        The operator wants to drive the path shown.
     cancel_requested()
-        The operator does not want it, or read why there is none.
+        The operator does not want it, or has read why there is none.
     """
 
     go_requested = Signal()
@@ -48,21 +62,21 @@ class WayBar(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setObjectName("wayBar")
+        self.setObjectName("pathPreview")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleName("Way round")
-        self._stage = Stage.NONE
+        self.setAccessibleName("Detour")
+        self._state = PreviewState.NONE
         self._badge = StateBadge(State.BUSY)
-        self._head = named(ElidedLabel(), "wayHead")
+        self._head = named(ElidedLabel(), "pathHead")
         self._head.setFont(ui_font(bold=True))
-        self._words = named(QLabel(), "wayWords")
+        self._words = named(QLabel(), "pathWords")
         self._words.setTextFormat(Qt.TextFormat.PlainText)
         self._words.setWordWrap(True)
         self._words.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self._progress = named(QProgressBar(), "wayProgress")
-        self._progress.setAccessibleName("Progress on the way round")
-        self._go = named(push_button("Go", "Go this way, part by part"), "wayGo")
-        self._cancel = named(push_button("Cancel", ""), "wayCancel")
+        self._progress = named(QProgressBar(), "pathProgress")
+        self._progress.setAccessibleName("Progress of the detour")
+        self._go = named(push_button("Go", "Drive this path, waypoint by waypoint"), "pathGo")
+        self._cancel = named(push_button("Cancel", ""), "pathCancel")
         self._go.clicked.connect(self.go_requested)
         self._cancel.clicked.connect(self.cancel_requested)
         self._arrange()
@@ -89,62 +103,63 @@ class WayBar(QWidget):
         column.addLayout(last)
 
     @property
-    def stage(self) -> Stage:
-        """What it is at."""
-        return self._stage
+    def state(self) -> PreviewState:
+        """What it shows."""
+        return self._state
 
     @property
     def text(self) -> str:
-        """What it says; empty when there is nothing to say."""
+        """The text shown; empty when there is none."""
         parts = (self._head.text(), self._words.text())
-        return "" if self._stage is Stage.NONE else "\n".join(part for part in parts if part)
+        shown = self._state is not PreviewState.NONE
+        return "\n".join(part for part in parts if part) if shown else ""
 
     def clear(self) -> None:
-        """Have nothing to say."""
-        self._stage = Stage.NONE
+        """Show nothing."""
+        self._state = PreviewState.NONE
         self.hide()
 
-    def show_search(self, what: str, why: str) -> None:
-        """Say that a way is looked for, and why the straight one will not do."""
-        self._show(Stage.SEARCHING, State.BUSY, f"Looking for a way for {what}", why)
+    def show_planning(self, what: str, why: str) -> None:
+        """Show that a detour is being planned, and why the straight path is refused."""
+        self._show(PreviewState.PLANNING, State.BUSY, f"Planning a detour for {what}", why)
         self._progress.setRange(0, 0)
 
-    def show_found(self, what: str, way: Way) -> None:
-        """Offer a way."""
-        words = f"{way_text(way)}. Nothing moves before you press Go."
-        self._show(Stage.FOUND, State.OK, f"Way found for {what}", words)
+    def show_found(self, what: str, path: Way) -> None:
+        """Offer a path."""
+        words = f"{path_text(path)}. Nothing moves before you press Go."
+        self._show(PreviewState.FOUND, State.OK, f"Detour found for {what}", words)
 
-    def show_going(self, what: str) -> None:
-        """Say that the way is being gone."""
-        self._show(Stage.GOING, State.BUSY, f"Going round: {what}", "")
+    def show_moving(self, what: str) -> None:
+        """Show that the path is being driven."""
+        self._show(PreviewState.MOVING, State.BUSY, f"Driving the detour: {what}", "")
         self._progress.setRange(0, 100)
         self._progress.setValue(0)
 
     def show_progress(self, fraction: float, text: str) -> None:
-        """Say how far it is."""
-        if self._stage is Stage.GOING:
+        """Show how much of the path is done."""
+        if self._state is PreviewState.MOVING:
             self._progress.setValue(round(100 * fraction))
             self._words.setText(text)
 
     def show_end(self, head: str, why: str) -> None:
-        """Say why there is no way, or why it was left."""
-        self._show(Stage.ENDED, State.REFUSED, head, why)
+        """Show why there is no detour, or why it was abandoned."""
+        self._show(PreviewState.ENDED, State.REFUSED, head, why)
 
-    def say(self, words: str) -> None:
-        """Say something else of what is shown."""
+    def set_words(self, words: str) -> None:
+        """Replace the text below the heading."""
         self._words.setText(words)
 
-    def _show(self, stage: Stage, state: State, head: str, words: str) -> None:
-        self._stage = stage
+    def _show(self, preview: PreviewState, state: State, head: str, words: str) -> None:
+        self._state = preview
         self._badge.set_state(state)
         self._head.set_text(head)
         self._words.setText(words)
-        self._words.ensurePolished()  # room for two lines always: the scene below keeps its place
+        self._words.ensurePolished()  # two lines always: the scene below keeps its position
         self._words.setMinimumHeight(2 * self._words.fontMetrics().lineSpacing() + 2)
-        self._go.setVisible(stage is Stage.FOUND)
-        self._progress.setVisible(stage in (Stage.SEARCHING, Stage.GOING))
-        self._cancel.setText("Close" if stage is Stage.ENDED else "Cancel")
-        self._cancel.setToolTip(_CANCEL_TIPS[stage])
+        self._go.setVisible(preview is PreviewState.FOUND)
+        self._progress.setVisible(preview in (PreviewState.PLANNING, PreviewState.MOVING))
+        self._cancel.setText("Close" if preview is PreviewState.ENDED else "Cancel")
+        self._cancel.setToolTip(_CANCEL_TIPS[preview])
         self.show()
 
     @override
@@ -153,27 +168,208 @@ class WayBar(QWidget):
             super().keyPressEvent(event)
         elif self._cancel.hasFocus():
             self._cancel.click()
-        elif self._stage is Stage.FOUND:
+        elif self._state is PreviewState.FOUND:
             self._go.click()
 
 
 _CANCEL_TIPS: Final = {
-    Stage.SEARCHING: "Look no further",
-    Stage.FOUND: "Leave everything where it is",
-    Stage.GOING: "Stop here and leave the way",
-    Stage.ENDED: "Take this note away",
+    PreviewState.PLANNING: "Stop planning",
+    PreviewState.FOUND: "Leave every axis at its position",
+    PreviewState.MOVING: "Stop here and abandon the detour",
+    PreviewState.ENDED: "Close this message",
 }
 
 
-def way_text(way: Way) -> str:
-    """Return what a way is like, such as "detour, 9.2 mm instead of 4.0 mm, about 3 s, 5 parts"."""
-    count = len(way.waypoints)
-    lengths = f"{_length_text(way.length)} instead of {_length_text(way.straight_length)}"
-    parts = [way.method, lengths]
-    if math.isfinite(way.duration_s):
-        digits = 1 if way.duration_s < _TENTHS_BELOW_S else 0
-        parts.append(f"about {way.duration_s:.{digits}f} s")
-    parts.append(f"{count} part{'' if count == 1 else 's'}")
+class PathController(QObject):
+    """Plans a detour for a blocked move and drives it after Go; GUI thread.
+
+    Nothing moves before the operator presses Go, and the gate checks each part again.
+
+    Parameters
+    ----------
+    panel : MicoWidget
+        Where the moves come from.
+    scene : ScenePanel
+        Where the path is drawn.
+    preview : PathPreview
+        Where it is offered.
+
+    Signals
+    -------
+    offered()
+        The preview has something new to show.
+    """
+
+    offered = Signal()
+
+    def __init__(
+        self,
+        panel: MicoWidget,
+        scene: ScenePanel,
+        preview: PathPreview,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._mico = panel.mico
+        self._application = panel.mico.application
+        self._scene = scene
+        self._preview = preview
+        self._request: WayRequest | None = None
+        self._task: Task | None = None
+        self._answer: Way | MoveVerdict | None = None
+        self._path: Way | None = None
+        # Queued even from this thread: the answer was sent before, and comes before its end.
+        queued = Qt.ConnectionType.QueuedConnection
+        self._relay = Relay(self._on_progressed, queued=True)
+        self._application.way_found.connect(self._on_answer, queued)
+        self._application.way_missing.connect(self._on_answer, queued)
+        panel.way_wanted.connect(self.plan)
+        scene.refused_gone.connect(self._on_refused_gone)
+        preview.go_requested.connect(self.go)
+        preview.cancel_requested.connect(self.cancel)
+
+    @property
+    def state(self) -> PreviewState:
+        """What the preview shows."""
+        return self._preview.state
+
+    # Planning
+
+    def plan(self, request: WayRequest) -> None:
+        """Plan a detour; an earlier offer is withdrawn."""
+        if self._mico[request.axis].details.in_motion:
+            self._refuse(request, f"{request.axis} is moving; wait until it is stationary")
+            return
+        try:
+            task = self._application.search_way({request.axis: request.target})
+        except NotAvailable as exc:
+            self._refuse(request, str(exc))
+            return
+        self._forget()
+        self._request, self._task = request, task
+        request.note("the straight path is blocked; planning a detour")
+        self._preview.show_planning(_what(request), str(request.verdict))
+        self.offered.emit()
+        task.subscribe(partial(self._relay, task))
+
+    def _refuse(self, request: WayRequest, why: str) -> None:
+        """Let the refusal of the straight path stand."""
+        text = f"{request.verdict}; no detour was planned: {why}"
+        request.refuse(replace(request.verdict, text=text))
+
+    def _on_answer(self, answer: object) -> None:
+        if isinstance(answer, Way | MoveVerdict):
+            self._answer = answer
+
+    def _on_progressed(self, task: Task, progress: Progress) -> None:
+        if task is not self._task:
+            return
+        if not progress.done:
+            self._preview.show_progress(progress.fraction, progress.text)
+            return
+        self._task = None
+        if self.state is PreviewState.PLANNING:
+            self._end_planning(progress)
+        elif self.state is PreviewState.MOVING:
+            self._end_moving(task, progress)
+
+    def _end_planning(self, progress: Progress) -> None:
+        request, answer, self._answer = self._request, self._answer, None
+        if request is None:
+            return
+        if isinstance(answer, Way) and not progress.error:
+            self._offer(request, answer)
+            return
+        verdict = replace(request.verdict, text=progress.error)
+        if isinstance(answer, MoveVerdict) and str(answer) == progress.error:
+            verdict = answer
+        logger.info("no detour for %s: %s", _what(request), verdict)
+        request.refuse(verdict)
+        self._preview.show_end(f"No detour for {_what(request)}", str(verdict))
+
+    def _offer(self, request: WayRequest, path: Way) -> None:
+        self._path = path
+        self._scene.clear_refused()
+        self._scene.set_planned(poses_along(path, self._positions()))
+        self._preview.show_found(_what(request), path)
+        request.note("a detour was found: Go or Cancel in the panel Scene")
+        self.offered.emit()
+
+    def _positions(self) -> dict[str, float]:
+        states = {axis.name: axis.details for axis in self._mico}
+        return {name: each.position for name, each in states.items() if each.position is not None}
+
+    # Moving
+
+    def go(self) -> None:
+        """Drive the path on offer; plans again where an axis has left the start of the path."""
+        request, path = self._request, self._path
+        if self.state is not PreviewState.FOUND or request is None or path is None:
+            return
+        if self._left_start(path):
+            logger.info("an axis moved since the detour was found: planning again")
+            self.plan(request)
+            return
+        try:
+            task = self._application.follow_way(path, self._mico[request.axis].commander.source)
+        except NotAvailable as exc:
+            self._preview.set_words(f"Not yet: {exc}. Then press Go again.")
+            return
+        logger.info("detour: %s, %d waypoints", _what(request), len(path.waypoints))
+        self._task = task
+        request.note("driving the detour")
+        self._preview.show_moving(_what(request))
+        task.subscribe(partial(self._relay, task))
+
+    def _left_start(self, path: Way) -> bool:
+        for name, start in path.start.items():
+            state = self._mico[name].details
+            away = state.position is None or abs(state.position - start) > _AT_START
+            if state.in_motion or away:
+                return True
+        return False
+
+    def _end_moving(self, task: Task, progress: Progress) -> None:
+        request = self._request
+        what = _what(request) if request is not None else ""
+        self._forget()
+        if progress.error and not task.cancel_requested:
+            self._preview.show_end(f"The detour was abandoned: {what}", progress.error)
+            self.offered.emit()
+
+    def cancel(self) -> None:
+        """Abandon what the preview shows: planning, offer, message, or the movement itself."""
+        if self.state is PreviewState.MOVING and self._task is not None:
+            self._task.cancel()  # its end clears the preview
+            return
+        if self._task is not None:
+            self._task.cancel()
+        offered = self.state in (PreviewState.PLANNING, PreviewState.FOUND)
+        if offered and self._request is not None:
+            logger.info("the detour for %s was abandoned", _what(self._request))
+        self._forget()
+
+    def _forget(self) -> None:
+        if self._request is not None:
+            self._request.note("")
+        self._request = self._task = self._answer = self._path = None
+        self._scene.set_planned(None)
+        self._preview.clear()
+
+    def _on_refused_gone(self) -> None:
+        if self.state is PreviewState.ENDED:
+            self._forget()
+
+
+def path_text(path: Way) -> str:
+    """Return a path in one line: "detour, 9.2 mm instead of 4.0 mm, about 3 s, 5 waypoints"."""
+    count = len(path.waypoints)
+    lengths = f"{_length_text(path.length)} instead of {_length_text(path.straight_length)}"
+    parts = [path.method, lengths]
+    if math.isfinite(path.duration_s):
+        digits = 1 if path.duration_s < _TENTHS_BELOW_S else 0
+        parts.append(f"about {path.duration_s:.{digits}f} s")
+    parts.append(f"{count} waypoint{'' if count == 1 else 's'}")
     return ", ".join(parts)
 
 
@@ -181,3 +377,15 @@ def _length_text(length_um: float) -> str:
     if length_um < _MILLIMETRE_UM:
         return f"{length_um:.0f} µm"
     return f"{length_um / _MILLIMETRE_UM:.1f} mm"
+
+
+def _what(request: WayRequest) -> str:
+    return f"{request.axis} to {request.where}"
+
+
+def poses_along(path: Way, positions: dict[str, float]) -> list[dict[str, float]]:
+    """Return where all axes are at the start of a path and after each of its waypoints."""
+    poses = [{**positions, **path.start}]
+    for waypoint in path.waypoints:
+        poses.append({**poses[-1], **waypoint})
+    return poses

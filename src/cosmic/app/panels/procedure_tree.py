@@ -36,14 +36,14 @@ _SHAPES: Final = {
 }
 _KINDS: Final = {
     "operation": "One operation",
-    "sequence": "One part after the other",
-    "retry": "Tried again when it fails",
-    "fallback": "The next part when one fails",
+    "sequence": "One step after the other",
+    "retry": "Retried after a failure",
+    "fallback": "The next step if one fails",
     "guard": "Runs only while a condition holds",
-    "parallel": "Side by side",
-    "repeat": "Again and again",
-    "holding": "Needs something that one part at a time may use",
-    "role": "Done by one of several arms that do the same",
+    "parallel": "In parallel",
+    "repeat": "Repeated",
+    "holding": "Needs a shared resource",
+    "role": "Done by one of several equal arms",
 }
 
 

@@ -2,14 +2,13 @@
 
 import json
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Final
 
 from PySide6.QtCore import QSettings, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QPaintEvent, QShowEvent
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
-from cosmic.app.panels.scene_facts import bodies_moved_by, far, margin_um
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named
 from cosmic.frame.gui.elided_label import ElidedLabel
@@ -17,7 +16,7 @@ from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.overrides import override
 from cosmic.frame.verdict import MoveVerdict, Reason
 from cosmic.mico.core.collision.answer import Approach
-from cosmic.mico.core.collision.model import SceneModel
+from cosmic.mico.core.collision.model import SceneModel, pair_of
 from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.gui.mico_widget import MicoWidget
@@ -28,6 +27,35 @@ if TYPE_CHECKING:
     from cosmic.mico.gui.scene.scene_widget import SceneWidget
 
 logger = logging.getLogger(__name__)
+
+_STILL: Final = 1e-3
+"""Share of its travel by which the position of an axis at rest may differ."""
+
+
+def bodies_moved_by(model: SceneModel, axes: Iterable[str]) -> frozenset[str]:
+    """Return the bodies that the axes move, with all that these carry."""
+    wanted = frozenset(axes)
+    driven = {drive.joint for drive in model.drives if drive.axis in wanted}
+    moved: set[str] = set()
+    for joint in model.joints:  # parents come before their children
+        if joint.name in driven or joint.parent in moved:
+            moved.add(joint.child)
+    return frozenset(moved)
+
+
+def margin_um(model: SceneModel, one: str, other: str) -> float:
+    """Return how far apart two bodies must keep."""
+    pair = pair_of(one, other)
+    return next((each.margin_um for each in model.pairs if each.bodies == pair), 0.0)
+
+
+def far(state: PositionerState, stood: float) -> bool:
+    """Tell whether an axis stands elsewhere than where it stood."""
+    if state.position is None:
+        return False
+    low, high = state.limits or (0.0, 1000.0)
+    return abs(state.position - stood) > _STILL * (high - low)
+
 
 PERIOD_MS: Final = 50
 _STATE: Final = "scene/view"
@@ -180,7 +208,7 @@ class ScenePanel(QWidget):
                     axis.commander.movement_refused.connect(self._on_refused)
                 self._feed.add(axis.name, self)
         except CosmicError as exc:
-            logger.debug("the scene waits for the end of a rescan: %s", exc)
+            logger.debug("the scene is shown after the rescan: %s", exc)
         self._on_flushed()
 
     def show_state(self, state: PositionerState) -> None:
@@ -197,7 +225,9 @@ class ScenePanel(QWidget):
         self._scene.set_positions(self._positions)
         unknown = [name for name, is_unknown in self._unknown.items() if is_unknown]
         mark = state_look(State.UNKNOWN).glyph
-        self._note.set_text(f"{mark} position unknown, drawn as last read: {', '.join(unknown)}")
+        self._note.set_text(
+            f"{mark} position unknown, drawn at the last reading: {', '.join(unknown)}"
+        )
         self._note.setVisible(bool(unknown) and self._model is not None)
 
     def _on_nearest(self, nearest: Approach | None) -> None:

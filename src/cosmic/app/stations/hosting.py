@@ -1,14 +1,18 @@
 """Makes the applications of one process out of the platform file."""
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
+
+from PySide6.QtCore import QStandardPaths
 
 from cosmic.app.configuration.platform_file import PlatformFile
 from cosmic.app.configuration.scene_fit import load_checker
-from cosmic.app.faults import SimulationFaults
-from cosmic.app.left_open import close_left_open, open_recordings
+from cosmic.app.simulation import SimulationFaults
 from cosmic.daqco.api.application import DaqcoApplication
+from cosmic.daqco.core.left_behind import Closing, OpenRecordings, Outcome
 from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.daqco.hw.factory import make_library
 from cosmic.daqco.hw.sim_signal import Source
@@ -26,6 +30,31 @@ from cosmic.vico.hw.factory import make_camera_library, make_lens, make_light
 from cosmic.vico.hw.interface import CameraLibrary
 from cosmic.vico.hw.peripherals import Lens
 from cosmic.vico.hw.sim_peripherals import SimPeripherals
+
+logger = logging.getLogger(__name__)
+
+_LEVELS: Final = {
+    Outcome.CLOSED: logging.WARNING,
+    Outcome.UNSURE: logging.WARNING,
+    Outcome.IN_USE: logging.DEBUG,
+    Outcome.WHOLE: logging.DEBUG,
+}
+
+
+def open_recordings() -> OpenRecordings:
+    """Return the notes of this user's open recordings."""
+    place = QStandardPaths.StandardLocation.GenericStateLocation
+    return OpenRecordings(
+        Path(QStandardPaths.writableLocation(place)) / "CoSMic" / "open-recordings"
+    )
+
+
+def close_left_open(notes: OpenRecordings, folders: tuple[Path, ...]) -> list[Closing]:
+    """Close what processes that are gone left open, and say so in the log."""
+    found = notes.close_left_open(folders)
+    for each in found:
+        logger.log(_LEVELS[each.outcome], "%s", each.text)
+    return found
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Joins what one application does to another, in this process or over a line."""
 
 from cosmic.app.stations.hosting import Hosted, Site
-from cosmic.app.stations.remote_applications import Elsewhere
+from cosmic.app.stations.remote_applications import RemoteApplications
 from cosmic.autonomy.couplings import join_teleoperation
 from cosmic.autonomy.interlocks import (
     join_force_cautions,
@@ -36,7 +36,7 @@ def join_here(own: Hosted, site: Site) -> None:
 def join_stations(
     mico: MicoApplicationBase | None,
     daqco: DaqcoApplication | RemoteApplication[Daqco] | None,
-    elsewhere: Elsewhere,
+    remote: RemoteApplications,
     policy: FailurePolicy,
 ) -> None:
     """Have a force limit stop motion where the two are in different processes.
@@ -44,7 +44,7 @@ def join_stations(
     What belongs to one station is joined there. A limit whose station fell silent counts as
     crossed. This holds while this process runs and no longer.
     """
-    there, boards_at = elsewhere.host_of.get("mico"), elsewhere.host_of.get("daqco")
+    there, boards_at = remote.host_of.get("mico"), remote.host_of.get("daqco")
     if mico is None or daqco is None or there is boards_at:
         return
     guard = daqco_of(daqco).guard

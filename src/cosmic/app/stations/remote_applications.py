@@ -29,7 +29,7 @@ _DECLARED: Final[Mapping[str, tuple[str, type[Declared]]]] = {
 
 
 @dataclass(frozen=True)
-class Elsewhere:
+class RemoteApplications:
     """What other stations host for this process.
 
     Attributes
@@ -72,7 +72,7 @@ def open_stations(
     program: str,
     certificates: "Certificates | None" = None,
     wanted: Sequence[str] = KNOWN_APPLICATIONS,
-) -> Elsewhere:
+) -> RemoteApplications:
     """Connect to stations; whoever gets them closes them.
 
     Parameters
@@ -110,7 +110,7 @@ def open_stations(
                     raise ConfigError(f"both {host_of[name].name} and {station.name} host {name}")
                 host_of[name] = station
         undo.pop_all()
-    return Elsewhere(tuple(stations), host_of)
+    return RemoteApplications(tuple(stations), host_of)
 
 
 def _client_name(program: str, certificates: "Certificates | None") -> str:

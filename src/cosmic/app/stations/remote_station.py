@@ -224,4 +224,4 @@ class RemoteStation:
 
 
 def _say_later(error: CosmicError) -> None:
-    logger.info("it is not known who holds the controls: %s", error)
+    logger.info("the holder of the control is unknown: %s", error)

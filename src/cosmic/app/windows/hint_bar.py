@@ -20,7 +20,7 @@ def first_steps(settings: MicoSettings, stop_key: str) -> str:
     for each in settings.positioner:
         if each.forward_key:
             steps.append(
-                f"hold {key_text(each.forward_key)} to move {each.name}, let go to stop it"
+                f"hold {key_text(each.forward_key)} to move {each.name}, release it to stop"
             )
             break
     if any(each.positioner_kind is not PositionerKind.OPEN_LOOP for each in settings.positioner):
@@ -47,9 +47,7 @@ class HintBar(QWidget):
         label = QLabel(text)
         label.setWordWrap(True)
         label.setTextFormat(Qt.TextFormat.PlainText)
-        dismiss = named(
-            push_button("Got it", "Take this line away; it does not come back"), "gotIt"
-        )
+        dismiss = named(push_button("Got it", "Hide this line for good"), "gotIt")
         dismiss.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         dismiss.clicked.connect(self._on_dismissed)
         row = QHBoxLayout(self)

@@ -3,25 +3,22 @@
 import logging
 from typing import Final
 
-from PySide6.QtCore import QSettings, Qt, QTimer
+from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
 import cosmic
 from cosmic.app.panels.calibrations import CalibrationPanel, add_calibrations
 from cosmic.app.panels.campaign.dock import CAMPAIGN, CampaignDock, can_run
 from cosmic.app.panels.instruments import instruments_of
-from cosmic.app.panels.path_guide import WayGuide
-from cosmic.app.panels.path_preview import Stage, WayBar
+from cosmic.app.panels.path_preview import PathController, PathPreview, PreviewState
 from cosmic.app.panels.procedures import TRAJECTORIES, ProcedurePanels
 from cosmic.app.panels.scene import ScenePanel
 from cosmic.app.platform import Platform
 from cosmic.app.rig import Rig
 from cosmic.app.stations.host import StationHost
-from cosmic.app.windows.bridge import WindowBridge
-from cosmic.app.windows.collision_bar import CollisionBar
-from cosmic.app.windows.control_mode import ACM, ECM, SCM, ControlMode, blocked_modes
 from cosmic.app.windows.hint_bar import HintBar, first_steps
 from cosmic.app.windows.stations import WindowStations
+from cosmic.app.windows.top_bar import ACM, ECM, SCM, CollisionBar, ControlMode, blocked_modes
 from cosmic.daqco.api.daqco import daqco_of
 from cosmic.daqco.gui.limit_indicator import LimitIndicator
 from cosmic.frame.failure import Failure
@@ -37,6 +34,22 @@ from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.mico.gui.mico_widget import MicoWidget
 
 logger = logging.getLogger(__name__)
+
+
+class WindowBridge(QObject):
+    """Emits in the GUI thread what any thread reports; outlives the window, so nothing is lost."""
+
+    failure_reported = Signal(object)
+    latch_changed = Signal(object)
+
+    def report_failure(self, failure: Failure) -> None:
+        """Report a failure."""
+        self.failure_reported.emit(failure)
+
+    def report_latch(self, state: StopState) -> None:
+        """Report that the stop was latched or reset."""
+        self.latch_changed.emit(state)
+
 
 MICO: Final = "MiCo"
 CONSOLE: Final = "Console"
@@ -86,9 +99,9 @@ class OperatorWindow(CosmicServerGui):
         self._procedures: ProcedurePanels | None = None
         self._mico_gui: MicoWidget | None = None
         self._scene: ScenePanel | None = None
-        self._guide: WayGuide | None = None
+        self._path: PathController | None = None
         self._bridge = WindowBridge()
-        self._forget_policy = platform.policy.subscribe(self._bridge.tell_failure)
+        self._forget_policy = platform.policy.subscribe(self._bridge.report_failure)
         self._add_mico(settings)
         images = self._add_instruments()
         if self._mico_gui is not None and self._scene is not None:
@@ -137,15 +150,15 @@ class OperatorWindow(CosmicServerGui):
         self.add_panel(MICO, panel, Qt.DockWidgetArea.LeftDockWidgetArea, scroll=False)
         self._mico_gui = gui
         gui.failure_changed.connect(self._on_mico_failure)
-        application.manager.latch.subscribe(self._bridge.tell_latch)
+        application.manager.latch.subscribe(self._bridge.report_latch)
         self._scene = ScenePanel(gui, settings)
         self.add_panel(SCENE, self._scene, Qt.DockWidgetArea.RightDockWidgetArea, scroll=False)
         gui.undo_planned.connect(self._scene.set_planned)
         self._collision_bar = CollisionBar(self.top_bar, gui, self)
-        way_bar = WayBar()
-        self._scene.set_bar(way_bar)
-        self._guide = WayGuide(gui, self._scene, way_bar, self)
-        self._guide.offered.connect(self._raise_scene)
+        preview = PathPreview()
+        self._scene.set_bar(preview)
+        self._path = PathController(gui, self._scene, preview, self)
+        self._path.offered.connect(self._raise_scene)
 
     def _add_instruments(self) -> str:
         """Put image and lens in the middle, force below the scene; return the image's title."""
@@ -193,7 +206,7 @@ class OperatorWindow(CosmicServerGui):
         stop_key = platform.file.platform.stop_key
         keys = [
             (stop_key, "stop every movement and keep it stopped, from anywhere"),
-            ("Esc", "cancel a menu, dialog, entry or tool; with none of them, stop what moves"),
+            ("Esc", "cancel a menu, dialog, entry or tool; otherwise stop what moves"),
         ]
         if self._mico_gui is not None:
             keys += self._mico_gui.keys()
@@ -280,10 +293,10 @@ class OperatorWindow(CosmicServerGui):
 
     def _cancel_path(self) -> bool:
         """Leave a detour that is looked for or offered; one that is being driven is stopped."""
-        guide = self._guide
-        if guide is None or guide.stage not in (Stage.SEARCHING, Stage.FOUND):
+        path = self._path
+        if path is None or path.state not in (PreviewState.PLANNING, PreviewState.FOUND):
             return False
-        guide.cancel()
+        path.cancel()
         return True
 
     def _on_stop_button(self) -> None:
@@ -301,18 +314,18 @@ class OperatorWindow(CosmicServerGui):
         if self._mico_gui is not None:
             self._mico_gui.release_keys()
             self._mico_gui.show_stopped(state.reason)
-        if self._guide is not None and state.reason is not None:
-            self._guide.cancel()
+        if self._path is not None and state.reason is not None:
+            self._path.cancel()
 
     def _on_mode_changed(self, mode: str) -> None:
-        if self._mico_gui is None or self._guide is None:
+        if self._mico_gui is None or self._path is None:
             return
         self._mico_gui.set_seeking_ways(mode == ECM)
         panel = {SCM: TRAJECTORIES, ACM: CAMPAIGN}.get(mode)
         if panel is not None:
             self.raise_panel(panel)
-        if self._guide.stage is not Stage.GOING:
-            self._guide.cancel()
+        if self._path.state is not PreviewState.MOVING:
+            self._path.cancel()
 
     def _raise_scene(self) -> None:
         self.raise_panel(SCENE)

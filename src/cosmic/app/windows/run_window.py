@@ -119,7 +119,7 @@ def _log_to(ring: RingBufferHandler) -> Callable[[], None]:
         return set_up_logging(ring, file=log_file())
     except OSError as exc:
         undo = set_up_logging(ring)
-        logger.warning("%s: the log is kept in the window only: %s", log_file(), exc)
+        logger.warning("%s: cannot be written; the log is in the window only: %s", log_file(), exc)
         return undo
 
 

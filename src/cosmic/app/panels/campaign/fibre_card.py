@@ -141,8 +141,8 @@ class FibreCurves(CurveFrame):
         self._add_axis_below("push beyond the first contact, µm")
         self.setMinimumSize(36 * STEP_PX, 28 * STEP_PX)
         self.setToolTip(
-            "Force over push beyond the first contact: full points on the way out, hollow ones on "
-            "the way back, lines as the model has it; each by its place along the fibre"
+            "Force over push beyond the first contact: full points loading, hollow ones "
+            "unloading, lines of the model; one set per position along the fibre"
         )
         self._curves: tuple[SpanCurve, ...] = ()
         self.labels: list[pg.TextItem] = []
@@ -312,7 +312,7 @@ class FibreCard(QWidget):
         flags = f"Doubtful: {', '.join(card.flags)}." if card.flags else ""
         _say(self.doubts, "\n".join(part for part in (flags, *card.doubts) if part))
         failed = [f"{name}: {cause}" for name, cause in card.failures]
-        _say(self.failures, "Failed on the way: " + ", ".join(failed) if failed else "")
+        _say(self.failures, "Failed operations: " + ", ".join(failed) if failed else "")
 
     def clear(self) -> None:
         """Show that none is chosen."""

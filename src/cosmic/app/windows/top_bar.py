@@ -1,4 +1,4 @@
-"""The control mode of a window: MCM, SCM, ECM with a collision model, or ACM (thesis 3.4)."""
+"""What the top bar shows of the platform: the control mode (thesis 3.4) and the clearance."""
 
 import logging
 from collections.abc import Mapping
@@ -6,15 +6,70 @@ from typing import Final
 
 from PySide6.QtCore import QObject, QSettings, Signal
 
+from cosmic.frame.gui.clearance_meter import Clearance
 from cosmic.frame.gui.top_bar import NO_COLLISION_MODEL, TopBar
+from cosmic.mico.core.collision.answer import Approach
+from cosmic.mico.gui.mico_widget import MicoWidget
 
 logger = logging.getLogger(__name__)
+
+NOT_REFERENCED: Final = "not referenced"
+
+
+class CollisionBar(QObject):
+    """Keeps clearance, axes taken out and contacts allowed in sight; GUI thread.
+
+    Parameters
+    ----------
+    bar : TopBar
+        Where they are shown.
+    panel : MicoWidget
+        Whose platform it is.
+    """
+
+    def __init__(self, bar: TopBar, panel: MicoWidget, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._bar = bar
+        self._panel = panel
+        self._application = panel.mico.application
+        panel.collision.changed.connect(self._on_collision_changed)
+        watch = self._application.clearance_watch
+        if watch is not None:
+            watch.changed.connect(self._on_clearance)  # its thread; queued to this one
+            panel.refreshed.connect(self._on_refreshed)
+        self._on_collision_changed()
+        self._on_refreshed()
+
+    def _on_collision_changed(self) -> None:
+        self._bar.set_collision_model(present=self._panel.collision.has_model)
+        self._bar.set_unwatched(self._panel.collision.unwatched)
+        self._bar.set_contacts(self._panel.collision.contacts)
+
+    def _on_refreshed(self) -> None:
+        watch = self._application.clearance_watch
+        self._on_clearance(watch.latest if watch is not None else None)
+
+    def _on_clearance(self, nearest: Approach | None) -> None:
+        if nearest is None:
+            self._bar.set_clearance(None, self._why_unknown())
+            return
+        reading = Clearance(nearest.distance_um, nearest.bodies, nearest.margin_um)
+        self._bar.set_clearance(reading)
+
+    def _why_unknown(self) -> str:
+        manager = self._application.manager
+        if not manager.ready:
+            return "MiCo is not ready"
+        if manager.positions() is None:
+            return NOT_REFERENCED
+        return "no answer yet, or no body is watched"
+
 
 MCM: Final = "MCM"
 SCM: Final = "SCM"
 ECM: Final = "ECM"
 ACM: Final = "ACM"
-NO_MICO: Final = "nothing here moves"
+NO_MICO: Final = "this window has no axes"
 NO_ACM: Final = "procedures need MiCo, DAQCo and ViCo, all in this program"
 NO_ECM: Final = f"{NO_COLLISION_MODEL}; name a scene in the platform file"
 _KEY: Final = "window/mode"
@@ -84,7 +139,7 @@ class ControlMode(QObject):
         """Put `mode` in force, if it can be chosen."""
         if mode not in self._available or mode == self._mode:
             return
-        logger.info("control mode %s instead of %s", mode, self._mode)
+        logger.info("control mode %s (was %s)", mode, self._mode)
         self._mode = mode
         self._settings.setValue(_KEY, mode)
         self._bar.set_mode(mode)
