@@ -13,8 +13,9 @@ import numpy.typing as npt
 
 from benchmarks.figures import Figure, main
 from cosmic.frame.clock import ManualClock
+from cosmic.twin.cantilever import Cantilever
 from cosmic.twin.force_side import ForceSide
-from cosmic.twin.rod import EI_UN_UM2_PER_N_M2, clamped_at_one_end, held_at_both_ends
+from cosmic.twin.rod import EI_UN_UM2_PER_N_M2, held_at_both_ends
 from cosmic.twin.scene import Scene
 from cosmic.twin.settings import shipped_settings
 
@@ -69,6 +70,11 @@ def curve_us(make: Callable[[float], object], count: int) -> float:
     return 1e6 * (time.thread_time() - before_s) / count
 
 
+def cantilever(line_um: npt.NDArray[np.float64], ei: float) -> Cantilever:
+    """Return a fibre clamped 8 um inside the jaws."""
+    return Cantilever(*line_um.T, ei_un_um2=ei, depth_um=8.0, radius_um=25.0)
+
+
 def measure(quick: bool = False) -> list[Figure]:
     """Return the figures of one run."""
     duration_s, count = (0.05, 5) if quick else (2.0, 500)
@@ -86,12 +92,10 @@ def measure(quick: bool = False) -> list[Figure]:
     rig.go("left.x", 3400.0, 200.0 / (2.0 * duration_s))
     sliding_s = rig.cost(duration_s, *reads)
     ei, ea = 5e-11 * EI_UN_UM2_PER_N_M2, 7.2e6
-    one_us = curve_us(
-        lambda span: clamped_at_one_end(
-            ei_un_um2=ei, span_um=span, free_um=1200.0, radius_um=25.0, sensor_un_um=800.0
-        ),
-        count,
-    )
+    line = np.array([[0.0, 0.0], [600.0, 20.0], [1190.0, 80.0]])
+    grasp_us = curve_us(lambda span: cantilever(line, ei).curve(span, sensor_un_um=800.0), 5)
+    one = cantilever(line, ei)
+    one_us = curve_us(lambda span: one.curve(span, sensor_un_um=800.0), count)
     both_us = curve_us(
         lambda span: held_at_both_ends(
             ei_un_um2=ei, ea_un=ea, span_um=span, distance_um=1000.0, slack_um=0.0,
@@ -104,6 +108,7 @@ def measure(quick: bool = False) -> list[Figure]:
         Figure(NAME, "two sensors, probe pushes", pushing_s, "s CPU a second", 0.045),
         Figure(NAME, "two sensors, probe slides along", sliding_s, "s CPU a second", 0.1),
         Figure(NAME, "probe pushes, to a plain filter", pushing_s / plain_s, "times"),
+        Figure(NAME, "all curves of a grasp", grasp_us, "us CPU"),
         Figure(NAME, "curve of a fibre held at one end", one_us, "us CPU"),
         Figure(NAME, "curve of a fibre held at both ends", both_us, "us CPU"),
     ]

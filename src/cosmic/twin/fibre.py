@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.twin.cantilever import Cantilever
 from cosmic.twin.centre_line import CentreLine
 from cosmic.twin.fate import Fate
 from cosmic.twin.force_settings import ContactSettings, FibreSettings
@@ -19,7 +20,6 @@ from cosmic.twin.rod import (
     EI_UN_UM2_PER_N_M2,
     UN_PER_N,
     PushCurve,
-    clamped_at_one_end,
     held_at_both_ends,
     tension_un,
 )
@@ -142,6 +142,8 @@ class Fibre:
         self.grasps = 0
         self.falls = 0
         self._contact = contact
+        self._cantilever: tuple[Free, float, Cantilever] | None = None
+        self._curve: tuple[float, PushCurve] | None = None
         energy = handling.adhesion_un * math.exp(
             handling.adhesion_sigma_ln * random.Random(f"adhesion {self.key}").gauss(0.0, 1.0)
         )
@@ -239,20 +241,14 @@ class Fibre:
 
     # ------------------------------------------------------------------ what the probe feels
 
-    def lever_um(self, line: Line, abscissa_um: float) -> float:
-        """Return the length from the true clamp over which a push there bends it."""
-        hold = next(iter(self.holds.values()))
-        along = max(abscissa_um, NEAREST_UM)
-        return (along if line.free is None else line.free.lever_um(along)) + hold.depth_um
-
-    def strain(self, line: Line, abscissa_um: float, force_un: float) -> float:
+    def strain(self, abscissa_um: float, force_un: float) -> float:
         """Return the strain at the clamp under a force there."""
-        moment = abs(force_un) * self.lever_um(line, abscissa_um)
+        moment = abs(force_un) * self._arm_um(abscissa_um)
         stiffness = self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2
         return 0.5 * self.settings.thickness_um * moment / stiffness
 
     def curve(self, line: Line, abscissa_um: float, *, edge_um: float, sensor: float) -> PushCurve:
-        """Return force over way for a probe at an abscissa.
+        """Return force over travel for a probe at an abscissa.
 
         Parameters
         ----------
@@ -262,26 +258,42 @@ class Fibre:
             Stiffness of the sensor, uN/um.
         """
         (hold, *more) = self.holds.values()
-        ei = self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2
-        span = _rounded(self.lever_um(line, abscissa_um))
         if line.free is not None:
-            return clamped_at_one_end(
-                ei_un_um2=ei,
-                span_um=span,
-                free_um=_rounded(span + line.free.beyond_um(max(abscissa_um, NEAREST_UM))),
-                radius_um=edge_um + self.settings.width_um / 2.0,
-                sensor_un_um=sensor,
-            )
+            return self._held_at_one_end(hold, line.free, abscissa_um, edge_um, sensor)
         distance = _rounded(line.reach_um + hold.depth_um + more[0].depth_um)
         return held_at_both_ends(
-            ei_un_um2=ei,
+            ei_un_um2=self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2,
             ea_un=self.settings.ea_n * UN_PER_N,
-            span_um=min(span, distance - NEAREST_UM),
+            span_um=min(_rounded(self._arm_um(abscissa_um)), distance - NEAREST_UM),
             distance_um=distance,
             slack_um=_rounded(self.slack_um(line.reach_um)),
             gripper_un_um=self._contact.gripper_un_um,
             sensor_un_um=sensor,
         )
+
+    def _arm_um(self, abscissa_um: float) -> float:
+        """Return how far from the true clamp a place is, along the jaws."""
+        return max(abscissa_um, NEAREST_UM) + next(iter(self.holds.values())).depth_um
+
+    def _held_at_one_end(
+        self, hold: Hold, free: Free, abscissa_um: float, edge_um: float, sensor: float
+    ) -> PushCurve:
+        solved = self._cantilever
+        if solved is None or solved[0] is not free or solved[1] != hold.depth_um:
+            made = Cantilever(
+                free.abscissas_um,
+                free.asides_um,
+                ei_un_um2=self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2,
+                depth_um=hold.depth_um,
+                radius_um=edge_um + self.settings.width_um / 2.0,
+            )
+            solved = self._cantilever = free, hold.depth_um, made
+            self._curve = None
+        place = _rounded(max(abscissa_um, NEAREST_UM))
+        if self._curve is None or self._curve[0] != place:
+            curve = solved[2].curve(place, sensor_un_um=sensor)
+            self._curve = place, curve
+        return self._curve[1]
 
 
 def _rounded(length_um: float) -> float:

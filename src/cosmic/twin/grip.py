@@ -23,9 +23,12 @@ class Free:
         As far as the abscissa rises along the fibre.
     length_um : float
         Of fibre outside the jaws.
+    abscissas_um, asides_um : ndarray, shape (n,), float64
+        All of it, where it turns back too.
     """
 
     def __init__(self, abscissas: Floats, asides: Floats) -> None:
+        self.abscissas_um, self.asides_um = abscissas, asides
         steps = np.hypot(np.diff(abscissas), np.diff(asides))
         arcs = np.concatenate([[0.0], np.cumsum(steps)])
         rises = np.diff(abscissas) > 1e-9
@@ -37,15 +40,10 @@ class Free:
         self._u: list[float] = u.tolist()
         self._aside: list[float] = asides[:last].tolist()
         self._beyond: list[float] = (self.length_um - arcs[:last]).tolist()
-        self._longer: list[float] = (_levers(u, arcs[:last]) - u).tolist()
 
     def aside_um(self, along_um: float) -> float:
         """Return how far to the side the undeformed fibre is there."""
         return 0.0 if self._straight else self._at(self._aside, along_um)
-
-    def lever_um(self, along_um: float) -> float:
-        """Return the length of a straight cantilever that gives way as much there."""
-        return along_um if self._straight else along_um + self._at(self._longer, along_um)
 
     def beyond_um(self, along_um: float) -> float:
         """Return the length of fibre beyond the place."""
@@ -57,17 +55,6 @@ class Free:
         low, high = nodes[after - 1], nodes[after]
         part = min(max((along_um - low) / (high - low), 0.0), 1.0) if high > low else 0.0
         return values[after - 1] + part * (values[after] - values[after - 1])
-
-
-def _levers(u: Floats, arcs: Floats) -> Floats:
-    """Return for each node the span of a straight cantilever with the same compliance.
-
-    A force across the jaws' axis at u bends by the integral of (u - u(s))^2 / EI over the arc.
-    """
-    arms = np.maximum(u[:, None] - u[None, :], 0.0)
-    first, second = arms[:, :-1], arms[:, 1:]
-    parts = (first * first + first * second + second * second) / 3.0 * np.diff(arcs)
-    return np.asarray(np.cbrt(3.0 * parts.sum(axis=1)))
 
 
 @dataclass(slots=True)

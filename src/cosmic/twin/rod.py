@@ -1,18 +1,13 @@
-"""A fibre as a thin elastic rod, pushed sideways at one point; quasi-static.
+"""A fibre as a thin elastic rod, held at both ends and pushed sideways at one point; quasi-static.
 
 Units that fit together without factors: um, uN, hence uN um2 for a bending stiffness, and uN/um,
-the same number as N/m, for a spring. The probe has no friction, a round edge, and stays at one
-abscissa; what its sensor feels is the force along its own axis.
-
-Two cases, each solved as far as algebra goes:
-
-- Clamped at one end: the elastica, with the fibre sliding over the probe; exact for any bow.
-- Held at both ends: the beam under axial tension (stability functions), tension and deflection
-  tied by the stretching of fibre and grippers. Good for slopes below about 0.2.
+the same number as N/m, for a spring. The beam is under axial tension (stability functions),
+tension and deflection tied by the stretching of fibre and grippers; good for slopes below 0.2.
+A fibre held at one end is in `cantilever`.
 """
 
 from bisect import bisect_right
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -24,9 +19,6 @@ EI_UN_UM2_PER_N_M2: Final = 1e18
 """1e6 uN in a newton, 1e12 um2 in a square metre."""
 
 UN_PER_N: Final = 1e6
-
-STEEPEST_RAD: Final = 1.0
-"""Slope of a cantilever at the probe up to which its curve is laid out."""
 
 HIGHEST_TENSION_UN: Final = 2e5
 """Tension up to which a curve is laid out: a dry fibre breaks at 50 to 200 mN."""
@@ -74,68 +66,6 @@ class PushCurve:
             part = (way - ways[after - 1]) / (ways[after] - ways[after - 1])
             force = forces[after - 1] + part * (forces[after] - forces[after - 1])
         return force if way_um >= 0.0 else -force
-
-
-@cache
-def _elastica() -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Return a cantilever's deflection/a, force a^2/EI and arc length/a, rising with the slope.
-
-    Before these come the slope's sine, and one less its cosine.
-
-    With the slope angle psi counted from the contact, where the moment is zero, the first
-    integral of the elastica is (psi')^2 = 2 k sin(psi), k = N/EI, N normal to the fibre there.
-    Integrals over psi up to the slope at the contact give arc length and both coordinates.
-    """
-    slopes = np.linspace(0.0, STEEPEST_RAD**0.5, 121)[1:] ** 2
-    nodes, weights = np.polynomial.legendre.leggauss(24)
-    # psi = t^2 takes the root out of both integrands.
-    top = np.sqrt(slopes)[:, None]
-    t = 0.5 * top * (nodes + 1.0)
-    ratio = np.sqrt(np.sin(t * t)) / t
-    step = 0.5 * top * weights
-    arc = (2.0 / ratio * step).sum(axis=1)  # sqrt(2 k) times arc length
-    rise = (2.0 * t * t * ratio * step).sum(axis=1)  # sqrt(2 k) times the way across
-    along = 2.0 * np.sqrt(np.sin(slopes))
-    a = along * np.cos(slopes) + rise * np.sin(slopes)
-    d = along * np.sin(slopes) - rise * np.cos(slopes)
-    force = 0.5 * a * a * np.cos(slopes)  # k a^2 cos(beta), as a still holds sqrt(2 k)
-    zero = np.zeros(1)
-    return (
-        np.concatenate([zero, np.sin(slopes)]),
-        np.concatenate([zero, 1.0 - np.cos(slopes)]),
-        np.concatenate([zero, d / a]),
-        np.concatenate([zero, force]),
-        np.concatenate([zero + 1.0, arc / a]),
-    )
-
-
-@lru_cache(maxsize=512)
-def clamped_at_one_end(
-    *, ei_un_um2: float, span_um: float, free_um: float, radius_um: float, sensor_un_um: float
-) -> PushCurve:
-    """Return the curve of a fibre clamped at one end.
-
-    Parameters
-    ----------
-    ei_un_um2 : float
-        Bending stiffness.
-    span_um : float
-        From the clamp to the middle of the probe, along the straight fibre.
-    free_um : float
-        Length of fibre beyond the clamp; it slides off when the bow needs more.
-    radius_um : float
-        Of the probe's edge and half the fibre together: as the fibre slopes, it touches the
-        probe nearer to the clamp.
-    sensor_un_um : float
-        Stiffness of the sensor behind the probe.
-    """
-    sine, flat, bow, force, arc = _elastica()
-    touched = span_um - radius_um * sine
-    held = (touched > 0.0) & (touched * arc <= free_um)
-    last = len(held) if held.all() else max(int(held.argmin()), 1)
-    touched = touched[:last]
-    deflections = touched * bow[:last] + radius_um * flat[:last]
-    return PushCurve(deflections, force[:last] * (ei_un_um2 / touched**2), sensor_un_um)
 
 
 @lru_cache(maxsize=128)

@@ -217,17 +217,15 @@ class Workplace:
             touch.lose()
             return None
         deflection = way - force / self._sensor
-        if line.free is not None and not self._bears(fibre, line, along, force, around):
+        if line.free is not None and not self._bears(fibre, along, force, around):
             touch.lose()
             return None
         return Push(fibre.number, force, along, deflection)
 
-    def _bears(
-        self, fibre: Fibre, line: Line, along: float, force_un: float, around: Around
-    ) -> bool:
+    def _bears(self, fibre: Fibre, along: float, force_un: float, around: Around) -> bool:
         """Return whether the fibre bears the bending; a grip that gives way shows later."""
         (hold,) = fibre.holds.values()
-        strain = fibre.strain(line, along, force_un)
+        strain = fibre.strain(along, force_un)
         if strain > hold.fate.loosen_strain:
             self._hands.loosen(fibre)
         if strain > hold.fate.break_strain:

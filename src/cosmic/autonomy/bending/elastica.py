@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 
+from cosmic.autonomy.bending.curved import PushedCurve
 from cosmic.autonomy.bending.result import Floats
 
 STEEPEST_RAD: Final = 1.0
@@ -55,7 +56,13 @@ def cantilever(radius_part: float) -> tuple[Floats, Floats]:
 
 
 def force_un(
-    way_um: Floats, *, k_un_um: float, span_um: float, radius_um: float, sensor_un_um: float
+    way_um: Floats,
+    *,
+    k_un_um: float,
+    span_um: float,
+    radius_um: float,
+    sensor_un_um: float,
+    curved: PushedCurve | None = None,
 ) -> Floats:
     """Return the force of a fibre in front of a sensor that gives way; 0 before the contact.
 
@@ -65,8 +72,13 @@ def force_un(
         Of the probe's axis since the first contact.
     k_un_um : float
         Stiffness of the fibre at the first contact, 3 EI/span^3.
+    curved : PushedCurve, optional
+        Of a fibre that is not straight by nature.
     """
-    deflection, pushed = cantilever(round(radius_um / span_um, 3))
+    if curved is not None:
+        deflection, pushed = curved.deflection, curved.pushed
+    else:
+        deflection, pushed = cantilever(round(radius_um / span_um, 3))
     force = k_un_um * span_um * pushed
     way = span_um * deflection + force / sensor_un_um
     return np.asarray(np.interp(way_um, way, force), dtype=np.float64)

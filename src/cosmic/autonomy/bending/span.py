@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.autonomy.bending.curved import NaturalShape
+
 Floats = npt.NDArray[np.float64]
 
 
@@ -29,6 +31,9 @@ class Span:
         On the platform's clock.
     loading : ndarray, shape (n,), bool
         True on the way out, False on the way back.
+    shape : NaturalShape or None
+        Of the fibre before the push, where it is not straight; `nominal_um` is then the lever of
+        a straight fibre that gives way as much.
     """
 
     nominal_um: float
@@ -39,3 +44,4 @@ class Span:
     force_std_un: Floats
     time_s: Floats
     loading: npt.NDArray[np.bool_]
+    shape: NaturalShape | None = None

@@ -21,6 +21,7 @@ from cosmic.autonomy.bending.branch import (
     touched,
 )
 from cosmic.autonomy.bending.branch import stuck as clings
+from cosmic.autonomy.bending.curved import PushedCurve
 from cosmic.autonomy.bending.elastica import force_un
 from cosmic.autonomy.bending.result import Floats, Quality, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
@@ -55,8 +56,15 @@ class _Found:
 class _Model:
     """Force over way of one span, both ways."""
 
-    def __init__(self, points: Points, settings: FitSettings, length_um: float) -> None:
+    def __init__(
+        self,
+        points: Points,
+        settings: FitSettings,
+        length_um: float,
+        curved: PushedCurve | None,
+    ) -> None:
         self._points = points
+        self._curved = curved
         self._settings = settings
         self._length_um = length_um
         self._elapsed_s = points.time_s - points.time_s[0]
@@ -77,6 +85,7 @@ class _Model:
             span_um=self._length_um,
             radius_um=self._settings.radius_um,
             sensor_un_um=self._settings.sensor_un_um,
+            curved=self._curved,
         )
 
     def slopes(self, values: Floats) -> Floats:
@@ -155,7 +164,7 @@ def fit_span(span: Span, *, settings: FitSettings, place_um: float, length_um: f
     Raises
     ------
     BendingError
-        The span is not whole.
+        The span is not whole, or the fibre slopes too much at the probe.
     """
     points = points_of(span)
     points = points.but(clings(points, settings.drift_un_sqrt_s))
@@ -163,7 +172,10 @@ def fit_span(span: Span, *, settings: FitSettings, place_um: float, length_um: f
     if not touched(points, settings.drift_un_sqrt_s):
         peak = float(np.max(points.force_un - free_force_un(points)))
         return _without_contact(span, place_um, peak)
-    model = _Model(points, settings, length_um)
+    curved = None
+    if span.shape is not None:
+        curved = span.shape.curve(depth_um=settings.offset_um, radius_um=settings.radius_um)
+    model = _Model(points, settings, length_um, curved)
     found = model.fit()
     fit = _told(span, points, model, found, place_um)
     flags = _flags(span, fit, points, settings, found)

@@ -10,6 +10,7 @@ from typing import Final
 import h5py
 import numpy as np
 
+from cosmic.autonomy.bending.curved import NaturalShape
 from cosmic.autonomy.bending.result import BendingResult, Quality, SpanFit
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.campaign.records import (
@@ -330,6 +331,9 @@ def _put_span(group: h5py.Group, span: Span) -> None:
     for name in COLUMNS:
         group[name] = getattr(span, name)
     group["loading"] = span.loading
+    if span.shape is not None:
+        group["shape_um"] = np.column_stack([span.shape.ahead_um, span.shape.aside_um])
+        group["shape_um"].attrs["at_um"] = span.shape.at_um
 
 
 def read_curves(path: Path) -> tuple[tuple[Span, ...], tuple[Floats, ...], tuple[Series, ...]]:
@@ -371,7 +375,15 @@ def _measured_span(group: h5py.Group) -> Span:
         force_std_un=columns["force_std_un"],
         time_s=columns["time_s"],
         loading=np.asarray(group["loading"], dtype=np.bool_),
+        shape=_natural_shape(group),
     )
+
+
+def _natural_shape(group: h5py.Group) -> NaturalShape | None:
+    if "shape_um" not in group:  # straight, or written before shapes were kept
+        return None
+    ahead, aside = np.asarray(group["shape_um"], dtype=np.float64).T
+    return NaturalShape(ahead, aside, float(group["shape_um"].attrs["at_um"]))
 
 
 def _fitted(group: h5py.Group) -> Floats:

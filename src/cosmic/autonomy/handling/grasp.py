@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from typing_extensions import override
 
+from cosmic.autonomy.bending.curved import NaturalShape
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import along, ways
@@ -45,18 +46,23 @@ class HeldShape:
         """Return how far in y the fibre is from straight ahead, so far from the jaws."""
         return float(np.interp(ahead_um, self.ahead_um, self.aside_um))
 
-    def lever_um(self, ahead_um: float) -> float:
-        """Return the length of a straight cantilever that gives way as much to a push there.
+    def gentle_um(self, steepest_deg: float) -> float:
+        """Return how far ahead of the jaws the fibre slopes less than so much."""
+        slope = np.abs(np.degrees(np.arctan2(np.diff(self.aside_um), np.diff(self.ahead_um))))
+        steep = slope > steepest_deg
+        return float(self.ahead_um[int(steep.argmax())]) if steep.any() else self.reach_um
 
-        The push is across the jaws' axis: each piece of the fibre bends with its arm along the
-        axis, and a bowed fibre has more pieces than a straight one.
+    def natural(self, ahead_um: float, towards: float) -> NaturalShape:
+        """Return the shape that a push meets.
+
+        Parameters
+        ----------
+        ahead_um : float
+            Where the middle of the probe is, along the jaws.
+        towards : float
+            1 or -1: which way along y the probe is, seen from the fibre.
         """
-        count = int(np.searchsorted(self.ahead_um, ahead_um))
-        u = np.append(self.ahead_um[:count], ahead_um)
-        s = np.append(self.way_um[:count], np.interp(ahead_um, self.ahead_um, self.way_um))
-        arm = ahead_um - u
-        parts = (arm[:-1] ** 2 + arm[:-1] * arm[1:] + arm[1:] ** 2) / 3.0 * np.diff(s)
-        return float(np.cbrt(3.0 * parts.sum()))
+        return NaturalShape(self.ahead_um, towards * self.aside_um, ahead_um)
 
 
 def held_shape(line_um: Floats, inside_um: float, forward: float) -> HeldShape:

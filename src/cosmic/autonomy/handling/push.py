@@ -271,9 +271,8 @@ class OneSpan:
         hold_x, _ = work.tip_now(work.gripper)
         off_x, _ = work.calibration.probe_off_um
         ahead = (probe_x + off_x - hold_x) * work.jaws.forward
-        # A bowed fibre gives way as a straight one that is a little longer: the fit knows only
-        # straight ones.
-        longer = self._shape.lever_um(ahead) - ahead
+        shape = self._shape.natural(ahead, -self._sign)
+        longer = shape.lever_um() - ahead
         self._fibre.spans.append(
             Span(
                 nominal_um=ahead + longer,
@@ -284,6 +283,7 @@ class OneSpan:
                 force_std_un=np.array(points.std_un),
                 time_s=np.array(points.time_s),
                 loading=np.array(points.loading, dtype=np.bool_),
+                shape=shape,
             )
         )
 
@@ -303,7 +303,8 @@ class PushSpans(FibreOperation):
         fibre.spans.clear()
         fibre.contacts.clear()
         fibre.zero_un = None
-        fibre.free_um = min(fibre.free_um, shape_of(work, fibre).reach_um)
+        gentle = shape_of(work, fibre).gentle_um(work.settings.push.steepest_deg)
+        fibre.free_um = min(fibre.free_um, gentle)
         try:
             plan_spans(fibre.free_um, limits=span_limits(work))
         except BendingError as exc:

@@ -176,6 +176,9 @@ class PushSettings(StrictModel):
     tilt_um, tilt_longest_um : float
         How much lower, then higher, a fibre is held that was not met, for it may point up or down:
         at the longest span then, and in proportion at shorter ones.
+    steepest_deg : float
+        Where a fibre slopes more before it is pushed, it is not pushed: it would slide along the
+        probe.
     spans : SpanLimits
         What spans there may be.
     fit : FitSettings
@@ -200,6 +203,7 @@ class PushSettings(StrictModel):
     retreat_um: float = Field(12.0, gt=0.0)
     tilt_um: float = Field(55.0, ge=0.0)
     tilt_longest_um: float = Field(330.0, gt=0.0)
+    steepest_deg: float = Field(40.0, gt=0.0, le=50.0)
     spans: SpanLimits = Field(default_factory=lambda: SpanLimits(longest_um=600.0))
     fit: FitSettings = Field(default_factory=FitSettings)
 

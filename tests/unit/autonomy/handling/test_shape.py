@@ -21,7 +21,7 @@ def test_a_straight_fibre_gives_way_as_the_straight_one_it_is():
     shape = held_shape(line, 250.0, 1.0)
     assert shape.reach_um == pytest.approx(950.0)
     assert shape.bow_um(500.0) == pytest.approx(0.0, abs=1e-9)
-    assert shape.lever_um(500.0) == pytest.approx(500.0, rel=1e-6)
+    assert shape.natural(500.0, 1.0).lever_um() == pytest.approx(500.0, rel=1e-6)
 
 
 @pytest.mark.parametrize("turned_deg", [-100.0, 0.0, 35.0])
@@ -41,13 +41,22 @@ def test_the_other_gripper_holds_it_the_other_way_round():
     )
 
 
-def test_a_bowed_fibre_is_the_softer_by_the_length_that_its_bow_adds():
+def test_a_bowed_fibre_gives_way_to_a_push_along_its_normal():
     radius, span = 1500.0, 500.0
-    shape = held_shape(arc(radius, 1300.0, 0.0), 250.0, 1.0)
+    natural = held_shape(arc(radius, 1300.0, 0.0), 250.0, 1.0).natural(span, 1.0)
+    slope = math.asin(span / radius)
+    assert natural.slope_rad == pytest.approx(slope, abs=0.01)
     u = np.linspace(0.0, span, 4001)
-    compliance = np.trapezoid((span - u) ** 2 / np.sqrt(1.0 - (u / radius) ** 2), u)
-    assert shape.lever_um(span) == pytest.approx(np.cbrt(3.0 * compliance), rel=1e-3)
-    assert shape.lever_um(span) > span
+    rise = np.sqrt(radius**2 - u**2) - math.sqrt(radius**2 - span**2)
+    arm = (span - u) + rise * math.tan(slope)
+    compliance = np.trapezoid(arm**2 / np.sqrt(1.0 - (u / radius) ** 2), u)
+    assert natural.lever_um() == pytest.approx(np.cbrt(3.0 * compliance), rel=3e-3)
+
+
+def test_a_fibre_is_pushed_only_as_far_out_as_it_is_not_steep():
+    shape = held_shape(arc(1000.0, 1300.0, 0.0), 250.0, 1.0)
+    assert shape.gentle_um(30.0) == pytest.approx(500.0, rel=0.03)
+    assert held_shape(arc(9000.0, 1300.0, 0.0), 250.0, 1.0).gentle_um(30.0) > 1000.0
 
 
 def test_it_reaches_no_further_than_to_where_it_turns_back():
