@@ -6,6 +6,7 @@ from PySide6.QtCore import QEvent, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QPixmap
 from PySide6.QtWidgets import QLabel, QWidget
 
+from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.state_badge import shape_path
 from cosmic.frame.gui.theme import State, current_palette, state_look
 from cosmic.frame.overrides import override
@@ -20,17 +21,16 @@ def state_pixmap(state: State | None) -> QPixmap:
     pixmap = QPixmap(_SHARPNESS * INDICATOR_PX, _SHARPNESS * INDICATOR_PX)
     pixmap.setDevicePixelRatio(_SHARPNESS)
     pixmap.fill(Qt.GlobalColor.transparent)
-    painter = QPainter(pixmap)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    place = QRectF(1.0, 1.0, INDICATOR_PX - 2.0, INDICATOR_PX - 2.0)
-    if state is None:
-        painter.setPen(QPen(QColor(current_palette().dim), 1.2))
-        painter.drawPath(shape_path(State.UNKNOWN, place.adjusted(1.0, 1.0, -1.0, -1.0)))
-    else:
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(state_look(state).colour))
-        painter.drawPath(shape_path(state, place))
-    painter.end()
+    with painting(pixmap) as painter:
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        place = QRectF(1.0, 1.0, INDICATOR_PX - 2.0, INDICATOR_PX - 2.0)
+        if state is None:
+            painter.setPen(QPen(QColor(current_palette().dim), 1.2))
+            painter.drawPath(shape_path(State.UNKNOWN, place.adjusted(1.0, 1.0, -1.0, -1.0)))
+        else:
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(state_look(state).colour))
+            painter.drawPath(shape_path(state, place))
     return pixmap
 
 

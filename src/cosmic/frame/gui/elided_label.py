@@ -1,9 +1,10 @@
 """A label for one line of any length: what does not fit is elided and stands in the tooltip."""
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetrics, QMouseEvent, QPainter, QPaintEvent, QPalette
+from PySide6.QtGui import QColor, QFontMetrics, QMouseEvent, QPaintEvent, QPalette
 from PySide6.QtWidgets import QLabel, QSizePolicy, QStyle, QStyleOption, QWidget
 
+from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.theme import current_palette
 from cosmic.frame.overrides import override
 
@@ -58,24 +59,24 @@ class ElidedLabel(QLabel):
     def paintEvent(self, event: QPaintEvent) -> None:
         option = QStyleOption()
         option.initFrom(self)
-        painter = QPainter(self)
-        style = self.style()
-        style.drawPrimitive(QStyle.PrimitiveElement.PE_Widget, option, painter, self)
-        room = self.contentsRect()
-        text = QFontMetrics(self.font()).elidedText(
-            self.text(), Qt.TextElideMode.ElideRight, room.width()
-        )
-        if self._dim:
-            painter.setPen(QColor(current_palette().dim))
-        style.drawItemText(
-            painter,
-            room,
-            int(self.alignment()),
-            option.palette,
-            self.isEnabled(),
-            text,
-            QPalette.ColorRole.NoRole if self._dim else self.foregroundRole(),
-        )
+        with painting(self) as painter:
+            style = self.style()
+            style.drawPrimitive(QStyle.PrimitiveElement.PE_Widget, option, painter, self)
+            room = self.contentsRect()
+            text = QFontMetrics(self.font()).elidedText(
+                self.text(), Qt.TextElideMode.ElideRight, room.width()
+            )
+            if self._dim:
+                painter.setPen(QColor(current_palette().dim))
+            style.drawItemText(
+                painter,
+                room,
+                int(self.alignment()),
+                option.palette,
+                self.isEnabled(),
+                text,
+                QPalette.ColorRole.NoRole if self._dim else self.foregroundRole(),
+            )
 
     @override
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:

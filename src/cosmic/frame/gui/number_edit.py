@@ -3,10 +3,11 @@
 import math
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QPaintEvent
 from PySide6.QtWidgets import QLineEdit, QWidget
 
 from cosmic.frame.errors import QuantityError
+from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.refusal import show_refusal
 from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
 from cosmic.frame.overrides import override
@@ -73,7 +74,7 @@ class NumberEdit(QLineEdit):
         if not self._unit:
             return
         colours = current_palette()
-        painter = QPainter(self)
-        painter.setPen(QColor(colours.dim if self.isEnabled() else colours.disabled))
-        align = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(self.rect().adjusted(0, 0, -STEP_PX, 0), int(align), self._unit)
+        with painting(self) as painter:
+            painter.setPen(QColor(colours.dim if self.isEnabled() else colours.disabled))
+            align = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+            painter.drawText(self.rect().adjusted(0, 0, -STEP_PX, 0), int(align), self._unit)

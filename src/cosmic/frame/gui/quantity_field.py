@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QEnterEvent, QFocusEvent, QKeyEvent, QPainter,
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QWidget
 
 from cosmic.frame.errors import QuantityError
+from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.reason_bubble import ReasonBubble
 from cosmic.frame.gui.theme import STEP_PX, State, current_palette, number_font, state_look
 from cosmic.frame.overrides import override
@@ -251,14 +252,14 @@ class QuantityField(QLineEdit):
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
-        painter = QPainter(self)
-        palette = current_palette()
-        painter.setPen(QColor(palette.dim if self.isEnabled() else palette.disabled))
-        room: QRect = self.rect().adjusted(0, 0, -STEP_PX, 0)
-        align = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(room, int(align), DISPLAY[self._unit])
-        if self._reason:
-            self._paint_mark(painter)
+        with painting(self) as painter:
+            palette = current_palette()
+            painter.setPen(QColor(palette.dim if self.isEnabled() else palette.disabled))
+            room: QRect = self.rect().adjusted(0, 0, -STEP_PX, 0)
+            align = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+            painter.drawText(room, int(align), DISPLAY[self._unit])
+            if self._reason:
+                self._paint_mark(painter)
 
     def _paint_mark(self, painter: QPainter) -> None:
         """Draw the shape of REFUSED at the left: colour alone would not do."""

@@ -14,6 +14,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.theme import (
     STEP_PX,
     State,
@@ -89,18 +90,18 @@ class StateBadge(QWidget):
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
         look = self._look()
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        box = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
-        painter.setPen(QColor(look.colour))
-        painter.setBrush(QColor(look.fill))
-        painter.drawRoundedRect(box, 4.0, 4.0)
-        place = QRectF(STEP_PX, (self.height() - _SHAPE_PX) / 2.0, _SHAPE_PX, _SHAPE_PX)
-        loud = look.fill == look.colour
-        self._paint_shape(painter, place, QColor(look.text if loud else look.colour))
-        painter.setPen(QColor(look.text))
-        room = box.adjusted(1.5 * STEP_PX + _SHAPE_PX, 0.0, 0.0, 0.0)
-        painter.drawText(room, int(Qt.AlignmentFlag.AlignVCenter), look.word)
+        with painting(self) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            box = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
+            painter.setPen(QColor(look.colour))
+            painter.setBrush(QColor(look.fill))
+            painter.drawRoundedRect(box, 4.0, 4.0)
+            place = QRectF(STEP_PX, (self.height() - _SHAPE_PX) / 2.0, _SHAPE_PX, _SHAPE_PX)
+            loud = look.fill == look.colour
+            self._paint_shape(painter, place, QColor(look.text if loud else look.colour))
+            painter.setPen(QColor(look.text))
+            room = box.adjusted(1.5 * STEP_PX + _SHAPE_PX, 0.0, 0.0, 0.0)
+            painter.drawText(room, int(Qt.AlignmentFlag.AlignVCenter), look.word)
 
     def _paint_shape(self, painter: QPainter, place: QRectF, colour: QColor) -> None:
         hollow = self._state is State.UNKNOWN

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from cosmic.frame.gui.build import named
 from cosmic.frame.gui.chip import Chip, Tone
+from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.palette import OKABE_ITO, blend
 from cosmic.frame.gui.theme import (
     LARGE_PX,
@@ -61,19 +62,19 @@ class Card(QWidget):
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
         palette = current_palette()
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        inset = _LOUD_PX / 2.0 if self._loud else 0.5
-        box = QRectF(self.rect()).adjusted(inset, inset, -inset, -inset)
-        loud = QPen(QColor(OKABE_ITO["vermillion"]), _LOUD_PX)
-        painter.setPen(loud if self._loud else QColor(palette.border))
-        painter.setBrush(QColor(blend(palette.raised, palette.panel, 0.45)))
-        painter.drawRoundedRect(box, 5.0, 5.0)
-        if self._edge in _CALM:
-            return
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(state_look(self._edge, palette).colour))
-        painter.drawRoundedRect(QRectF(0.0, 4.0, _EDGE_PX, self.height() - 8.0), 1.5, 1.5)
+        with painting(self) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            inset = _LOUD_PX / 2.0 if self._loud else 0.5
+            box = QRectF(self.rect()).adjusted(inset, inset, -inset, -inset)
+            loud = QPen(QColor(OKABE_ITO["vermillion"]), _LOUD_PX)
+            painter.setPen(loud if self._loud else QColor(palette.border))
+            painter.setBrush(QColor(blend(palette.raised, palette.panel, 0.45)))
+            painter.drawRoundedRect(box, 5.0, 5.0)
+            if self._edge in _CALM:
+                return
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(state_look(self._edge, palette).colour))
+            painter.drawRoundedRect(QRectF(0.0, 4.0, _EDGE_PX, self.height() - 8.0), 1.5, 1.5)
 
     @override
     def changeEvent(self, event: QEvent) -> None:

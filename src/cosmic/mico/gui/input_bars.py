@@ -7,6 +7,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.theme import FONT_PX, STEP_PX, current_palette, number_font
 from cosmic.frame.overrides import override
 from cosmic.mico.hw.input_device import InputState
@@ -70,16 +71,16 @@ class InputBars(QWidget):
 
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        colours = current_palette()
-        if not self._axes and not self._buttons:
-            painter.setPen(QColor(colours.dim))
-            text = "axes and buttons are shown here once it has been started"
-            painter.drawText(self.rect(), int(Qt.AlignmentFlag.AlignVCenter), text)
-            return
-        for number, (name, value) in enumerate(self._axes):
-            self._paint_axis(painter, number * self._row_px(), name, value)
-        self._paint_lamps(painter, len(self._axes) * self._row_px())
+        with painting(self) as painter:
+            colours = current_palette()
+            if not self._axes and not self._buttons:
+                painter.setPen(QColor(colours.dim))
+                text = "axes and buttons are shown here once it has been started"
+                painter.drawText(self.rect(), int(Qt.AlignmentFlag.AlignVCenter), text)
+                return
+            for number, (name, value) in enumerate(self._axes):
+                self._paint_axis(painter, number * self._row_px(), name, value)
+            self._paint_lamps(painter, len(self._axes) * self._row_px())
 
     def _paint_axis(self, painter: QPainter, top: int, name: str, value: float) -> None:
         colours, row = current_palette(), self._row_px()
@@ -147,13 +148,14 @@ class ForceBar(QWidget):
 
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter, colours = QPainter(self), current_palette()
-        box = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
-        painter.fillRect(box, QColor(colours.field))
-        bar = QRectF(box.left(), box.bottom() - 4, box.width() * min(1.0, abs(self._force)), 4)
-        painter.fillRect(bar, QColor(colours.refused if self._slowed < 1.0 else colours.accent))
-        painter.setPen(QColor(colours.border_strong))
-        painter.drawRect(box)
-        painter.setPen(QColor(colours.text))
-        room = box.adjusted(STEP_PX, 0.0, -STEP_PX, -3.0)
-        painter.drawText(room, int(Qt.AlignmentFlag.AlignVCenter), self.text)
+        colours = current_palette()
+        with painting(self) as painter:
+            box = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
+            painter.fillRect(box, QColor(colours.field))
+            bar = QRectF(box.left(), box.bottom() - 4, box.width() * min(1.0, abs(self._force)), 4)
+            painter.fillRect(bar, QColor(colours.refused if self._slowed < 1.0 else colours.accent))
+            painter.setPen(QColor(colours.border_strong))
+            painter.drawRect(box)
+            painter.setPen(QColor(colours.text))
+            room = box.adjusted(STEP_PX, 0.0, -STEP_PX, -3.0)
+            painter.drawText(room, int(Qt.AlignmentFlag.AlignVCenter), self.text)

@@ -6,6 +6,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.state_badge import shape_path
 from cosmic.frame.gui.theme import STEP_PX, State, state_look, ui_font
 from cosmic.frame.overrides import override
@@ -58,21 +59,21 @@ class PhaseSign(QWidget):
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
         look = state_look(LOOKS[self._phase])
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        box = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
-        painter.setPen(QColor(look.colour))
-        painter.setBrush(QColor(look.fill))
-        painter.drawRoundedRect(box, 4.0, 4.0)
-        place = QRectF(STEP_PX, (self.height() - _SHAPE_PX) / 2.0, _SHAPE_PX, _SHAPE_PX)
-        colour = QColor(look.text if look.fill == look.colour else look.colour)
-        hollow = self._phase is TeleoperationPhase.OFF
-        painter.setPen(QPen(colour, 2.0) if hollow else Qt.PenStyle.NoPen)
-        painter.setBrush(Qt.BrushStyle.NoBrush if hollow else colour)
-        painter.drawPath(shape_path(LOOKS[self._phase], place))
-        painter.setPen(QColor(look.text))
-        room = box.adjusted(2.0 * STEP_PX + _SHAPE_PX, 0.0, -0.5 * STEP_PX, 0.0)
-        words = painter.fontMetrics().elidedText(
-            self._words, Qt.TextElideMode.ElideRight, int(room.width())
-        )
-        painter.drawText(room, int(Qt.AlignmentFlag.AlignVCenter), words)
+        with painting(self) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            box = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
+            painter.setPen(QColor(look.colour))
+            painter.setBrush(QColor(look.fill))
+            painter.drawRoundedRect(box, 4.0, 4.0)
+            place = QRectF(STEP_PX, (self.height() - _SHAPE_PX) / 2.0, _SHAPE_PX, _SHAPE_PX)
+            colour = QColor(look.text if look.fill == look.colour else look.colour)
+            hollow = self._phase is TeleoperationPhase.OFF
+            painter.setPen(QPen(colour, 2.0) if hollow else Qt.PenStyle.NoPen)
+            painter.setBrush(Qt.BrushStyle.NoBrush if hollow else colour)
+            painter.drawPath(shape_path(LOOKS[self._phase], place))
+            painter.setPen(QColor(look.text))
+            room = box.adjusted(2.0 * STEP_PX + _SHAPE_PX, 0.0, -0.5 * STEP_PX, 0.0)
+            words = painter.fontMetrics().elidedText(
+                self._words, Qt.TextElideMode.ElideRight, int(room.width())
+            )
+            painter.drawText(room, int(Qt.AlignmentFlag.AlignVCenter), words)

@@ -5,6 +5,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
 from cosmic.frame.overrides import override
 from cosmic.vico.gui.levels import BINS, Histogram, Levels
@@ -37,22 +38,22 @@ class HistogramPlot(QWidget):
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
         colours = current_palette()
-        painter = QPainter(self)
-        box = QRectF(0.5, 0.5, self.width() - 1.0, HEIGHT_PX - 1.0)
-        painter.setPen(QColor(colours.border))
-        painter.setBrush(QColor(colours.field))
-        painter.drawRect(box)
-        found = self.histogram
-        if found is None:
-            return
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(colours.dim))
-        painter.drawPolygon(_outline(found, box))
-        painter.setPen(QPen(QColor(colours.accent), 1.5))
-        for value in (self._levels.low, self._levels.high):
-            x = box.left() + box.width() * min(max(value / found.full, 0.0), 1.0)
-            painter.drawLine(QPointF(x, box.top()), QPointF(x, box.bottom()))
-        self._paint_numbers(painter, found.full)
+        with painting(self) as painter:
+            box = QRectF(0.5, 0.5, self.width() - 1.0, HEIGHT_PX - 1.0)
+            painter.setPen(QColor(colours.border))
+            painter.setBrush(QColor(colours.field))
+            painter.drawRect(box)
+            found = self.histogram
+            if found is None:
+                return
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(colours.dim))
+            painter.drawPolygon(_outline(found, box))
+            painter.setPen(QPen(QColor(colours.accent), 1.5))
+            for value in (self._levels.low, self._levels.high):
+                x = box.left() + box.width() * min(max(value / found.full, 0.0), 1.0)
+                painter.drawLine(QPointF(x, box.top()), QPointF(x, box.bottom()))
+            self._paint_numbers(painter, found.full)
 
     def _paint_numbers(self, painter: QPainter, full: int) -> None:
         painter.setPen(QColor(current_palette().dim))

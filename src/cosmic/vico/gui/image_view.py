@@ -18,6 +18,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QToolTip, QWidget
 
+from cosmic.frame.gui.painting import saved
 from cosmic.frame.gui.theme import current_palette
 from cosmic.frame.overrides import override
 from cosmic.vico.api.places import Pixel
@@ -213,14 +214,12 @@ class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
     @override
     def drawForeground(self, painter: QPainter, rect: QRectF) -> None:
         self.paints += 1
-        painter.save()
-        painter.resetTransform()
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        for layer in self.layers:
-            painter.save()
-            layer.paint(painter, self)
-            painter.restore()
-        painter.restore()
+        with saved(painter):
+            painter.resetTransform()
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            for layer in self.layers:
+                with saved(painter):
+                    layer.paint(painter, self)
 
     @override
     def drawBackground(self, painter: QPainter, rect: QRectF) -> None:

@@ -4,9 +4,10 @@ from collections import deque
 from typing import Final
 
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.palette import INK, OKABE_ITO
 from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
 from cosmic.frame.overrides import override
@@ -55,17 +56,17 @@ class Reading(QWidget):
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
         colours = current_palette()
-        painter = QPainter(self)
-        if self._alarm:
-            painter.fillRect(self.rect(), QColor(OKABE_ITO["orange"]))
-        dim, ink = (INK, INK) if self._alarm else (colours.dim, colours.text)
-        x = STEP_PX // 2
-        for text, colour in ((self._before, dim), (self._number, ink), (self._after, dim)):
-            if text:
-                painter.setPen(QColor(colour))
-                width = self.fontMetrics().horizontalAdvance(text)
-                painter.drawText(x, 0, width + 1, self.height(), _MIDDLE, text)
-                x += width + STEP_PX // 2
+        with painting(self) as painter:
+            if self._alarm:
+                painter.fillRect(self.rect(), QColor(OKABE_ITO["orange"]))
+            dim, ink = (INK, INK) if self._alarm else (colours.dim, colours.text)
+            x = STEP_PX // 2
+            for text, colour in ((self._before, dim), (self._number, ink), (self._after, dim)):
+                if text:
+                    painter.setPen(QColor(colour))
+                    width = self.fontMetrics().horizontalAdvance(text)
+                    painter.drawText(x, 0, width + 1, self.height(), _MIDDLE, text)
+                    x += width + STEP_PX // 2
 
 
 class FocusBars(QWidget):
@@ -102,13 +103,13 @@ class FocusBars(QWidget):
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
         colours = current_palette()
-        painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(colours.field))
-        painter.setPen(Qt.PenStyle.NoPen)
-        room = self.height() - 2.0
-        first = BARS - len(self.values)
-        for number, value in enumerate(self.values):
-            height = room * value / self.best if self.best > 0.0 else 0.0
-            newest = number == len(self.values) - 1
-            painter.setBrush(QColor(colours.accent if newest else colours.dim))
-            painter.drawRect(QRectF(1 + 3 * (first + number), 1 + room - height, 2, height))
+        with painting(self) as painter:
+            painter.fillRect(self.rect(), QColor(colours.field))
+            painter.setPen(Qt.PenStyle.NoPen)
+            room = self.height() - 2.0
+            first = BARS - len(self.values)
+            for number, value in enumerate(self.values):
+                height = room * value / self.best if self.best > 0.0 else 0.0
+                newest = number == len(self.values) - 1
+                painter.setBrush(QColor(colours.accent if newest else colours.dim))
+                painter.drawRect(QRectF(1 + 3 * (first + number), 1 + room - height, 2, height))

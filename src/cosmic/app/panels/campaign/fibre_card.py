@@ -37,6 +37,7 @@ from cosmic.autonomy.campaign.snapshot import FibreCardData, Mask, SpanCurve
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.chip import Chip
+from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.palette import OKABE_ITO, Palette
 from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
 from cosmic.frame.overrides import override
@@ -75,23 +76,23 @@ class FibreImageView(QWidget):
 
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        palette = current_palette()
-        painter.fillRect(self.rect(), QColor(palette.field))
-        if self._pixmap.isNull():
-            painter.setPen(QColor(palette.dim))
-            painter.drawText(self.rect(), int(Qt.AlignmentFlag.AlignCenter), self._words)
-            return
-        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-        size = self._pixmap.size().scaled(self.size(), Qt.AspectRatioMode.KeepAspectRatio)
-        place = QRect(
-            (self.width() - size.width()) // 2,
-            (self.height() - size.height()) // 2,
-            size.width(),
-            size.height(),
-        )
-        painter.drawPixmap(place, self._pixmap)
-        self._paint_bar(painter, place)
+        with painting(self) as painter:
+            palette = current_palette()
+            painter.fillRect(self.rect(), QColor(palette.field))
+            if self._pixmap.isNull():
+                painter.setPen(QColor(palette.dim))
+                painter.drawText(self.rect(), int(Qt.AlignmentFlag.AlignCenter), self._words)
+                return
+            painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+            size = self._pixmap.size().scaled(self.size(), Qt.AspectRatioMode.KeepAspectRatio)
+            place = QRect(
+                (self.width() - size.width()) // 2,
+                (self.height() - size.height()) // 2,
+                size.width(),
+                size.height(),
+            )
+            painter.drawPixmap(place, self._pixmap)
+            self._paint_bar(painter, place)
 
     def _paint_bar(self, painter: QPainter, place: QRect) -> None:
         """Draw a bar of a round length, light on dark, which any image shows."""

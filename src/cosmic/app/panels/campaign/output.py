@@ -24,7 +24,6 @@ from PySide6.QtGui import (
     QImage,
     QPageLayout,
     QPageSize,
-    QPainter,
     QPdfWriter,
     QTextDocument,
 )
@@ -38,6 +37,7 @@ from cosmic.autonomy.campaign.store import CampaignStore, write_whole
 from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.gui.painting import painting
 from cosmic.frame.overrides import override
 from cosmic.frame.threads import WorkerThread
 
@@ -76,9 +76,8 @@ class _Figures:
         height_px = round(width_px * size.height() / size.width())
         image = QImage(FINE * width_px, FINE * height_px, QImage.Format.Format_RGB32)
         image.fill(0xFFFFFFFF)
-        painter = QPainter(image)
-        drawing.render(painter)
-        painter.end()
+        with painting(image) as painter:
+            drawing.render(painter)
         return f"<p>{self._keep(image, width_px, height_px, 'figure')}</p>"
 
     def png(self, data: bytes, width_px: int, words: str) -> str:
@@ -131,26 +130,25 @@ def _print(document: QTextDocument, writer: QPdfWriter) -> None:
     """Print page by page, with their numbers."""
     document.setDocumentMargin(0.0)
     document.setPageSize(QSizeF(WIDTH_PX, HEIGHT_PX))
-    painter = QPainter(writer)
-    scale = writer.width() / WIDTH_PX
-    font = QFont(document.defaultFont())
-    font.setPixelSize(NUMBER_PX)  # a size in points would be scaled twice
-    painter.setFont(font)
-    count = document.pageCount()
-    for page in range(count):
-        if page:
-            writer.newPage()
-        painter.save()
-        painter.scale(scale, scale)
-        painter.drawText(
-            QRectF(0.0, HEIGHT_PX + 10.0, WIDTH_PX, 18.0),
-            Qt.AlignmentFlag.AlignRight,
-            f"{page + 1} / {count}",
-        )
-        painter.translate(0.0, -page * HEIGHT_PX)
-        document.drawContents(painter, QRectF(0.0, page * HEIGHT_PX, WIDTH_PX, HEIGHT_PX))
-        painter.restore()
-    painter.end()
+    with painting(writer) as painter:
+        scale = writer.width() / WIDTH_PX
+        font = QFont(document.defaultFont())
+        font.setPixelSize(NUMBER_PX)  # a size in points would be scaled twice
+        painter.setFont(font)
+        count = document.pageCount()
+        for page in range(count):
+            if page:
+                writer.newPage()
+            painter.save()
+            painter.scale(scale, scale)
+            painter.drawText(
+                QRectF(0.0, HEIGHT_PX + 10.0, WIDTH_PX, 18.0),
+                Qt.AlignmentFlag.AlignRight,
+                f"{page + 1} / {count}",
+            )
+            painter.translate(0.0, -page * HEIGHT_PX)
+            document.drawContents(painter, QRectF(0.0, page * HEIGHT_PX, WIDTH_PX, HEIGHT_PX))
+            painter.restore()
 
 
 HTML: Final = "report.html"

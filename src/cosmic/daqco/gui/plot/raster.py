@@ -10,6 +10,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter
 
 from cosmic.daqco.gui.plot.columns import Block, Columns
+from cosmic.frame.gui.painting import painting
 
 Flags = npt.NDArray[np.bool_]
 Reals = npt.NDArray[np.float64]
@@ -117,20 +118,14 @@ class Raster:
     def _paint(self, begin: int, last: int) -> None:
         if last < begin:
             return
-        painter = QPainter(self.image)
-        try:
+        with painting(self.image) as painter:
             self._paint_ground(painter, begin, last)
             self._paint_channels(painter, begin, last)
-        finally:
-            painter.end()
         self.painted += last - begin + 1
 
     def _paint_grid(self) -> None:
-        painter = QPainter(self.image)
-        try:
+        with painting(self.image) as painter:
             self._paint_ground(painter, 0, self.width - 1)
-        finally:
-            painter.end()
 
     def _paint_ground(self, painter: QPainter, begin: int, last: int) -> None:
         ground, line = QColor(self.look.ground), QColor(self.look.line)

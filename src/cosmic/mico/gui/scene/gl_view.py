@@ -5,10 +5,11 @@ from typing import Final
 import numpy as np
 from OpenGL import GL
 from PySide6.QtCore import QPointF, QRectF, QSize
-from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QWheelEvent
+from PySide6.QtGui import QColor, QImage, QPaintEvent, QWheelEvent
 from PySide6.QtWidgets import QWidget
 
 from cosmic.frame.errors import NotAvailable
+from cosmic.frame.gui.painting import painting
 from cosmic.frame.overrides import override
 from cosmic.mico.core.collision.model import Floats
 from cosmic.mico.gui.scene.annotations import (
@@ -89,13 +90,13 @@ class GLSceneView(SceneView):
             self._image.setDevicePixelRatio(ratio)
             self.frames += 1
         palette = self.theme()
-        painter = QPainter(self)
-        painter.drawImage(0, 0, self._image)
-        draw_annotations(painter, self.content, self._project, palette)
-        draw_axes(painter, self._camera.axes, palette)
-        draw_scale(painter, self._camera.px_mm(self.width(), self.height()), palette)
-        draw_legend(painter, self.content, QRectF(self.rect()), palette)
-        self.draw_hovered(painter, palette)
+        with painting(self) as painter:
+            painter.drawImage(0, 0, self._image)
+            draw_annotations(painter, self.content, self._project, palette)
+            draw_axes(painter, self._camera.axes, palette)
+            draw_scale(painter, self._camera.px_mm(self.width(), self.height()), palette)
+            draw_legend(painter, self.content, QRectF(self.rect()), palette)
+            self.draw_hovered(painter, palette)
 
     def _smooth(self, size: QSize) -> bool:
         """Tell whether soft edges leave 20 pictures per second."""

@@ -8,6 +8,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QPainter, QPaintEvent, QPen, QPolygonF, QWheelEvent
 from PySide6.QtWidgets import QWidget
 
+from cosmic.frame.gui.painting import painting, saved
 from cosmic.frame.gui.palette import Palette, blend
 from cosmic.frame.gui.theme import STEP_PX, number_font, ui_font
 from cosmic.frame.overrides import override
@@ -129,22 +130,21 @@ class ProjectionView(SceneView):
     def paintEvent(self, event: QPaintEvent) -> None:
         self.frames += 1
         palette = self.theme()
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.fillRect(self.rect(), QColor(palette.panel))
-        for panel in self.panels():
-            painter.fillRect(panel.box, QColor(palette.window))
-            _draw_rulers(painter, panel, palette)
-            painter.save()
-            painter.setClipRect(panel.box)
-            self._draw_bodies(painter, panel, palette)
-            draw_annotations(painter, self.content, panel.project, palette)
-            _draw_title(painter, panel, palette)
-            painter.restore()
-        notes = [f"{self._reason}: projections"] if self._reason else []
-        room = self.panels()[0].box.adjusted(0, 2.5 * STEP_PX, 0, 0)
-        draw_legend(painter, self.content, room, palette, notes)
-        self.draw_hovered(painter, palette)
+        with painting(self) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.fillRect(self.rect(), QColor(palette.panel))
+            for panel in self.panels():
+                painter.fillRect(panel.box, QColor(palette.window))
+                _draw_rulers(painter, panel, palette)
+                with saved(painter):
+                    painter.setClipRect(panel.box)
+                    self._draw_bodies(painter, panel, palette)
+                    draw_annotations(painter, self.content, panel.project, palette)
+                    _draw_title(painter, panel, palette)
+            notes = [f"{self._reason}: projections"] if self._reason else []
+            room = self.panels()[0].box.adjusted(0, 2.5 * STEP_PX, 0, 0)
+            draw_legend(painter, self.content, room, palette, notes)
+            self.draw_hovered(painter, palette)
 
     def _draw_bodies(self, painter: QPainter, panel: Panel, palette: Palette) -> None:
         shown = self.content.shown
