@@ -3,7 +3,6 @@
 import random
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -227,15 +226,20 @@ class OrderAttack(Attack):
         self._axes = list(rig.mico)
         self._seen: list[Order] = []
         for axis in self._axes:
-            axis.commander.order_issued.connect(self._remember)
+            device = rig.mico.application.manager.device(axis.name)
+            device.submit = self._remembering(device.submit)
         self.acts = [(1, self._replay), (2, self._forge), (1, self._steal)]
 
-    def _remember(self, order: Order) -> None:
-        self._seen = [*self._seen[-200:], order]
+    def _remembering(self, submit: Callable[[Order], None]) -> Callable[[Order], None]:
+        def remembered(order: Order) -> None:
+            self._seen = [*self._seen[-200:], order]
+            submit(order)
+
+        return remembered
 
     def _submit(self, order: Order) -> None:
         axis = self.chance.choice(self._axes)
-        axis.commander.order_issued.emit(order)
+        self._rig.mico.application.manager.device(axis.name).submit(order)
 
     def _epoch(self) -> int:
         mico = self._rig.mico.application
@@ -274,7 +278,7 @@ class OrderAttack(Attack):
         if reserved:
             order = self.chance.choice(reserved)
             motion = MoveTo(self.chance.uniform(-7000.0, 7000.0), "um")  # type: ignore[arg-type]
-            self._submit(replace(order, motion=motion))
+            self._submit(order._replace(motion=motion))
 
 
 class ForceAttack(Attack):

@@ -63,16 +63,19 @@ def watch_gate(bench: Stand) -> list[tuple[str, float, float]]:
     """Note axis, begin and end of every decision."""
     decisions: list[tuple[str, float, float]] = []
     gate = bench.manager.gate
-    decide = gate.decide
+    for name in ("decide", "decide_promptly"):
+        setattr(gate, name, _timed(getattr(gate, name), decisions))
+    return decisions
 
+
+def _timed(decide: Any, decisions: list[tuple[str, float, float]]) -> Any:
     def timed(requests: Any, *more: Any) -> Any:
         began_s = time.perf_counter()
         answer = decide(requests, *more)
         decisions.append((requests[0].axis, began_s, time.perf_counter()))
         return answer
 
-    gate.decide = timed  # type: ignore[method-assign]
-    return decisions
+    return timed
 
 
 def collect(bench: Stand, count: int) -> Samples:

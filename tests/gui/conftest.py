@@ -58,6 +58,12 @@ class InProcess(Answering):
             return self._sweep.check(spans, ignored)
 
     @override
+    def check_promptly(
+        self, spans: Spans, ignored: Set[BodyPair] = frozenset()
+    ) -> SweepAnswer | None:
+        return self.check(spans, ignored)
+
+    @override
     def nearest(
         self, positions: Mapping[str, float], ignored: Set[BodyPair] = frozenset()
     ) -> Approach | None:

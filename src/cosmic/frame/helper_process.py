@@ -129,6 +129,7 @@ class HelperProcess:
         self.ready = False
         self.began_s = WALL.now_s()
         self._numbers = count(READY + 1)
+        self._left: tuple[int, str, object] | None = None
         self._words = tempfile.TemporaryFile()  # noqa: SIM115 - read when the process has ended
         self._pipe, theirs = Pipe()
         try:
@@ -183,19 +184,54 @@ class HelperProcess:
         HelperRefusalError
             It could not answer this question, and says why.
         """
-        until_s = WALL.now_s() + timeout_s
+        number = self._asked(kind, payload, timeout_s)
+        reply = self._reply_to(number, timeout_s)
+        if reply is None:
+            raise HelperLateError(f"it did not answer within {timeout_s:g} s")
+        return self._value(reply)
+
+    def ask_promptly(
+        self, kind: str, payload: object, timeout_s: float, within_s: float
+    ) -> object | None:
+        """Put a question and return the answer, or None where it takes longer than `within_s`.
+
+        The process goes on with it, and the same question put next is not asked a second time.
+
+        Raises
+        ------
+        HelperFaultError, HelperRefusalError
+            See `ask`.
+        """
+        number = self._asked(kind, payload, timeout_s)
+        reply = self._reply_to(number, within_s)
+        if reply is None:
+            self._left = number, kind, payload
+            return None
+        return self._value(reply)
+
+    def _asked(self, kind: str, payload: object, timeout_s: float) -> int:
+        """Put a question, unless it is the one that is being answered; returns its number."""
+        left, self._left = self._left, None
+        if left is not None and left[1:] == (kind, payload):
+            return left[0]
         number = self.next_number()
         self.put(number, kind, payload, timeout_s)
+        return number
+
+    def _reply_to(self, number: int, wait_s: float) -> Reply | None:
+        """Return the reply to question `number`, None when it has not come after `wait_s`."""
+        until_s = WALL.now_s() + wait_s
         while True:
             left_s = until_s - WALL.now_s()
             reply = self.take(left_s) if left_s > 0.0 else None
-            if reply is None:
-                raise HelperLateError(f"it did not answer within {timeout_s:g} s")
+            if reply is None or reply.number == number:
+                return reply
             # An older one belongs to a question whose asker was interrupted.
-            if reply.number == number:
-                break
             if not READY < reply.number < number:
                 raise HelperFaultError(f"it answered question {reply.number}, asked was {number}")
+
+    @staticmethod
+    def _value(reply: Reply) -> object:
         if not reply.good:
             raise HelperRefusalError(str(reply.value))
         return reply.value

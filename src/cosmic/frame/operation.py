@@ -77,12 +77,12 @@ class Operation(Generic[T]):
     _on_cancel: tuple[Callable[[], object], ...] = ()
     _done = False
     _told: "_Told | None" = None
+    _future: Future[T] | None = None
 
     def __init__(self, title: str, *, clock: Clock = WALL) -> None:
         self._title = title
         self._clock = clock
         self._began_s = clock.now_s()
-        self._future: Future[T] = Future()
         self._lock = Lock()  # only held to change what is here, so that `cancel` never waits
 
     @override
@@ -132,7 +132,7 @@ class Operation(Generic[T]):
         """
         if not self._done:
             self._await_end(timeout)
-        error = self._future.exception()  # it is there, or will be at once
+        error = self._end.exception()  # it is there, or will be at once
         assert error is None or isinstance(error, Exception)
         return error
 
@@ -149,7 +149,7 @@ class Operation(Generic[T]):
         error = self.exception(timeout_s)
         if error is not None:
             raise error
-        return self._future.result()
+        return self._end.result()
 
     @property
     def result(self) -> T:
@@ -170,7 +170,7 @@ class Operation(Generic[T]):
 
         It must return at once.
         """
-        self._future.add_done_callback(lambda _future: notify(callback, self))
+        self._end.add_done_callback(lambda _future: notify(callback, self))
 
     def when_failed(self, callback: Callable[[CosmicError], object]) -> None:
         """Call `callback(error)` once it fails by what is foreseen; a defect is told elsewhere."""
@@ -228,7 +228,7 @@ class Operation(Generic[T]):
         """End it well; False where it had ended before."""
         if not self._may_end():
             return False
-        self._future.set_result(result)
+        self._end.set_result(result)
         self._tell()
         return True
 
@@ -236,9 +236,18 @@ class Operation(Generic[T]):
         """End it badly; False where it had ended before."""
         if not self._may_end():
             return False
-        self._future.set_exception(error)
+        self._end.set_exception(error)
         self._tell()
         return True
+
+    @property
+    def _end(self) -> Future[T]:
+        """The future, made when it is first of use: who begins a movement does not wait for it."""
+        future = self._future
+        if future is None:
+            with self._lock:
+                future = self._future = self._future or Future()
+        return future
 
     def _may_end(self) -> bool:
         with self._lock:
@@ -257,7 +266,7 @@ class Operation(Generic[T]):
             forbid_waiting_here(f"waiting for {self._title}")
         try:
             if timeout_s is None or self._clock is WALL:
-                self._future.exception(timeout_s)
+                self._end.exception(timeout_s)
             else:
                 self._await_until(self._clock.now_s() + timeout_s)
         except TimeoutError:
@@ -271,9 +280,10 @@ class Operation(Generic[T]):
             with changed:
                 changed.notify_all()
 
-        self._future.add_done_callback(wake)
+        future = self._end
+        future.add_done_callback(wake)
         with changed:
-            while not self._future.done():
+            while not future.done():
                 if self._clock.now_s() >= until_s:
                     raise TimeoutError
                 self._clock.wait(changed, until_s)

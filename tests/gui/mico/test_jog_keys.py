@@ -152,11 +152,12 @@ def test_the_dead_man_stops_a_window_that_hangs(slow: MicoWidget, qtbot: QtBot) 
 def test_the_speed_field_says_how_fast(slow: MicoWidget, qtbot: QtBot) -> None:
     enter(qtbot, field(slow, "jogSpeed_um"), "1 mm", accept=True)
     part(slow, "initialise", QPushButton).setFocus()
-    with qtbot.waitSignal(slow.cards["left.x"].axis.commander.order_issued) as issued:
+    device = slow.mico.application.manager.device("left.x")
+    with qtbot.waitSignal(device.movement_begun) as begun:
         qtbot.keyPress(slow.focusWidget(), Qt.Key.Key_D)
     qtbot.keyRelease(slow.focusWidget(), Qt.Key.Key_D)
-    assert issued.args is not None
-    assert issued.args[0].motion.speed == 1000.0
+    assert begun.args is not None
+    assert begun.args[0].motion.speed == 1000.0
     qtbot.waitUntil(lambda: at_rest(slow, "left.x"))
 
 

@@ -50,6 +50,12 @@ class Inside(Answering):
         return self.instead or self.sweep.check(spans, ignored)
 
     @override
+    def check_promptly(
+        self, spans: Spans, ignored: Set[BodyPair] = frozenset()
+    ) -> SweepAnswer | None:
+        return self.check(spans, ignored)
+
+    @override
     def nearest(
         self, positions: Mapping[str, float], ignored: Set[BodyPair] = frozenset()
     ) -> Approach | None:

@@ -86,6 +86,28 @@ def gone(pid: int) -> bool:
 # --- answers ----------------------------------------------------------------------------------
 
 
+def test_who_cannot_wait_gets_the_answer_at_once_or_none(gate: GateProcess) -> None:
+    prompt = gate.check_promptly(FREE, within_s=5.0)
+    assert prompt is not None
+    assert prompt.clear
+    signalled(gate, signal.SIGSTOP)
+    began_s = WALL.now_s()
+    assert gate.check_promptly(FREE) is None
+    assert WALL.now_s() - began_s < 0.5
+    signalled(gate, signal.SIGCONT)
+    assert gate.check(FREE).clear
+    assert gate.restarts == 0
+
+
+def test_the_answer_to_who_did_not_wait_is_not_taken_for_that_to_another(gate: GateProcess) -> None:
+    signalled(gate, signal.SIGSTOP)
+    assert gate.check_promptly(FREE) is None
+    assert gate.check_promptly(BLOCKED) is None
+    signalled(gate, signal.SIGCONT)
+    assert not gate.check(BLOCKED).clear
+    assert gate.check(FREE).clear
+
+
 def test_it_answers_as_the_pure_gate_does(gate: GateProcess) -> None:
     assert gate.check(FREE).clear
     refused = gate.check(BLOCKED)

@@ -9,7 +9,7 @@ import cosmic
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.frame.network.lease import StationLease
-from cosmic.frame.verdict import ALLOWED, Reason
+from cosmic.frame.verdict import ALLOWED, Reason, refuse
 from cosmic.mico.core.collision.answer import AxisSpan, SweepAnswer
 from cosmic.mico.core.collision.checker import CollisionChecker
 from cosmic.mico.core.collision.collision_manager import CollisionManager
@@ -68,6 +68,35 @@ def test_a_slow_answer_is_an_answer(monkeypatch):
         checker.go.set()
         assert movement.wait(2) == 50.0
         assert len(checker.asked) == 1
+
+
+class Prompt(Slow):
+    """Answers at once, and hangs where it is asked to take its time."""
+
+    def __init__(self, verdict=ALLOWED):
+        super().__init__()
+        self.go.clear()
+        self.verdict = verdict
+
+    def check_promptly(self, spans):
+        self.prompted = spans
+        return self.verdict
+
+
+@pytest.mark.parametrize("allowed", [True, False])
+def test_a_prompt_answer_is_waited_for_in_no_queue(allowed):
+    refusal = refuse(Reason.NO_ANSWER, "the collision gate is down")
+    with mico(("LLN",)) as (rig, controller):
+        checker = Prompt(ALLOWED if allowed else refusal)
+        rig.application.manager.gate._checker = checker
+        movement = rig["d0.c0"].move_to(50.0, wait=False)
+        if allowed:
+            assert movement.wait(2) == 50.0
+        else:
+            assert movement.exception(2).verdict == refusal
+        assert checker.prompted["d0.c0"].high == 50.0
+        assert not checker.asked
+        assert len(controller.of("move_to")) == allowed
 
 
 def test_a_stop_waits_for_no_answer_and_nothing_moves_when_it_comes(monkeypatch):

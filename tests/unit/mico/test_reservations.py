@@ -163,8 +163,8 @@ def test_an_axis_that_was_elsewhere_meanwhile_is_judged_again():
         away = manager.order_together({NAME: MoveTo(1000.0, "um")}, source="test")
         away[NAME].movement.wait(2)
         checked = []
-        real = gate.decide
-        gate.decide = lambda requests, *more: checked.append(requests) or real(requests, *more)
+        real = gate.decide_promptly
+        gate.decide_promptly = lambda requests: checked.append(requests) or real(requests)
         assert submit(manager, motion, late).wait(2) == 10.0
         assert len(checked) == 1, "the way from 1000 um was never looked at"
 

@@ -32,7 +32,7 @@ from cosmic.mico.api.station_words import (
     StartedTogether,
 )
 from cosmic.mico.core.collision.model import SceneModel
-from cosmic.mico.core.motion.device_commander import CommanderType, DeviceCommander, join
+from cosmic.mico.core.motion.device_commander import CommanderType, DeviceCommander
 from cosmic.mico.core.motion.group_start import GroupStarted
 from cosmic.mico.core.motion.lease import Lease
 from cosmic.mico.core.motion.orders import Order
@@ -158,7 +158,7 @@ class RemoteAxes(QObject):
         device = self._devices.get(index)
         if device is None:
             raise NotAvailable(f"there is no device {index}")
-        join(device.slots, commander, kind)
+        commander.attach(device.slots, kind)
 
     def _order_undo(self, entry: UndoEntry) -> dict[str, Order]:
         raise NotImplementedError

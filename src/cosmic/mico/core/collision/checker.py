@@ -27,6 +27,12 @@ class CollisionChecker(Protocol):
         axis could go, which takes longer to find out than that it cannot.
         """
 
+    def check_promptly(self, spans: Spans) -> MoveVerdict | None:
+        """Judge as `check` where that takes a few milliseconds at most; None where it may not.
+
+        A refusal is said without haste: None leaves it to `check`, as a checker may always do.
+        """
+
     @abstractmethod
     def start(self) -> None:
         """Make it ready to answer; returns when it is, or has failed and answers no."""
@@ -47,6 +53,10 @@ class NoCollisionModel(CollisionChecker):
     @override
     def check(self, spans: Spans, *, advice: bool = True) -> MoveVerdict:
         return MoveVerdict(allowed=True, reason=Reason.ALLOWED, text=f"allowed; {NO_MODEL_TEXT}")
+
+    @override
+    def check_promptly(self, spans: Spans) -> MoveVerdict | None:
+        return self.check(spans)
 
     @override
     def start(self) -> None:

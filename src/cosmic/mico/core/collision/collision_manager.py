@@ -40,6 +40,9 @@ class Answering(Protocol):
     def check(self, spans: Spans, ignored: Set[BodyPair] = _NOBODY) -> SweepAnswer:
         """See `Sweep.check`; raises `NoAnswerError`."""
 
+    def check_promptly(self, spans: Spans, ignored: Set[BodyPair] = _NOBODY) -> SweepAnswer | None:
+        """See `GateProcess.check_promptly`; raises `NoAnswerError`."""
+
     def nearest(
         self, positions: Mapping[str, float], ignored: Set[BodyPair] = _NOBODY
     ) -> Approach | None:
@@ -117,6 +120,18 @@ class CollisionManager(Exemptions, CollisionChecker):
         except Exception as exc:  # a check that cannot answer says no
             logger.exception("the collision check failed")
             return words.no_answer(f"{type(exc).__name__}: {exc}")
+
+    @override
+    def check_promptly(self, spans: Spans) -> MoveVerdict | None:
+        before = self.taken_out, self.ignored_pairs
+        freed = self._with_freed(spans)
+        try:
+            answer = self._process.check_promptly(freed, before[1])
+        except NoAnswerError as no:
+            return words.no_answer(str(no))
+        if answer is None or answer.clear is not True:
+            return None
+        return self._allow(freed) if before == (self.taken_out, self.ignored_pairs) else None
 
     def nearest(self, positions: Mapping[str, float]) -> Approach | None:
         """Return the pair nearest to each other with the axes at `positions`, if any is watched.

@@ -133,15 +133,25 @@ class ChannelController:
         if reservation is not None:
             self._go(order, reservation)
         elif self._has_origin(order):
-            self._context.queries.ask(
-                order, partial(self._ask, order, order.motion), self._on_checked
-            )
+            self._ask_gate(order)
+
+    def _ask_gate(self, order: Order) -> None:
+        """Begin `order` where the gate answers at once; otherwise go on, and begin it later."""
+        motion = order.motion
+        decided = self._context.gate.decide_promptly([_request(self.name, order, motion)])
+        if decided is None:
+            self._context.queries.ask(order, partial(self._ask, order, motion), self._on_checked)
+            return
+        verdict, reservations = decided
+        self._start(order, verdict, reservations.get(self.name))
 
     def _on_checked(self, checked: CheckedMove) -> None:
+        self._start(checked.order, checked.verdict, checked.reservation)
+
+    def _start(self, order: Order, verdict: MoveVerdict, reservation: Reservation | None) -> None:
         """Begin an order that the gate has decided; it may have waited for that for long."""
-        order, reservation = checked.order, checked.reservation
-        if not checked.verdict.allowed:
-            self.turn_away(order, checked.verdict)
+        if not verdict.allowed:
+            self.turn_away(order, verdict)
         elif reservation is not None and self._still_wanted(order, reservation):
             self._go(order, reservation)
 
@@ -256,7 +266,7 @@ class ChannelController:
         slowed: bool = False,
     ) -> CheckedMove:
         """Ask the gate for one motion; any thread, for the answer may be long in coming."""
-        request = Request(self.name, motion, order.token, order.consent, guard=order.guard)
+        request = _request(self.name, order, motion)
         verdict, reservations = self._context.gate.decide([request], query)
         return CheckedMove(order, motion, verdict, reservations.get(self.name), jog, slowed)
 
@@ -362,7 +372,7 @@ class ChannelController:
         """Return how much of its speed a jog may keep with what is in its way."""
         for share in SLOWER:
             ahead = jog.look_ahead(self._positioner.state, share)
-            request = Request(self.name, ahead, order.token, order.consent, guard=order.guard)
+            request = _request(self.name, order, ahead)
             verdict = self._context.gate.check([request], advice=False)
             if verdict.reason is not Reason.COLLISION:
                 return share
@@ -420,6 +430,10 @@ class ChannelController:
             active.progress_s = self._context.clock.now_s()
             if isinstance(jog, SteerRun) and jog.must_locate():
                 self.monitor.ask_position()
+
+
+def _request(name: str, order: Order, motion: Motion) -> Request:
+    return Request(name, motion, order.token, order.consent, guard=order.guard)
 
 
 def _unguarded(name: str, guard: Guard) -> MoveVerdict:

@@ -4,11 +4,12 @@ import logging
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final, Self
+from functools import partial
+from typing import Final, Self, TypeVar
 
 from cosmic.frame.units import format_quantity
-from cosmic.frame.verdict import MoveVerdict, Reason, refuse
-from cosmic.mico.core.collision.answer import AxisSpan
+from cosmic.frame.verdict import ALLOWED, MoveVerdict, Reason, refuse
+from cosmic.mico.core.collision.answer import AxisSpan, Spans
 from cosmic.mico.core.collision.checker import CollisionChecker
 from cosmic.mico.core.motion.lease import Guard
 from cosmic.mico.core.motion.orders import (
@@ -35,6 +36,8 @@ from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Direction, PositionerKind, ReferenceKind
 
 logger = logging.getLogger(__name__)
+
+Answer = TypeVar("Answer", MoveVerdict, MoveVerdict | None)
 
 ROUNDING: Final = 1e-6
 """What adding and taking away a user's zero may cost a limit that is shown and typed again."""
@@ -413,6 +416,28 @@ def check_move(
     advice: bool = True,
 ) -> Decision:
     """Decide several movements together; pure: state in, answer out, nothing else touched."""
+    planned = _planned(requests, snapshot)
+    if not planned.verdict.allowed:
+        return planned
+    verdict = _clear_of_everything(planned, snapshot, partial(checker.check, advice=advice))
+    return replace(planned, verdict=verdict, intervals=planned.intervals if verdict.allowed else {})
+
+
+def check_move_promptly(
+    requests: Sequence[Request], snapshot: PlatformSnapshot, checker: CollisionChecker
+) -> Decision | None:
+    """Decide as `check_move` where that takes a few milliseconds at most; None where it may not."""
+    planned = _planned(requests, snapshot)
+    if not planned.verdict.allowed:
+        return planned
+    verdict = _clear_of_everything(planned, snapshot, checker.check_promptly)
+    if verdict is None or not verdict.allowed:
+        return None if verdict is None else replace(planned, verdict=verdict, intervals={})
+    return replace(planned, verdict=verdict)
+
+
+def _planned(requests: Sequence[Request], snapshot: PlatformSnapshot) -> Decision:
+    """Return what the rules say, and what would be swept; the bodies are not looked at yet."""
     intervals: dict[str, Interval] = {}
     targets: dict[str, float] = {}
     headings = dict(snapshot.headings)
@@ -435,10 +460,7 @@ def check_move(
         intervals[request.axis] = swept_interval(
             request.motion, state, target, place, snapshot.rules
         )
-    verdict = _clear_of_everything(
-        intervals, replace(snapshot, headings=headings), checker, advice=advice
-    )
-    return Decision(verdict, intervals if verdict.allowed else {}, targets, headings)
+    return Decision(ALLOWED, intervals, targets, headings)
 
 
 def still_true(requests: Sequence[Request], then: PlatformSnapshot, now: PlatformSnapshot) -> bool:
@@ -527,18 +549,15 @@ def _torn_apart(
 
 
 def _clear_of_everything(
-    intervals: Mapping[str, Interval],
-    snapshot: PlatformSnapshot,
-    checker: CollisionChecker,
-    *,
-    advice: bool,
-) -> MoveVerdict:
+    planned: Decision, before: PlatformSnapshot, check: Callable[[Spans], Answer]
+) -> Answer | MoveVerdict:
+    snapshot = replace(before, headings=planned.headings)
     spans = {
-        name: span_of(state, intervals.get(name), snapshot)
+        name: span_of(state, planned.intervals.get(name), snapshot)
         for name, state in snapshot.states.items()
     }
     try:
-        verdict = checker.check(spans, advice=advice)
+        verdict = check(spans)
     except Exception:  # a check that cannot answer says no
         logger.exception("the collision check failed")
         return refuse(

@@ -1,9 +1,7 @@
 """`Device`: all calls to the controller library for one device (thesis 5.4, 6.1)."""
 
 import logging
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Callable
 from functools import partial
 from queue import Empty
 from threading import Lock
@@ -140,14 +138,17 @@ class Device(WorkerThread):
         if stop.latched:
             self._refuse_stopped(order, stop.reason or "")
             return
+        # First, for the device thread cannot begin before this one lets it. Cancelled in between,
+        # the order finds that out before it is sent.
+        order.movement.on_cancel(partial(self._cancel, order))
+        if order.epoch != stop.epoch:
+            order = order._replace(epoch=stop.epoch)
         with self._intake:
             taken = self._open
             if taken:
                 self._newest[order.channel] = order.number
-                self._inbox.put(replace(order, epoch=stop.epoch))
-        if taken:
-            order.movement.on_cancel(lambda: self._cancel(order))
-        else:
+                self._inbox.put(order)
+        if not taken:
             self._turn_away(order, self.container.state(order.channel))
 
     def renew_jog(self, order: Order) -> None:
@@ -346,8 +347,11 @@ class Device(WorkerThread):
             self._context.gate.withdraw(order.reservation)
             order.movement.fail(MoveCancelled(f"{axis.name}: halted before it started"))
             return
-        with self._failing(order, axis):
+        try:
             axis.launch(order)
+        except BaseException as exc:
+            self._fail_with_defect(order, axis.name, exc)
+            raise
 
     def _on_answer(self, answer: GateAnswer) -> None:
         checked = answer.checked
@@ -359,8 +363,11 @@ class Device(WorkerThread):
         if not wanted or axis is None or (order.movement.done and not begun):
             self._context.gate.withdraw(checked.reservation)
             return
-        with self._failing(order, axis):
+        try:
             answer.on_checked(checked)
+        except BaseException as exc:
+            self._fail_with_defect(order, axis.name, exc)
+            raise
 
     def _drop_halted(self, halt: Halt) -> None:
         """End the orders of a channel that was halted before the gate has answered."""
@@ -379,16 +386,10 @@ class Device(WorkerThread):
             self._queries.withdraw(order)
             order.movement.fail(error)
 
-    @contextmanager
-    def _failing(self, order: Order, axis: ChannelController) -> Iterator[None]:
+    def _fail_with_defect(self, order: Order, name: str, defect: BaseException) -> None:
         """Fail `order` with a mistake in the program that keeps it from being sent."""
-        try:
-            yield
-        except DeviceError:
-            raise  # the end of a device that is lost is reported by its channel
-        except BaseException as exc:
-            order.movement.fail(DeviceError(f"{axis.name}: {exc}"))
-            raise
+        if not isinstance(defect, DeviceError):  # the end of a device is reported by its channel
+            order.movement.fail(DeviceError(f"{name}: {defect}"))
 
     def _on_group_move_sent(self, sent: GroupMoveSent) -> None:
         axis = self._channels.get(sent.order.channel)

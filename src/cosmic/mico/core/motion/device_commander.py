@@ -1,7 +1,6 @@
-"""`DeviceCommander`: the run-time API of one device, decoupled by signals (thesis 6.1.2)."""
+"""`DeviceCommander`: the run-time API of one device, joined to it at run time (thesis 6.1.2)."""
 
 from abc import abstractmethod
-from collections.abc import Callable
 from enum import Flag, auto
 from typing import Protocol
 
@@ -22,6 +21,7 @@ from cosmic.mico.core.motion.orders import (
     Step,
     ToEndStop,
 )
+from cosmic.mico.core.motion.stop_latch import StopLatch
 from cosmic.mico.hw.interface import Direction
 
 
@@ -83,8 +83,9 @@ class DeviceCommander(QObject):
     """Commands the channels of whatever device it is connected to, and hears from it.
 
     It knows nothing of the device: `DeviceManager.connect_device_commander` joins the two. Each
-    command emits `order_issued` and returns at once with the `Movement`; any thread. Positions
-    are in gate coordinates.
+    command goes into the device's queue in the caller's thread, so that no event loop is needed
+    to make a move, and returns at once with the `Movement`; any thread. Positions are in gate
+    coordinates.
 
     Parameters
     ----------
@@ -95,17 +96,11 @@ class DeviceCommander(QObject):
 
     Signals
     -------
-    order_issued(Order)
-        To the device.
     position_changed(PositionChanged), state_changed(PositionerState),
     movement_ended(MovementEnded), movement_refused(MoveVerdict)
         From the device, in its thread.
     """
 
-    order_issued = Signal(object)
-    jog_renewed = Signal(object)
-    jog_steered = Signal(object, float)
-    halt_requested = Signal(int, str)
     position_changed = Signal(object)
     state_changed = Signal(object)
     movement_ended = Signal(object)
@@ -115,21 +110,34 @@ class DeviceCommander(QObject):
         super().__init__(parent)
         self._token = token
         self.source = source
-        self._may_command = False
+        self._device: Commanded | None = None
+        self._latch: StopLatch | None = None
         self._connections: list[QMetaObject.Connection] = []
 
-    def attach(self, connections: list[QMetaObject.Connection], kind: CommanderType) -> None:
-        """Take note of the connections to a device; for `connect_device_commander`."""
+    def attach(
+        self, device: Commanded, kind: CommanderType, latch: StopLatch | None = None
+    ) -> None:
+        """Join it to a device, parting it from any other; for `connect_device_commander`."""
         self.detach()
-        self._connections = connections
-        self._may_command = CommanderType.INPUT in kind
+        self._latch = latch
+        if CommanderType.OUTPUT in kind:
+            pairs = (
+                (device.position_changed, self.position_changed),
+                (device.state_changed, self.state_changed),
+                (device.movement_ended, self.movement_ended),
+                (device.movement_refused, self.movement_refused),
+            )
+            direct = Qt.ConnectionType.DirectConnection
+            self._connections = [signal.connect(heard, direct) for signal, heard in pairs]
+        if CommanderType.INPUT in kind:
+            self._device = device
 
     def detach(self) -> None:
         """Part from the device."""
+        self._device = None
         connections, self._connections = self._connections, []
         for connection in connections:
             QObject.disconnect(connection)
-        self._may_command = False
 
     def move_absolute(
         self, channel: int, target: float, unit: AxisUnit, *, consent: bool = False
@@ -175,7 +183,8 @@ class DeviceCommander(QObject):
 
     def renew_jog(self, order: Order) -> None:
         """Keep the jog begun by `order` alive."""
-        self.jog_renewed.emit(order)
+        if self._device is not None:
+            self._device.renew_jog(order)
 
     def steer(self, channel: int, velocity: float, *, dead_man_s: float) -> Order:
         """Begin to move at a signed speed that `steer_on` changes; it ends when that stays away."""
@@ -184,11 +193,13 @@ class DeviceCommander(QObject):
 
     def steer_on(self, order: Order, velocity: float) -> None:
         """Keep the movement begun by `steer` alive at `velocity`; only the newest counts."""
-        self.jog_steered.emit(order, velocity)
+        if self._device is not None:
+            self._device.steer_jog(order, velocity)
 
     def stop(self, channel: int, why: str = "stopped") -> None:
         """Stop one channel; nothing is latched."""
-        self.halt_requested.emit(channel, why)
+        if self._device is not None:
+            self._device.halt(channel, why)
 
     def send(
         self,
@@ -204,33 +215,12 @@ class DeviceCommander(QObject):
     def _issue(
         self, channel: int, motion: Motion, *, consent: bool, follows: Movement | None = None
     ) -> Order:
-        if not self._may_command:
+        device = self._device
+        if device is None:
             raise NotConnectedError("this commander is connected to no device, or only listens")
-        order = Order(channel, motion, self._token, self.source, consent, follows=follows)
-        self.order_issued.emit(order)
+        epoch = None if self._latch is None else self._latch.state.epoch
+        order = Order(
+            channel, motion, self._token, self.source, consent, follows=follows, epoch=epoch
+        )
+        device.submit(order)
         return order
-
-
-def join(device: Commanded, commander: DeviceCommander, kind: CommanderType) -> None:
-    """Connect a commander to a device, parting it from any other.
-
-    The connections are direct: a command goes into the device's queue in the caller's thread, so
-    that no event loop is needed to make a move.
-    """
-    pairs: list[tuple[SignalInstance, Callable[..., object] | SignalInstance]] = []
-    if CommanderType.INPUT in kind:
-        pairs += [
-            (commander.order_issued, device.submit),
-            (commander.jog_renewed, device.renew_jog),
-            (commander.jog_steered, device.steer_jog),
-            (commander.halt_requested, device.halt),
-        ]
-    if CommanderType.OUTPUT in kind:
-        pairs += [
-            (device.position_changed, commander.position_changed),
-            (device.state_changed, commander.state_changed),
-            (device.movement_ended, commander.movement_ended),
-            (device.movement_refused, commander.movement_refused),
-        ]
-    direct = Qt.ConnectionType.DirectConnection
-    commander.attach([signal.connect(slot, direct) for signal, slot in pairs], kind)

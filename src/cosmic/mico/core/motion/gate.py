@@ -18,6 +18,7 @@ from cosmic.mico.core.motion.checks import (
     PlatformSnapshot,
     Request,
     check_move,
+    check_move_promptly,
     origin,
     span_of,
     still_true,
@@ -29,6 +30,7 @@ from cosmic.mico.core.motion.stop_latch import StopLatch, StopState
 
 SOON_S: Final = 0.05
 """An answer that took no longer is as new as the positions, which are asked for so often."""
+PROMPT_S: Final = 0.002
 MOST_TRIES: Final = 3
 """How often movements are checked because the platform changed meanwhile."""
 
@@ -137,6 +139,33 @@ class Gate:
             for reservation in reservations.values():
                 self.release(reservation)
         return words.changed(), {}
+
+    def decide_promptly(
+        self, requests: Sequence[Request]
+    ) -> tuple[MoveVerdict, dict[str, Reservation]] | None:
+        """Decide as `decide` where that takes a few milliseconds at most; None where it may not.
+
+        For a thread that has something else to do. None holds nothing.
+        """
+        holder = self._lease.holder  # first, for it may emit that it has lapsed
+        before = holder.token, self._revision
+        if not self._deciding.acquire(timeout=PROMPT_S):
+            return None
+        try:
+            epoch = self._latch.state.epoch
+            snapshot = self._snapshot(holder)
+            decision = check_move_promptly(requests, snapshot, self._checker)
+            if decision is None or WALL.now_s() - snapshot.now_wall_s > SOON_S:
+                return None
+            with self._lock:
+                reservations = self._hold(requests, snapshot, decision, epoch)
+        finally:
+            self._deciding.release()
+        if before == (self._lease.holder.token, self._revision):
+            return decision.verdict, reservations
+        for reservation in reservations.values():
+            self.release(reservation)
+        return None
 
     @property
     def _revision(self) -> object:

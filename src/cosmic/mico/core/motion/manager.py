@@ -28,7 +28,7 @@ from cosmic.mico.core.mode import Mode
 from cosmic.mico.core.motion.checks import Limits
 from cosmic.mico.core.motion.data_container import NO_DEVICE, DeviceDataContainer, Memory
 from cosmic.mico.core.motion.device import Device
-from cosmic.mico.core.motion.device_commander import CommanderType, DeviceCommander, join
+from cosmic.mico.core.motion.device_commander import CommanderType, DeviceCommander
 from cosmic.mico.core.motion.device_listener import DeviceListener
 from cosmic.mico.core.motion.gate import Gate
 from cosmic.mico.core.motion.group import GroupOrders
@@ -451,7 +451,7 @@ class DeviceManager(QObject):
         device = self._devices.get(index)
         if device is None:
             raise NotAvailable(f"there is no device {index}")
-        join(device, commander, kind)
+        commander.attach(device, kind, self.latch)
 
     def usual_frequency_hz(self, name: str) -> int:
         """Return the closed-loop frequency limit that is set on an axis."""

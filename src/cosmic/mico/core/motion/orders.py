@@ -1,8 +1,8 @@
 """What can be asked of an axis, as frozen data."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import count
-from typing import Final
+from typing import Final, NamedTuple, Self
 
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.core.motion.group_start import GroupStart
@@ -120,8 +120,23 @@ class Reservation:
     target: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class Order:
+class _OrderFields(NamedTuple):
+    channel: int
+    motion: Motion
+    token: str
+    source: str
+    consent: bool
+    movement: Movement
+    reservation: Reservation | None
+    follows: Movement | None
+    epoch: int | None
+    start: GroupStart | None
+    frequency_hz: int | None
+    guard: Guard | None
+    number: int
+
+
+class Order(_OrderFields):
     """One command on its way to a `Device`.
 
     Attributes
@@ -152,16 +167,38 @@ class Order:
         Ends the movement when it expires; None for what this process commands.
     """
 
-    channel: int
-    motion: Motion
-    token: str
-    source: str = "script"
-    consent: bool = False
-    movement: Movement = field(default_factory=Movement)
-    reservation: Reservation | None = None
-    follows: Movement | None = None
-    epoch: int | None = None
-    start: GroupStart | None = None
-    frequency_hz: int | None = None
-    guard: Guard | None = None
-    number: int = field(default_factory=lambda: next(_numbers))
+    __slots__ = ()  # a tuple, for it is made between a command and the call of the library
+
+    def __new__(
+        cls,
+        channel: int,
+        motion: Motion,
+        token: str,
+        source: str = "script",
+        consent: bool = False,
+        *,
+        movement: Movement | None = None,
+        reservation: Reservation | None = None,
+        follows: Movement | None = None,
+        epoch: int | None = None,
+        start: GroupStart | None = None,
+        frequency_hz: int | None = None,
+        guard: Guard | None = None,
+    ) -> Self:
+        """Return an order with a number, and with a movement, of its own."""
+        return super().__new__(
+            cls,
+            channel,
+            motion,
+            token,
+            source,
+            consent,
+            Movement() if movement is None else movement,
+            reservation,
+            follows,
+            epoch,
+            start,
+            frequency_hz,
+            guard,
+            next(_numbers),
+        )

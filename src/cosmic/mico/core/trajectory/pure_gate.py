@@ -34,6 +34,10 @@ class PureAnswers(Answering):
         return self.sweep.check(spans, ignored)
 
     @override
+    def check_promptly(self, spans: Spans, ignored: Set[BodyPair] = _NOBODY) -> SweepAnswer | None:
+        return self.check(spans, ignored)
+
+    @override
     def nearest(
         self, positions: Mapping[str, float], ignored: Set[BodyPair] = _NOBODY
     ) -> Approach | None:
