@@ -23,6 +23,8 @@ from cosmic.twin.rod import (
     held_at_both_ends,
     tension_un,
 )
+from cosmic.twin.rubbing import RubbedPush, Rubbing
+from cosmic.twin.stiffness import StiffnessProfile
 from cosmic.twin.tools import Tool
 
 Floats = npt.NDArray[np.float64]
@@ -142,8 +144,14 @@ class Fibre:
         self.grasps = 0
         self.falls = 0
         self._contact = contact
-        self._cantilever: tuple[Free, float, Cantilever] | None = None
-        self._curve: tuple[float, PushCurve] | None = None
+        self._rubbing = Rubbing(contact.friction_turn_um)
+        self._profile: StiffnessProfile | None = None
+        if settings.ei_variation:
+            self._profile = StiffnessProfile(
+                settings.length_um, settings.ei_variation, settings.ei_length_um, self.key
+            )
+        self._cantilevers: tuple[Free, float, tuple[Cantilever, ...]] | None = None
+        self._curves: tuple[float, tuple[PushCurve, ...]] | None = None
         energy = handling.adhesion_un * math.exp(
             handling.adhesion_sigma_ln * random.Random(f"adhesion {self.key}").gauss(0.0, 1.0)
         )
@@ -247,8 +255,10 @@ class Fibre:
         stiffness = self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2
         return 0.5 * self.settings.thickness_um * moment / stiffness
 
-    def curve(self, line: Line, abscissa_um: float, *, edge_um: float, sensor: float) -> PushCurve:
-        """Return force over travel for a probe at an abscissa.
+    def push(
+        self, line: Line, abscissa_um: float, travel_um: float, *, edge_um: float, sensor: float
+    ) -> PushCurve | RubbedPush:
+        """Return force over travel for a probe at an abscissa, which has come so far.
 
         Parameters
         ----------
@@ -259,7 +269,9 @@ class Fibre:
         """
         (hold, *more) = self.holds.values()
         if line.free is not None:
-            return self._held_at_one_end(hold, line.free, abscissa_um, edge_um, sensor)
+            part = self._rubbing.follow(travel_um)
+            growing, *falling = self._held_at_one_end(hold, line.free, abscissa_um, edge_um, sensor)
+            return RubbedPush(growing, falling[0], part) if falling else growing
         distance = _rounded(line.reach_um + hold.depth_um + more[0].depth_um)
         return held_at_both_ends(
             ei_un_um2=self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2,
@@ -277,23 +289,42 @@ class Fibre:
 
     def _held_at_one_end(
         self, hold: Hold, free: Free, abscissa_um: float, edge_um: float, sensor: float
-    ) -> PushCurve:
-        solved = self._cantilever
+    ) -> tuple[PushCurve, ...]:
+        """Return the curve, or with friction those of a growing and of a falling push."""
+        solved = self._cantilevers
         if solved is None or solved[0] is not free or solved[1] != hold.depth_um:
-            made = Cantilever(
+            made = self._solved(hold, free, edge_um)
+            solved = self._cantilevers = free, hold.depth_um, made
+            self._curves = None
+        place = _rounded(max(abscissa_um, NEAREST_UM))
+        if self._curves is None or self._curves[0] != place:
+            curves = tuple(each.curve(place, sensor_un_um=sensor) for each in solved[2])
+            self._curves = place, curves
+        return self._curves[1]
+
+    def _solved(self, hold: Hold, free: Free, edge_um: float) -> tuple[Cantilever, ...]:
+        friction, profile = self._contact.probe_friction, self._profile
+        stiffness = None
+        if profile is not None:
+            begin, outwards = hold.at_um, hold.outwards
+
+            def stiffness(along_um: Floats) -> Floats:
+                return profile(begin + outwards * along_um)
+
+        return tuple(
+            Cantilever(
                 free.abscissas_um,
                 free.asides_um,
                 ei_un_um2=self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2,
                 depth_um=hold.depth_um,
                 radius_um=edge_um + self.settings.width_um / 2.0,
+                friction=rubbed,
+                turn_rad_un_um=self._contact.jaw_turn_rad_un_um,
+                side_un_um=self._contact.jaw_side_un_um,
+                stiffness=stiffness,
             )
-            solved = self._cantilever = free, hold.depth_um, made
-            self._curve = None
-        place = _rounded(max(abscissa_um, NEAREST_UM))
-        if self._curve is None or self._curve[0] != place:
-            curve = solved[2].curve(place, sensor_un_um=sensor)
-            self._curve = place, curve
-        return self._curve[1]
+            for rubbed in ((friction, -friction) if friction else (0.0,))
+        )
 
 
 def _rounded(length_um: float) -> float:

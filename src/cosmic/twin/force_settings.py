@@ -72,6 +72,10 @@ class ContactSettings(StrictModel):
         How far off a fibre may lie and still be taken.
     clamp_depth_um, clamp_depth_spread_um : float
         How far inside the jaws' tip a fibre is really held; drawn anew for each grasp.
+    jaw_side_un_um, jaw_turn_rad_un_um : float
+        Stiffness of closed jaws across, and by how much a moment in uN um turns a fibre in them.
+    probe_friction, friction_turn_um : float
+        Of fibre and probe; and travel over which the friction turns round when the probe does.
     """
 
     step_s: float = Field(ge=1e-5, le=0.01)
@@ -82,6 +86,10 @@ class ContactSettings(StrictModel):
     grasp_angle_deg: float = Field(gt=0.0, lt=90.0)
     clamp_depth_um: float = Field(ge=0.0)
     clamp_depth_spread_um: float = Field(ge=0.0)
+    jaw_side_un_um: float = Field(default=1e9, gt=0.0)
+    jaw_turn_rad_un_um: float = Field(default=0.0, ge=0.0)
+    probe_friction: float = Field(default=0.0, ge=0.0, lt=1.0)
+    friction_turn_um: float = Field(default=0.3, gt=0.0)
 
 
 class FibreSettings(StrictModel):
@@ -91,6 +99,9 @@ class FibreSettings(StrictModel):
     ----------
     ei_n_m2, ea_n : float
         Bending and axial stiffness.
+    ei_variation, ei_length_um : float
+        By how much the bending stiffness varies along the fibre, as a part of it, and over which
+        length; `ei_n_m2` is then that of a uniform fibre which gives way as much as a whole.
     held_by : str
         A gripper whose gap is not wider than the fibre; "" and it lies on the plate, as it does
         when that gripper is found open.
@@ -113,6 +124,8 @@ class FibreSettings(StrictModel):
     thickness_um: float = Field(gt=0.0)
     ei_n_m2: float = Field(gt=0.0)
     ea_n: float = Field(gt=0.0)
+    ei_variation: float = Field(default=0.0, ge=0.0, le=1.0)
+    ei_length_um: float = Field(default=150.0, gt=0.0)
     held_by: str = ""
     free_um: float = Field(default=0.0, ge=0.0)
     x_um: float = 0.0

@@ -53,7 +53,7 @@ class PushCurve:
             ways, forces_un = ways[kept], forces_un[kept]
         self.ways_um: list[float] = ways.tolist()
         self.forces_un: list[float] = forces_un.tolist()
-        self.reach_um = self.ways_um[-1]
+        self.reach_um: float = self.ways_um[-1]
 
     def force_un(self, way_um: float) -> float:
         """Return the force at a way; the same with the opposite sign on the other side."""

@@ -209,9 +209,8 @@ class Workplace:
             self._nothing_before(max(-reach, -way))
             return None
         self._slack_um = 0.0
-        curve = fibre.curve(
-            line, along, edge_um=self._geometry.probe_edge_radius_um, sensor=self._sensor
-        )
+        edge = self._geometry.probe_edge_radius_um
+        curve = fibre.push(line, along, way, edge_um=edge, sensor=self._sensor)
         force = curve.force_un(way)
         if way > curve.reach_um or force < -self._contact.pull_off_un:
             touch.lose()

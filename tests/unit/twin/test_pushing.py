@@ -145,6 +145,35 @@ def test_no_clamp_lies_in_front_of_the_jaws() -> None:
     assert max(forces) == pytest.approx(3.0 * EI * 10.0 / 400.0**3, rel=0.01)
 
 
+def test_friction_shows_between_the_way_out_and_the_way_back() -> None:
+    bench = before_the_fibre(Bench(settings(probe_friction=0.4, friction_turn_um=0.3)))
+    out = pushed(bench, 60.0).force_un
+    pushed(bench, 80.0)
+    back = pushed(bench, 60.0).force_un
+    assert out > 1.05 * back
+    smooth = before_the_fibre(Bench(settings()))
+    assert back < pushed(smooth, 60.0).force_un < out
+
+
+def test_jaws_that_give_way_make_a_fibre_seem_softer() -> None:
+    rigid = pushed(before_the_fibre(Bench()), 5.0).force_un
+    stiff = 3.0 * EI / 400.0**3
+    soft = pushed(before_the_fibre(Bench(settings(jaw_side_un_um=10.0))), 5.0).force_un
+    assert rigid / soft == pytest.approx(1.0 + stiff / 10.0, rel=5e-3)
+    turned = pushed(before_the_fibre(Bench(settings(jaw_turn_rad_un_um=2e-7))), 5.0).force_un
+    assert rigid / turned == pytest.approx(1.0 + stiff * 2e-7 * 400.0**2, rel=5e-3)
+
+
+def test_a_stiffness_that_varies_along_the_fibre_is_told_by_the_span() -> None:
+    varied = FIBRE.model_copy(update={"ei_variation": 0.25})
+    apart = []
+    for seed in range(5):
+        bench = before_the_fibre(Bench(settings(varied), seed))
+        apart.append(pushed(bench, 5.0).force_un * 400.0**3 / (15.0 * EI))
+    assert 0.05 < float(np.std(apart)) < 0.4
+    assert 0.6 < float(np.mean(apart)) < 1.5
+
+
 # --- through the sensor -----------------------------------------------------------------------
 
 
