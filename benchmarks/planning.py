@@ -20,7 +20,7 @@ from cosmic.mico.core.collision.sweep import Sweep
 from cosmic.mico.core.planning.boxes import Boxes, Effort
 from cosmic.mico.core.planning.planner import CHECKS_SEARCHED, plan
 from cosmic.mico.core.planning.problem import NoWay, Plan, Problem
-from cosmic.mico.core.planning.rrt import MOST_LEGS, search
+from cosmic.mico.core.planning.rrt_connect import MOST_LEGS, search
 from cosmic.mico.core.planning.simplify import shorten
 from cosmic.mico.core.planning.space import Space
 

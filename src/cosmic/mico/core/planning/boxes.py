@@ -12,7 +12,7 @@ from cosmic.mico.core.collision.model import BodyPair, SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
 from cosmic.mico.core.collision.words import cannot_judge
 from cosmic.mico.core.planning.problem import Problem
-from cosmic.mico.core.planning.space import Place, Space, Way, between
+from cosmic.mico.core.planning.space import Path, Point, Space, between
 
 SHORTEST_UM: Final = 20.0
 """A straight way is not cut into shorter legs than this."""
@@ -57,13 +57,13 @@ class Boxes:
         self._slack = tuple(
             max(over[axis], least) for axis, least in zip(space.axes, self._point, strict=True)
         )
-        self._legs: dict[tuple[Place, Place], bool] = {}
-        self._free: dict[Place, bool] = {}
-        self._edges: dict[tuple[Place, Place, int], Way | None] = {}
+        self._legs: dict[tuple[Point, Point], bool] = {}
+        self._free: dict[Point, bool] = {}
+        self._edges: dict[tuple[Point, Point, int], Path | None] = {}
 
     # Places
 
-    def free(self, place: Place) -> bool:
+    def free(self, place: Point) -> bool:
         """Return whether the axes can be at a place, with overshoot and to spare."""
         known = self._free.get(place)
         if known is None:
@@ -72,23 +72,23 @@ class Boxes:
             known = self._free[place] = self.touch_at(place) is None
         return known
 
-    def touch_at(self, place: Place) -> Approach | None:
+    def touch_at(self, place: Point) -> Approach | None:
         """Return what is too close with the axes at a place, or within their overshoot of it."""
         return self._ask(self._sweep, self._standing(place))
 
-    def touch_exactly_at(self, place: Place) -> Approach | None:
+    def touch_exactly_at(self, place: Point) -> Approach | None:
         """Return what is too close with the axes at a place, without overshoot."""
         model = self._sweep.model
         drives = tuple(replace(drive, overshoot=0.0) for drive in model.drives)
         return self._ask(Sweep(replace(model, drives=drives)), self._standing(place))
 
-    def _standing(self, place: Place) -> Spans:
+    def _standing(self, place: Point) -> Spans:
         spans = dict(self._others)
         for axis, value, point in zip(self.space.axes, place, self._point, strict=True):
             spans[axis] = AxisSpan(value - point, value + point, moving=True)
         return spans
 
-    def gap_at(self, place: Place) -> float | None:
+    def gap_at(self, place: Point) -> float | None:
         """Return the least distance of two watched bodies with the axes at a place, um.
 
         The other axes stand where they rest, or in the middle of where they may be.
@@ -104,7 +104,7 @@ class Boxes:
 
     # Legs
 
-    def clear(self, here: Place, there: Place) -> bool:
+    def clear(self, here: Point, there: Point) -> bool:
         """Return whether the axes may go from one place to another, in any step with each other."""
         key = (here, there) if here <= there else (there, here)
         known = self._legs.get(key)
@@ -114,7 +114,7 @@ class Boxes:
             known = self._legs[key] = self.touch(here, there) is None
         return known
 
-    def touch(self, here: Place, there: Place) -> Approach | None:
+    def touch(self, here: Point, there: Point) -> Approach | None:
         """Return what is too close somewhere on a leg.
 
         Where an axis rests, it may have stopped short of its target, or gone too far.
@@ -127,7 +127,7 @@ class Boxes:
                 spans[axis] = AxisSpan(min(one, other), max(one, other), moving=True)
         return self._ask(self._sweep, spans)
 
-    def touch_tight(self, here: Place, there: Place, *, leaving: bool) -> Approach | None:
+    def touch_tight(self, here: Point, there: Point, *, leaving: bool) -> Approach | None:
         """Return what is too close on a leg beside something, where there is nothing to spare.
 
         Parameters
@@ -142,7 +142,7 @@ class Boxes:
             spans[axis] = AxisSpan(min(one, other), max(one, other), now, moving=one != other)
         return self._ask(self._sweep, spans)
 
-    def edge(self, here: Place, there: Place, most: int) -> Way | None:
+    def edge(self, here: Point, there: Point, most: int) -> Path | None:
         """Return the corners of the straight way as legs that are clear; None where it is not.
 
         The way is halved until every leg is clear. `here` is not among the corners.
@@ -159,7 +159,7 @@ class Boxes:
             return None
         return way[1:] if one is here else way[-2::-1]
 
-    def _cut(self, one: Place, other: Place, most: int) -> Way | None:
+    def _cut(self, one: Point, other: Point, most: int) -> Path | None:
         """Return all corners from `one` to `other`, coarse legs first to fail soon."""
         length = self.space.distance(one, other)
         todo = deque([(0.0, 1.0)])

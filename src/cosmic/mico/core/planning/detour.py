@@ -4,10 +4,10 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations
 
 from cosmic.mico.core.planning.boxes import Boxes
-from cosmic.mico.core.planning.space import Place, Space, Way
+from cosmic.mico.core.planning.space import Path, Point, Space
 
 
-def one_by_one(boxes: Boxes, here: Place, there: Place, up: Mapping[int, float]) -> Way | None:
+def one_by_one(boxes: Boxes, here: Point, there: Point, up: Mapping[int, float]) -> Path | None:
     """Return legs that move axes one after the other, those left over at once where possible.
 
     Parameters
@@ -15,7 +15,7 @@ def one_by_one(boxes: Boxes, here: Place, there: Place, up: Mapping[int, float])
     up : mapping of float
         Highest places of lifting axes, by number: those that go up go first, down last.
     """
-    hopeless: set[Place] = set()
+    hopeless: set[Point] = set()
 
     def rank(number: int) -> int:
         if number not in up:
@@ -24,7 +24,7 @@ def one_by_one(boxes: Boxes, here: Place, there: Place, up: Mapping[int, float])
 
     order = sorted(range(len(here)), key=rank)
 
-    def onwards(at: Place) -> Way | None:
+    def onwards(at: Point) -> Path | None:
         if at == there:
             return ()
         if at in hopeless:
@@ -43,7 +43,7 @@ def one_by_one(boxes: Boxes, here: Place, there: Place, up: Mapping[int, float])
     return onwards(here)
 
 
-def detour(boxes: Boxes, here: Place, there: Place, heights: Mapping[str, float]) -> Way | None:
+def detour(boxes: Boxes, here: Point, there: Point, heights: Mapping[str, float]) -> Path | None:
     """Return a way that retracts, travels and descends.
 
     Lifting axes go to their detour height, the fewest first; where that does not help, any one
@@ -86,14 +86,14 @@ def _ends(space: Space) -> Iterator[Mapping[int, float]]:
 
 
 def over(
-    boxes: Boxes, here: Place, there: Place, lifted: Mapping[int, float], up: Mapping[int, float]
-) -> Way | None:
+    boxes: Boxes, here: Point, there: Point, lifted: Mapping[int, float], up: Mapping[int, float]
+) -> Path | None:
     """Return a way on which the axes `lifted` are out of the way while the others travel."""
     above, beyond = (
         _raised(boxes.space, here, there, lifted),
         _raised(boxes.space, there, here, lifted),
     )
-    way: Way = ()
+    way: Path = ()
     for begin, end in ((here, above), (above, beyond), (beyond, there)):
         leg = one_by_one(boxes, begin, end, up)
         if leg is None:
@@ -102,7 +102,7 @@ def over(
     return way
 
 
-def _raised(space: Space, place: Place, other: Place, lifted: Mapping[int, float]) -> Place:
+def _raised(space: Space, place: Point, other: Point, lifted: Mapping[int, float]) -> Point:
     """Return `place` with some axes lifted; one that is higher at either end stays there."""
     raised = list(place)
     for number, height in lifted.items():

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 from typing import Final
 
 from cosmic.mico.core.planning.boxes import Boxes
-from cosmic.mico.core.planning.space import DIGITS, Place
+from cosmic.mico.core.planning.space import DIGITS, Point
 
 STEPS_UM: Final = (5.0, 20.0, 100.0, 500.0, 2500.0)
 
 
-def departure(boxes: Boxes, start: Place, goal: Place) -> Place | None:
+def departure(boxes: Boxes, start: Point, goal: Point) -> Point | None:
     """Return a place free for every axis to which the axes can retreat: the goal, or one near."""
     inside = boxes.space.clipped(start)
     for place in (goal, inside, *_around(boxes, inside)):
@@ -22,7 +22,7 @@ def departure(boxes: Boxes, start: Place, goal: Place) -> Place | None:
     return None
 
 
-def arrival(boxes: Boxes, goal: Place) -> Place | None:
+def arrival(boxes: Boxes, goal: Point) -> Point | None:
     """Return a free place from which one axis can bring everything to the goal."""
     for place in _around(boxes, goal):
         if boxes.effort.spent:
@@ -32,7 +32,7 @@ def arrival(boxes: Boxes, goal: Place) -> Place | None:
     return None
 
 
-def _around(boxes: Boxes, place: Place) -> Iterator[Place]:
+def _around(boxes: Boxes, place: Point) -> Iterator[Point]:
     """Yield places beside one, each off by one axis, the nearest first."""
     space = boxes.space
     for step_um in STEPS_UM:

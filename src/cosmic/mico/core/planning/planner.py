@@ -11,9 +11,9 @@ from cosmic.mico.core.planning.detour import detour, lifts, one_by_one
 from cosmic.mico.core.planning.margins import arrival, departure
 from cosmic.mico.core.planning.problem import NoWay, Plan, Problem, Segment, validate
 from cosmic.mico.core.planning.refusals import at_goal, at_start, no_way, too_tight
-from cosmic.mico.core.planning.rrt import MOST_LEGS, search
+from cosmic.mico.core.planning.rrt_connect import MOST_LEGS, search
 from cosmic.mico.core.planning.simplify import legs, shorten
-from cosmic.mico.core.planning.space import Place, Space, Way
+from cosmic.mico.core.planning.space import Path, Point, Space
 
 LONG: Final = 1.5
 """A way this many times as long as the straight one is worth a search for a better one."""
@@ -37,7 +37,7 @@ class _Found:
     """A way in clear legs, with its first place, and how long it was before it was shortened."""
 
     method: str
-    way: Way
+    way: Path
     found_length: float
 
 
@@ -72,7 +72,7 @@ def plan(sweep: Sweep, problem: Problem) -> Plan | NoWay:
     return _plan(problem, boxes, whole)
 
 
-def _ends(boxes: Boxes) -> tuple[Place, Place] | NoWay:
+def _ends(boxes: Boxes) -> tuple[Point, Point] | NoWay:
     """Return where the axes move freely from the start, and until shortly before the goal."""
     start, goal = boxes.space.start, boxes.space.goal
     here, there = start, goal
@@ -92,7 +92,7 @@ def _ends(boxes: Boxes) -> tuple[Place, Place] | NoWay:
     return here, there
 
 
-def _best(boxes: Boxes, problem: Problem, ends: tuple[Place, Place]) -> _Found | None:
+def _best(boxes: Boxes, problem: Problem, ends: tuple[Point, Point]) -> _Found | None:
     """Return the shortest way that was found, None where there is none."""
     space = boxes.space
     near = _nearby(boxes, *ends)
@@ -115,7 +115,7 @@ def _best(boxes: Boxes, problem: Problem, ends: tuple[Place, Place]) -> _Found |
     return min(ways, key=lambda each: space.length(each.way), default=None)
 
 
-def _nearby(boxes: Boxes, here: Place, there: Place) -> _Found | None:
+def _nearby(boxes: Boxes, here: Point, there: Point) -> _Found | None:
     """Return a way that an operator would choose."""
     edge = boxes.edge(here, there, MOST_STEPS)
     if edge is not None:
@@ -128,7 +128,7 @@ def _nearby(boxes: Boxes, here: Place, there: Place) -> _Found | None:
     return None if way is None else _in_legs(boxes, "detour", (here, *way), 1)
 
 
-def _searched(boxes: Boxes, here: Place, there: Place, seed: int) -> _Found | None:
+def _searched(boxes: Boxes, here: Point, there: Point, seed: int) -> _Found | None:
     corners = search(boxes, here, there, seed)
     if corners is None:
         return None
@@ -147,7 +147,7 @@ def _shortened(boxes: Boxes, found: _Found, seed: int) -> _Found:
 
 
 def _in_legs(
-    boxes: Boxes, method: str, way: Sequence[Place], most: int, before: float | None = None
+    boxes: Boxes, method: str, way: Sequence[Point], most: int, before: float | None = None
 ) -> _Found | None:
     driven = legs(boxes, way, most)
     if driven is None:
@@ -155,7 +155,7 @@ def _in_legs(
     return _Found(method, driven, boxes.space.length(way) if before is None else before)
 
 
-def _certified(boxes: Boxes, way: Way, *, leaving: bool, arriving: bool) -> bool:
+def _certified(boxes: Boxes, way: Path, *, leaving: bool, arriving: bool) -> bool:
     """Ask once more about every leg as it will be driven, with nothing remembered."""
     for number, (one, other) in enumerate(pairwise(way)):
         if (leaving and number == 0) or (arriving and number == len(way) - 2):
@@ -181,13 +181,13 @@ def _plan(problem: Problem, boxes: Boxes, found: _Found) -> Plan:
     )
 
 
-def _clearance_um(boxes: Boxes, way: Way) -> float | None:
+def _clearance_um(boxes: Boxes, way: Path) -> float | None:
     if len(way) > MOST_CORNERS:
         return None
     gaps = [gap for place in way if (gap := boxes.gap_at(place)) is not None]
     return min(gaps, default=None)
 
 
-def _segment(space: Space, one: Place, other: Place) -> Segment:
+def _segment(space: Space, one: Point, other: Point) -> Segment:
     targets = zip(space.axes, one, other, strict=True)
     return Segment({axis: target for axis, before, target in targets if target != before})

@@ -3,7 +3,7 @@
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.planning.boxes import Boxes
 from cosmic.mico.core.planning.problem import NoWay
-from cosmic.mico.core.planning.space import Place, between
+from cosmic.mico.core.planning.space import Point, between
 
 _HALVINGS = 7
 
@@ -36,7 +36,7 @@ def at_start(boxes: Boxes, touch: Approach | None) -> NoWay:
     )
 
 
-def no_way(boxes: Boxes, here: Place, there: Place) -> NoWay:
+def no_way(boxes: Boxes, here: Point, there: Point) -> NoWay:
     """Return the answer to a search that found nothing."""
     late = boxes.effort.spent
     reached, touch = _reached(boxes, here, there)
@@ -51,7 +51,7 @@ def no_way(boxes: Boxes, here: Place, there: Place) -> NoWay:
     )
 
 
-def _reached(boxes: Boxes, here: Place, there: Place) -> tuple[Place, Approach | None]:
+def _reached(boxes: Boxes, here: Point, there: Point) -> tuple[Point, Approach | None]:
     """Return how far the straight way can be followed, and what is in the way there.
 
     Asks a few questions more, whatever time it is.

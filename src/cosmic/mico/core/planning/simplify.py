@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import Final
 
 from cosmic.mico.core.planning.boxes import Boxes
-from cosmic.mico.core.planning.space import DIGITS, Place, Way, between
+from cosmic.mico.core.planning.space import DIGITS, Path, Point, between
 
 CUTS: Final = 40
 """Random cuts tried."""
@@ -18,7 +18,7 @@ HALVINGS: Final = 4
 """How closely the largest cut of a corner is found: to a sixteenth of its edges."""
 
 
-def shorten(boxes: Boxes, way: Sequence[Place], seed: int, most: int, checks: int) -> Way:
+def shorten(boxes: Boxes, way: Sequence[Point], seed: int, most: int, checks: int) -> Path:
     """Return a shorter way of clear edges between the same ends.
 
     Parameters
@@ -44,7 +44,7 @@ def shorten(boxes: Boxes, way: Sequence[Place], seed: int, most: int, checks: in
     return _skip(boxes, best, most) if boxes.effort.checks < until else best
 
 
-def _corners_cut(boxes: Boxes, way: Way, most: int, until: int) -> Way:
+def _corners_cut(boxes: Boxes, way: Path, most: int, until: int) -> Path:
     """Cut every corner once, as far as its two edges and the gate allow."""
     cut = [way[0]]
     for number in range(1, len(way) - 1):
@@ -56,10 +56,10 @@ def _corners_cut(boxes: Boxes, way: Way, most: int, until: int) -> Way:
     return (*cut, *way[len(way) - 1 :])
 
 
-def _cut_off(boxes: Boxes, corner: tuple[Place, Place, Place], most: int) -> Way:
+def _cut_off(boxes: Boxes, corner: tuple[Point, Point, Point], most: int) -> Path:
     """Return the two places between which the largest part of a corner is cut off, or itself."""
     before, at, after = corner
-    best: Way = (at,)
+    best: Path = (at,)
     share, step = 0.5, 0.25
     for _ in range(HALVINGS):
         one, other = _rounded(between(at, before, share)), _rounded(between(at, after, share))
@@ -72,7 +72,7 @@ def _cut_off(boxes: Boxes, corner: tuple[Place, Place, Place], most: int) -> Way
     return best
 
 
-def _skip(boxes: Boxes, way: Sequence[Place], most: int) -> Way:
+def _skip(boxes: Boxes, way: Sequence[Point], most: int) -> Path:
     """Go from each corner straight to the farthest one that can be reached."""
     kept = [way[0]]
     at = 0
@@ -87,7 +87,7 @@ def _skip(boxes: Boxes, way: Sequence[Place], most: int) -> Way:
     return tuple(kept)
 
 
-def _cut(boxes: Boxes, way: Way, chance: random.Random, most: int) -> Way | None:
+def _cut(boxes: Boxes, way: Path, chance: random.Random, most: int) -> Path | None:
     """Return the way with a straight edge between two of its places, None if blocked."""
     first, second = sorted(chance.sample(range(len(way) - 1), 2))
     begin = _on(way, first, chance)
@@ -99,15 +99,15 @@ def _cut(boxes: Boxes, way: Way, chance: random.Random, most: int) -> Way | None
     return (*way[: first + 1], *middle, *way[second + 1 :])
 
 
-def _on(way: Way, edge: int, chance: random.Random) -> Place:
+def _on(way: Path, edge: int, chance: random.Random) -> Point:
     return _rounded(between(way[edge], way[edge + 1], chance.random()))
 
 
-def _rounded(place: Place) -> Place:
+def _rounded(place: Point) -> Point:
     return tuple(round(value, DIGITS) for value in place)
 
 
-def legs(boxes: Boxes, way: Sequence[Place], most: int) -> Way | None:
+def legs(boxes: Boxes, way: Sequence[Point], most: int) -> Path | None:
     """Return the corners of the legs of a way, as few as can be found by joining neighbours.
 
     None when one of its edges is not clear after all.
@@ -121,7 +121,7 @@ def legs(boxes: Boxes, way: Sequence[Place], most: int) -> Way | None:
     return _joined(boxes, corners)
 
 
-def _joined(boxes: Boxes, corners: Sequence[Place]) -> Way:
+def _joined(boxes: Boxes, corners: Sequence[Point]) -> Path:
     kept = [corners[0]]
     at = 0
     while at < len(corners) - 1:

@@ -11,9 +11,9 @@ from cosmic.mico.core.collision.kinematics import body_poses
 from cosmic.mico.core.collision.model import JointKind, SceneModel
 from cosmic.mico.core.planning.problem import Problem, limits_of
 
-Place = tuple[float, ...]
+Point = tuple[float, ...]
 """One position for each axis to move, in its unit."""
-Way = tuple[Place, ...]
+Path = tuple[Point, ...]
 
 DIGITS: Final = 4
 """Corners that the planner chooses are rounded to so many decimals, um or deg."""
@@ -32,42 +32,43 @@ class Space:
     def __init__(self, model: SceneModel, problem: Problem) -> None:
         self.axes = tuple(axis for axis in model.axes if axis in problem.goal)
         bounds = [limits_of(model, problem, axis) for axis in self.axes]
-        self.low: Place = tuple(low for low, _ in bounds)
-        self.high: Place = tuple(high for _, high in bounds)
-        self.weights: Place = tuple(um_per_unit(model, axis) for axis in self.axes)
-        self.start: Place = tuple(float(problem.start[axis]) for axis in self.axes)
-        self.goal: Place = tuple(float(problem.goal[axis]) for axis in self.axes)
+        self.low: Point = tuple(low for low, _ in bounds)
+        self.high: Point = tuple(high for _, high in bounds)
+        self.weights: Point = tuple(um_per_unit(model, axis) for axis in self.axes)
+        self.start: Point = tuple(float(problem.start[axis]) for axis in self.axes)
+        self.goal: Point = tuple(float(problem.goal[axis]) for axis in self.axes)
+        self.diagonal = self.distance(self.low, self.high)
 
-    def distance(self, one: Place, other: Place) -> float:
+    def distance(self, one: Point, other: Point) -> float:
         """Return how far two places are apart, um."""
         return math.hypot(
             *(weight * (b - a) for weight, a, b in zip(self.weights, one, other, strict=True))
         )
 
-    def length(self, way: Sequence[Place]) -> float:
+    def length(self, way: Sequence[Point]) -> float:
         """Return the length of a way along its corners, um."""
         return sum(self.distance(one, other) for one, other in pairwise(way))
 
-    def contains(self, place: Place) -> bool:
+    def contains(self, place: Point) -> bool:
         """Return whether a place is within the limits."""
         return all(
             low <= value <= high
             for low, value, high in zip(self.low, place, self.high, strict=True)
         )
 
-    def clipped(self, place: Place) -> Place:
+    def clipped(self, place: Point) -> Point:
         """Return the nearest place within the limits."""
         return tuple(
             min(max(value, low), high)
             for low, value, high in zip(self.low, place, self.high, strict=True)
         )
 
-    def named(self, place: Place) -> Mapping[str, float]:
+    def named(self, place: Point) -> Mapping[str, float]:
         """Return a place by name of axis."""
         return dict(zip(self.axes, place, strict=True))
 
 
-def between(one: Place, other: Place, share: float) -> Place:
+def between(one: Point, other: Point, share: float) -> Point:
     """Return the place at `share` of the straight way; exactly the ends at 0 and 1."""
     if share in (0.0, 1.0):
         return other if share else one

@@ -1,15 +1,11 @@
-"""How fast each axis goes on a leg and how long a way takes; the only file that knows ruckig."""
+"""How fast each axis goes on a leg, and how long a path takes."""
 
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import Final
-
-from ruckig import InputParameter, Result, Ruckig, Synchronization, Trajectory
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from cosmic.frame.errors import NotAvailable
 from cosmic.mico.core.planning.problem import Plan, Segment
-
-_NO_JERK_LIMIT: Final = float("inf")
 
 
 def speeds(
@@ -47,37 +43,91 @@ def profile(
         There is no such profile.
     """
     axes = tuple(axis for axis, target in segment.targets.items() if target != start[axis])
-    if not axes:
-        return Profile((), None)
-    asked = InputParameter(len(axes))
-    asked.current_position = [start[axis] for axis in axes]
-    asked.target_position = [segment.targets[axis] for axis in axes]
-    asked.max_velocity = [_positive(top_speed, axis) for axis in axes]
-    asked.max_acceleration = [_positive(acceleration, axis) for axis in axes]
-    asked.max_jerk = [_NO_JERK_LIMIT] * len(axes)
-    # The default, "Time", lets the axes arrive together but leaves the line on the way.
-    asked.synchronization = Synchronization.Phase if in_phase else Synchronization.No
-    trajectory = Trajectory(len(axes))
-    result = Ruckig(len(axes)).calculate(asked, trajectory)
-    if result not in (Result.Working, Result.Finished):
-        raise NotAvailable(f"no speed profile for {', '.join(axes)}: ruckig says {result.name}")
-    return Profile(axes, trajectory)
+    distances = {axis: segment.targets[axis] - start[axis] for axis in axes}
+    if in_phase:
+        shared = _slowest(distances, top_speed, acceleration)
+        ramps = dict.fromkeys(axes, shared)
+    else:
+        ramps = {axis: _slowest({axis: distances[axis]}, top_speed, acceleration) for axis in axes}
+    return Profile({axis: _Stroke(start[axis], distances[axis], ramps[axis]) for axis in axes})
 
 
 class Profile:
     """Positions of the axes of one leg over time."""
 
-    def __init__(self, axes: tuple[str, ...], trajectory: Trajectory | None) -> None:
-        self.axes = axes
-        self._trajectory = trajectory
-        self.duration_s: float = trajectory.duration if trajectory is not None else 0.0
+    def __init__(self, strokes: "Mapping[str, _Stroke]") -> None:
+        self.axes = tuple(strokes)
+        self.duration_s = max((each.ramp.duration_s for each in strokes.values()), default=0.0)
+        self._strokes = strokes
 
     def at(self, time_s: float) -> Mapping[str, float]:
         """Return the position of every axis that moves, `time_s` after the start of the leg."""
-        if self._trajectory is None:
-            return {}
-        place = self._trajectory.at_time(min(max(time_s, 0.0), self.duration_s))[0]
-        return dict(zip(self.axes, place, strict=True))
+        return {
+            axis: each.begin + each.distance * each.ramp.share(time_s)
+            for axis, each in self._strokes.items()
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class _Ramp:
+    """The share of a stroke that is done over time: a trapezoid of speed, or a triangle.
+
+    Attributes
+    ----------
+    speed, acceleration : float
+        Highest ones, in shares per second, and per second squared.
+    """
+
+    speed: float
+    acceleration: float
+
+    @property
+    def rise_s(self) -> float:
+        """How long it gets faster, and at the end slower."""
+        return min(self.speed / self.acceleration, math.sqrt(1.0 / self.acceleration))
+
+    @property
+    def duration_s(self) -> float:
+        """From rest to rest."""
+        top = self.acceleration * self.rise_s
+        return 1.0 / top + self.rise_s
+
+    def share(self, time_s: float) -> float:
+        """Return how much is done at a time; 0 before and 1 after."""
+        if time_s >= self.duration_s:
+            return 1.0
+        rise_s = self.rise_s
+        into_s, left_s = max(time_s, 0.0), self.duration_s - max(time_s, 0.0)
+        if into_s < rise_s:
+            return self.acceleration * into_s**2 / 2.0
+        if left_s < rise_s:
+            return 1.0 - self.acceleration * left_s**2 / 2.0
+        return self.acceleration * rise_s * (into_s - rise_s / 2.0)
+
+
+@dataclass(frozen=True, slots=True)
+class _Stroke:
+    """What one axis does on a leg."""
+
+    begin: float
+    distance: float
+    ramp: _Ramp
+
+
+def _slowest(
+    distances: Mapping[str, float],
+    top_speed: Mapping[str, float],
+    acceleration: Mapping[str, float],
+) -> _Ramp:
+    """Return the fastest ramp that no axis is too slow for, if all keep step."""
+
+    def least(most: Mapping[str, float]) -> float:
+        shares: Sequence[float] = [
+            _positive(most, axis) / abs(distance) for axis, distance in distances.items()
+        ]
+        return min(shares, default=math.inf)
+
+    return _Ramp(least(top_speed), least(acceleration))
 
 
 def duration_s(
