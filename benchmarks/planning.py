@@ -18,8 +18,8 @@ from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.collision.scene_loader import load_scene
 from cosmic.mico.core.collision.sweep import Sweep
 from cosmic.mico.core.planning.boxes import Boxes, Effort
-from cosmic.mico.core.planning.planner import CHECKS_SEARCHED, plan
-from cosmic.mico.core.planning.problem import NoWay, Plan, Problem
+from cosmic.mico.core.planning.planner import CHECKS_SEARCHED, plan_path
+from cosmic.mico.core.planning.problem import NoPath, Plan, Problem
 from cosmic.mico.core.planning.rrt_connect import MOST_LEGS, search
 from cosmic.mico.core.planning.simplify import shorten
 from cosmic.mico.core.planning.space import Space
@@ -41,7 +41,7 @@ class Run:
     """One problem and what came of it."""
 
     problem: Problem
-    found: Plan | NoWay
+    found: Plan | NoPath
     took_s: float
     cpu_s: float
 
@@ -177,7 +177,7 @@ def solve(model: SceneModel, count: int, *, six: bool) -> list[Run]:
     sweep, runs = Sweep(model), []
     for problem in problems(model, count, 6 if six else 3, six=six):
         began_s, began_cpu_s = time.perf_counter(), time.process_time()
-        found = plan(sweep, problem)
+        found = plan_path(sweep, problem)
         took_s, cpu_s = time.perf_counter() - began_s, time.process_time() - began_cpu_s
         runs.append(Run(problem, found, took_s, cpu_s))
     return runs

@@ -7,7 +7,7 @@ from itertools import pairwise, product
 from cosmic.mico.core.collision.answer import AxisSpan
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
-from cosmic.mico.core.planning.planner import plan
+from cosmic.mico.core.planning.planner import plan_path
 from cosmic.mico.core.planning.problem import Plan, Problem
 from unit.mico.small_scenes import turntable, two_arms
 
@@ -32,7 +32,7 @@ def at(**places: float) -> dict[str, float]:
 
 def solved(sweep: Sweep, problem: Problem) -> Plan:
     """The plan that there must be."""
-    found = plan(sweep, problem)
+    found = plan_path(sweep, problem)
     assert isinstance(found, Plan), found
     return found
 

@@ -16,11 +16,12 @@ sys.path.insert(0, "tests")
 from dataclasses import replace
 from unit.mico.planning_problems import LIMITS, arms, at
 from cosmic.mico.core.collision.sweep import Sweep
-from cosmic.mico.core.planning.planner import plan
+from cosmic.mico.core.planning.planner import plan_path
 from cosmic.mico.core.planning.problem import Problem
 walled = {**LIMITS, "left.x": (2400.0, 4000.0), "left.z": (-40.0, 40.0)}
 start = at(left_x=2500.0, left_y=-600.0)
-print(type(plan(Sweep(arms()), Problem(start, {"left.y": 600.0}, walled, budget_s=0.1))).__name__)
+problem = Problem(start, {"left.y": 600.0}, walled, budget_s=0.1)
+print(type(plan_path(Sweep(arms()), problem)).__name__)
 """
 
 
@@ -45,5 +46,5 @@ def test_a_search_writes_nothing_to_the_terminal_of_the_operator() -> None:
         timeout=60,
         check=False,
     )
-    assert (done.stdout, done.stderr) == ("NoWay\n", "")
+    assert (done.stdout, done.stderr) == ("NoPath\n", "")
     assert done.returncode == 0

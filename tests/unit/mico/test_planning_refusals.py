@@ -11,8 +11,8 @@ from cosmic.frame.verdict import Reason
 from cosmic.mico.core.collision.answer import AxisSpan, SweepAnswer
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
-from cosmic.mico.core.planning.planner import plan
-from cosmic.mico.core.planning.problem import NoWay, Problem
+from cosmic.mico.core.planning.planner import plan_path
+from cosmic.mico.core.planning.problem import NoPath, Problem
 from unit.mico.planning_problems import LIMITS, arms, at, certified, corners, solved
 
 WALLED = {**LIMITS, "left.x": (2400.0, 4000.0), "left.z": (-40.0, 40.0)}
@@ -20,9 +20,9 @@ WALLED = {**LIMITS, "left.x": (2400.0, 4000.0), "left.z": (-40.0, 40.0)}
 SIDE_TO_SIDE = Problem(at(left_x=2500.0, left_y=-600.0), {"left.y": 600.0}, WALLED, budget_s=0.3)
 
 
-def refused(problem: Problem, model: SceneModel | None = None) -> NoWay:
-    answer = plan(Sweep(model or arms()), problem)
-    assert isinstance(answer, NoWay), answer
+def refused(problem: Problem, model: SceneModel | None = None) -> NoPath:
+    answer = plan_path(Sweep(model or arms()), problem)
+    assert isinstance(answer, NoPath), answer
     return answer
 
 
@@ -110,38 +110,38 @@ def test_numbers_that_are_none_are_refused(wrong: float) -> None:
         Problem(at(), {"left.x": 100.0}, LIMITS, budget_s=wrong),
     ):
         with pytest.raises(MoveRefused) as caught:
-            plan(sweep, problem)
+            plan_path(sweep, problem)
         assert caught.value.verdict.reason is Reason.NOT_FINITE
 
 
 def test_limits_that_are_no_numbers_are_refused() -> None:
     for low, high in ((math.nan, 100.0), (-100.0, math.nan), (100.0, -100.0)):
         with pytest.raises(LimitError):
-            plan(Sweep(arms()), Problem(at(), {"left.x": 0.5}, {"left.x": (low, high)}))
+            plan_path(Sweep(arms()), Problem(at(), {"left.x": 0.5}, {"left.x": (low, high)}))
 
 
 def test_a_held_span_that_is_no_interval_is_refused_and_never_planned_past() -> None:
     start = {axis: place for axis, place in at().items() if axis != "right.y"}
     others = {"right.y": AxisSpan(math.nan, 0.0)}
     with pytest.raises(MoveRefused) as caught:
-        plan(Sweep(arms()), Problem(start, {"left.x": 100.0}, LIMITS, others))
+        plan_path(Sweep(arms()), Problem(start, {"left.x": 100.0}, LIMITS, others))
     assert caught.value.verdict.reason is Reason.NO_ANSWER
 
 
 def test_a_target_outside_its_limits_is_refused_with_the_limit() -> None:
     with pytest.raises(LimitError) as caught:
-        plan(Sweep(arms()), Problem(at(), {"left.x": 4000.5}, LIMITS))
+        plan_path(Sweep(arms()), Problem(at(), {"left.x": 4000.5}, LIMITS))
     assert caught.value.verdict.limit == 4000.0
 
 
 def test_an_unknown_axis_is_refused_by_name() -> None:
     with pytest.raises(UnknownAxisError, match=r"middle\.x"):
-        plan(Sweep(arms()), Problem({**at(), "middle.x": 0.0}, {"middle.x": 1.0}, LIMITS))
+        plan_path(Sweep(arms()), Problem({**at(), "middle.x": 0.0}, {"middle.x": 1.0}, LIMITS))
 
 
 def test_an_axis_that_stands_nowhere_known_is_refused() -> None:
     with pytest.raises(MoveRefused) as caught:
-        plan(Sweep(arms()), Problem({}, {"left.x": 1.0}, LIMITS))
+        plan_path(Sweep(arms()), Problem({}, {"left.x": 1.0}, LIMITS))
     assert caught.value.verdict.reason is Reason.POSITION_UNKNOWN
 
 
@@ -177,11 +177,11 @@ class Forgetful(Sweep):
 
 def test_every_leg_of_a_plan_is_asked_about_once_more_before_it_is_told() -> None:
     problem = Problem(at(), {"left.x": 1000.0, "left.y": 500.0}, LIMITS)
-    assert isinstance(plan(Forgetful(arms()), problem), NoWay)
+    assert isinstance(plan_path(Forgetful(arms()), problem), NoPath)
 
 
 @pytest.mark.parametrize("good", [0, 1, 5, 40, 60, 80])
 def test_a_gate_that_breaks_in_the_middle_never_leads_to_a_plan(good: int) -> None:
     problem = replace(SIDE_TO_SIDE, limits=LIMITS, budget_s=20.0)
     with pytest.raises(RuntimeError, match="broken in the middle"):
-        plan(Failing(arms(lift=None), good), problem)
+        plan_path(Failing(arms(lift=None), good), problem)

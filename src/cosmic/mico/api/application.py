@@ -21,9 +21,9 @@ from cosmic.mico.core.collision.collision_manager import CollisionManager
 from cosmic.mico.core.mode import Mode
 from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.undo import Cautions, ClosedGrippers, UndoHistory
+from cosmic.mico.core.path_planner import PathPlanner
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
-from cosmic.mico.core.way_finder import WayFinder
 from cosmic.mico.hw.interface import Controller
 
 logger = logging.getLogger(__name__)
@@ -59,8 +59,8 @@ class MicoApplication(MicoApplicationBase):
             if self.collision is not None
             else None
         )
-        self.way_finder = (
-            WayFinder(self.manager, self.collision.model) if self.collision is not None else None
+        self.path_planner = (
+            PathPlanner(self.manager, self.collision.model) if self.collision is not None else None
         )
         self.cautions = Cautions()
         self._grippers = ClosedGrippers(self.manager)
@@ -130,9 +130,9 @@ class MicoApplication(MicoApplicationBase):
         MoveRefused
             No way was found; the verdict says what blocks.
         """
-        if self.way_finder is None:
+        if self.path_planner is None:
             raise NotAvailable(f"{NO_MODEL_TEXT}: without one there is nothing to go round")
-        return way_from_plan(self.way_finder.find(targets, budget_s))
+        return way_from_plan(self.path_planner.plan_path(targets, budget_s))
 
     def _rescan(self, task: Task) -> None:
         task.report(0.1, "closing and opening the library")
@@ -156,8 +156,8 @@ class MicoApplication(MicoApplicationBase):
         if self.clearance_watch is not None:
             self.clearance_watch.request_end()
             self.clearance_watch.join()
-        if self.way_finder is not None:
-            self.way_finder.close()
+        if self.path_planner is not None:
+            self.path_planner.close()
         self.manager.close()
         self.join()
         self._forget()

@@ -1,1 +1,1 @@
-"""Finds a way round what is in the way: the enhanced manual control mode (thesis 3.4.2)."""
+"""Plans a path past what blocks the straight one: the enhanced manual control (thesis 3.4.2)."""

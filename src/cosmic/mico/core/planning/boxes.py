@@ -1,4 +1,4 @@
-"""Asks the gate about legs of a way: each is a box of all places that its axes can have."""
+"""Asks the gate about legs of a path: each is a box of all points that its axes can have."""
 
 import math
 from collections import Counter, deque
@@ -15,11 +15,11 @@ from cosmic.mico.core.planning.problem import Problem
 from cosmic.mico.core.planning.space import Path, Point, Space, between
 
 SHORTEST_UM: Final = 20.0
-"""A straight way is not cut into shorter legs than this."""
+"""A straight path is not cut into shorter legs than this."""
 
 
 POINT_UM: Final = 1e-3
-"""A place is asked about as a box of this half width: the gate takes a box without any width for
+"""A point is asked about as a box of this half width: the gate takes a box without any width for
 a movement that brings nothing closer."""
 
 
@@ -37,7 +37,7 @@ class Effort:
 
 
 class Boxes:
-    """Legs between places, each judged as a joint box by the gate.
+    """Legs between points, each judged as a joint box by the gate.
 
     After the time is over every leg counts as refused, until it is `certified`.
     """
@@ -49,7 +49,7 @@ class Boxes:
         self.detour_height = sweep.model.detour_height
         self._sweep = sweep
         self._others: Spans = {
-            **{axis: AxisSpan(place, place, place) for axis, place in problem.start.items()},
+            **{axis: AxisSpan(point, point, point) for axis, point in problem.start.items()},
             **problem.others,
         }
         over = {drive.axis: drive.overshoot for drive in sweep.model.drives}
@@ -61,35 +61,35 @@ class Boxes:
         self._free: dict[Point, bool] = {}
         self._edges: dict[tuple[Point, Point, int], Path | None] = {}
 
-    # Places
+    # Points
 
-    def free(self, place: Point) -> bool:
-        """Return whether the axes can be at a place, with overshoot and to spare."""
-        known = self._free.get(place)
+    def free(self, point: Point) -> bool:
+        """Return whether the axes can be at a point, with overshoot and to spare."""
+        known = self._free.get(point)
         if known is None:
             if self.effort.spent:
                 return False
-            known = self._free[place] = self.touch_at(place) is None
+            known = self._free[point] = self.touch_at(point) is None
         return known
 
-    def touch_at(self, place: Point) -> Approach | None:
-        """Return what is too close with the axes at a place, or within their overshoot of it."""
-        return self._ask(self._sweep, self._standing(place))
+    def touch_at(self, point: Point) -> Approach | None:
+        """Return what is too close with the axes at a point, or within their overshoot of it."""
+        return self._ask(self._sweep, self._standing(point))
 
-    def touch_exactly_at(self, place: Point) -> Approach | None:
-        """Return what is too close with the axes at a place, without overshoot."""
+    def touch_exactly_at(self, point: Point) -> Approach | None:
+        """Return what is too close with the axes at a point, without overshoot."""
         model = self._sweep.model
         drives = tuple(replace(drive, overshoot=0.0) for drive in model.drives)
-        return self._ask(Sweep(replace(model, drives=drives)), self._standing(place))
+        return self._ask(Sweep(replace(model, drives=drives)), self._standing(point))
 
-    def _standing(self, place: Point) -> Spans:
+    def _standing(self, point: Point) -> Spans:
         spans = dict(self._others)
-        for axis, value, point in zip(self.space.axes, place, self._point, strict=True):
-            spans[axis] = AxisSpan(value - point, value + point, moving=True)
+        for axis, value, half in zip(self.space.axes, point, self._point, strict=True):
+            spans[axis] = AxisSpan(value - half, value + half, moving=True)
         return spans
 
-    def gap_at(self, place: Point) -> float | None:
-        """Return the least distance of two watched bodies with the axes at a place, um.
+    def gap_at(self, point: Point) -> float | None:
+        """Return the least distance of two watched bodies with the axes at a point, um.
 
         The other axes stand where they rest, or in the middle of where they may be.
         """
@@ -99,13 +99,13 @@ class Boxes:
             for axis, span in self._others.items()
             if axis in model.axes
         }
-        near = self._sweep.nearest({**pose, **self.space.named(place)})
+        near = self._sweep.nearest({**pose, **self.space.named(point)})
         return None if near is None else near.distance_um
 
     # Legs
 
     def clear(self, here: Point, there: Point) -> bool:
-        """Return whether the axes may go from one place to another, in any step with each other."""
+        """Return whether the axes may go from one point to another, in any step with each other."""
         key = (here, there) if here <= there else (there, here)
         known = self._legs.get(key)
         if known is None:
@@ -143,9 +143,9 @@ class Boxes:
         return self._ask(self._sweep, spans)
 
     def edge(self, here: Point, there: Point, most: int) -> Path | None:
-        """Return the corners of the straight way as legs that are clear; None where it is not.
+        """Return the corners of the straight path as legs that are clear; None where it is not.
 
-        The way is halved until every leg is clear. `here` is not among the corners.
+        The path is halved until every leg is clear. `here` is not among the corners.
         """
         one, other = (here, there) if here <= there else (there, here)
         key = (one, other, most)
@@ -154,10 +154,10 @@ class Boxes:
             if found is None and self.effort.spent:
                 return None
             self._edges[key] = found
-        way = self._edges[key]
-        if way is None:
+        path = self._edges[key]
+        if path is None:
             return None
-        return way[1:] if one is here else way[-2::-1]
+        return path[1:] if one is here else path[-2::-1]
 
     def _cut(self, one: Point, other: Point, most: int) -> Path | None:
         """Return all corners from `one` to `other`, coarse legs first to fail soon."""

@@ -1,4 +1,4 @@
-"""Ways that an operator would choose: straight on, one axis after the other, up and over."""
+"""Paths that an operator would choose: straight on, one axis after the other, up and over."""
 
 from collections.abc import Iterator, Mapping
 from itertools import combinations
@@ -13,7 +13,7 @@ def one_by_one(boxes: Boxes, here: Point, there: Point, up: Mapping[int, float])
     Parameters
     ----------
     up : mapping of float
-        Highest places of lifting axes, by number: those that go up go first, down last.
+        Highest points of lifting axes, by number: those that go up go first, down last.
     """
     hopeless: set[Point] = set()
 
@@ -44,23 +44,23 @@ def one_by_one(boxes: Boxes, here: Point, there: Point, up: Mapping[int, float])
 
 
 def detour(boxes: Boxes, here: Point, there: Point, heights: Mapping[str, float]) -> Path | None:
-    """Return a way that retracts, travels and descends.
+    """Return a path that retracts, travels and descends.
 
     Lifting axes go to their detour height, the fewest first; where that does not help, any one
     axis goes to one of its ends.
     """
     up = lifts(boxes.space, heights)
     found = [
-        way
-        for way in (over(boxes, here, there, lifted, up) for lifted in _choices(up))
-        if way is not None
+        path
+        for path in (over(boxes, here, there, lifted, up) for lifted in _choices(up))
+        if path is not None
     ]
     if found:
-        return min(found, key=lambda way: boxes.space.length((here, *way)))
+        return min(found, key=lambda path: boxes.space.length((here, *path)))
     for lifted in _ends(boxes.space):
-        way = over(boxes, here, there, lifted, up)
-        if way is not None:
-            return way
+        path = over(boxes, here, there, lifted, up)
+        if path is not None:
+            return path
     return None
 
 
@@ -88,25 +88,25 @@ def _ends(space: Space) -> Iterator[Mapping[int, float]]:
 def over(
     boxes: Boxes, here: Point, there: Point, lifted: Mapping[int, float], up: Mapping[int, float]
 ) -> Path | None:
-    """Return a way on which the axes `lifted` are out of the way while the others travel."""
+    """Return a path on which the axes `lifted` are up while the others travel."""
     above, beyond = (
         _raised(boxes.space, here, there, lifted),
         _raised(boxes.space, there, here, lifted),
     )
-    way: Path = ()
+    path: Path = ()
     for begin, end in ((here, above), (above, beyond), (beyond, there)):
         leg = one_by_one(boxes, begin, end, up)
         if leg is None:
             return None
-        way += leg
-    return way
+        path += leg
+    return path
 
 
-def _raised(space: Space, place: Point, other: Point, lifted: Mapping[int, float]) -> Point:
-    """Return `place` with some axes lifted; one that is higher at either end stays there."""
-    raised = list(place)
+def _raised(space: Space, point: Point, other: Point, lifted: Mapping[int, float]) -> Point:
+    """Return `point` with some axes lifted; one that is higher at either end stays there."""
+    raised = list(point)
     for number, height in lifted.items():
         upwards = height >= (space.low[number] + space.high[number]) / 2.0
-        ends = (height, place[number], other[number])
+        ends = (height, point[number], other[number])
         raised[number] = max(ends) if upwards else min(ends)
     return tuple(raised)

@@ -1,4 +1,4 @@
-"""The way from one place of some axes to another: what is simplest first, then a search."""
+"""The path from one point of some axes to another: what is simplest first, then a search."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,40 +9,40 @@ from cosmic.mico.core.collision.sweep import Sweep
 from cosmic.mico.core.planning.boxes import Boxes, Effort
 from cosmic.mico.core.planning.detour import detour, lifts, one_by_one
 from cosmic.mico.core.planning.margins import arrival, departure
-from cosmic.mico.core.planning.problem import NoWay, Plan, Problem, Segment, validate
-from cosmic.mico.core.planning.refusals import at_goal, at_start, no_way, too_tight
+from cosmic.mico.core.planning.problem import NoPath, Plan, Problem, Segment, validate
+from cosmic.mico.core.planning.refusals import at_goal, at_start, no_path, too_tight
 from cosmic.mico.core.planning.rrt_connect import MOST_LEGS, search
 from cosmic.mico.core.planning.simplify import legs, shorten
 from cosmic.mico.core.planning.space import Path, Point, Space
 
 LONG: Final = 1.5
-"""A way this many times as long as the straight one is worth a search for a better one."""
+"""A path this many times as long as the straight one is worth a search for a better one."""
 GOOD: Final = 1.1
-"""A way not longer than this many times the straight one is left as it is."""
+"""A path not longer than this many times the straight one is left as it is."""
 WORTH_LEGS: Final = 0.95
-"""Cutting the corners of a simple way makes more legs; it must save this much of its length."""
+"""Cutting the corners of a simple path makes more legs; it must save this much of its length."""
 CHECKS_NEAR: Final = 60
 CHECKS_SEARCHED: Final = 400
-"""Questions to the gate that cutting corners may cost, for a simple way and for one searched."""
+"""Questions to the gate that cutting corners may cost, for a simple path and for one searched."""
 MOST_CORNERS: Final = 20
-"""Of a way with more corners the clearance is not worked out."""
+"""Of a path with more corners the clearance is not worked out."""
 FEW_STEPS: Final = 8
-"""An edge that cuts the corner of a simple way is driven in at most so many legs."""
+"""An edge that cuts the corner of a simple path is driven in at most so many legs."""
 MOST_STEPS: Final = 16
-"""The straight way is driven in at most so many legs."""
+"""The straight path is driven in at most so many legs."""
 
 
 @dataclass(frozen=True)
 class _Found:
-    """A way in clear legs, with its first place, and how long it was before it was shortened."""
+    """A path in clear legs, with its first point, and how long it was before it was shortened."""
 
     method: str
-    way: Path
+    path: Path
     found_length: float
 
 
-def plan(sweep: Sweep, problem: Problem) -> Plan | NoWay:
-    """Return a way from start to goal on which every leg is clear, or what is in the way.
+def plan_path(sweep: Sweep, problem: Problem) -> Plan | NoPath:
+    """Return a path from start to goal on which every leg is clear, or what blocks it.
 
     Straight at once, in steps, one axis after the other, up and over, and only then a search by
     chance, which is the same for the same seed as long as the time suffices.
@@ -58,21 +58,21 @@ def plan(sweep: Sweep, problem: Problem) -> Plan | NoWay:
     if space.start == space.goal:
         return _plan(problem, boxes, _Found("straight", (space.start,), 0.0))
     ends = _ends(boxes)
-    if isinstance(ends, NoWay):
+    if isinstance(ends, NoPath):
         return ends
     here, there = ends
     found = _Found("straight", (here,), 0.0) if here == there else _best(boxes, problem, ends)
     if found is None:
-        return no_way(boxes, here, there)
+        return no_path(boxes, here, there)
     before = () if here == space.start else (space.start,)
     after = () if there == space.goal else (space.goal,)
-    whole = _Found(found.method, before + found.way + after, found.found_length)
-    if not _certified(boxes, whole.way, leaving=bool(before), arriving=bool(after)):
-        return no_way(boxes, here, there)
+    whole = _Found(found.method, before + found.path + after, found.found_length)
+    if not _certified(boxes, whole.path, leaving=bool(before), arriving=bool(after)):
+        return no_path(boxes, here, there)
     return _plan(problem, boxes, whole)
 
 
-def _ends(boxes: Boxes) -> tuple[Point, Point] | NoWay:
+def _ends(boxes: Boxes) -> tuple[Point, Point] | NoPath:
     """Return where the axes move freely from the start, and until shortly before the goal."""
     start, goal = boxes.space.start, boxes.space.goal
     here, there = start, goal
@@ -93,16 +93,16 @@ def _ends(boxes: Boxes) -> tuple[Point, Point] | NoWay:
 
 
 def _best(boxes: Boxes, problem: Problem, ends: tuple[Point, Point]) -> _Found | None:
-    """Return the shortest way that was found, None where there is none."""
+    """Return the shortest path that was found, None where there is none."""
     space = boxes.space
     near = _nearby(boxes, *ends)
     straight = space.distance(*ends)
     if near is not None:
         if near.method in ("straight", "steps"):
             return near
-        if space.length(near.way) > GOOD * straight:
+        if space.length(near.path) > GOOD * straight:
             near = _shortened(boxes, near, problem.seed)
-        if space.length(near.way) <= LONG * straight and not problem.optimise:
+        if space.length(near.path) <= LONG * straight and not problem.optimise:
             return near
     found = [near]
     seed = problem.seed
@@ -111,12 +111,12 @@ def _best(boxes: Boxes, problem: Problem, ends: tuple[Point, Point]) -> _Found |
         if not problem.optimise:
             break
         seed += 1
-    ways = [each for each in found if each is not None]
-    return min(ways, key=lambda each: space.length(each.way), default=None)
+    paths = [each for each in found if each is not None]
+    return min(paths, key=lambda each: space.length(each.path), default=None)
 
 
 def _nearby(boxes: Boxes, here: Point, there: Point) -> _Found | None:
-    """Return a way that an operator would choose."""
+    """Return a path that an operator would choose."""
     edge = boxes.edge(here, there, MOST_STEPS)
     if edge is not None:
         method = "straight" if len(edge) == 1 else "steps"
@@ -124,8 +124,8 @@ def _nearby(boxes: Boxes, here: Point, there: Point) -> _Found | None:
     serial = one_by_one(boxes, here, there, lifts(boxes.space, boxes.detour_height))
     if serial is not None:
         return _in_legs(boxes, "one by one", (here, *serial), 1)
-    way = detour(boxes, here, there, boxes.detour_height)
-    return None if way is None else _in_legs(boxes, "detour", (here, *way), 1)
+    path = detour(boxes, here, there, boxes.detour_height)
+    return None if path is None else _in_legs(boxes, "detour", (here, *path), 1)
 
 
 def _searched(boxes: Boxes, here: Point, there: Point, seed: int) -> _Found | None:
@@ -133,32 +133,32 @@ def _searched(boxes: Boxes, here: Point, there: Point, seed: int) -> _Found | No
     if corners is None:
         return None
     raw = (here, *corners)
-    way = shorten(boxes, raw, seed, MOST_LEGS, CHECKS_SEARCHED)
-    return _in_legs(boxes, "search", way, MOST_LEGS, boxes.space.length(raw))
+    path = shorten(boxes, raw, seed, MOST_LEGS, CHECKS_SEARCHED)
+    return _in_legs(boxes, "search", path, MOST_LEGS, boxes.space.length(raw))
 
 
 def _shortened(boxes: Boxes, found: _Found, seed: int) -> _Found:
-    """Return the way with its corners cut, where that saves enough to be worth more legs."""
-    way = shorten(boxes, found.way, seed, FEW_STEPS, CHECKS_NEAR)
-    cut = _in_legs(boxes, found.method, way, FEW_STEPS, found.found_length)
-    length = boxes.space.length(found.way)
-    worthwhile = cut is not None and boxes.space.length(cut.way) < WORTH_LEGS * length
+    """Return the path with its corners cut, where that saves enough to be worth more legs."""
+    path = shorten(boxes, found.path, seed, FEW_STEPS, CHECKS_NEAR)
+    cut = _in_legs(boxes, found.method, path, FEW_STEPS, found.found_length)
+    length = boxes.space.length(found.path)
+    worthwhile = cut is not None and boxes.space.length(cut.path) < WORTH_LEGS * length
     return cut if cut is not None and worthwhile else found
 
 
 def _in_legs(
-    boxes: Boxes, method: str, way: Sequence[Point], most: int, before: float | None = None
+    boxes: Boxes, method: str, path: Sequence[Point], most: int, before: float | None = None
 ) -> _Found | None:
-    driven = legs(boxes, way, most)
+    driven = legs(boxes, path, most)
     if driven is None:
         return None
-    return _Found(method, driven, boxes.space.length(way) if before is None else before)
+    return _Found(method, driven, boxes.space.length(path) if before is None else before)
 
 
-def _certified(boxes: Boxes, way: Path, *, leaving: bool, arriving: bool) -> bool:
+def _certified(boxes: Boxes, path: Path, *, leaving: bool, arriving: bool) -> bool:
     """Ask once more about every leg as it will be driven, with nothing remembered."""
-    for number, (one, other) in enumerate(pairwise(way)):
-        if (leaving and number == 0) or (arriving and number == len(way) - 2):
+    for number, (one, other) in enumerate(pairwise(path)):
+        if (leaving and number == 0) or (arriving and number == len(path) - 2):
             touch = boxes.touch_tight(one, other, leaving=leaving and number == 0)
         else:
             touch = boxes.touch(one, other)
@@ -169,22 +169,22 @@ def _certified(boxes: Boxes, way: Path, *, leaving: bool, arriving: bool) -> boo
 
 def _plan(problem: Problem, boxes: Boxes, found: _Found) -> Plan:
     space = boxes.space
-    pairs = pairwise(found.way)
+    pairs = pairwise(found.path)
     return Plan(
         start=dict(problem.start),
         segments=tuple(_segment(space, one, other) for one, other in pairs),
         method=found.method,
-        length=space.length(found.way),
+        length=space.length(found.path),
         straight_length=space.distance(space.start, space.goal),
         found_length=found.found_length,
-        clearance_um=_clearance_um(boxes, found.way),
+        clearance_um=_clearance_um(boxes, found.path),
     )
 
 
-def _clearance_um(boxes: Boxes, way: Path) -> float | None:
-    if len(way) > MOST_CORNERS:
+def _clearance_um(boxes: Boxes, path: Path) -> float | None:
+    if len(path) > MOST_CORNERS:
         return None
-    gaps = [gap for place in way if (gap := boxes.gap_at(place)) is not None]
+    gaps = [gap for point in path if (gap := boxes.gap_at(point)) is not None]
     return min(gaps, default=None)
 
 

@@ -31,7 +31,7 @@ class Problem:
         Wall time for the search. What was found is then checked once more, which takes a little
         longer.
     optimise : bool
-        Use the whole budget to look for a shorter way, instead of taking the first good one.
+        Use the whole budget to look for a shorter path, instead of taking the first good one.
     """
 
     start: Mapping[str, float]
@@ -47,7 +47,7 @@ class Problem:
 class Segment:
     """One leg: the axes named start together, each at any speed, and the leg ends with the last.
 
-    All positions the axes can have on the way have been found clear, in whatever order they are
+    All positions the axes can have on it have been found clear, in whatever order they are
     reached: axes need not keep step with each other.
     """
 
@@ -56,15 +56,15 @@ class Segment:
 
 @dataclass(frozen=True)
 class Plan:
-    """A way from start to goal, leg by leg.
+    """A path from start to goal, leg by leg.
 
     Attributes
     ----------
     method : str
         "straight", "steps", "one by one", "detour" or "search".
     length, straight_length : float
-        Along the corners, and from start to goal; um, turning axes by the way their farthest
-        point makes (see `Space`).
+        Along the corners, and from start to goal; um, turning axes by the travel of their
+        farthest point (see `Space`).
     found_length : float
         Before it was made shorter.
     duration_s : float or None
@@ -84,17 +84,17 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class NoWay:
-    """No way was found.
+class NoPath:
+    """No path was found.
 
     Attributes
     ----------
     text : str
         Why, for the operator: which bodies, where, what to do.
     blocking : Approach or None
-        What is too close at the goal or the start, or what is in the straight way.
+        What is too close at the goal or the start, or what blocks the straight path.
     best : mapping of float
-        How far the straight way can be followed, in steps; empty where it cannot.
+        How far the straight path can be followed, in steps; empty where it cannot.
     """
 
     text: str
@@ -117,26 +117,26 @@ def validate(model: SceneModel, problem: Problem) -> None:
     UnknownAxisError
         An axis to move is not in the scene.
     MoveRefused
-        A number is not finite, the place of an axis is unknown, or the time is no time.
+        A number is not finite, the position of an axis is unknown, or the time is no time.
     LimitError
         A target lies outside its limits.
     """
     if not 0.0 < problem.budget_s < math.inf:
         raise refusal(
-            refuse(Reason.NOT_FINITE, f"{problem.budget_s!r} s is no time to plan a way in")
+            refuse(Reason.NOT_FINITE, f"{problem.budget_s!r} s is no time to plan a path in")
         )
     for axis in (*problem.goal, *problem.start):
         if axis not in model.axes:
             raise UnknownAxisError(axis, model.axes)
-    for axis, place in problem.start.items():
-        _finite(axis, place, "stands at")
+    for axis, point in problem.start.items():
+        _finite(axis, point, "stands at")
     for axis, target in problem.goal.items():
         _finite(axis, target, "is to go to")
         if axis not in problem.start:
             raise refusal(
                 refuse(
                     Reason.POSITION_UNKNOWN,
-                    f"{axis}: no way can be planned from an unknown position; reference it first",
+                    f"{axis}: no path can be planned from an unknown position; reference it first",
                     axis=axis,
                 )
             )
@@ -157,7 +157,7 @@ def _within(model: SceneModel, problem: Problem, axis: str, target: float) -> No
         raise refusal(
             refuse(
                 Reason.LIMIT,
-                f"{axis}: a way needs limits at both ends, got {soft_low:g} to {soft_high:g}",
+                f"{axis}: a path needs limits at both ends, got {soft_low:g} to {soft_high:g}",
                 axis=axis,
                 value=target,
             )

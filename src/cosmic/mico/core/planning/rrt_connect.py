@@ -30,8 +30,8 @@ def search(boxes: Boxes, here: Point, there: Point, seed: int) -> Path | None:
     planning", ICRA 2000: a tree from each end grows towards random points, and the other tree
     then grows towards what was added as far as it can. An edge is in a tree only when the gate
     has proved it. Steps get shorter where a tree was blocked, as in L. Jaillet and others,
-    "Adaptive tuning of the sampling domain for dynamic-domain RRTs", IROS 2005: that finds the
-    way into narrow passages.
+    "Adaptive tuning of the sampling domain for dynamic-domain RRTs", IROS 2005: that leads
+    into narrow passages.
     """
     space = boxes.space
     chance = random.Random(seed)
@@ -62,7 +62,7 @@ class _Tree:
         self._least_um = SHORTEST_SHARE * self._steps_um[0]
 
     def grow(self, target: Point, only: int | None = None) -> int | None:
-        """Add one point on the way to `target`; return its number, None where it is blocked.
+        """Add one point towards `target`; return its number, None where it is blocked.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Makes a way shorter by cutting corners, and its legs fewer; every cut is proved by the gate."""
+"""Makes a path shorter by cutting corners, and its legs fewer; every cut is proved by the gate."""
 
 import random
 from collections.abc import Sequence
@@ -13,24 +13,24 @@ CUTS: Final = 40
 IN_VAIN: Final = 12
 """It is left at that after so many cuts in a row that were of no use."""
 WORTHWHILE: Final = 0.002
-"""A cut that shortens the way by less, as a share, is of no use."""
+"""A cut that shortens the path by less, as a share, is of no use."""
 HALVINGS: Final = 4
 """How closely the largest cut of a corner is found: to a sixteenth of its edges."""
 
 
-def shorten(boxes: Boxes, way: Sequence[Point], seed: int, most: int, checks: int) -> Path:
-    """Return a shorter way of clear edges between the same ends.
+def shorten(boxes: Boxes, path: Sequence[Point], seed: int, most: int, checks: int) -> Path:
+    """Return a shorter path of clear edges between the same ends.
 
     Parameters
     ----------
-    way : sequence of places
+    path : sequence of points
         With both ends; its edges can be driven in `most` legs each.
     checks : int
         It is left at that after so many questions to the gate.
     """
     chance = random.Random(seed)
     until = boxes.effort.checks + checks
-    best = _corners_cut(boxes, _skip(boxes, way, most), most, until)
+    best = _corners_cut(boxes, _skip(boxes, path, most), most, until)
     in_vain = 0
     for _ in range(CUTS):
         if len(best) < 3 or in_vain >= IN_VAIN or boxes.effort.checks >= until:
@@ -44,20 +44,20 @@ def shorten(boxes: Boxes, way: Sequence[Point], seed: int, most: int, checks: in
     return _skip(boxes, best, most) if boxes.effort.checks < until else best
 
 
-def _corners_cut(boxes: Boxes, way: Path, most: int, until: int) -> Path:
+def _corners_cut(boxes: Boxes, path: Path, most: int, until: int) -> Path:
     """Cut every corner once, as far as its two edges and the gate allow."""
-    cut = [way[0]]
-    for number in range(1, len(way) - 1):
-        before, corner, after = cut[-1], way[number], way[number + 1]
+    cut = [path[0]]
+    for number in range(1, len(path) - 1):
+        before, corner, after = cut[-1], path[number], path[number + 1]
         if boxes.effort.checks >= until:
             cut.append(corner)
             continue
         cut.extend(_cut_off(boxes, (before, corner, after), most))
-    return (*cut, *way[len(way) - 1 :])
+    return (*cut, *path[len(path) - 1 :])
 
 
 def _cut_off(boxes: Boxes, corner: tuple[Point, Point, Point], most: int) -> Path:
-    """Return the two places between which the largest part of a corner is cut off, or itself."""
+    """Return the two points between which the largest part of a corner is cut off, or itself."""
     before, at, after = corner
     best: Path = (at,)
     share, step = 0.5, 0.25
@@ -72,48 +72,48 @@ def _cut_off(boxes: Boxes, corner: tuple[Point, Point, Point], most: int) -> Pat
     return best
 
 
-def _skip(boxes: Boxes, way: Sequence[Point], most: int) -> Path:
+def _skip(boxes: Boxes, path: Sequence[Point], most: int) -> Path:
     """Go from each corner straight to the farthest one that can be reached."""
-    kept = [way[0]]
+    kept = [path[0]]
     at = 0
-    while at < len(way) - 1:
+    while at < len(path) - 1:
         following = at + 1
-        for farther in range(len(way) - 1, at + 1, -1):
-            if boxes.edge(way[at], way[farther], most) is not None:
+        for farther in range(len(path) - 1, at + 1, -1):
+            if boxes.edge(path[at], path[farther], most) is not None:
                 following = farther
                 break
-        kept.append(way[following])
+        kept.append(path[following])
         at = following
     return tuple(kept)
 
 
-def _cut(boxes: Boxes, way: Path, chance: random.Random, most: int) -> Path | None:
-    """Return the way with a straight edge between two of its places, None if blocked."""
-    first, second = sorted(chance.sample(range(len(way) - 1), 2))
-    begin = _on(way, first, chance)
-    end = _on(way, second, chance)
-    for one, other in ((way[first], begin), (begin, end), (end, way[second + 1])):
+def _cut(boxes: Boxes, path: Path, chance: random.Random, most: int) -> Path | None:
+    """Return the path with a straight edge between two of its points, None if blocked."""
+    first, second = sorted(chance.sample(range(len(path) - 1), 2))
+    begin = _on(path, first, chance)
+    end = _on(path, second, chance)
+    for one, other in ((path[first], begin), (begin, end), (end, path[second + 1])):
         if one != other and boxes.edge(one, other, most) is None:
             return None
-    middle = [place for place in (begin, end) if place not in (way[first], way[second + 1])]
-    return (*way[: first + 1], *middle, *way[second + 1 :])
+    middle = [point for point in (begin, end) if point not in (path[first], path[second + 1])]
+    return (*path[: first + 1], *middle, *path[second + 1 :])
 
 
-def _on(way: Path, edge: int, chance: random.Random) -> Point:
-    return _rounded(between(way[edge], way[edge + 1], chance.random()))
+def _on(path: Path, edge: int, chance: random.Random) -> Point:
+    return _rounded(between(path[edge], path[edge + 1], chance.random()))
 
 
-def _rounded(place: Point) -> Point:
-    return tuple(round(value, DIGITS) for value in place)
+def _rounded(point: Point) -> Point:
+    return tuple(round(value, DIGITS) for value in point)
 
 
-def legs(boxes: Boxes, way: Sequence[Point], most: int) -> Path | None:
-    """Return the corners of the legs of a way, as few as can be found by joining neighbours.
+def legs(boxes: Boxes, path: Sequence[Point], most: int) -> Path | None:
+    """Return the corners of the legs of a path, as few as can be found by joining neighbours.
 
     None when one of its edges is not clear after all.
     """
-    corners = [way[0]]
-    for one, other in pairwise(way):
+    corners = [path[0]]
+    for one, other in pairwise(path):
         edge = boxes.edge(one, other, most)
         if edge is None:
             return None

@@ -24,9 +24,9 @@ class Space:
 
     Notes
     -----
-    The distance of two places is the root of the summed squares of the ways of all axes. A
-    degree of a turning axis counts as the way that the farthest point it carries makes, so that
-    all ways are um of a body.
+    The distance of two points is the root of the summed squares of the travel of all axes. A
+    degree of a turning axis counts as the travel of the farthest point that it carries, so that
+    all distances are um of a body.
     """
 
     def __init__(self, model: SceneModel, problem: Problem) -> None:
@@ -40,36 +40,36 @@ class Space:
         self.diagonal = self.distance(self.low, self.high)
 
     def distance(self, one: Point, other: Point) -> float:
-        """Return how far two places are apart, um."""
+        """Return how far two points are apart, um."""
         return math.hypot(
             *(weight * (b - a) for weight, a, b in zip(self.weights, one, other, strict=True))
         )
 
-    def length(self, way: Sequence[Point]) -> float:
-        """Return the length of a way along its corners, um."""
-        return sum(self.distance(one, other) for one, other in pairwise(way))
+    def length(self, path: Sequence[Point]) -> float:
+        """Return the length of a path along its corners, um."""
+        return sum(self.distance(one, other) for one, other in pairwise(path))
 
-    def contains(self, place: Point) -> bool:
-        """Return whether a place is within the limits."""
+    def contains(self, point: Point) -> bool:
+        """Return whether a point is within the limits."""
         return all(
             low <= value <= high
-            for low, value, high in zip(self.low, place, self.high, strict=True)
+            for low, value, high in zip(self.low, point, self.high, strict=True)
         )
 
-    def clipped(self, place: Point) -> Point:
-        """Return the nearest place within the limits."""
+    def clipped(self, point: Point) -> Point:
+        """Return the nearest point within the limits."""
         return tuple(
             min(max(value, low), high)
-            for low, value, high in zip(self.low, place, self.high, strict=True)
+            for low, value, high in zip(self.low, point, self.high, strict=True)
         )
 
-    def named(self, place: Point) -> Mapping[str, float]:
-        """Return a place by name of axis."""
-        return dict(zip(self.axes, place, strict=True))
+    def named(self, point: Point) -> Mapping[str, float]:
+        """Return a point by name of axis."""
+        return dict(zip(self.axes, point, strict=True))
 
 
 def between(one: Point, other: Point, share: float) -> Point:
-    """Return the place at `share` of the straight way; exactly the ends at 0 and 1."""
+    """Return the point at `share` of the straight path; exactly the ends at 0 and 1."""
     if share in (0.0, 1.0):
         return other if share else one
     return tuple(a + share * (b - a) for a, b in zip(one, other, strict=True))
@@ -96,11 +96,13 @@ def _radius_um(model: SceneModel, number: int) -> float:
         if other.parent in carried:
             carried.add(other.child)
     pose = poses[model.body_number[joint.child]]
-    way = pose[:3, :3] @ joint.axis
+    direction = pose[:3, :3] @ joint.axis
     farthest = 0.0
     for piece in model.pieces:
         if piece.body in carried:
             body = poses[model.body_number[piece.body]]
             points = piece.vertices_um @ body[:3, :3].T + body[:3, 3] - pose[:3, 3]
-            farthest = max(farthest, float(np.linalg.norm(np.cross(points, way), axis=1).max()))
+            farthest = max(
+                farthest, float(np.linalg.norm(np.cross(points, direction), axis=1).max())
+            )
     return farthest

@@ -14,11 +14,13 @@ def speeds(
     """Return the speed of every axis of a leg, in unit/s, so that all arrive together.
 
     The axis that needs longest goes at its top speed. That keeps the leg close to its straight
-    line; it is clear either way.
+    line; it is clear either path.
     """
-    ways = {axis: abs(target - start[axis]) for axis, target in segment.targets.items()}
-    longest_s = max((way / _positive(top_speed, axis) for axis, way in ways.items()), default=0.0)
-    return {axis: way / longest_s for axis, way in ways.items() if way > 0.0}
+    distances = {axis: abs(target - start[axis]) for axis, target in segment.targets.items()}
+    longest_s = max(
+        (distance / _positive(top_speed, axis) for axis, distance in distances.items()), default=0.0
+    )
+    return {axis: distance / longest_s for axis, distance in distances.items() if distance > 0.0}
 
 
 def profile(

@@ -8,8 +8,8 @@ import pytest
 
 from cosmic.mico.core.collision.answer import AxisSpan
 from cosmic.mico.core.collision.sweep import Sweep
-from cosmic.mico.core.planning.planner import plan
-from cosmic.mico.core.planning.problem import NoWay, Plan, Problem
+from cosmic.mico.core.planning.planner import plan_path
+from cosmic.mico.core.planning.problem import NoPath, Plan, Problem
 from unit.mico.planning_problems import (
     LIMITS,
     arms,
@@ -127,7 +127,7 @@ def test_a_degree_counts_as_the_way_of_the_farthest_point_that_turns() -> None:
 def test_the_same_seed_gives_the_same_way() -> None:
     problem = replace(BEHIND, seed=5, budget_s=60.0)
     model = arms(lift=None)
-    first, second = plan(Sweep(model), problem), plan(Sweep(model), problem)
+    first, second = plan_path(Sweep(model), problem), plan_path(Sweep(model), problem)
     assert isinstance(first, Plan)
     assert first == second
 
@@ -136,8 +136,8 @@ def test_problems_and_answers_go_through_a_pipe() -> None:
     problem = pickle.loads(pickle.dumps(BEHIND))
     found = solved(Sweep(arms()), problem)
     assert pickle.loads(pickle.dumps(found)) == found
-    refused = plan(Sweep(arms()), Problem(at(), {"left.x": 3000.0}, LIMITS))
-    assert isinstance(refused, NoWay)
+    refused = plan_path(Sweep(arms()), Problem(at(), {"left.x": 3000.0}, LIMITS))
+    assert isinstance(refused, NoPath)
     assert pickle.loads(pickle.dumps(refused)) == refused
 
 
@@ -147,7 +147,7 @@ def test_axes_that_may_be_anywhere_are_kept_clear_of_wherever_they_are() -> None
     found = solved(Sweep(arms()), Problem(start, {"left.x": 1900.0}, LIMITS, anywhere))
     assert found.clearance_um is not None
     assert math.isfinite(found.clearance_um)
-    assert isinstance(plan(Sweep(arms()), Problem(start, {"left.x": 2100.0}, LIMITS)), NoWay)
+    assert isinstance(plan_path(Sweep(arms()), Problem(start, {"left.x": 2100.0}, LIMITS)), NoPath)
 
 
 def test_a_plan_tells_the_least_distance_at_its_corners() -> None:

@@ -1,4 +1,4 @@
-"""`WayFinder`: asks the planner, in a process of its own, for a way round (ECM, thesis 3.4.2)."""
+"""`PathPlanner`: asks for a detour in a process of its own (ECM, thesis 3.4.2)."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,16 +10,16 @@ from cosmic.mico.core.collision.helper_link import GateProcess, NoAnswerError
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
-from cosmic.mico.core.planning.problem import NoWay, Plan, Problem, validate
+from cosmic.mico.core.planning.problem import NoPath, Plan, Problem, validate
 from cosmic.mico.core.planning.timing import duration_s
 
-PLANNER: Final = "cosmic.mico.core.planning.planner:plan"
-PATIENCE_S: Final = 5.0
+PLANNER: Final = "cosmic.mico.core.planning.planner:plan_path"
+GRACE_S: Final = 5.0
 """How much longer than its budget the planner may take before its process is given up."""
 
 
-class WayFinder:
-    """Finds ways that the gate holds safe; for threads that may wait.
+class PathPlanner:
+    """Plans paths that the gate holds safe; for threads that may wait.
 
     It has a process of its own, so that a search never keeps the gate from answering. The
     process is started by the first search.
@@ -31,15 +31,15 @@ class WayFinder:
         self._process = GateProcess(model, handlers={"plan": PLANNER})
         self._started = False
 
-    def find(self, targets: Mapping[str, float], budget_s: float) -> Plan:
-        """Return a way of the axes named to `targets`, in gate coordinates.
+    def plan_path(self, targets: Mapping[str, float], budget_s: float) -> Plan:
+        """Return a path of the axes named to `targets`, in gate coordinates.
 
         Raises
         ------
         UnknownAxisError
             One axis does not exist.
         MoveRefused
-            There is no way, or none was found in `budget_s` of wall time; the verdict says what
+            There is no path, or none was found in `budget_s` of wall time; the verdict says what
             blocks.
         """
         problem = self._problem(targets, budget_s)
@@ -48,12 +48,12 @@ class WayFinder:
             if not self._started or not self._process.alive:
                 self._process.start()
                 self._started = True
-            answer = self._process.ask("plan", problem, budget_s + PATIENCE_S)
+            answer = self._process.ask("plan", problem, budget_s + GRACE_S)
         except NoAnswerError as exc:
-            text = f"no way was looked for: the planner gave no answer ({exc}); try again"
+            text = f"no path was planned: the planner gave no answer ({exc}); try again"
             raise refusal(refuse(Reason.NO_ANSWER, text)) from exc
-        if isinstance(answer, NoWay):
-            raise refusal(_no_way(answer))
+        if isinstance(answer, NoPath):
+            raise refusal(_no_path(answer))
         if not isinstance(answer, Plan):
             raise refusal(refuse(Reason.NO_ANSWER, "the planner's answer makes no sense"))
         return self._timed(answer)
@@ -94,7 +94,7 @@ class WayFinder:
         )
 
     def _companions(self, targets: Mapping[str, float]) -> set[str]:
-        """Return the axes that carry the same bodies: a way may use them, and brings them back."""
+        """Return the axes that carry the same bodies: a path may use them, and brings them back."""
         carried = {axis: self._model.carried(axis) for axis in self._model.axes}
         return {
             axis
@@ -113,19 +113,19 @@ def _can_help(state: PositionerState) -> bool:
 
 def _known(state: PositionerState) -> float:
     if state.position is None or state.confidence is not Confidence.KNOWN:
-        text = f"{state.name}: no way can be planned from an unknown position; initialise first"
+        text = f"{state.name}: no path can be planned from an unknown position; initialise first"
         raise refusal(refuse(Reason.POSITION_UNKNOWN, text, axis=state.name))
     return state.position
 
 
 def _limits(state: PositionerState) -> tuple[float, float]:
     if state.limits is None:
-        text = f"{state.name}: ways are planned for axes with a sensor only"
+        text = f"{state.name}: paths are planned for axes with a sensor only"
         raise refusal(refuse(Reason.WRONG_KIND, text, axis=state.name))
     return state.limits
 
 
-def _no_way(answer: NoWay) -> MoveVerdict:
+def _no_path(answer: NoPath) -> MoveVerdict:
     blocking = answer.blocking
     if blocking is None:
         return refuse(Reason.COLLISION, answer.text)
