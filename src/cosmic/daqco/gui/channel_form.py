@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QIcon
 from PySide6.QtWidgets import (
     QCheckBox,
     QColorDialog,
@@ -46,6 +46,9 @@ class ChannelForm(QWidget):
         self.name = named(tipped(QLineEdit(), "Name of the channel, such as force"), "channelName")
         self.colour_shown = tipped(QLineEdit(), "Colour of its curve")
         self.colour_shown.setReadOnly(True)
+        self._swatch = self.colour_shown.addAction(
+            QIcon(), QLineEdit.ActionPosition.LeadingPosition
+        )
         self.colour = tipped(QComboBox(), "Choose a colour for its curve")
         for name, value in OKABE_ITO.items():
             self.colour.addItem(swatch(value), name, value)
@@ -155,7 +158,7 @@ class ChannelForm(QWidget):
     def _show_colour(self, colour: str) -> None:
         self.colour_shown.setProperty("colour", colour)
         self.colour_shown.setText(colour_name(colour))
-        self.colour_shown.setStyleSheet(f"border-left: {STEP_PX}px solid {readable(colour)}")
+        self._swatch.setIcon(swatch(readable(colour)))
         known = self.colour.findData(colour.upper(), flags=Qt.MatchFlag.MatchExactly)
         self.colour.setCurrentIndex(known if known >= 0 else self.colour.count() - 1)
 

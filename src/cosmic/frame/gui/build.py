@@ -13,6 +13,27 @@ def named(widget: W, name: str) -> W:
     return widget
 
 
+def styled(widget: W, look: str) -> W:
+    """Give `widget` a look that the style sheet defines by its name; returns it."""
+    widget.setProperty("look", look)
+    return widget
+
+
+def restyle(*widgets: QWidget) -> None:
+    """Have the style sheet read the properties of widgets again; each costs a new layout."""
+    for each in widgets:
+        each.style().unpolish(each)
+        each.style().polish(each)
+
+
+def set_style_property(widget: QWidget, name: str, value: object) -> None:
+    """Set a property that the style sheet looks at, and have the widget styled anew."""
+    if widget.property(name) == value:
+        return
+    widget.setProperty(name, value)
+    restyle(widget, *widget.findChildren(QWidget))
+
+
 def tipped(widget: W, tip: str) -> W:
     """Give `widget` a tooltip; a button that shows a sign only is also named by it."""
     widget.setToolTip(tip)

@@ -4,24 +4,10 @@ from typing import Literal
 
 from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
+from cosmic.frame.gui.build import set_style_property
 from cosmic.frame.gui.theme import ui_font
 
 Tone = Literal["simulated", "real", "alarm", "warning", "quiet"]
-
-
-def set_style_property(widget: QWidget, name: str, value: object) -> None:
-    """Set a property that the style sheet looks at, and have the widget styled anew."""
-    if widget.property(name) == value:
-        return
-    widget.setProperty(name, value)
-    restyle(widget, *widget.findChildren(QWidget))
-
-
-def restyle(*widgets: QWidget) -> None:
-    """Have widgets styled anew; each costs a new layout."""
-    for each in widgets:
-        each.style().unpolish(each)
-        each.style().polish(each)
 
 
 class Chip(QLabel):

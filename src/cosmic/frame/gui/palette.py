@@ -19,6 +19,20 @@ OKABE_ITO: Final = {
 INK: Final = "#101214"
 """Text on a field filled with one of the Okabe-Ito colours."""
 
+ON_IMAGE: Final = {
+    "ink": "#FFFFFF",
+    "found": "#35D0A0",
+    "rim": "#96000000",
+    "faint rim": "#50000000",
+    "label": "#A5000000",
+    "text": "#B9000000",
+    "notice": "#F2101214",
+}
+"""What is drawn over images, bright or dark, in every theme, some as "#AARRGGBB".
+
+"found" is Okabe-Ito's bluish green, lighter: the original is lost on a grey image.
+"""
+
 
 @dataclass(frozen=True, slots=True)
 class Palette:

@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QEnterEvent, QFocusEvent, QKeyEvent, QPainter,
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QWidget
 
 from cosmic.frame.errors import QuantityError
+from cosmic.frame.gui.build import restyle
 from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.reason_bubble import ReasonBubble
 from cosmic.frame.gui.theme import STEP_PX, State, current_palette, number_font, state_look
@@ -180,8 +181,7 @@ class QuantityField(QLineEdit):
             return
         self._reason = reason
         self.setProperty("refused", bool(reason))
-        self.style().unpolish(self)
-        self.style().polish(self)
+        restyle(self)
         self._tell()
         self.update()
 

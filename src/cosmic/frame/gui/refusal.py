@@ -2,6 +2,7 @@
 
 from PySide6.QtWidgets import QLineEdit
 
+from cosmic.frame.gui.build import restyle
 from cosmic.frame.gui.reason_bubble import ReasonBubble
 from cosmic.frame.gui.theme import State, state_look
 
@@ -16,8 +17,7 @@ def show_refusal(field: QLineEdit, reason: str) -> None:
         return
     field.setAccessibleDescription(reason)
     field.setProperty("refused", bool(reason))
-    field.style().unpolish(field)
-    field.style().polish(field)
+    restyle(field)
 
 
 def mark_refusal(field: QLineEdit, reason: str) -> None:

@@ -1,4 +1,4 @@
-"""The style sheet of the theme, made from a palette."""
+"""The style sheets: of the theme, made from a palette, and of printed pages."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -147,6 +147,18 @@ QHeaderView::section {
 }
 
 [role="dim"] { color: $dim; }
+[role="refused"] { color: $refused; }
+
+QPushButton[look="narrow"] { padding: 3px 6px; }
+QToolButton[look="tool"], QToolButton[look="tool menu"] { padding: 1px 5px; }
+QToolButton[look="menu"]::menu-indicator, QToolButton[look="tool menu"]::menu-indicator {
+    image: none;
+}
+QToolButton[look="heading"] {
+    background: transparent; border: none; color: $text; padding: 0px; text-align: left;
+}
+QProgressBar[look="bar"] { min-height: 8px; border: none; }
+#stopAxis:enabled { color: $alarm; }
 
 #topBar { background: $window; border-bottom: 1px solid $border; }
 #topBar[latched="true"] { background: $latched; border-bottom: 1px solid $stop; }
@@ -190,6 +202,15 @@ QPushButton[watched="false"], QPushButton[watched="false"]:hover {
     padding: 4px 8px;
 }
 """
+
+PRINTED: Final = """
+body { font-family: sans-serif; font-size: 11px; color: #202428; }
+h1 { font-size: 20px; } h2 { font-size: 15px; } h3 { font-size: 13px; margin-top: 14px; }
+h3.long { page-break-before: always; }
+th { background-color: #eef1f4; font-size: 11px; } td { font-size: 11px; }
+pre { background-color: #f3f5f7; font-size: 10px; } small { font-size: 9px; }
+"""
+"""Of a printed report: black on white in every theme."""
 
 
 def stylesheet(palette: Palette) -> str:

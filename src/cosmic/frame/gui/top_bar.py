@@ -14,8 +14,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from cosmic.frame.gui.build import named, push_button, tight_row
-from cosmic.frame.gui.chip import Chip, restyle
+from cosmic.frame.gui.build import named, push_button, restyle, tight_row
+from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.clearance_meter import Clearance, ClearanceMeter
 from cosmic.frame.gui.controls_sign import ControlsSign
 from cosmic.frame.gui.elided_label import ElidedLabel

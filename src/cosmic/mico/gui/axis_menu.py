@@ -6,7 +6,7 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QToolButton
 
-from cosmic.frame.gui.build import named, tipped
+from cosmic.frame.gui.build import named, styled, tipped
 
 
 class AxisMenu(QObject):
@@ -36,7 +36,7 @@ class AxisMenu(QObject):
         self.menu = QMenu(self.button)
         self.menu.setToolTipsVisible(True)
         self.button.setMenu(self.menu)
-        self.button.setStyleSheet("QToolButton::menu-indicator { image: none; }")
+        styled(self.button, "menu")
         self.button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
         self._add(
             "Set zero here",

@@ -6,8 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QHideEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
-from cosmic.frame.gui.build import named, push_button, tipped
-from cosmic.frame.gui.chip import set_style_property
+from cosmic.frame.gui.build import named, push_button, set_style_property, styled, tipped
 from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.overrides import override
 from cosmic.mico.gui.overlay import Overlay
@@ -40,7 +39,7 @@ class CollisionSwitch(QPushButton):
         self._axis = axis
         self._model = False
         self._watched = True
-        self.setStyleSheet(f"QPushButton {{ padding: 3px {STEP_PX - 2}px; }}")
+        styled(self, "narrow")
         self.setFixedWidth(self.fontMetrics().horizontalAdvance("CD OFF") + 2 * STEP_PX + 2)
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.sign = QLabel("▲")

@@ -5,7 +5,7 @@ from typing import Final
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
-from cosmic.frame.gui.build import named, tipped
+from cosmic.frame.gui.build import named, styled, tipped
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, ui_font
 from cosmic.mico.core.motion.positioner import PositionerState
@@ -26,15 +26,11 @@ class DeviceGUI(QWidget):
         self.title = title
         self._cards: dict[str, PositionerBaseGUI] = {}
         self._states: dict[str, State] = {}
-        self._fold = named(QToolButton(), "fold")
+        self._fold = styled(named(QToolButton(), "fold"), "heading")
         self._fold.setText(title)
         self._fold.setFont(ui_font(bold=True))
         self._fold.setCheckable(True)
         self._fold.setChecked(True)
-        self._fold.setStyleSheet(
-            "QToolButton { background: transparent; border: none; color: palette(text);"
-            " padding: 0px; text-align: left; }"
-        )
         self._fold.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self._fold.setArrowType(Qt.ArrowType.DownArrow)
         self._fold.setFocusPolicy(Qt.FocusPolicy.NoFocus)

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from cosmic.frame.gui.build import named, push_button, tipped
+from cosmic.frame.gui.build import named, push_button, styled, tipped
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.overrides import override
 from cosmic.mico.gui.overlay import Overlay
@@ -49,7 +49,7 @@ class LinkSwitch(QPushButton):
         super().__init__("Link off", parent)
         self._axis = axis
         self._linked: dict[str, float] = {}
-        self.setStyleSheet(f"QPushButton {{ padding: 3px {STEP_PX - 2}px; }}")
+        styled(self, "narrow")
         self.setFixedWidth(self.fontMetrics().horizontalAdvance("Link off") + 2 * STEP_PX + 2)
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.sign = QLabel("○")

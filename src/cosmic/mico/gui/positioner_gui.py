@@ -9,7 +9,6 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QToolButton, QVBoxLayout
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
-from cosmic.frame.gui.palette import OKABE_ITO
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look, ui_font
@@ -111,7 +110,6 @@ class PositionerBaseGUI(Card):
         self._detection.wanted.connect(self._on_detection_wanted)
         self._stop = named(QToolButton(), "stopAxis")
         self._stop.setText("■")
-        self._stop.setStyleSheet(f"QToolButton:enabled {{ color: {OKABE_ITO['vermillion']}; }}")
         tipped(self._stop, f"Stop {settings.name}; the other axes go on")
         self._stop.clicked.connect(self._on_stop_clicked)
         self._forward = self._direction_button(settings.forward_text, settings.forward_key, "+")

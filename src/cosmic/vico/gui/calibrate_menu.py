@@ -9,9 +9,9 @@ from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.amounts import duration_text
-from cosmic.frame.gui.build import named, tipped
+from cosmic.frame.gui.build import named, styled, tipped
 from cosmic.frame.gui.task_watch import TaskWatch
-from cosmic.frame.gui.theme import STEP_PX, State, state_look
+from cosmic.frame.gui.theme import State, state_look
 from cosmic.frame.operation import Progress, Task
 from cosmic.vico.api.camera import CameraHandle
 
@@ -43,10 +43,7 @@ class CalibrateButton(QToolButton):
         self._watch.progressed.connect(self._on_progressed)
         self.setText("Calibrate")
         named(tipped(self, TIP), "calibrate")
-        self.setStyleSheet(
-            f"QToolButton {{ padding: 1px {STEP_PX - 3}px; }}"
-            "QToolButton::menu-indicator { image: none; }"
-        )
+        styled(self, "tool menu")
         self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         shown = QMenu(self)
         shown.setToolTipsVisible(True)

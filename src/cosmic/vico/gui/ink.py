@@ -7,14 +7,13 @@ from typing import Final
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPen
 
-from cosmic.frame.gui.palette import OKABE_ITO
+from cosmic.frame.gui.palette import OKABE_ITO, ON_IMAGE
 from cosmic.frame.gui.theme import STEP_PX, number_font
 
-HALO: Final = QColor(0, 0, 0, 150)
-WHITE: Final = QColor("#FFFFFF")
+HALO: Final = QColor(ON_IMAGE["rim"])
+WHITE: Final = QColor(ON_IMAGE["ink"])
 SKY: Final = QColor(OKABE_ITO["sky blue"])
-GREEN: Final = QColor("#35D0A0")
-"""Okabe-Ito's bluish green, lighter: the original is lost on a grey image."""
+GREEN: Final = QColor(ON_IMAGE["found"])
 ORANGE: Final = QColor(OKABE_ITO["orange"])
 YELLOW: Final = QColor(OKABE_ITO["yellow"])
 PINK: Final = QColor(OKABE_ITO["reddish purple"])
@@ -47,7 +46,7 @@ def stroke(painter: QPainter, path: QPainterPath, made: QPen) -> None:
 
 def line(painter: QPainter, begin: QPointF, end: QPointF, made: QPen) -> None:
     """Draw a line over a faint dark rim."""
-    painter.setPen(pen(QColor(0, 0, 0, 80), made.widthF() + 2.0))
+    painter.setPen(pen(QColor(ON_IMAGE["faint rim"]), made.widthF() + 2.0))
     painter.drawLine(begin, end)
     painter.setPen(made)
     painter.drawLine(begin, end)
@@ -78,7 +77,7 @@ def label(
         if box.intersects(other):
             box.moveTop(other.bottom() + 2.0)
     painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(0, 0, 0, 165))
+    painter.setBrush(QColor(ON_IMAGE["label"]))
     painter.drawRoundedRect(box, 3.0, 3.0)
     painter.setFont(font)
     painter.setPen(colour)

@@ -6,6 +6,7 @@ from typing import Final
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPen
 
+from cosmic.frame.gui.palette import ON_IMAGE
 from cosmic.frame.gui.theme import STEP_PX, current_palette
 from cosmic.frame.overrides import override
 from cosmic.vico.gui.image_view import CameraImageView, Layer
@@ -128,7 +129,7 @@ class CornerText(Layer):
         if not self._top:
             box.moveBottom(room.bottom())
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(0, 0, 0, 185))
+        painter.setBrush(QColor(ON_IMAGE["text"]))
         painter.drawRoundedRect(box, 3.0, 3.0)
         painter.setFont(font)
         painter.setPen(WHITE)
@@ -153,7 +154,7 @@ class Note(Layer):
         box = needed.adjusted(-16, -10, 16, 10)
         box.moveCenter(room.center())
         painter.setPen(pen(QColor(current_palette().refused), 2.0))
-        painter.setBrush(QColor(16, 18, 20, 242))
+        painter.setBrush(QColor(ON_IMAGE["notice"]))
         painter.drawRoundedRect(box, 4.0, 4.0)
         painter.setFont(font)
         painter.setPen(WHITE)

@@ -6,7 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
-from cosmic.frame.gui.build import named, tipped
+from cosmic.frame.gui.build import named, styled, tipped
 from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.theme import STEP_PX
 
@@ -124,5 +124,4 @@ def _button(text: str, tip: str, *, checkable: bool = False) -> QToolButton:
     button.setText(text)
     button.setAccessibleName(tip if text == "1:1" else text)
     button.setCheckable(checkable)
-    button.setStyleSheet(f"QToolButton {{ padding: 1px {STEP_PX - 3}px; }}")
-    return button
+    return styled(button, "tool")

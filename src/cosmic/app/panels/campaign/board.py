@@ -11,7 +11,7 @@ from cosmic.app.panels.campaign.table import FibreTable
 from cosmic.app.panels.state_indicator import StateIndicator
 from cosmic.autonomy.campaign.formatting import EI_LABEL, duration, mean_words, number
 from cosmic.autonomy.campaign.snapshot import CampaignSnapshot
-from cosmic.frame.gui.build import named, tipped
+from cosmic.frame.gui.build import named, styled, tipped
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
@@ -40,10 +40,9 @@ class CauseList(QWidget):
         self.show_causes({})
 
     def _line(self, row: int) -> tuple[ElidedLabel, QProgressBar, QLabel]:
-        text, bar, count = ElidedLabel(), QProgressBar(), QLabel()
+        text, bar, count = ElidedLabel(), styled(QProgressBar(), "bar"), QLabel()
         bar.setTextVisible(False)
         bar.setFixedSize(8 * STEP_PX, STEP_PX)
-        bar.setStyleSheet(f"QProgressBar {{ min-height: {STEP_PX}px; border: none; }}")
         count.setFont(number_font())
         count.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         count.setMinimumWidth(count.fontMetrics().horizontalAdvance("0000"))

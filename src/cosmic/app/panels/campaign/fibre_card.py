@@ -38,7 +38,7 @@ from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.painting import painting
-from cosmic.frame.gui.palette import OKABE_ITO, Palette
+from cosmic.frame.gui.palette import OKABE_ITO, ON_IMAGE, Palette
 from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
 from cosmic.frame.overrides import override
 
@@ -106,9 +106,9 @@ class FibreImageView(QWidget):
         height = painter.fontMetrics().height()
         box_px = max(length_px, painter.fontMetrics().horizontalAdvance(words)) + STEP_PX
         ground = QRect(left - 4, bottom - height - 8, box_px, height + 12)
-        painter.fillRect(ground, QColor(0, 0, 0, 150))
-        painter.fillRect(left, bottom - 3, length_px, 3, Qt.GlobalColor.white)
-        painter.setPen(Qt.GlobalColor.white)
+        painter.fillRect(ground, QColor(ON_IMAGE["rim"]))
+        painter.fillRect(left, bottom - 3, length_px, 3, QColor(ON_IMAGE["ink"]))
+        painter.setPen(QColor(ON_IMAGE["ink"]))
         painter.drawText(left, bottom - 7, words)
 
 

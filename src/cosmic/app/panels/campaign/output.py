@@ -38,6 +38,7 @@ from cosmic.autonomy.campaign.store_read import CampaignReader
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.gui.painting import painting
+from cosmic.frame.gui.stylesheet import PRINTED
 from cosmic.frame.overrides import override
 from cosmic.frame.threads import WorkerThread
 
@@ -52,14 +53,6 @@ MARGINS_MM: Final = (15.0, 15.0, 15.0, 15.0)
 WIDTH_PX: Final = 680.0
 HEIGHT_PX: Final = 976.0
 """Of the text on a page of A4, in the pixels that the report counts in."""
-
-STYLE: Final = """
-body { font-family: sans-serif; font-size: 11px; color: #202428; }
-h1 { font-size: 20px; } h2 { font-size: 15px; } h3 { font-size: 13px; margin-top: 14px; }
-h3.long { page-break-before: always; }
-th { background-color: #eef1f4; font-size: 11px; } td { font-size: 11px; }
-pre { background-color: #f3f5f7; font-size: 10px; } small { font-size: 9px; }
-"""
 
 
 class _Figures:
@@ -113,7 +106,7 @@ def write_pdf(campaign: CampaignStore | CampaignReader, path: str | Path) -> Non
     data = report_data(reader)
     document = QTextDocument()
     figures = _Figures(document)
-    document.setDefaultStyleSheet(STYLE)
+    document.setDefaultStyleSheet(PRINTED)
     document.setHtml(f"<body>{report_body(data, svg=figures.svg, png=figures.png)}</body>")
     held = QBuffer()
     held.open(QIODevice.OpenModeFlag.WriteOnly)

@@ -11,6 +11,7 @@ from PySide6.QtGui import QColor, QImage, QPainter
 
 from cosmic.daqco.gui.plot.columns import Block, Columns
 from cosmic.frame.gui.painting import painting
+from cosmic.frame.gui.palette import DARK
 
 Flags = npt.NDArray[np.bool_]
 Reals = npt.NDArray[np.float64]
@@ -41,8 +42,8 @@ class Look:
     low: Reals
     high: Reals
     grid: tuple[float, ...] = ()
-    ground: str = "#000000"
-    line: str = "#404040"
+    ground: str = DARK.field
+    line: str = DARK.border
 
 
 class Raster:

@@ -6,8 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
-from cosmic.frame.gui.build import tipped
-from cosmic.frame.gui.chip import set_style_property
+from cosmic.frame.gui.build import set_style_property, tipped
 
 
 class BodiesButton(QToolButton):

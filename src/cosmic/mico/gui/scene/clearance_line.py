@@ -1,13 +1,12 @@
 """The lines below the scene: how near the nearest pair is, and what was refused."""
 
-from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
 
-from cosmic.frame.gui.build import named, tipped
+from cosmic.frame.gui.build import named, set_style_property, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.state_badge import StateBadge
-from cosmic.frame.gui.theme import LARGE_PX, STEP_PX, State, current_palette, number_font
-from cosmic.frame.overrides import override
+from cosmic.frame.gui.theme import LARGE_PX, STEP_PX, State, number_font
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.gui.scene.annotations import distance_text
 
@@ -45,25 +44,17 @@ class ClearanceLine(QWidget):
         if approach is None:
             self._figures.setText("–")
             self._names.set_text("nearest pair not known")
-            self._tint("")
+            self._tint(refused=False)
             return
         one, other = approach.bodies
         self._figures.setText(distance_text(approach.distance_um))
         inside = approach.distance_um <= approach.margin_um
         margin = f"  (margin {distance_text(approach.margin_um)} µm reached)" if inside else ""
         self._names.set_text(f"{one} – {other}{margin}")
-        self._tint(current_palette().refused if inside else "")
+        self._tint(refused=inside)
 
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self.set_nearest(self._approach)
-
-    def _tint(self, colour: str) -> None:
-        sheet = f"color: {colour};" if colour else ""
-        if self._figures.styleSheet() != sheet:
-            self._figures.setStyleSheet(sheet)
+    def _tint(self, *, refused: bool) -> None:
+        set_style_property(self._figures, "role", "refused" if refused else "")
 
 
 class RefusedLine(QWidget):
