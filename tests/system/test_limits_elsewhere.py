@@ -56,6 +56,7 @@ def test_boards_there_stop_axes_here_and_their_silence_does_as_well() -> None:
         served("daqco") as (_, host, endpoint),
         cosmic.connect(applications=("mico",), stations={"there": endpoint}) as rig,
     ):
+        assert StationAddress.known("there").endpoint == endpoint, "it is remembered"
         rig.daqco.arm_limit("force", low=-500.0, high=-400.0)
         assert wait_until(lambda: rig.stopped)
         assert "force" in (rig.stopped or "")

@@ -127,6 +127,7 @@ def _add_station_commands(
         help="such as mico,daqco (default: all)",
     )
     serve.add_argument("--seed", type=int, default=0, help="seed of the simulation")
+    commands.add_parser("stations", help="list the stations that were used before")
     made = commands.add_parser("certificates", help="make the certificates of stations and clients")
     made.add_argument("folder", type=Path, metavar="FOLDER")
     made.add_argument(
@@ -152,7 +153,7 @@ def _add_procedure_commands(
     campaign = commands.add_parser(
         "campaign",
         help="characterise fibres by a recipe, without a window",
-        parents=[platform],
+        parents=[platform, _connect_options()],
     )
     campaign.add_argument("recipe", type=Path, metavar="RECIPE", help="a file, or a shipped name")
     campaign.add_argument("--out", type=Path, required=True, metavar="FOLDER")
@@ -160,7 +161,7 @@ def _add_procedure_commands(
     calibrate = commands.add_parser(
         "calibrate",
         help="renew expired calibrations, without a window",
-        parents=[platform],
+        parents=[platform, _connect_options()],
     )
     calibrate.add_argument(
         "--anew",
@@ -205,21 +206,31 @@ def _window_options(platform: argparse.ArgumentParser) -> argparse.ArgumentParse
     return options
 
 
-def _line_options() -> argparse.ArgumentParser:
-    """Return the options of whoever serves or connects."""
-    # Suppressed defaults, so that an option before the command is not reset by the command.
+def _connect_options() -> argparse.ArgumentParser:
+    """Return the options of whoever uses other stations."""
     options = argparse.ArgumentParser(add_help=False, argument_default=argparse.SUPPRESS)
     add = options.add_argument
-    add("--listen", metavar="ENDPOINT", help="endpoint to listen at, such as tcp/127.0.0.1:7447")
-    add("--name", metavar="NAME", help="name of this station for others")
     add("--certificates", type=Path, metavar="FOLDER", help="certificates of this station")
     add(
         "--connect",
         action="append",
-        metavar="NAME=ENDPOINT",
+        metavar="NAME[=ENDPOINT]",
         help="use the applications of another station, such as "
-        "fibervision=tcp/127.0.0.1:7448; may be given several times",
+        "fibervision=tcp/127.0.0.1:7448; the name alone if it was used before; may be given "
+        "several times",
     )
+    return options
+
+
+def _line_options() -> argparse.ArgumentParser:
+    """Return the options of whoever serves or connects."""
+    # Suppressed defaults, so that an option before the command is not reset by the command.
+    options = argparse.ArgumentParser(
+        add_help=False, argument_default=argparse.SUPPRESS, parents=[_connect_options()]
+    )
+    add = options.add_argument
+    add("--listen", metavar="ENDPOINT", help="endpoint to listen at, such as tcp/127.0.0.1:7447")
+    add("--name", metavar="NAME", help="name of this station for others")
     return options
 
 

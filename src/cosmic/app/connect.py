@@ -17,7 +17,7 @@ def connect(
     config: str | Path | None = None,
     applications: Sequence[str] = KNOWN_APPLICATIONS,
     rate: float = 1.0,
-    stations: Mapping[str, str] | None = None,
+    stations: Mapping[str, str] | Sequence[str] | None = None,
     *,
     cold: bool = False,
     seed: int = 0,
@@ -35,16 +35,17 @@ def connect(
         Which of "mico", "daqco", "vico" to host, as far as the platform file names them.
     rate : float
         How many times faster than the wall the simulated platform runs at most.
-    stations : mapping of str to str
+    stations : mapping of str to str, or sequence of str
         Other stations by name, with where they listen, such as
-        ``{"fibervision": "tcp/127.0.0.1:7448"}``. What they host is used there and not hosted here.
+        ``{"fibervision": "tcp/127.0.0.1:7448"}``; names alone of stations used before. What they
+        host is used there and not hosted here.
     cold : bool
         Start the simulated platform at power-up, with no position known.
     seed : int
         Of everything random in the simulated platform.
     certificates : path or None
-        Folder certificates of this station, for stations at ``tls/``; None: the one that the
-        platform file names.
+        Folder with the certificates of this program, for stations at ``tls/``; None: the one
+        that the platform file names.
     sample : str or None
         What lies on the simulated plate, as twin.toml names it, such as "forty-dry"; None: the
         fibres that twin.toml lists.
@@ -66,14 +67,11 @@ def connect(
     for name, path in (("config", config), ("truth", truth), ("certificates", certificates)):
         if path is not None:
             check_path(name, path)
-    for station, endpoint in (stations or {}).items():
-        if not (isinstance(station, str) and isinstance(endpoint, str)):
-            raise TypeError(f"connect: stations must map names to endpoints, not {endpoint!r}")
     if isinstance(applications, str):
         applications = (applications,)
     check_applications(applications, "applications")
     uses = Uses(
-        tuple(StationAddress(*each) for each in (stations or {}).items()),
+        _addresses(stations or ()),
         certificates=None if certificates is None else Path(certificates),
     )
     platform = build_platform(
@@ -93,3 +91,13 @@ def connect(
         rig.close()
         raise NotConnectedError(platform.failure)
     return rig
+
+
+def _addresses(stations: Mapping[str, str] | Sequence[str]) -> tuple[StationAddress, ...]:
+    if not isinstance(stations, Mapping):
+        names = (stations,) if isinstance(stations, str) else stations
+        return tuple(StationAddress.known(each) for each in names)
+    for station, endpoint in stations.items():
+        if not (isinstance(station, str) and isinstance(endpoint, str)):
+            raise TypeError(f"connect: stations must map names to endpoints, not {endpoint!r}")
+    return tuple(StationAddress(*each) for each in stations.items())

@@ -179,7 +179,8 @@ def test_init_into_a_file_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[
         (["--listen", "somewhere"], "'somewhere' is no endpoint"),
         (["--name", "fibre station"], "letters, digits, - and _"),
         (["--certificates", "nowhere"], "nowhere/authority.pem: there is no such file"),
-        (["--connect", "fibervision"], "'fibervision' is no station; it reads NAME=tcp/"),
+        (["--connect", "fibervision"], "no station 'fibervision' was used before; used were: none"),
+        (["--connect", "=tcp/1"], "'=tcp/1' is no station; it reads NAME=tcp/"),
         (["--config", "nowhere.toml"], "nowhere.toml: there is no such file"),
     ],
 )

@@ -5,6 +5,7 @@ import sys
 from typing import Final
 
 from cosmic.app.connect import connect
+from cosmic.app.stations.address import endpoints_of
 from cosmic.autonomy.calibrating.registry import (
     CalibrationEntry,
     CalibrationRegistry,
@@ -26,7 +27,13 @@ def run(chosen: argparse.Namespace) -> int:
     """
     rate = 1.0 if chosen.rate is None else chosen.rate
     with connect(
-        chosen.config, rate=rate, cold=chosen.cold, sample=chosen.sample, truth=chosen.truth
+        chosen.config,
+        rate=rate,
+        cold=chosen.cold,
+        sample=chosen.sample,
+        truth=chosen.truth,
+        stations=endpoints_of(chosen),
+        certificates=chosen.certificates,
     ) as rig:
         run = rig.calibrate(anew=chosen.anew, zooms=chosen.zooms)
         run.subscribe(_tell)

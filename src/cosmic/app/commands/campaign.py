@@ -11,6 +11,7 @@ from typing import Final, TextIO
 
 from cosmic.app.connect import connect
 from cosmic.app.panels.campaign.output import gui_application, write_output
+from cosmic.app.stations.address import endpoints_of
 from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.opening import read_recipe, recorded_seed
 from cosmic.autonomy.campaign.recipe import Recipe
@@ -47,7 +48,14 @@ def run(chosen: argparse.Namespace) -> int:
     with (
         ExitStack() as at_end,
         connect(
-            chosen.config, rate=rate, cold=chosen.cold, seed=seed, sample=sample, truth=chosen.truth
+            chosen.config,
+            rate=rate,
+            cold=chosen.cold,
+            seed=seed,
+            sample=sample,
+            truth=chosen.truth,
+            stations=endpoints_of(chosen),
+            certificates=chosen.certificates,
         ) as rig,
     ):
         campaign = rig.campaign(recipe, chosen.out)

@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 from cosmic.app.configuration.platform_file import KNOWN_APPLICATIONS
-from cosmic.app.stations.address import StationAddress
+from cosmic.app.stations.address import StationAddress, remember_stations
 from cosmic.app.stations.remote_station import RemoteStation
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.frame.application import GuiFactory
@@ -110,6 +110,7 @@ def open_stations(
                     raise ConfigError(f"both {host_of[name].name} and {station.name} host {name}")
                 host_of[name] = station
         undo.pop_all()
+    remember_stations(addresses)
     return RemoteApplications(tuple(stations), host_of)
 
 

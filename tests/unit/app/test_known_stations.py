@@ -1,0 +1,55 @@
+"""Stations that answered are remembered, and found again by their name."""
+
+import logging
+
+import pytest
+
+import cosmic
+from cosmic.app.cli import main
+from cosmic.app.stations.address import (
+    StationAddress,
+    known_stations,
+    remember_stations,
+    stations_file,
+)
+from cosmic.frame.errors import ConfigError
+
+VISION = StationAddress("fibervision", "tcp/127.0.0.1:7448")
+STATION = StationAddress("fiberstation", "tls/192.168.1.5:7447")
+
+
+def test_a_station_used_before_is_found_by_its_name_alone(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    remember_stations([VISION])
+    remember_stations([STATION])
+    assert StationAddress.read("fibervision") == VISION
+    assert StationAddress.known("fiberstation") == STATION
+    assert main(["stations"]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "fiberstation=tls/192.168.1.5:7447",
+        "fibervision=tcp/127.0.0.1:7448",
+    ]
+
+
+def test_its_newest_address_holds() -> None:
+    remember_stations([VISION])
+    remember_stations([StationAddress("fibervision", "tcp/127.0.0.1:9999")])
+    assert known_stations() == {"fibervision": "tcp/127.0.0.1:9999"}
+
+
+def test_an_unknown_name_is_refused_with_those_that_are_known() -> None:
+    remember_stations([VISION])
+    with pytest.raises(ConfigError, match=r"no station 'fiber' was used before.*fibervision"):
+        cosmic.connect(stations=["fiber"])
+
+
+def test_a_damaged_file_is_named_and_left_as_it_is(caplog: pytest.LogCaptureFixture) -> None:
+    stations_file().parent.mkdir(parents=True, exist_ok=True)
+    stations_file().write_text("[stations", encoding="utf-8")
+    with caplog.at_level(logging.WARNING):
+        remember_stations([VISION])
+    assert "not remembered" in caplog.text
+    assert stations_file().read_text(encoding="utf-8") == "[stations"
+    with pytest.raises(ConfigError, match=r"stations\.toml: not valid TOML"):
+        StationAddress.read("fibervision")
