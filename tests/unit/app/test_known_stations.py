@@ -27,8 +27,8 @@ def test_a_station_used_before_is_found_by_its_name_alone(
     assert StationAddress.known("fiberstation") == STATION
     assert main(["stations"]) == 0
     assert capsys.readouterr().out.splitlines() == [
-        "fiberstation=tls/192.168.1.5:7447",
         "fibervision=tcp/127.0.0.1:7448",
+        "fiberstation=tls/192.168.1.5:7447",
     ]
 
 
@@ -36,6 +36,15 @@ def test_its_newest_address_holds() -> None:
     remember_stations([VISION])
     remember_stations([StationAddress("fibervision", "tcp/127.0.0.1:9999")])
     assert known_stations() == {"fibervision": "tcp/127.0.0.1:9999"}
+
+
+def test_what_the_user_wrote_into_the_file_stays() -> None:
+    remember_stations([VISION])
+    text = stations_file().read_text(encoding="utf-8")
+    stations_file().write_text(f"{text}# the microscope\n", encoding="utf-8")
+    remember_stations([STATION])
+    assert "# the microscope" in stations_file().read_text(encoding="utf-8")
+    assert set(known_stations()) == {"fibervision", "fiberstation"}
 
 
 def test_an_unknown_name_is_refused_with_those_that_are_known() -> None:

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import tomlkit
 from pydantic import Field
 from PySide6.QtCore import QStandardPaths
 
 from cosmic.frame.config import StrictModel, load_model
 from cosmic.frame.errors import ConfigError
-from cosmic.frame.kept_file import toml, write_whole
+from cosmic.frame.kept_file import write_whole
 
 logger = logging.getLogger(__name__)
 
@@ -121,11 +122,13 @@ def remember_stations(addresses: Iterable[StationAddress]) -> None:
     path = stations_file()
     try:
         known = known_stations()
-        kept = known | {each.name: each.endpoint for each in addresses}
-        if kept == known:
+        fresh = {each.name: each.endpoint for each in addresses}
+        if fresh.items() <= known.items():
             return
         path.parent.mkdir(parents=True, exist_ok=True)
-        lines = (f"{toml(name)} = {toml(endpoint)}\n" for name, endpoint in sorted(kept.items()))
-        write_whole(path, _HEAD + "".join(lines))
+        text = path.read_text(encoding="utf-8") if path.exists() else _HEAD
+        document = tomlkit.parse(text)  # which keeps the user's comments
+        document.setdefault("stations", tomlkit.table()).update(fresh)
+        write_whole(path, document.as_string())
     except (ConfigError, OSError) as exc:
         logger.warning("%s: the stations in use are not remembered: %s", path, exc)
