@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from contract.fake_scu3d import LINEAR_TYPE, NO_TYPE, ROTARY_TYPE, FakeScu3d
+from contract.fake_smaractctl import FakeSmaractctl
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.hw.interface import (
@@ -16,6 +17,8 @@ from cosmic.mico.hw.interface import (
 )
 from cosmic.mico.hw.scu3d import Scu3dController
 from cosmic.mico.hw.sim_scu3d import load_simulated_library
+from cosmic.mico.hw.sim_smaractctl import load_simulated_library as load_simulated_smaractctl
+from cosmic.mico.hw.smaractctl import SmaractCtlController
 
 E = TypeVar("E", bound=Event)
 
@@ -71,3 +74,13 @@ def over_fake() -> Controller:
         104: [ROTARY_TYPE, NO_TYPE, NO_TYPE],
     }
     return Scu3dController(FakeScu3d(devices))
+
+
+def simulated_mcs2() -> Controller:
+    library = load_simulated_smaractctl(clock=ManualClock(auto_advance=True))
+    return SmaractCtlController(library, simulated=True)
+
+
+def mcs2_over_fake() -> Controller:
+    devices = {"MCS2-101": "LLL", "MCS2-102": "LLL", "MCS2-103": "LLN", "MCS2-104": "RNN"}
+    return SmaractCtlController(FakeSmaractctl(devices))

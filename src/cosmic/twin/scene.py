@@ -23,6 +23,7 @@ from cosmic.twin.twin_faults import TwinFaults
 Wiring = tuple[tuple[str | None, ...], ...]
 
 CHANNELS_PER_DEVICE: Final = 3
+DEFAULT_MAKE: Final = "scu3d"
 _KIND_OF_LETTER: Final = {"L": "linear", "R": "rotary", "N": "gripper"}
 
 
@@ -64,6 +65,8 @@ class Scene:
         All stages by name.
     wiring : tuple of tuples of (str or None)
         Name of the stage at each device and channel; None where nothing is connected.
+    makes : tuple of str
+        Make of each device, such as "scu3d".
     at_power_up : mapping of str to AtPowerUp
         What the controllers know of each stage.
     force_side : ForceSide or None
@@ -88,6 +91,7 @@ class Scene:
         seed: int,
         stages: Mapping[str, Stage],
         wiring: Wiring,
+        makes: tuple[str, ...] = (),
         at_power_up: Mapping[str, AtPowerUp],
         force_side: ForceSide | None = None,
         lens: TwinLens | None = None,
@@ -101,6 +105,7 @@ class Scene:
         self.seed = seed
         self.stages = dict(stages)
         self.wiring = wiring
+        self.makes = makes or (DEFAULT_MAKE,) * len(wiring)
         self.at_power_up = dict(at_power_up)
         self.force_side = force_side
         self.lens = lens
@@ -171,6 +176,7 @@ class Scene:
             seed=seed,
             stages=stages,
             wiring=wiring,
+            makes=tuple(device.make for device in settings.devices),
             at_power_up=at_power_up,
             force_side=force_side,
             lens=lens,
@@ -189,6 +195,7 @@ class Scene:
         seed: int = 0,
         *,
         cold: bool = True,
+        channels: tuple[int, int] = (CHANNELS_PER_DEVICE, CHANNELS_PER_DEVICE),
     ) -> Self:
         """Make a scene of bare stages, named "device.channel", such as "0.2".
 
@@ -200,6 +207,8 @@ class Scene:
         cold : bool
             True: just switched on for the first time, nothing in the controllers' memory but the
             sensors' calibration. False: referenced, every stage in the middle of its travel.
+        channels : tuple of int
+            How many letters a device has, at least and at most.
 
         Raises
         ------
@@ -209,7 +218,7 @@ class Scene:
         stages: dict[str, Stage] = {}
         at_power_up: dict[str, AtPowerUp] = {}
         wiring: list[tuple[str | None, ...]] = []
-        for device, letters in enumerate(parse_layout(layout)):
+        for device, letters in enumerate(parse_layout(layout, channels)):
             names = tuple(f"{device}.{channel}" for channel in range(len(letters)))
             wiring.append(names)
             for name, letter in zip(names, letters, strict=True):
@@ -229,6 +238,11 @@ class Scene:
             wiring=tuple(wiring),
             at_power_up=at_power_up,
         )
+
+    def devices_of(self, make: str) -> tuple[int, ...]:
+        """Return the numbers of the devices of one make; all of a scene that has none of it."""
+        fitting = tuple(number for number, each in enumerate(self.makes) if each == make)
+        return fitting or tuple(range(len(self.wiring)))
 
     def close(self) -> None:
         """End the truth; harmless the second time."""
@@ -255,19 +269,23 @@ class Scene:
         return {} if self.force_side is None else self.force_side.tips(now_s)
 
 
-def parse_layout(layout: str) -> tuple[str, ...]:
+def parse_layout(
+    layout: str, channels: tuple[int, int] = (CHANNELS_PER_DEVICE, CHANNELS_PER_DEVICE)
+) -> tuple[str, ...]:
     """Return the letters of each device in `layout`; a comma at the end is no device.
 
     Raises
     ------
     ValueError
-        The text is not groups of three letters L, R, N, separated by commas.
+        The text is not groups of letters L, R, N, separated by commas.
     """
+    low, high = channels
+    most = "three" if low == high == CHANNELS_PER_DEVICE else f"{low} to {high}"
     groups = [group.strip() for group in layout.strip().removesuffix(",").split(",")]
     for number, group in enumerate(groups, start=1):
-        if not re.fullmatch(f"[LRN]{{{CHANNELS_PER_DEVICE}}}", group):
+        if not re.fullmatch(f"[LRN]{{{low},{high}}}", group):
             raise ValueError(
-                f"layout {layout!r}: device {number} is {group!r}; write three letters a device, "
+                f"layout {layout!r}: device {number} is {group!r}; write {most} letters a device, "
                 'L, R or N, and a comma between devices, such as "LLL,RNN"'
             )
     return tuple(groups)

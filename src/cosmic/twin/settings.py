@@ -1,7 +1,7 @@
 """Constants of the twin, as config/twin.toml states them."""
 
 from functools import cache
-from typing import Literal, Self
+from typing import Final, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -17,6 +17,8 @@ from cosmic.twin.handling_settings import HandlingSettings
 from cosmic.twin.lens_settings import LensSettings, LightSettings
 from cosmic.twin.optics.settings import OpticsSettings
 from cosmic.twin.sample_settings import SampleSettings
+
+SCU_CHANNELS: Final = 3
 
 
 class StageKind(StrictModel):
@@ -123,9 +125,22 @@ class ControllerSettings(StrictModel):
 
 
 class DeviceWiring(StrictModel):
-    """What is plugged into one controller; "" where nothing is."""
+    """What is plugged into one controller; "" where nothing is.
 
-    channels: tuple[str, str, str] = Field(strict=False)
+    Attributes
+    ----------
+    make : str
+        "scu3d" with three channels, or "smaractctl" (MCS2) with up to 18.
+    """
+
+    channels: tuple[str, ...] = Field(strict=False, min_length=1, max_length=18)
+    make: Literal["scu3d", "smaractctl"] = "scu3d"
+
+    @model_validator(mode="after")
+    def _as_many_as_it_has(self) -> Self:
+        if self.make == "scu3d" and len(self.channels) != SCU_CHANNELS:
+            raise ValueError(f"an SCU has {SCU_CHANNELS} channels, not {len(self.channels)}")
+        return self
 
 
 class TwinSettings(StrictModel):
@@ -187,6 +202,9 @@ class TwinSettings(StrictModel):
                 raise ValueError(
                     f"stage {name}: power_up_low and power_up_high must rise inside its travel"
                 )
+        makes = [device.make for device in self.devices]
+        if makes != sorted(makes):
+            raise ValueError('devices: those of make "scu3d" come before those of "smaractctl"')
         wired = [name for device in self.devices for name in device.channels if name]
         for name in wired:
             if name not in self.stages:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
-from cosmic.frame.errors import DeviceError
+from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.frame.units import AxisUnit
 
 
@@ -201,6 +201,30 @@ class OtherAnswer:
     text: str
 
 
+@dataclass(frozen=True, slots=True)
+class MatchedMove:
+    """One axis' part of a movement along a straight line.
+
+    Attributes
+    ----------
+    target : float
+        Where it goes, in `unit`.
+    speed, acceleration : float
+        Above 0, per second and per second squared; those of all parts are to each other as their
+        distances, so that all axes are at the same share of their ways at any time.
+    following_error : float
+        How far the axis may lag behind before it counts as failed, in `unit`.
+    """
+
+    channel: Channel
+    target: float
+    unit: AxisUnit
+    hold_s: float
+    speed: float
+    acceleration: float
+    following_error: float
+
+
 Event = (
     Completed
     | Failed
@@ -212,6 +236,12 @@ Event = (
     | SafeDirectionRead
     | OtherAnswer
 )
+
+
+def _unsupported(channel: Channel, what: str) -> DeviceError:
+    text = f"device {channel.device}, channel {channel.channel}: the controller knows no {what}"
+    fault = DeviceFault.UNSUPPORTED
+    return DeviceError(text, fault=fault, device=channel.device, channel=channel.channel)
 
 
 class Controller(Protocol):
@@ -335,6 +365,19 @@ class Controller(Protocol):
     @abstractmethod
     def move_to_end_stop(self, channel: Channel, direction: Direction, *, hold_s: float) -> None:
         """Drive until the travel ends."""
+
+    def set_speed(
+        self, channel: Channel, speed: float, acceleration: float, unit: AxisUnit
+    ) -> None:
+        """Set speed and acceleration of the movements to come; needs `Capabilities.velocity`."""
+        raise _unsupported(channel, f"a speed of {speed} {unit}/s, {acceleration} {unit}/s2")
+
+    def move_together(self, moves: Sequence[MatchedMove]) -> None:
+        """Start movements of one device by one command, all or none.
+
+        Needs `Capabilities.group_start` and `Capabilities.velocity`.
+        """
+        raise _unsupported(moves[0].channel, "a start of several channels by one command")
 
     @abstractmethod
     def stop(self, channel: Channel) -> None:

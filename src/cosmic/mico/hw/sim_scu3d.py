@@ -113,7 +113,7 @@ class SimulatedLibrary:
         self._lock = Lock()
         self._wired = [
             Device(number, scene, self.faults, self._lock, newest_error=newest_error)
-            for number in range(len(scene.wiring))
+            for number in scene.devices_of("scu3d")
         ]
         self._to_open: list[int] = []
         self._opened: list[Device] = []

@@ -61,7 +61,7 @@ class Device:
 
     def _channel(self, scene: Scene, index: int, name: str | None) -> Channel:
         if name is None:
-            stage = Stage(f"nothing at {self.number}.{index}", _NOTHING, start=0.0, seed=0)
+            stage = Stage(f"nothing at {self.number}.{index}", NOTHING, start=0.0, seed=0)
             memory = AtPowerUp(known=False, calibrated=False, scale=0.0)
         else:
             stage, memory = scene.stages[name], scene.at_power_up[name]
@@ -159,7 +159,7 @@ def _strike(channel: Channel, fault: Fault, now_s: float) -> None:
 
 
 # A connector with nothing in it: commands are taken and nothing moves.
-_NOTHING = StageKind(
+NOTHING = StageKind(
     unit="um",
     sensor=False,
     positioner_type=0,
