@@ -319,7 +319,7 @@ class Fibre:
                 depth_um=hold.depth_um,
                 radius_um=edge_um + self.settings.width_um / 2.0,
                 friction=rubbed,
-                turn_rad_un_um=self._contact.jaw_turn_rad_un_um,
+                turn_rad_un_um=math.radians(self._contact.jaw_turn_deg) * 1e-3,
                 side_un_um=self._contact.jaw_side_un_um,
                 stiffness=stiffness,
             )

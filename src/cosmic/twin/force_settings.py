@@ -72,8 +72,8 @@ class ContactSettings(StrictModel):
         How far off a fibre may lie and still be taken.
     clamp_depth_um, clamp_depth_spread_um : float
         How far inside the jaws' tip a fibre is really held; drawn anew for each grasp.
-    jaw_side_un_um, jaw_turn_rad_un_um : float
-        Stiffness of closed jaws across, and by how much a moment in uN um turns a fibre in them.
+    jaw_side_un_um, jaw_turn_deg : float
+        Stiffness of closed jaws across, and by how much 1000 uN um turn a fibre in them.
     probe_friction, friction_turn_um : float
         Of fibre and probe; and travel over which the friction turns round when the probe does.
     """
@@ -87,7 +87,7 @@ class ContactSettings(StrictModel):
     clamp_depth_um: float = Field(ge=0.0)
     clamp_depth_spread_um: float = Field(ge=0.0)
     jaw_side_un_um: float = Field(default=1e9, gt=0.0)
-    jaw_turn_rad_un_um: float = Field(default=0.0, ge=0.0)
+    jaw_turn_deg: float = Field(default=0.0, ge=0.0)
     probe_friction: float = Field(default=0.0, ge=0.0, lt=1.0)
     friction_turn_um: float = Field(default=0.3, gt=0.0)
 

@@ -1,5 +1,7 @@
 """The probe and a held fibre, with stages that move as they do on the platform."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -160,8 +162,10 @@ def test_jaws_that_give_way_make_a_fibre_seem_softer() -> None:
     stiff = 3.0 * EI / 400.0**3
     soft = pushed(before_the_fibre(Bench(settings(jaw_side_un_um=10.0))), 5.0).force_un
     assert rigid / soft == pytest.approx(1.0 + stiff / 10.0, rel=5e-3)
-    turned = pushed(before_the_fibre(Bench(settings(jaw_turn_rad_un_um=2e-7))), 5.0).force_un
-    assert rigid / turned == pytest.approx(1.0 + stiff * 2e-7 * 400.0**2, rel=5e-3)
+    turned = pushed(before_the_fibre(Bench(settings(jaw_turn_deg=0.02))), 5.0).force_un
+    assert rigid / turned == pytest.approx(
+        1.0 + stiff * math.radians(0.02) * 1e-3 * 400.0**2, rel=5e-3
+    )
 
 
 def test_a_stiffness_that_varies_along_the_fibre_is_told_by_the_span() -> None:
