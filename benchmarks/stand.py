@@ -35,7 +35,7 @@ from cosmic.mico.gui.mico_widget import make_mico_gui
 from cosmic.mico.hw.scu3d import Scu3dController
 from cosmic.mico.hw.sim_scu3d import load_simulated_library
 from cosmic.twin.scene import Scene
-from cosmic.twin.settings import DeviceWiring, StagePlace, TwinSettings
+from cosmic.twin.settings import DeviceWiring, StageSettings, TwinSettings
 
 R = TypeVar("R")
 
@@ -189,7 +189,7 @@ def _enlarged(
     ]
     mico = MicoSettings.model_validate({"positioner": positioners})
     wiring = tuple(DeviceWiring(channels=(row[0], row[1], row[2])) for row in names)
-    places = {name: StagePlace(kind="linear", start=0.0) for row in names for name in row}
+    places = {name: StageSettings(kind="linear", start=0.0) for row in names for name in row}
     stages = {**twin.stages, **places}  # the tools of the twin stand on its own ones
     return (
         file.model_copy(update={"mico": mico}),

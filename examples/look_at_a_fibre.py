@@ -43,7 +43,7 @@ def calibrate(rig: cosmic.Rig) -> None:
 
 
 def move_by_click(rig: cosmic.Rig) -> None:
-    """Move the gripper's tip over a place of the image, through the gate as every move."""
+    """Move the gripper's tip over a position of the image, through the gate as every move."""
     camera = rig.vico.camera()
     print(camera.click_to_move((1250.0, 600.0), "right"))
 

@@ -1,6 +1,6 @@
 """Record movements to a readable file, rehearse it, and let the platform make them again.
 
-Then the same for the other assembly, and at another place by a named pose.
+Then the same for the other assembly, and at another position by a named pose.
 """
 
 import tempfile
@@ -30,7 +30,7 @@ def rehearse(mico: Mico, trajectory: Trajectory) -> None:
     print(f"  about {found.duration_s:.1f} s, left.x ends at {found.end['left.x']:.0f} um")
 
 
-def at_another_place(mico: Mico, path: Path) -> None:
+def at_another_position(mico: Mico, path: Path) -> None:
     """Teach the pose anew where the next fibre lies, and run the same file."""
     mico.move({"left.x": -500.0, "left.y": 0.0})
     mico.poses.teach("fibre", "Left assembly")
@@ -58,7 +58,7 @@ def main() -> None:
         rehearse(mico, trajectory)
         mico.trajectories.run(trajectory, start="straight")
         print(f"repeated: left.x is at {mico['left.x'].position_um:.0f} um")
-        at_another_place(mico, path)
+        at_another_position(mico, path)
         with_mistakes(mico)
 
 

@@ -9,17 +9,17 @@ ROWS_UM = (-50.0, 0.0, 50.0)
 
 
 def main() -> None:
-    """Ask the gate about every place first, so that nothing starts that cannot end."""
-    places = [{"probe.x": x, "probe.y": y} for y, x in product(ROWS_UM, COLUMNS_UM)]
+    """Ask the gate about every position first, so that nothing starts that cannot end."""
+    positions = [{"probe.x": x, "probe.y": y} for y, x in product(ROWS_UM, COLUMNS_UM)]
     with cosmic.connect(rate=20) as rig:
-        for place in places:
-            verdict = rig.mico.check(place)
+        for position in positions:
+            verdict = rig.mico.check(position)
             if not verdict.allowed:
-                raise SystemExit(f"{place} cannot be visited: {verdict}")
+                raise SystemExit(f"{position} cannot be visited: {verdict}")
         print("x_um,y_um,x_reached_um,y_reached_um")
-        for place in places:
-            reached = rig.mico.move(place)
-            print(*place.values(), reached["probe.x"], reached["probe.y"], sep=",")
+        for position in positions:
+            reached = rig.mico.move(position)
+            print(*position.values(), reached["probe.x"], reached["probe.y"], sep=",")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Write a procedure: touch a fibre at several places, push it there, and note the stiffness."""
+"""Write a procedure: touch a fibre at several positions, push it there, and note the stiffness."""
 
 from dataclasses import dataclass, field
 
@@ -24,7 +24,7 @@ class Work:
     """What the operations share: the rig, what is left to do, and what was found."""
 
     rig: cosmic.Rig
-    places_um: list[float]
+    positions_um: list[float]
     stiffness_un_um: dict[float, float] = field(default_factory=dict)
 
     @property
@@ -34,14 +34,14 @@ class Work:
 
 
 class BringNear(UnitOperation[Work]):
-    """Bring the next place of the fibre in front of the probe."""
+    """Bring the next position of the fibre in front of the probe."""
 
     name = "bring near"
 
     @override
     def run(self, work: Work) -> Steps:
         yield work.rig.mico["probe.y"].move_to(-4940.0, wait=False)
-        yield work.rig.mico.move({"left.z": -800.0, "left.x": work.places_um[0]}, wait=False)
+        yield work.rig.mico.move({"left.z": -800.0, "left.x": work.positions_um[0]}, wait=False)
         yield SAFE_POINT
 
 
@@ -85,7 +85,7 @@ class Push(UnitOperation[Work]):
         before_un = work.force_un
         yield work.rig.mico["probe.y"].move_by(-10.0, wait=False)
         yield 0.1
-        place_um = work.places_um.pop(0)
+        place_um = work.positions_um.pop(0)
         work.stiffness_un_um[place_um] = (work.force_un - before_un) / 10.0
 
 
@@ -107,15 +107,17 @@ def draw_back(work: Work) -> Steps:
 
 def scan() -> Procedure[Work]:
     """Put the operations together."""
-    one_place = Sequence(
-        "one place",
+    one_position = Sequence(
+        "one position",
         BringNear(),
         Retry(Touch(), times=3, only={"no contact", "lost contact"}),
         Guard(Push(), lambda work: work.force_un < 90.0, cause="force too high"),
         DrawBack(),
     )
-    all_places = Repeat(one_place, until=lambda work: not work.places_um, name="each place")
-    return Procedure("stiffness along a fibre", all_places, make_safe=draw_back)
+    all_positions = Repeat(
+        one_position, until=lambda work: not work.positions_um, name="each position"
+    )
+    return Procedure("stiffness along a fibre", all_positions, make_safe=draw_back)
 
 
 def tell(event: NodeEvent) -> None:
@@ -127,7 +129,7 @@ def tell(event: NodeEvent) -> None:
 def main() -> None:
     """Run it on the simulated platform, ten times as fast as in life."""
     with cosmic.connect(applications=("mico", "daqco"), rate=10.0) as rig:
-        work = Work(rig, places_um=[3600.0, 3500.0, 3400.0])
+        work = Work(rig, positions_um=[3600.0, 3500.0, 3400.0])
         run = rig.procedure(scan(), work)
         run.subscribe(tell)
         run.run_here()

@@ -579,10 +579,10 @@ def test_a_click_into_an_image_that_has_changed_moves_nothing(away: VicoRig) -> 
     away.home.camera.push(noise(1))
     assert soon(lambda: camera.latest() is not None)
     shown = camera.latest()
-    assert shown is not None and camera.images.places is not None
+    assert shown is not None and camera.images.transform is not None
     places.shift_um = 130.0
     with pytest.raises(NotAvailable, match="has changed since"):
-        camera.images.places.move_to(shown, (10.0, 5.0), "left")
+        camera.images.transform.move_to(shown, (10.0, 5.0), "left")
     assert places.moved == []
 
 

@@ -23,11 +23,16 @@ from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Transport
 from cosmic.frame.operation import Task
 from cosmic.vico.api.application import VicoApplication
-from cosmic.vico.api.places import CalibrationShown, Pixel, Places, RotationShown
+from cosmic.vico.api.coordinate_transform import (
+    CalibrationShown,
+    CoordinateTransform,
+    Pixel,
+    RotationShown,
+)
 from cosmic.vico.api.vico import Vico
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.peripheral_settings import LampSettings, MotorLensSettings, ZoomStepSettings
-from cosmic.vico.core.settings import CameraPlace, VicoSettings
+from cosmic.vico.core.settings import CameraConfig, VicoSettings
 from cosmic.vico.hw.factory import make_lens, make_light
 from cosmic.vico.hw.interface import (
     Camera,
@@ -187,7 +192,7 @@ class PushedLibrary(CameraLibrary):
     def close(self) -> None: ...
 
 
-class FlatPlaces(Places):
+class FlatPlaces(CoordinateTransform):
     """A plate that is seen at 2 um a pixel, turned by a quarter; remembers what was to move."""
 
     def __init__(self) -> None:
@@ -203,8 +208,8 @@ class FlatPlaces(Places):
         return ""
 
     @override
-    def platform_um(self, image: CameraImage, place_px: Pixel) -> tuple[float, float]:
-        x, y = place_px
+    def platform_um(self, image: CameraImage, point_px: Pixel) -> tuple[float, float]:
+        x, y = point_px
         return self.shift_um - 2.0 * y, 50.0 + 2.0 * x
 
     @property
@@ -213,10 +218,10 @@ class FlatPlaces(Places):
         return ("left", "right")
 
     @override
-    def move_to(self, image: CameraImage, place_px: Pixel, what: str) -> str:
+    def move_to(self, image: CameraImage, point_px: Pixel, what: str) -> str:
         if what not in self.targets:
             raise ConfigError(f"there is no tool {what!r}")
-        self.moved.append((place_px, what))
+        self.moved.append((point_px, what))
         return f"{what} moves"
 
     @override
@@ -270,7 +275,7 @@ def settings(folder: Path) -> VicoSettings:
     )
     return VicoSettings(
         directory=str(folder),
-        camera=(CameraPlace(name="top", title="From above", behind_lens=True, algorithms=()),),
+        camera=(CameraConfig(name="top", title="From above", behind_lens=True, algorithms=()),),
         lens=MotorLensSettings(backend="simulated", homed=True, step=steps),
         light=LampSettings(backend="simulated"),
     )
@@ -292,7 +297,7 @@ def at_home(
         policy=policy,
     )
     places = FlatPlaces()
-    application.places = places
+    application.transform = places
     home = Home(application, camera, places, policy)
     policy.subscribe(home.failures.append)
     application.initialize()

@@ -86,9 +86,9 @@ from cosmic.mico.core.trajectory.rehearsal import Rehearsal
 from cosmic.mico.hw.input_device import Feedback, InputInfo, InputKind, InputState
 from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
 from cosmic.vico.api.camera import CameraHandle, Seen
+from cosmic.vico.api.coordinate_transform import CalibrationShown, RotationShown
 from cosmic.vico.api.fibres import PlacedFibre
 from cosmic.vico.api.lens import LensHandle, LightHandle
-from cosmic.vico.api.places import CalibrationShown, RotationShown
 from cosmic.vico.api.vico import Vico
 from cosmic.vico.core.camera_recordings import ImageRecordingState
 from cosmic.vico.core.image import CameraImage, Circumstances

@@ -53,7 +53,7 @@ from cosmic.twin.settings import (
     ControllerSettings,
     DeviceWiring,
     StageKind,
-    StagePlace,
+    StageSettings,
     TwinSettings,
 )
 from cosmic.vico.core.peripheral_settings import (
@@ -61,7 +61,7 @@ from cosmic.vico.core.peripheral_settings import (
     MotorLensSettings,
     ZoomStepSettings,
 )
-from cosmic.vico.core.settings import CameraPlace, VicoSettings
+from cosmic.vico.core.settings import CameraConfig, VicoSettings
 from cosmic.vico.core.tool_settings import ToolSettings
 
 # Heading in the page, and the model whose keys its table lists.
@@ -86,7 +86,7 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[[daqco.channel]]": ChannelSettings,
     "[[daqco.limit]]": LimitSettings,
     "[vico]": VicoSettings,
-    "[[vico.camera]]": CameraPlace,
+    "[[vico.camera]]": CameraConfig,
     "[[vico.tool]]": ToolSettings,
     "[vico.lens]": MotorLensSettings,
     "[[vico.lens.step]]": ZoomStepSettings,
@@ -96,7 +96,7 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[kinds.NAME]": StageKind,
     "[controller]": ControllerSettings,
     "[[devices]]": DeviceWiring,
-    "[stages]": StagePlace,
+    "[stages]": StageSettings,
     "[geometry]": GeometrySettings,
     "[geometry.joints]": JointDrive,
     "[geometry.grippers]": GripperGeometry,

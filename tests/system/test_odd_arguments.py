@@ -76,7 +76,7 @@ def sensible(rig: cosmic.Rig) -> dict[str, object]:
         "export.target": "made.csv", "directory": ".",
         "limit": LimitSettings(channel="force", high=100.0),
         "scale": Scale("a", "uN", (0.0, 1.0)), "key": "top", "what": "left",
-        "place_px": (10.0, 10.0),
+        "point_px": (10.0, 10.0),
         "since_s": 0.0, "format_name": "ffv1", "interval_s": 1.0, "count": 1, "target_counts": 10,
         "set_point": 1.0, "gains": PidGains(1.0), "speed": 1.0, "travel": 10.0, "tolerance": 1.0,
         "setpoint_un": 10.0, "device": "none", "profile": "p", "percent": 50.0, "zoom": 2.0,

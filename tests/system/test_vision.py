@@ -194,7 +194,7 @@ def test_the_tips_are_seen_where_stages_and_calibration_expect_them(lab: Lab) ->
         camera.switch("tips", on=False)
     assert tip.name == "right"
     assert tip.certain
-    assert tip.place_px == pytest.approx(lab.tip_px(), abs=1.5)
+    assert tip.point_px == pytest.approx(lab.tip_px(), abs=1.5)
 
 
 # ------------------------------------------------------------------ calibrating

@@ -1,4 +1,4 @@
-"""Measuring about which place the table turns: a fibre on it is followed from angle to angle."""
+"""Measuring about which point the table turns: a fibre on it is followed from angle to angle."""
 
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -73,7 +73,7 @@ class RotationProcedure:
         self._plate_map(self._image(self._clock.now_s()))
         tracker: FibreTracker | None = None
         angles: list[float] = []
-        places: list[Floats] = []
+        lines: list[Floats] = []
         for number, away_deg in enumerate(ANGLES_DEG):
             task.report(number / len(ANGLES_DEG), f"angle {number + 1} of {len(ANGLES_DEG)}")
             since_s = self._mover.go({self._axis: begun_deg + away_deg}, task, self._source)
@@ -89,13 +89,13 @@ class RotationProcedure:
                 if track.fibre is None:
                     raise CalibrationRefused(
                         f"rotation centre: the fibre was lost at {away_deg:+g} degrees: "
-                        f"{track.reason}; choose a place with one clear fibre near the middle"
+                        f"{track.reason}; choose a point with one clear fibre near the middle"
                     )
                 fibre = track.fibre
             angles.append(self._angle(image))
             points = self._plate_map(image).to_um(_points(fibre))
-            places.append(_in_order(points, places[-1] if places else points))
-        return _best(angles, places)
+            lines.append(_in_order(points, lines[-1] if lines else points))
+        return _best(angles, lines)
 
     def _image(self, since_s: float) -> CameraImage:
         return self._unit.thread.next_image(since_s, IMAGE_S)
@@ -144,12 +144,12 @@ def _in_order(points: Floats, before: Floats) -> Floats:
     return points if nearer else turned
 
 
-def _best(angles: list[float], places: list[Floats]) -> RotationFit:
+def _best(angles: list[float], lines: list[Floats]) -> RotationFit:
     """Return the surest circle of those that both ends and the middle go round."""
     fits: list[RotationFit] = []
     refusals: list[CalibrationRefused] = []
     for index in range(3):
-        way = [(float(each[index][0]), float(each[index][1])) for each in places]
+        way = [(float(each[index][0]), float(each[index][1])) for each in lines]
         try:
             fits.append(fit_rotation(angles, way))
         except CalibrationRefused as exc:

@@ -1,4 +1,4 @@
-"""Measuring the map from platform to image: a tool goes to places, its tip is looked for."""
+"""Measuring the map from platform to image: a tool goes to positions, its tip is looked for."""
 
 import math
 from collections.abc import Sequence
@@ -73,17 +73,17 @@ LARGEST_PART: Final = 0.25
 
 @dataclass(frozen=True, slots=True)
 class _Guess:
-    """A first idea of the map: where the tip is seen at a place, and what moves do."""
+    """A first idea of the map: where the tip is seen at a position, and what moves do."""
 
-    place_um: Floats
+    position_um: Floats
     tip_px: Floats
     px_um: Floats
 
-    def px(self, place_um: Floats) -> Floats:
-        return np.asarray(self.tip_px + self.px_um @ (place_um - self.place_um))
+    def px(self, position_um: Floats) -> Floats:
+        return np.asarray(self.tip_px + self.px_um @ (position_um - self.position_um))
 
-    def um(self, place_px: Floats) -> Floats:
-        return np.asarray(self.place_um + np.linalg.solve(self.px_um, place_px - self.tip_px))
+    def um(self, point_px: Floats) -> Floats:
+        return np.asarray(self.position_um + np.linalg.solve(self.px_um, point_px - self.tip_px))
 
 
 class StageProcedure:
@@ -108,7 +108,7 @@ class StageProcedure:
     def run(self, task: Task) -> None:
         """Measure, keep, and go back where the tool was."""
         try:
-            begun = self._place()
+            begun = self._position()
             self._mover.remember()
             try:
                 plane = self._measure(task, begun)
@@ -123,11 +123,11 @@ class StageProcedure:
     def _measure(self, task: Task, begun: Floats) -> Plane:
         first = self._image(self._clock.now_s())
         guess = self._search(task, first, begun[:2])
-        places = self._grid(guess, first)
+        positions = self._grid(guess, first)
         sightings = []
-        for number, place in enumerate(places, start=1):
-            task.report(number / (len(places) + 1), f"place {number} of {len(places)}")
-            seen = self._sight(task, place, guess)
+        for number, position in enumerate(positions, start=1):
+            task.report(number / (len(positions) + 1), f"position {number} of {len(positions)}")
+            seen = self._sight(task, position, guess)
             if seen is not None:
                 sightings.append(seen)
         zoom = self._zoom(first)
@@ -142,7 +142,7 @@ class StageProcedure:
 
     # Where things are
 
-    def _place(self) -> Floats:
+    def _position(self) -> Floats:
         tip = tip_um(self._tool, self._mover.positions())
         if tip is None:
             raise NotAvailable(
@@ -154,7 +154,7 @@ class StageProcedure:
         return self._unit.thread.next_image(since_s, IMAGE_S)
 
     def _zoom(self, image: CameraImage) -> float:
-        if not self._unit.place.behind_lens:
+        if not self._unit.config.behind_lens:
             return 0.0
         zoom = image.circumstances.zoom_counts
         if zoom is None:
@@ -163,7 +163,7 @@ class StageProcedure:
 
     # The first idea
 
-    def _search(self, task: Task, first: CameraImage, place_um: Floats) -> _Guess:
+    def _search(self, task: Task, first: CameraImage, position_um: Floats) -> _Guess:
         """Find the tip by drawing it back twice, then what a step aside does."""
         self._zoom(first)
         scale = first.circumstances.scale_um_px
@@ -176,7 +176,7 @@ class StageProcedure:
         step_um = SEARCH_PART * self._tool.width_um * ahead
         images = [first]
         for times in (1, 2):
-            since_s = self._go(task, place_um - times * step_um)
+            since_s = self._go(task, position_um - times * step_um)
             images.append(self._image(since_s))
         greys = [grey(each.data) for each in images]
         strips = [
@@ -186,8 +186,10 @@ class StageProcedure:
         if strips[0] is None or strips[1] is None:
             raise NotAvailable(self._unseen("nothing like it moved on the image"))
         back_px = strips[1] - strips[0]
-        guess = self._similar(place_um - 2.0 * step_um, strips[1] + 0.5 * back_px, step_um, back_px)
-        seen = self._look(images[-1], guess, guess.place_um, REACH_PX)
+        guess = self._similar(
+            position_um - 2.0 * step_um, strips[1] + 0.5 * back_px, step_um, back_px
+        )
+        seen = self._look(images[-1], guess, guess.position_um, REACH_PX)
         if isinstance(seen, NotSeen):
             raise NotAvailable(self._unseen(seen.reason))
         return self._aside(task, guess, seen, step_um)
@@ -195,28 +197,28 @@ class StageProcedure:
     def _aside(self, task: Task, guess: _Guess, tip_px: Floats, step_um: Floats) -> _Guess:
         """Learn what a step aside does: no idea of the camera's handedness is taken for granted."""
         aside_um = np.array([-step_um[1], step_um[0]])
-        place = guess.place_um + aside_um
-        image = self._image(self._go(task, place))
+        position = guess.position_um + aside_um
+        image = self._image(self._go(task, position))
         moved_px = float(np.linalg.norm(guess.px_um @ step_um))
-        at = _Guess(place, tip_px, guess.px_um)
-        seen = self._look(image, at, place, moved_px + REACH_PX)
+        at = _Guess(position, tip_px, guess.px_um)
+        seen = self._look(image, at, position, moved_px + REACH_PX)
         if isinstance(seen, NotSeen):
             raise NotAvailable(self._unseen(seen.reason))
         both_um = np.column_stack([step_um, aside_um])
         both_px = np.column_stack([guess.px_um @ step_um, seen - tip_px])
-        return _Guess(guess.place_um, tip_px, both_px @ np.linalg.inv(both_um))
+        return _Guess(guess.position_um, tip_px, both_px @ np.linalg.inv(both_um))
 
     @staticmethod
-    def _similar(place: Floats, tip_px: Floats, step_um: Floats, back_px: Floats) -> _Guess:
+    def _similar(position: Floats, tip_px: Floats, step_um: Floats, back_px: Floats) -> _Guess:
         """Return a map that turns and stretches, from what a step back did; y is up, rows down."""
         one = complex(*(-back_px)) / complex(step_um[0], -step_um[1])
         turn = np.array([[one.real, -one.imag], [one.imag, one.real]])
-        return _Guess(place, tip_px, turn @ np.array([[1.0, 0.0], [0.0, -1.0]]))
+        return _Guess(position, tip_px, turn @ np.array([[1.0, 0.0], [0.0, -1.0]]))
 
-    # Places
+    # Positions
 
     def _grid(self, guess: _Guess, first: CameraImage) -> Sequence[Floats]:
-        """Return places at which the tip and enough of the tool are on the image, to and fro."""
+        """Return positions at which the tip and enough of the tool are on the image, to and fro."""
         height, width = first.data.shape[:2]
         scale_px_um = math.sqrt(abs(float(np.linalg.det(guess.px_um))))
         jaw_px = self._tool.width_um * scale_px_um
@@ -240,11 +242,11 @@ class StageProcedure:
             [guess.um(centre + half * (x, y)) for x in (steps if i % 2 == 0 else steps[::-1])]
             for i, y in enumerate(steps)
         ]
-        return [place for row in rows for place in row]
+        return [position for row in rows for position in row]
 
-    def _sight(self, task: Task, place_um: Floats, guess: _Guess) -> Sighting | None:
-        image = self._image(self._go(task, place_um))
-        stood = tip_um(self._tool, image.circumstances.positions) or tuple(self._place())
+    def _sight(self, task: Task, position_um: Floats, guess: _Guess) -> Sighting | None:
+        image = self._image(self._go(task, position_um))
+        stood = tip_um(self._tool, image.circumstances.positions) or tuple(self._position())
         seen = self._look(image, guess, np.array(stood[:2]), REACH_PX)
         if isinstance(seen, NotSeen):
             return None
@@ -252,10 +254,10 @@ class StageProcedure:
         return Sighting((stood[0], stood[1]), (float(sensor[0]), float(sensor[1])))
 
     def _look(
-        self, image: CameraImage, guess: _Guess, place_um: Floats, reach_px: float
+        self, image: CameraImage, guess: _Guess, position_um: Floats, reach_px: float
     ) -> Floats | NotSeen:
         """Return where the tip is seen, in the image's pixels."""
-        tip = guess.px(place_um)
+        tip = guess.px(position_um)
         forward = guess.px_um @ np.array(self._tool.forward)
         scale_px_um = math.sqrt(abs(float(np.linalg.det(guess.px_um))))
         gap_um = max(0.0, image.circumstances.positions.get(self._tool.gap_axis, 0.0))
@@ -272,15 +274,15 @@ class StageProcedure:
             return found
         return np.array(found.hold_px if isinstance(found, GripperTips) else found.tip_px)
 
-    def _on_sensor(self, place_px: Floats, image: CameraImage) -> Floats:
-        """Return a place in unbinned pixels of the whole sensor."""
+    def _on_sensor(self, point_px: Floats, image: CameraImage) -> Floats:
+        """Return a position in unbinned pixels of the whole sensor."""
         settings = self._unit.thread.settings
         if settings is None:
             raise NotAvailable(f"{image.camera}: the camera was lost")
-        return whole_sensor_px(place_px, settings)
+        return whole_sensor_px(point_px, settings)
 
-    def _go(self, task: Task, place_um: Floats) -> float:
-        x_um, y_um = place_um.tolist()
+    def _go(self, task: Task, position_um: Floats) -> float:
+        x_um, y_um = position_um.tolist()
         return self._mover.go(axis_targets(self._tool, x_um, y_um), task, self._source)
 
     def _unseen(self, reason: str) -> str:
@@ -290,15 +292,15 @@ class StageProcedure:
         )
 
 
-def whole_sensor_px(place_px: Floats, settings: CameraSettings) -> Floats:
-    """Return a place of an image in unbinned pixels of the whole sensor."""
+def whole_sensor_px(point_px: Floats, settings: CameraSettings) -> Floats:
+    """Return a position of an image in unbinned pixels of the whole sensor."""
     corner = np.array([settings.roi.x_px, settings.roi.y_px], dtype=np.float64)
-    return np.asarray((place_px + corner) * settings.binning + 0.5 * (settings.binning - 1))
+    return np.asarray((point_px + corner) * settings.binning + 0.5 * (settings.binning - 1))
 
 
 def _said(fit: MapFit) -> str:
     left_out = f", {len(fit.outliers)} left out" if fit.outliers else ""
     return (
         f"{fit.map.scale_um_px:.4g} µm a pixel, residual {fit.rms_px:.2f} px at "
-        f"{fit.map.points} places{left_out}"
+        f"{fit.map.points} positions{left_out}"
     )

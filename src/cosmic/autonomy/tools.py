@@ -25,7 +25,7 @@ def tip_um(tool: ToolSettings, positions: Mapping[str, float]) -> Place | None:
 
 
 def axis_targets(tool: ToolSettings, x_um: float, y_um: float) -> dict[str, float]:
-    """Return where its axes stand with its tip over a place on the platform."""
+    """Return where its axes stand with its tip over a position on the platform."""
     return {tool.x_axis: x_um - tool.tip_um[0], tool.y_axis: y_um - tool.tip_um[1]}
 
 

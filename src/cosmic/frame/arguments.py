@@ -69,10 +69,10 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
         if checks is None:  # not before: what annotations name may be loaded later
             checks = _checks_of(function, signature)
         given: list[object] = list(args)
-        for place, value in enumerate(args):
-            name = names[place] if place < len(names) else several
+        for index, value in enumerate(args):
+            name = names[index] if index < len(names) else several
             if name in checks and name is not None:
-                given[place] = _taken(checks[name], name, value, function)
+                given[index] = _taken(checks[name], name, value, function)
         named: dict[str, object] = {
             name: _taken(checks[name], name, value, function) if name in checks else value
             for name, value in kwargs.items()

@@ -36,7 +36,7 @@ def install_hooks(policy: FailurePolicy) -> Callable[[], None]:
         if isinstance(error, (KeyboardInterrupt, SystemExit)):
             before[0](kind, error, trace)
             return
-        policy.report(error.with_traceback(trace), _place(trace))
+        policy.report(error.with_traceback(trace), _where_in(trace))
 
     def on_thread_exception(args: threading.ExceptHookArgs) -> None:
         if args.exc_value is not None:
@@ -61,12 +61,12 @@ def install_hooks(policy: FailurePolicy) -> Callable[[], None]:
     return undo
 
 
-def _place(trace: TracebackType | None) -> str:
+def _where_in(trace: TracebackType | None) -> str:
     """Name the innermost function of CoSMic that was running, or the outermost of all."""
-    place = ""
+    where = ""
     while trace is not None:
         module = str(trace.tb_frame.f_globals.get("__name__", "?"))
-        if module != overrides.__name__ and (module.startswith("cosmic.") or not place):
-            place = f"{module}.{trace.tb_frame.f_code.co_qualname}"
+        if module != overrides.__name__ and (module.startswith("cosmic.") or not where):
+            where = f"{module}.{trace.tb_frame.f_code.co_qualname}"
         trace = trace.tb_next
-    return place or "window"
+    return where or "window"

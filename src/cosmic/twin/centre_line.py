@@ -1,4 +1,4 @@
-"""The middle of a fibre as a chain of points, and places along it."""
+"""The middle of a fibre as a chain of points, and positions along it."""
 
 import math
 from functools import cached_property
@@ -41,7 +41,7 @@ class CentreLine:
         return len(self.points_um) == 2
 
     def point(self, at_um: float) -> Floats:
-        """Return the place `at_um` along the line, shape (2,)."""
+        """Return the position `at_um` along the line, shape (2,)."""
         return np.array([np.interp(at_um, self.arcs_um, column) for column in self.points_um.T])
 
     def heading(self, at_um: float) -> float:
@@ -52,7 +52,7 @@ class CentreLine:
         return math.atan2(dy, dx)
 
     def part(self, low_um: float, high_um: float) -> tuple[Floats, Floats]:
-        """Return arcs, shape (m,), and points, shape (m, 2), from one place to another."""
+        """Return arcs, shape (m,), and points, shape (m, 2), from one position to another."""
         between = self.arcs_um[(self.arcs_um > low_um) & (self.arcs_um < high_um)]
         arcs = np.concatenate([[low_um], between, [high_um]])
         points = [np.interp(arcs, self.arcs_um, column) for column in self.points_um.T]

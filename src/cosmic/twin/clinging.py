@@ -14,19 +14,19 @@ class Clinging:
     ----------
     key : str
         Names seed, fibre and grasp: the same key, the same number of tries.
-    place : (float, float, float)
+    position : (float, float, float)
         Of the jaw's tip, um, world.
     """
 
-    def __init__(self, handling: HandlingSettings, key: str, place: Point) -> None:
+    def __init__(self, handling: HandlingSettings, key: str, position: Point) -> None:
         self._handling = handling
         self._chance = random.Random(f"free {key}")
-        self._turns = list(place)
+        self._turns = list(position)
         self._ways = [0, 0, 0]
-        self._last = place
+        self._last = position
         self._wiped_um = 0.0
 
-    def look(self, place: Point, low_um: float) -> str:
+    def look(self, position: Point, low_um: float) -> str:
         """Follow the jaw and return "shaken" or "wiped" once the fibre is free, else "".
 
         Parameters
@@ -34,11 +34,11 @@ class Clinging:
         low_um : float
             Below this height above the plate the fibre touches it.
         """
-        if self._shaken(place):
+        if self._shaken(position):
             return "shaken"
-        way = math.dist(place[:2], self._last[:2])
-        self._last = place
-        if place[2] >= low_um:
+        way = math.dist(position[:2], self._last[:2])
+        self._last = position
+        if position[2] >= low_um:
             return ""
         self._wiped_um += way
         if self._wiped_um < self._handling.wipe_um:
@@ -46,8 +46,8 @@ class Clinging:
         self._wiped_um = 0.0
         return "wiped" if self._chance.random() < self._handling.wipe_frees else ""
 
-    def _shaken(self, place: Point) -> bool:
-        for axis, now in enumerate(place):
+    def _shaken(self, position: Point) -> bool:
+        for axis, now in enumerate(position):
             since = now - self._turns[axis]
             way = self._ways[axis]
             if way == 0:

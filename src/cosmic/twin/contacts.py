@@ -1,7 +1,7 @@
 """Which bodies of the platform run into each other, found by the twin's own geometry.
 
 Written apart from the collision gate, to score it: bodies are convex and only slide, so for each
-pair the set of places where they overlap is a polytope that is computed once.
+pair the set of positions where they overlap is a polytope that is computed once.
 """
 
 import math
@@ -92,16 +92,16 @@ class Contacts:
 
     def look(self, values: Mapping[str, float], time_s: float, offsets: ToolOffsets) -> float:
         """Compare all bodies where needed, and return how far the nearest may still go, um."""
-        places = self._origins + self._ways @ [values[name] for name in self._stages]
+        positions = self._origins + self._ways @ [values[name] for name in self._stages]
         if not offsets.still:
             for tool, numbers in self._of_tool.items():
-                places[numbers] += offsets.at(tool, time_s)
-        gone = 2.0 * float(np.abs(places - self._looked_at).max())
+                positions[numbers] += offsets.at(tool, time_s)
+        gone = 2.0 * float(np.abs(positions - self._looked_at).max())
         if self._slack_um > gone or (self._by_design is not None and time_s < self._next_s):
             return max(self._slack_um - gone, FINEST_UM)
         self._next_s = time_s + CHECK_S
-        self._looked_at = places
-        depths = self._depths(values, places)
+        self._looked_at = positions
+        depths = self._depths(values, positions)
         if self._by_design is None:
             self._by_design = frozenset(depths)
         for pair, depth in depths.items():
@@ -173,8 +173,10 @@ class Contacts:
 
     # ------------------------------------------------------------------ depth
 
-    def _depths(self, values: Mapping[str, float], places: Floats) -> dict[tuple[str, str], float]:
-        low, high = self._low + places, self._high + places
+    def _depths(
+        self, values: Mapping[str, float], positions: Floats
+    ) -> dict[tuple[str, str], float]:
+        low, high = self._low + positions, self._high + positions
         first, second = self._first, self._second
         apart = np.maximum(low[first] - high[second], low[second] - high[first]).max(axis=1)
         self._slack_um = float(apart.min(initial=math.inf))
@@ -182,9 +184,9 @@ class Contacts:
         for pair in np.flatnonzero(apart < 0.0).tolist():
             one, two = int(first[pair]), int(second[pair])
             normals, reach = self._overlap(one, two)
-            depth = float((reach - normals @ (places[two] - places[one])).min())
+            depth = float((reach - normals @ (positions[two] - positions[one])).min())
             self._keep(found, (self._links[one], self._links[two]), depth)
-        self._on_plate(found, values, places, low)
+        self._on_plate(found, values, positions, low)
         return found
 
     def _keep(
@@ -206,14 +208,16 @@ class Contacts:
 
     def _top_um(self) -> float:
         """Return the height of the highest thing on the plate."""
-        place = float(self._skeleton.pose(self._plate, dict.fromkeys(self._stage_names, 0.0))[2, 3])
-        return max(float(box[1, 2]) for box in self._boxes) + place
+        position = float(
+            self._skeleton.pose(self._plate, dict.fromkeys(self._stage_names, 0.0))[2, 3]
+        )
+        return max(float(box[1, 2]) for box in self._boxes) + position
 
     def _on_plate(
         self,
         found: dict[tuple[str, str], float],
         values: Mapping[str, float],
-        places: Floats,
+        positions: Floats,
         low: Floats,
     ) -> None:
         """Add what stands in the plate or its clip: corners of one in the other."""
@@ -224,7 +228,7 @@ class Contacts:
             self._slack_um = min(self._slack_um, above)
             if above >= 0.0:
                 continue
-            corners = (self._corners[number] + places[number] - plate[:3, 3]) @ plate[:3, :3]
+            corners = (self._corners[number] + positions[number] - plate[:3, 3]) @ plate[:3, :3]
             for box in self._boxes:
                 inside = np.minimum(corners - box[0], box[1] - corners).min(axis=1)
                 depth = float(inside.max())

@@ -91,7 +91,7 @@ class Line:
     peeled_um: float = math.inf
 
     def abscissa_um(self, x_um: float) -> float:
-        """Return how far along the fibre a place in x is."""
+        """Return how far along the fibre a position in x is."""
         return (x_um - self.start[0]) * self.towards
 
     def y_um(self, along_um: float) -> float:
@@ -161,7 +161,7 @@ class Fibre:
     # ------------------------------------------------------------------ grasp and release
 
     def grip(self, tool: Tool, *, at_um: float, outwards: int, fate: Fate) -> None:
-        """Have a gripper hold the fibre at a place along it."""
+        """Have a gripper hold the fibre at a position along it."""
         self.holds[tool.name] = make_hold(self.line_um, at_um, outwards, tool.towards, fate)
         self.carried = None
 

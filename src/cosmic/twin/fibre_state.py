@@ -50,17 +50,17 @@ class FibreState:
     anchor: str
     relative_um: Floats
     tension_un: float
-    _place: Floats
+    _position: Floats
 
     @property
     def line_um(self) -> Floats:
         """Its middle in the world, shape (n, 3), um, not counting what the probe does to it."""
         if self.where not in ("plate", "gone"):
-            return np.asarray(self.relative_um + self._place)
+            return np.asarray(self.relative_um + self._position)
         flat = self.shape.placed(*self.plate_pose)
         height = np.full(len(flat), 0.5 * self.settings.thickness_um)
         whole = np.column_stack([flat, height, np.ones(len(flat))])
-        return np.asarray((whole @ self._place.T)[:, :3])
+        return np.asarray((whole @ self._position.T)[:, :3])
 
     @property
     def ends_um(self) -> tuple[Point, Point]:
@@ -77,7 +77,7 @@ def state_of(
 ) -> FibreState:
     """Return what is true of a fibre now."""
     where: Where = "gone" if fibre.gone else "plate"
-    anchor, relative, place, tension = "", _NONE, plate, 0.0
+    anchor, relative, position, tension = "", _NONE, plate, 0.0
     if fibre.holds:
         where, anchor = "held", f"{next(iter(fibre.holds))}.hold"
         relative = fibre.held_um(tools)
@@ -87,7 +87,7 @@ def state_of(
         carried = fibre.carried
         where, anchor, relative = carried.why, carried.anchor, carried.line_um
     if anchor:
-        place = np.array(tips[anchor])
+        position = np.array(tips[anchor])
     return FibreState(
         fibre.number,
         fibre.settings,
@@ -98,5 +98,5 @@ def state_of(
         anchor,
         relative,
         tension,
-        place,
+        position,
     )

@@ -13,7 +13,7 @@ from cosmic.twin.timeline import Floats, Timeline
 from cosmic.twin.tools import make_skeleton
 from cosmic.twin.truth import NO_TRUTH, Truth
 from cosmic.twin.twin_faults import TwinFaults
-from cosmic.twin.workplace import Workplace
+from cosmic.twin.workspace import Workspace
 
 RIGID_UN_UM: Final = 1e9
 """Stiffness of a probe without a sensor."""
@@ -65,7 +65,7 @@ class ForceSide:
         self.skeleton = make_skeleton(settings, folder)
         on_probe = [each for each in settings.force_sensors.values() if each.mounted_on]
         stiffness = on_probe[0].stiffness_un_um if on_probe else RIGID_UN_UM
-        self._workplace = Workplace(
+        self._workspace = Workspace(
             settings,
             self.skeleton,
             sensor_un_um=stiffness,
@@ -74,8 +74,8 @@ class ForceSide:
             truth=truth,
             folder=None if truth is NO_TRUTH else folder,
         )
-        self.offsets = self._workplace.offsets
-        self._timeline = Timeline(self._workplace, stages, settings.contact.step_s)
+        self.offsets = self._workspace.offsets
+        self._timeline = Timeline(self._workspace, stages, settings.contact.step_s)
         self.sensors = {
             name: ForceSensor(name, each, self.force_un if each.mounted_on else None, seed)
             for name, each in settings.force_sensors.items()
@@ -114,4 +114,4 @@ class ForceSide:
     def tips(self, now_s: float) -> dict[str, Point]:
         """Return where the tips of the tools are, um, world; see `Workplace.tips`."""
         values = {name: each.position_then(now_s) for name, each in self._stages.items()}
-        return self._workplace.tips(values, now_s)
+        return self._workspace.tips(values, now_s)

@@ -46,7 +46,7 @@ class Free:
         return 0.0 if self._straight else self._at(self._aside, along_um)
 
     def beyond_um(self, along_um: float) -> float:
-        """Return the length of fibre beyond the place."""
+        """Return the length of fibre beyond the position."""
         return self.length_um - along_um if self._straight else self._at(self._beyond, along_um)
 
     def _at(self, values: list[float], along_um: float) -> float:
@@ -64,7 +64,7 @@ class Hold:
     Attributes
     ----------
     at_um : float
-        Place on the fibre, from its first end, where it leaves the jaws.
+        Position on the fibre, from its first end, where it leaves the jaws.
     outwards : int
         +1: the fibre's second end is the one outside the jaws.
     towards : int
@@ -93,7 +93,7 @@ class Hold:
 
 
 def make_hold(line: CentreLine, at_um: float, outwards: int, towards: int, fate: Fate) -> Hold:
-    """Return the grip on a fibre at a place: straight inside the jaws, as it grew outside.
+    """Return the grip on a fibre at a position: straight inside the jaws, as it grew outside.
 
     Where it leaves the jaws it points along them.
     """

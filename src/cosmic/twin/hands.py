@@ -180,8 +180,8 @@ class Hands:
         if fate.slip_at_um < math.inf and fibre.height_um(tool) > fate.slip_at_um:
             self._lose(fibre, tool, around, "slipped")
         elif fate.drop_after_um < math.inf and not fibre.on_plate:
-            place, way = self._came_um[fibre.number]
-            way += math.dist(place, tool.hold)
+            position, way = self._came_um[fibre.number]
+            way += math.dist(position, tool.hold)
             self._came_um[fibre.number] = tool.hold, way
             if way > fate.drop_after_um:
                 self._lose(fibre, tool, around, "dropped")
@@ -266,8 +266,8 @@ class Hands:
         if carried is None:
             del self._clinging[number]
             return
-        place = around.anchor(carried.anchor)
-        how = self._clinging[number].look(place, self._contact.grasp_height_um)
+        position = around.anchor(carried.anchor)
+        how = self._clinging[number].look(position, self._contact.grasp_height_um)
         if how:
             del self._clinging[number]
             tool = around.tools[carried.anchor.partition(".")[0]]

@@ -37,7 +37,7 @@ class Joint:
 
     Attributes
     ----------
-    place : ndarray, shape (4, 4), float64
+    position : ndarray, shape (4, 4), float64
         `parent_from_child` while the joint stands at zero.
     axis : ndarray, shape (3,), float64
         Unit vector in the child's frame.
@@ -48,21 +48,21 @@ class Joint:
     name: str
     kind: str
     parent: str
-    place: Floats
+    offset: Floats
     axis: Floats
     drive: Drive | None
 
     def parent_from_child(self, values: Mapping[str, float]) -> Floats:
         """Return where the child is, shape (4, 4), um, with the stages at `values`."""
         if self.drive is None:
-            return self.place
+            return self.offset
         way = self.drive.factor * values[self.drive.stage]
         motion = np.eye(4)
         if self.kind == "prismatic":
             motion[:3, 3] = way * self.axis
         else:
             motion[:3, :3] = _turn(self.axis, math.radians(way))
-        return np.asarray(self.place @ motion)
+        return np.asarray(self.offset @ motion)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +136,7 @@ class Skeleton:
         pose = np.eye(4)
         ways: list[tuple[str, Point]] = []
         for joint in self._chain(link):
-            pose = pose @ joint.place
+            pose = pose @ joint.offset
             if joint.drive is None:
                 continue
             if joint.kind != "prismatic":
@@ -192,10 +192,10 @@ def _joint(path: Path, element: ET.Element, drives: Mapping[str, Drive]) -> tupl
     if kind not in _KINDS:
         raise ConfigError(f"{path}: joint {name}: the twin knows no {kind} joints")
     origin, axis = element.find("origin"), element.find("axis")
-    place = np.eye(4)
+    offset = np.eye(4)
     if origin is not None:
-        place[:3, :3] = from_rpy(*_numbers(origin.get("rpy", "0 0 0")))
-        place[:3, 3] = np.array(_numbers(origin.get("xyz", "0 0 0"))) * UM_PER_M
+        offset[:3, :3] = from_rpy(*_numbers(origin.get("rpy", "0 0 0")))
+        offset[:3, 3] = np.array(_numbers(origin.get("xyz", "0 0 0"))) * UM_PER_M
     vector = np.array(_numbers("1 0 0" if axis is None else axis.attrib["xyz"]))
     length = float(np.linalg.norm(vector))
     if not 0.0 < length < math.inf:
@@ -204,7 +204,7 @@ def _joint(path: Path, element: ET.Element, drives: Mapping[str, Drive]) -> tupl
     if drive is not None and kind == "fixed":
         raise ConfigError(f"{path}: joint {name} is fixed; no stage can drive it")
     parent = _link(element, "parent")
-    return _link(element, "child"), Joint(name, kind, parent, place, vector / length, drive)
+    return _link(element, "child"), Joint(name, kind, parent, offset, vector / length, drive)
 
 
 def _link(element: ET.Element, which: str) -> str:

@@ -15,7 +15,7 @@ from cosmic.twin.settings import TwinSettings
 Floats = npt.NDArray[np.float64]
 
 TRIES: Final = 4000
-"""Places tried for one fibre before the plate is called full."""
+"""Positions tried for one fibre before the plate is called full."""
 
 NODE_UM: Final = 30.0
 """Fibres are kept apart by points so far apart along them."""
@@ -35,8 +35,8 @@ def put_on(settings: TwinSettings, name: str, seed: int) -> TwinSettings:
         raise ConfigError(f"sample: there is no sample {name!r} in twin.toml; known: {known}")
     stages = dict(settings.stages)
     for gripper in settings.geometry.grippers.values():
-        place = stages[gripper.stage]
-        stages[gripper.stage] = place.model_copy(update={"start": sample.gap_um})
+        position = stages[gripper.stage]
+        stages[gripper.stage] = position.model_copy(update={"start": sample.gap_um})
     fibres = Spread(name, sample, seed).fibres()
     handling = settings.handling.model_copy(update={"default_faults": sample.faults})
     return settings.model_copy(update={"fibres": fibres, "stages": stages, "handling": handling})
@@ -70,13 +70,13 @@ class Spread:
         found: list[FibreSettings] = []
         # Pairs first: they need the most room.
         for _ in range(sample.crossing):
-            found += self._placed(self._pair("crossing", len(found)))
+            found += self._located(self._pair("crossing", len(found)))
         for _ in range(sample.stuck):
-            found += self._placed(self._pair("stuck", len(found)))
+            found += self._located(self._pair("stuck", len(found)))
         for _ in range(sample.single):
-            found += self._placed([self._drawn("single")])
+            found += self._located([self._drawn("single")])
         for _ in range(sample.debris):
-            found += self._placed([self._piece()])
+            found += self._located([self._piece()])
         return tuple(found)
 
     # ------------------------------------------------------------------ drawing
@@ -147,7 +147,7 @@ class Spread:
 
     # ------------------------------------------------------------------ finding room
 
-    def _placed(self, group: list[FibreSettings]) -> list[FibreSettings]:
+    def _located(self, group: list[FibreSettings]) -> list[FibreSettings]:
         """Return a group somewhere on the plate where it touches nothing else."""
         lines = [dense(centre_line_um(each)) for each in group]
         halves = np.concatenate(
@@ -176,7 +176,7 @@ class Spread:
     def _free(self, points: Floats, halves: Floats) -> bool:
         if (np.hypot(points[:, 0], points[:, 1]) > self._sample.radius_um).any():
             return False
-        # Most places are bad, and a few points show it.
+        # Most positions are bad, and a few points show it.
         return self._clear(points[::8], halves[::8]) and self._clear(points, halves)
 
     def _clear(self, points: Floats, halves: Floats) -> bool:
@@ -208,5 +208,5 @@ def dense(line: Floats) -> Floats:
     """Return points at most `NODE_UM` apart along a line."""
     steps = np.hypot(*np.diff(line, axis=0).T)
     along = np.concatenate([[0.0], np.cumsum(steps)])
-    places = np.linspace(0.0, along[-1], max(int(along[-1] / NODE_UM) + 2, 2))
-    return np.column_stack([np.interp(places, along, line[:, axis]) for axis in (0, 1)])
+    positions = np.linspace(0.0, along[-1], max(int(along[-1] / NODE_UM) + 2, 2))
+    return np.column_stack([np.interp(positions, along, line[:, axis]) for axis in (0, 1)])

@@ -151,12 +151,12 @@ class Scene:
         """
         stages: dict[str, Stage] = {}
         at_power_up: dict[str, AtPowerUp] = {}
-        for name, place in settings.stages.items():
-            kind = settings.kinds[place.kind]
-            start = _somewhere(place.at_power_up(kind), name, seed) if cold else place.start
+        for name, stage in settings.stages.items():
+            kind = settings.kinds[stage.kind]
+            start = _somewhere(stage.at_power_up(kind), name, seed) if cold else stage.start
             stages[name] = Stage(name, kind, start=start, seed=seed)
             known = kind.sensor and not cold
-            forward = place.safe_direction == "forward"
+            forward = stage.safe_direction == "forward"
             at_power_up[name] = AtPowerUp(
                 known=known,
                 calibrated=True,
@@ -298,7 +298,7 @@ def _kind(settings: TwinSettings, name: str) -> StageKind:
 
 
 def _somewhere(region: tuple[float, float], name: str, seed: int) -> float:
-    """Return a place where nobody left the stage on purpose: never the middle."""
+    """Return a position where nobody left the stage on purpose: never the middle."""
     low, high = region
     chance = random.Random(f"power-up {name} {seed}")
     part = chance.uniform(0.0, 0.4) if chance.random() < 0.5 else chance.uniform(0.6, 1.0)

@@ -68,7 +68,7 @@ class StageKind(StrictModel):
         return self
 
 
-class StagePlace(StrictModel):
+class StageSettings(StrictModel):
     """One stage of the platform: its kind and where it stands when found warm.
 
     Attributes
@@ -149,7 +149,7 @@ class TwinSettings(StrictModel):
     kinds: dict[str, StageKind]
     controller: ControllerSettings
     devices: tuple[DeviceWiring, ...] = Field(strict=False, min_length=1)
-    stages: dict[str, StagePlace]
+    stages: dict[str, StageSettings]
     geometry: GeometrySettings
     contact: ContactSettings
     fibres: tuple[FibreSettings, ...] = Field(default=(), strict=False)
@@ -177,9 +177,9 @@ class TwinSettings(StrictModel):
                 )
             if fibre.bonded_to is not None and not fibre.bonded_to < number:
                 raise ValueError(f"fibres[{number}].bonded_to must be the number of one before it")
-        for place, name in self.sensor_wiring.items():
+        for channel, name in self.sensor_wiring.items():
             if name not in self.force_sensors:
-                raise ValueError(f"sensor_wiring.{place}: there is no force sensor {name!r}")
+                raise ValueError(f"sensor_wiring.{channel}: there is no force sensor {name!r}")
         for name, sensor in self.force_sensors.items():
             if sensor.mounted_on not in ("probe", ""):
                 raise ValueError(f'force_sensors.{name}.mounted_on must be "probe" or ""')
@@ -187,17 +187,17 @@ class TwinSettings(StrictModel):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        for name, place in self.stages.items():
-            kind = self.kinds.get(place.kind)
+        for name, stage in self.stages.items():
+            kind = self.kinds.get(stage.kind)
             if kind is None:
                 known = ", ".join(self.kinds)
-                raise ValueError(f"stage {name} is of unknown kind {place.kind!r}; known: {known}")
-            if not kind.low <= place.start <= kind.high:
+                raise ValueError(f"stage {name} is of unknown kind {stage.kind!r}; known: {known}")
+            if not kind.low <= stage.start <= kind.high:
                 raise ValueError(
-                    f"stage {name} starts at {place.start} {kind.unit}, "
+                    f"stage {name} starts at {stage.start} {kind.unit}, "
                     f"outside its travel {kind.low} to {kind.high}"
                 )
-            low, high = place.at_power_up(kind)
+            low, high = stage.at_power_up(kind)
             if not kind.low <= low <= high <= kind.high:
                 raise ValueError(
                     f"stage {name}: power_up_low and power_up_high must rise inside its travel"

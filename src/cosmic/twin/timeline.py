@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from cosmic.twin.felt import Felt, Moment
 from cosmic.twin.stage import Path, Stage
-from cosmic.twin.workplace import Workplace
+from cosmic.twin.workspace import Workspace
 
 Floats = npt.NDArray[np.float64]
 
@@ -98,9 +98,9 @@ class Timeline:
     that ask, or that keep up when nobody does.
     """
 
-    def __init__(self, workplace: Workplace, stages: Mapping[str, Stage], step_s: float) -> None:
-        self._workplace = workplace
-        self._tracks = tuple(Track(stages[name]) for name in sorted(workplace.stages))
+    def __init__(self, workspace: Workspace, stages: Mapping[str, Stage], step_s: float) -> None:
+        self._workspace = workspace
+        self._tracks = tuple(Track(stages[name]) for name in sorted(workspace.stages))
         self._step_s = step_s
         self._lock = Lock()
         self._felt = Felt()
@@ -148,13 +148,13 @@ class Timeline:
         """Return the whole truth at `time_s`, or at the latest look if that is later."""
         with self._lock:
             self._advance(time_s)
-            return self._workplace.moment(self._times_s[-1], self._values, self._felt)
+            return self._workspace.moment(self._times_s[-1], self._values, self._felt)
 
     def finish(self, time_s: float) -> None:
         """Go on to the end, and have the workplace tell what lasts until then."""
         with self._lock:
             self._advance(time_s)
-            self._workplace.finish()
+            self._workspace.finish()
 
     def _looks_since(self, time_s: float) -> tuple[list[float], list[float]]:
         """Return times and forces from the last look before `time_s` on."""
@@ -197,7 +197,7 @@ class Timeline:
                 self._values[name] = track.position(time_s)
                 if path.end_s <= time_s:
                     self._resting[name] = path
-        self._felt = self._workplace.look(self._values, time_s)
+        self._felt = self._workspace.look(self._values, time_s)
         self._times_s.append(time_s)
         self._forces_un.append(self._felt.total_un)
 
@@ -206,7 +206,7 @@ class Timeline:
         now_s = self._at * self._step_s
         until_s = now_s + LONGEST_REST_S
         at_rest = True
-        felt, grippers = self._felt, self._workplace.gripper_stages
+        felt, grippers = self._felt, self._workspace.gripper_stages
         way = max(LONGEST_WAY, SLACK_PART * felt.slack_um)
         gap = max(LONGEST_WAY, SLACK_PART * min(felt.slack_um, felt.gap_um))
         for track in self._tracks:

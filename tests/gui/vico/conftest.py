@@ -72,8 +72,8 @@ class Mouse:
         self._target = view.viewport()
         self._view = view
 
-    def screen(self, place_px) -> QPointF:
-        return self._view.to_screen.map(QPointF(*place_px))
+    def screen(self, point_px) -> QPointF:
+        return self._view.to_screen.map(QPointF(*point_px))
 
     def _send(self, kind, there, button, buttons) -> None:
         everywhere = QPointF(self._target.mapToGlobal(there.toPoint()))
@@ -81,11 +81,11 @@ class Mouse:
         event = QMouseEvent(kind, there, everywhere, button, buttons, none)
         QApplication.sendEvent(self._target, event)
 
-    def move(self, place_px) -> None:
-        self._send(QEvent.Type.MouseMove, self.screen(place_px), NONE, NONE)
+    def move(self, point_px) -> None:
+        self._send(QEvent.Type.MouseMove, self.screen(point_px), NONE, NONE)
 
-    def click(self, place_px) -> None:
-        self.drag(place_px, place_px)
+    def click(self, point_px) -> None:
+        self.drag(point_px, point_px)
 
     def drag(self, begin_px, end_px) -> None:
         """Press, move, let go; the places are those before the image moves along."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from cosmic.frame.errors import ConfigError, CosmicError
 from cosmic.frame.operation import Task
-from cosmic.vico.api.places import CalibrationShown
+from cosmic.vico.api.coordinate_transform import CalibrationShown
 from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.hw.interface import (
     CameraCounters,
@@ -77,7 +77,7 @@ class Seen:
 @dataclass(frozen=True)
 class SeenTip:
     name: str = "left"
-    place_px: tuple[float, float] = (300.0, 250.0)
+    point_px: tuple[float, float] = (300.0, 250.0)
     certain: bool = True
 
 
@@ -262,10 +262,10 @@ class FakeCamera:
 
     # places
 
-    def platform_um(self, place_px: tuple[float, float]) -> tuple[float, ...] | None:
+    def platform_um(self, point_px: tuple[float, float]) -> tuple[float, ...] | None:
         if self.calibration_problem:
             return None
-        return (place_px[0] * 1.25 - 1000.0, place_px[1] * 1.25 - 750.0)
+        return (point_px[0] * 1.25 - 1000.0, point_px[1] * 1.25 - 750.0)
 
     def calibrate_stage(self, tool: str) -> Task:
         return self._began("Calibrating", "calibrate_stage", tool)
@@ -273,8 +273,8 @@ class FakeCamera:
     def find_rotation_centre(self) -> Task:
         return self._began("Rotation centre", "find_rotation_centre")
 
-    def click_to_move(self, place_px: tuple[float, float], what: str) -> str:
-        self._do("move", place_px, what)
+    def click_to_move(self, point_px: tuple[float, float], what: str) -> str:
+        self._do("move", point_px, what)
         return f"{what} goes there"
 
 

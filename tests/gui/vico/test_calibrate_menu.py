@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from cosmic.frame.errors import NotAvailable
-from cosmic.vico.api.places import CalibrationShown
+from cosmic.vico.api.coordinate_transform import CalibrationShown
 from cosmic.vico.gui.calibrate_menu import CalibrateButton
 
 NOW = datetime(2026, 11, 21, 12, 0, tzinfo=UTC)

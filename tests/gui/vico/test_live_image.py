@@ -21,11 +21,11 @@ def click(qtbot, button):
     qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
 
 
-def colour_at(view, place_px):
+def colour_at(view, point_px):
     """Return the colour on the screen in the middle of a pixel of the image."""
     view.row.scale.setChecked(False)
     QApplication.processEvents()
-    there = view.view.to_screen.map(QPointF(*place_px)).toPoint()
+    there = view.view.to_screen.map(QPointF(*point_px)).toPoint()
     return view.view.grab().toImage().pixelColor(there).getRgb()[:3]
 
 

@@ -7,10 +7,10 @@ from cosmic.vico.core.focus import FocusFault, peak_of
 
 
 def sweep(peak: float, *, contrast: float = 1.0, noise: float = 0.0) -> list[tuple[float, float]]:
-    places = np.linspace(-120.0, 120.0, 9)
-    measures = 1.0 + contrast / np.sqrt(1.0 + ((places - peak) / 40.0) ** 2)
+    positions = np.linspace(-120.0, 120.0, 9)
+    measures = 1.0 + contrast / np.sqrt(1.0 + ((positions - peak) / 40.0) ** 2)
     measures += noise * np.random.default_rng(3).standard_normal(9)
-    return list(zip(places.tolist(), measures.tolist(), strict=True))
+    return list(zip(positions.tolist(), measures.tolist(), strict=True))
 
 
 @pytest.mark.parametrize("peak", [-70.0, -13.0, 0.0, 41.0])

@@ -10,7 +10,7 @@ import pytest
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.errors import ConfigError
 from cosmic.vico.core.image import CameraImage, Circumstances
-from cosmic.vico.core.vision.algorithms import FindTools, TrackFibre, TrackPlace, make_chain
+from cosmic.vico.core.vision.algorithms import FindTools, TrackFibre, TrackPoint, make_chain
 from cosmic.vico.core.vision.chain import Chain, Registry, Results, Unavailable
 from cosmic.vico.core.vision.fibre_tracking import FibreTrack
 from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen
@@ -235,7 +235,7 @@ def test_a_fibre_that_was_found_is_followed_until_it_is_ended() -> None:
 def test_a_place_is_followed_or_refused_without_a_failure() -> None:
     chain = only("place track")
     tracker = chain.algorithm("place track")
-    assert isinstance(tracker, TrackPlace)
+    assert isinstance(tracker, TrackPoint)
     tracker.follow((590.0, 20.0))
     refused = chain.run(image(drawn(strand()))).get("place track", Unavailable)
     assert refused is not None

@@ -2,6 +2,7 @@
 
 from cosmic.app.stations.hosting import Hosted, Site
 from cosmic.app.stations.remote_applications import RemoteApplications
+from cosmic.autonomy.coordinate_transform import join_transform
 from cosmic.autonomy.couplings import join_teleoperation
 from cosmic.autonomy.interlocks import (
     join_force_cautions,
@@ -9,7 +10,6 @@ from cosmic.autonomy.interlocks import (
     join_positions,
     join_stage_positions,
 )
-from cosmic.autonomy.places import join_places
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco, daqco_of
 from cosmic.frame.failure import FailurePolicy
@@ -30,7 +30,7 @@ def join_here(own: Hosted, site: Site) -> None:
         join_stage_positions(vico, mico)
         kept_in = vico.settings.calibration
         folder = site.path.parent / kept_in if kept_in else None
-        join_places(vico, mico, folder, __version__)
+        join_transform(vico, mico, folder, __version__)
 
 
 def join_stations(

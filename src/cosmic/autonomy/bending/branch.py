@@ -134,17 +134,17 @@ def stuck(points: Points, drift_un_sqrt_s: float) -> Mask:
 
 
 def rough(points: Points, branch: Mask, baseline_un: Floats) -> Rough:
-    """Return where a branch has its kink, trying each place."""
+    """Return where a branch has its kink, trying each position."""
     order = np.argsort(points.way_um[branch], kind="stable")
     way = points.way_um[branch][order]
     force = (points.force_un - baseline_un)[branch][order]
-    places = np.unique(np.concatenate([way, (way[1:] + way[:-1]) / 2.0]))[:-1]
-    ramp = np.maximum(way - places[:, None], 0.0)
-    # Of the best line through zero at each place, what it leaves unexplained.
+    positions = np.unique(np.concatenate([way, (way[1:] + way[:-1]) / 2.0]))[:-1]
+    ramp = np.maximum(way - positions[:, None], 0.0)
+    # Of the best line through zero at each position, what it leaves unexplained.
     k = (ramp @ force) / (ramp * ramp).sum(axis=1)
     left = ((force - k[:, None] * ramp) ** 2).sum(axis=1)
     best = int(np.argmin(left))
-    return Rough(float(places[best]), float(k[best]))
+    return Rough(float(positions[best]), float(k[best]))
 
 
 NEAR_RANGE: Final = 0.98

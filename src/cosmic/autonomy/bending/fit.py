@@ -101,11 +101,11 @@ def fit_bending(spans: Sequence[Span], *, settings: FitSettings | None = None) -
     if not spans:
         raise BendingError("there is no span to fit: measure at least one")
     settings = settings or FitSettings()
-    places = places_um(spans)
+    positions = positions_um(spans)
     offset = settings.offset_um
-    fits, lever, used = _once(spans, places, offset, settings)
-    if lever is not None and abs(lever.offset_um - offset) > NEAR_PART * min(places):
-        fits, lever, used = _once(spans, places, lever.offset_um, settings)
+    fits, lever, used = _once(spans, positions, offset, settings)
+    if lever is not None and abs(lever.offset_um - offset) > NEAR_PART * min(positions):
+        fits, lever, used = _once(spans, positions, lever.offset_um, settings)
     if lever is None:
         return judged(_nothing(fits, settings), settings)
     low, high = _interval(fits, used, lever, settings)
@@ -129,10 +129,10 @@ def fit_bending(spans: Sequence[Span], *, settings: FitSettings | None = None) -
     )
 
 
-def places_um(spans: Sequence[Span]) -> tuple[float, ...]:
+def positions_um(spans: Sequence[Span]) -> tuple[float, ...]:
     """Return where each span lies: exact to each other, with an offset common to all.
 
-    The fibre may point either way along the axes; the nominal places tell which.
+    The fibre may point either way along the axes; the nominal positions tell which.
     """
     read = [span.probe_x_um - span.hold_x_um for span in spans]
     nominal = [span.nominal_um for span in spans]
@@ -143,11 +143,13 @@ def places_um(spans: Sequence[Span]) -> tuple[float, ...]:
 
 
 def _once(
-    spans: Sequence[Span], places: Sequence[float], offset_um: float, settings: FitSettings
+    spans: Sequence[Span], positions: Sequence[float], offset_um: float, settings: FitSettings
 ) -> tuple[tuple[SpanFit, ...], Lever | None, tuple[int, ...]]:
     fits = tuple(
-        fit_span(span, settings=settings, place_um=place, length_um=max(place + offset_um, 10.0))
-        for span, place in zip(spans, places, strict=True)
+        fit_span(
+            span, settings=settings, place_um=position, length_um=max(position + offset_um, 10.0)
+        )
+        for span, position in zip(spans, positions, strict=True)
     )
     used = usable(fits)
     return fits, (fit_lever([fits[n] for n in used], settings) if used else None), used

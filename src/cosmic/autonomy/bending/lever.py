@@ -1,6 +1,6 @@
-"""Stiffness over place along the fibre: how EI and the unknown clamp are told apart.
+"""Stiffness over position along the fibre: how EI and the unknown clamp are told apart.
 
-k = 3 EI / (place + offset)^3, so k^(-1/3) is a straight line over the place, which the encoders
+k = 3 EI / (position + offset)^3, so k^(-1/3) is a straight line over the position, which encoders
 know exactly from span to span. Its slope is (3 EI)^(-1/3), and the offset cancels in it.
 """
 
@@ -36,9 +36,9 @@ class Lever:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Line:
-    """k^(-1/3) = slope (place + offset), with what is known of the offset beforehand."""
+    """k^(-1/3) = slope (position + offset), with what is known of the offset beforehand."""
 
-    places: Floats
+    positions: Floats
     roots: Floats
     sigmas: Floats
     prior_um: float
@@ -49,13 +49,13 @@ class _Line:
         weights = (slope / self.sigmas) ** 2
         own = self.prior_std_um**-2
         total = float(weights.sum()) + own
-        wanted = self.roots / slope - self.places
+        wanted = self.roots / slope - self.positions
         return (float(weights @ wanted) + own * self.prior_um) / total, total**-0.5
 
     def chi2(self, slope: float) -> float:
         """Return the sum of squares with the best offset for a slope."""
         offset, _ = self.offset(slope)
-        away = (self.roots - slope * (self.places + offset)) / self.sigmas
+        away = (self.roots - slope * (self.positions + offset)) / self.sigmas
         return float(away @ away) + ((offset - self.prior_um) / self.prior_std_um) ** 2
 
 
@@ -65,7 +65,7 @@ def fit_lever(
     *,
     stiffnesses: Sequence[float] | None = None,
 ) -> Lever:
-    """Return EI and offset from stiffnesses at known places.
+    """Return EI and offset from stiffnesses at known positions.
 
     Parameters
     ----------
@@ -74,13 +74,13 @@ def fit_lever(
     """
     k = np.array([fit.k_un_um for fit in fits] if stiffnesses is None else stiffnesses)
     parts = np.array([max(fit.k_std_un_um / fit.k_un_um, LEAST_PART) for fit in fits])
-    places = np.array([fit.place_um for fit in fits])
+    positions = np.array([fit.place_um for fit in fits])
     roots = k ** (-1.0 / 3.0)
-    log_slope = float(np.log(np.mean(roots / np.maximum(places + settings.offset_um, 10.0))))
-    line = _line(places, roots, parts, log_slope, settings)
+    log_slope = float(np.log(np.mean(roots / np.maximum(positions + settings.offset_um, 10.0))))
+    line = _line(positions, roots, parts, log_slope, settings)
     for _ in range(ROUNDS):
         log_slope = _best(line, log_slope)
-        line = _line(places, roots, parts, log_slope, settings)
+        line = _line(positions, roots, parts, log_slope, settings)
     lowest = line.chi2(math.exp(log_slope))
     low, high = _ends(line, log_slope, lowest, scale=_excess(lowest, len(fits) - 1))
     offset, _ = line.offset(math.exp(log_slope))
@@ -95,12 +95,12 @@ def fit_lever(
 
 
 def _line(
-    places: Floats, roots: Floats, parts: Floats, log_slope: float, settings: FitSettings
+    positions: Floats, roots: Floats, parts: Floats, log_slope: float, settings: FitSettings
 ) -> _Line:
-    # An error of the place counts as one of the root, by a slope that is not known beforehand.
+    # An error of the position counts as one of the root, by a slope that is not known beforehand.
     contact = math.exp(log_slope) * settings.contact_std_um
     sigmas = np.hypot(roots * parts / 3.0, contact)
-    return _Line(places, roots, sigmas, settings.offset_um, settings.offset_std_um)
+    return _Line(positions, roots, sigmas, settings.offset_um, settings.offset_std_um)
 
 
 def _ei(log_slope: float) -> float:
@@ -145,7 +145,7 @@ def _offset_std(line: _Line, log_slope: float) -> float:
     """Return the offset's standard deviation, the slope's included."""
     slope = math.exp(log_slope)
     matrix = np.column_stack(
-        [(line.places + line.offset(slope)[0]), np.full_like(line.places, slope)]
+        [(line.positions + line.offset(slope)[0]), np.full_like(line.positions, slope)]
     )
     weighed = matrix / line.sigmas[:, None]
     information = weighed.T @ weighed

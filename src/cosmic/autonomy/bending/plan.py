@@ -108,9 +108,9 @@ def plan_spans(
     clear = (3.0 * ei * limits.shortest_stroke_um / limits.highest_un) ** (1.0 / 3.0)
     shortest = min(max(limits.shortest_um, limits.shortest_part * longest, clear), longest)
     remaining = limits.count - len(done)
-    places = _spread(shortest, longest, limits.count)
-    left = _farthest(places, [span.nominal_um for span in done], remaining)
-    return tuple(_planned(place, ei, limits) for place in sorted(left, reverse=True))
+    positions = _spread(shortest, longest, limits.count)
+    left = _farthest(positions, [span.nominal_um for span in done], remaining)
+    return tuple(_planned(position, ei, limits) for position in sorted(left, reverse=True))
 
 
 def guess_ei(spans: Sequence[Span], *, settings: FitSettings | None = None) -> float | None:
@@ -127,12 +127,12 @@ def _spread(shortest: float, longest: float, count: int) -> list[float]:
     return [longest - (longest - shortest) * n / (count - 1) for n in range(count)]
 
 
-def _farthest(places: list[float], done: list[float], count: int) -> list[float]:
-    """Return those of the places that are farthest from what has been measured."""
-    left = list(places)
-    for place in done:
+def _farthest(positions: list[float], done: list[float], count: int) -> list[float]:
+    """Return those of the positions that are farthest from what has been measured."""
+    left = list(positions)
+    for position in done:
         if len(left) > max(count, 0):
-            left.remove(min(left, key=lambda each: abs(each - place)))
+            left.remove(min(left, key=lambda each: abs(each - position)))
     return left[: max(count, 0)]
 
 

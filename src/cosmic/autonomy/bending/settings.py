@@ -21,14 +21,14 @@ class FitSettings(StrictModel):
     way_std_um, way_scale_std_part : float
         Of one reading of the probe's axis, and of the encoder's scale.
     contact_std_um : float
-        How well the place of contact along the fibre repeats from span to span.
+        How well the position of contact along the fibre repeats from span to span.
     offset_um, offset_std_um : float
         What is known beforehand of the way from the tip of the jaws back to where the fibre is
         truly clamped, errors of `Span.nominal_um` included.
     edge_radius_um, fibre_width_um : float
         The probe's round edge and the fibre: a sloping fibre touches nearer to the clamp.
     hysteresis_percent, slip_um : float
-        What loading and unloading may differ by, in force and in the place of first contact.
+        What loading and unloading may differ by, in force and in the position of first contact.
     soft_percent : float
         Half of the interval beyond which a result is too uncertain to be trusted.
     """

@@ -12,7 +12,7 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Span:
-    """One push of the probe against a held fibre, out and back, at one place along it.
+    """One push of the probe against a held fibre, out and back, at one position along it.
 
     Attributes
     ----------

@@ -157,7 +157,7 @@ def fit_span(span: Span, *, settings: FitSettings, place_um: float, length_um: f
     Parameters
     ----------
     place_um : float
-        Its place along the fibre, as told in the result.
+        Its position along the fibre, as told in the result.
     length_um : float
         From the clamp to the middle of the probe, as well as it is known.
 

@@ -21,7 +21,7 @@ class CheckDrift(FibreOperation):
     """Gripper and probe are seen on one image again, every so many fibres.
 
     What has moved by more than the setting, and by more than can be noise, is followed: maps,
-    rotation centre and the probe's place. What has moved far, or is not seen, is measured anew.
+    rotation centre and the probe's position. What has moved far, or is not seen, is measured anew.
     """
 
     name = "check the drift"

@@ -78,10 +78,10 @@ def _sweep(
         raise CalibrationRefused("the focus lies outside the travel of the lens")
     curve: list[tuple[float, float]] = []
     yield lens.seek_focus(max(0, round(low) - PLAY_COUNTS))
-    for place in np.linspace(low, high, frames).round().tolist():
-        yield lens.seek_focus(int(place))
+    for position in np.linspace(low, high, frames).round().tolist():
+        yield lens.seek_focus(int(position))
         image = yield work.image()
         assert isinstance(image, CameraImage)
         # The whole image, and its edges: of a tool, how much of it is dark tells little.
-        curve.append((place, sharpness(image.data, None, FocusMeasure.TENENGRAD)))
+        curve.append((position, sharpness(image.data, None, FocusMeasure.TENENGRAD)))
     return peak_of(curve)

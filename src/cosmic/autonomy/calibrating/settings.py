@@ -10,7 +10,7 @@ class CalibrationSettings(StrictModel):
 
     Attributes
     ----------
-    place_x_um, place_y_um, place_um : float
+    place_x_um, place_y_um, position_um : float
         Where the gripper is looked at above the plate.
     residual_px : float
         Largest RMS residual of a map.
@@ -59,7 +59,7 @@ class CalibrationSettings(StrictModel):
     touch_off_um : float
         How far touch and image may disagree.
     touch_std_um : float
-        Largest standard deviation of the place found by touch.
+        Largest standard deviation of the position found by touch.
     zooms_gap_um, zooms_small_um_px : float
         Opening of the jaws at zooms where a pixel is smaller than that.
     zooms_ahead_um : float
@@ -75,7 +75,7 @@ class CalibrationSettings(StrictModel):
 
     place_x_um: float = -1900.0
     place_y_um: float = 0.0
-    place_um: float = 12.0
+    position_um: float = 12.0
     residual_px: float = Field(0.5, gt=0.0)
     rotation_std_um: float = Field(3.0, gt=0.0)
     age_s: float = Field(7200.0, gt=0.0)

@@ -54,12 +54,14 @@ class TouchJaw(Calibrated):
 
     def _touched(self, work: HandlingContext) -> Generator[Yielded, object, list[float]]:
         """Return by how much the probe's tip is elsewhere than its stage says, touch by touch."""
-        settings, places = work.settings.calibration, work.settings.places
+        settings, positions = work.settings.calibration, work.settings.places
         side = -1.0 if work.probe.forward[1] > 0.0 else 1.0
         yield from retract_probe(work)
-        below = work.hold_tip_um + places.hold_above_tip_um - settings.touch_below_um
-        yield work.go_up(max(below, work.height_now(), places.travel_um))
-        yield work.go(work.at(work.gripper, places.hold_x_um * work.jaws.forward, places.hold_y_um))
+        below = work.hold_tip_um + positions.hold_above_tip_um - settings.touch_below_um
+        yield work.go_up(max(below, work.height_now(), positions.travel_um))
+        yield work.go(
+            work.at(work.gripper, positions.hold_x_um * work.jaws.forward, positions.hold_y_um)
+        )
         yield work.go_up(below)
         hold_x, hold_y = work.tip_now(work.gripper)
         off_x, off_y = work.calibration.probe_off_um
@@ -98,7 +100,7 @@ class TouchJaw(Calibrated):
     def _feel(
         self, work: HandlingContext, side: float, base_un: float
     ) -> Generator[Yielded, object, float]:
-        """Make small steps until something is felt, and return the place of the tip then."""
+        """Make small steps until something is felt, and return the position of the tip then."""
         settings, axis = work.settings.calibration, work.mico[work.probe.y_axis]
         _, begun = work.tip_now(work.probe)
         before = begun

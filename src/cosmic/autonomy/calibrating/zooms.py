@@ -64,7 +64,7 @@ class CalibrateZooms(Calibrated):
         yield from seek_from_below(work, begun)
         yield from move_jaws(work, work.settings.grasp.gap_um - (work.gap_um or 0.0))
         yield from zoom_to(work, work.settings.zoom)
-        how = f"9 places at each of {len(steps)} steps"
+        how = f"9 positions at each of {len(steps)} steps"
         self.kept(work, worst, "px", settings.residual_px, values=values, how=how)
 
     @staticmethod
@@ -77,7 +77,7 @@ class CalibrateZooms(Calibrated):
 
 
 def _middle_x_um(work: HandlingContext, scale_um_px: float) -> float:
-    """Return where the tip stands so that it reaches the places on both sides of it."""
+    """Return where the tip stands so that it reaches the positions on both sides of it."""
     settings, camera = work.settings.calibration, work.vico.camera(work.settings.camera)
     width_px = camera.settings.roi.width_px if camera.settings is not None else 0
     beyond = LARGEST_PART * width_px * scale_um_px - settings.zooms_ahead_um

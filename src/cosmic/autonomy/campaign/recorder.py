@@ -160,7 +160,7 @@ ROOM_PX: Final = 40
 
 def pose_of(candidate: Candidate) -> Pose:
     """Return where a fibre lies on the plate, turned with the line through its ends."""
-    x, y = candidate.place_um
+    x, y = candidate.position_um
     (x0, y0), (x1, y1) = candidate.line_um[0].tolist(), candidate.line_um[-1].tolist()
     return Pose(x, y, math.degrees(math.atan2(y1 - y0, x1 - x0)))
 

@@ -323,9 +323,9 @@ def _span_rows(result: BendingResult) -> list[tuple[str, ...]]:
             number(fit.drift_un_s, 3),
             number(fit.peak_un, 1),
             f"{fit.chi2:.0f} / {fit.freedom}",
-            ", ".join(sorted(fit.flags)) or ("" if place in result.used else "not used"),
+            ", ".join(sorted(fit.flags)) or ("" if index in result.used else "not used"),
         )
-        for place, fit in enumerate(result.spans)
+        for index, fit in enumerate(result.spans)
     ]
 
 
@@ -427,23 +427,23 @@ def _draw(plot: Plot, curve: SpanCurve) -> None:
 
 
 def stiffness_figure(record: FibreRecord) -> str:
-    """Return k^(-1/3) over the place, with the line whose slope is the bending stiffness."""
+    """Return k^(-1/3) over the position, with the line whose slope is the bending stiffness."""
     result = record.bending
     if result is None:
         return ""
     fits = [each for each in result.spans if each.k_un_um > 0.0]
     if not fits or not result.ei_n_m2 > 0.0:
         return ""
-    places = [each.place_um for each in fits]
+    positions = [each.place_um for each in fits]
     roots = [each.k_un_um ** (-1.0 / 3.0) for each in fits]
     slope = (3.0 * result.ei_n_m2 * 1e18) ** (-1.0 / 3.0)
-    begin, end = -result.clamp_offset_um, max(places) * 1.05
-    x = Axis("place of the probe from the tip of the jaws, µm", *around(min(begin, 0.0), end))
+    begin, end = -result.clamp_offset_um, max(positions) * 1.05
+    x = Axis("position of the probe from the tip of the jaws, µm", *around(min(begin, 0.0), end))
     y = Axis("k^(-1/3), (µN/µm)^(-1/3)", 0.0, 1.1 * max(*roots, slope * (end - begin)))
     plot = Plot(x, y, f"Stiffness of the spans of fibre {record.number}")
     plot.line([begin, end], [0.0, slope * (end - begin)], GREY)
-    for index, (place, root) in enumerate(zip(places, roots, strict=True)):
-        plot.points([place], [root], BLUE, hollow=index not in result.used)
+    for index, (position, root) in enumerate(zip(positions, roots, strict=True)):
+        plot.points([position], [root], BLUE, hollow=index not in result.used)
     plot.note(begin + 0.16 * (end - begin), 0.06 * y.high, "clamp, where the line begins")
     return plot.svg()
 
@@ -470,10 +470,10 @@ def distribution_figure(results: Sequence[BendingResult], mean: MeanEi) -> str:
     y = Axis("good fibres in order" if few else "fibres", 0.0, top, whole=True)
     plot = Plot(x, y, "Distribution of bending stiffness", width=640.0, height=280.0)
     if few:
-        for place, each in enumerate(results, 1):
+        for index, each in enumerate(results, 1):
             ends = _inside(x, each.ei_low_n_m2, each.ei_high_n_m2)
-            plot.line(ends, [float(place)] * 2, BLUE)
-            plot.points([each.ei_n_m2 / EI_UNIT], [float(place)], BLUE)
+            plot.line(ends, [float(index)] * 2, BLUE)
+            plot.points([each.ei_n_m2 / EI_UNIT], [float(index)], BLUE)
     else:
         for count, first, last in zip(counts, edges[:-1], edges[1:], strict=True):
             if count:

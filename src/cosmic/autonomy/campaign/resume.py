@@ -11,7 +11,7 @@ FELL: Final = "fell"
 """Phase of a line about a measured fibre that lies on the plate again, nobody knows where."""
 JOURNAL_LINES: Final = 20
 LOOKS: Final = ("length_um", "width_um", "curl")
-SAME_PLACE_UM: Final = 150.0
+SAME_POSITION_UM: Final = 150.0
 SAME_LENGTH_PART: Final = 0.05
 SAME_ANGLE_DEG: Final = 15.0
 MOST_INTERRUPTIONS: Final = 2
@@ -128,7 +128,7 @@ def _tries(fibre: FibreRecord, interrupted: Sequence[FibreRecord]) -> int:
 
 def _same(known: KnownFibre, pose: Pose, length_um: float) -> bool:
     away = known.pose.x_plate_um - pose.x_plate_um, known.pose.y_plate_um - pose.y_plate_um
-    near = away[0] ** 2 + away[1] ** 2 <= SAME_PLACE_UM**2
+    near = away[0] ** 2 + away[1] ** 2 <= SAME_POSITION_UM**2
     turned = (known.pose.angle_deg - pose.angle_deg + 90.0) % 180.0 - 90.0
     # An interrupted fibre has no length yet: nan differs from nothing.
     differs = abs(known.length_um - length_um) > SAME_LENGTH_PART * length_um

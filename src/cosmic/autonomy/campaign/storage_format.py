@@ -286,8 +286,8 @@ def _operation(row: Row) -> OperationRecord:
 def insert(connection: sqlite3.Connection, table: str, row: Row) -> None:
     """Add a row."""
     names = ", ".join(row)
-    places = ", ".join("?" for _ in row)
-    connection.execute(f"INSERT INTO {table} ({names}) VALUES ({places})", tuple(row.values()))
+    marks = ", ".join("?" for _ in row)
+    connection.execute(f"INSERT INTO {table} ({names}) VALUES ({marks})", tuple(row.values()))
 
 
 def update(connection: sqlite3.Connection, table: str, row: Row, *, key: int) -> None:

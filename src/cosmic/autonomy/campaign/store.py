@@ -365,7 +365,7 @@ class CampaignStore:
     ) -> int:
         """Note that a fibre's treatment begins, and return its number.
 
-        Place and length let it be known again if the treatment is interrupted.
+        Position and length let it be known again if the treatment is interrupted.
         """
         row: dict[str, str | int | float | None] = {
             "run": self._run,

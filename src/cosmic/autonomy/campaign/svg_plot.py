@@ -118,7 +118,7 @@ class Plot:
         )
 
     def note(self, x: float, y: float, text: str, *, end: bool = False) -> None:
-        """Write a text beside a place."""
+        """Write a text beside a position."""
         shift = -8.0 if end else 6.0
         self._parts.append(
             _text(self._px(x) + shift, self._py(y) + 4.0, text, anchor="end" if end else "start")

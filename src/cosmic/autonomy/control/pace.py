@@ -70,14 +70,14 @@ class PaceMeter:
 
     def note(self, period_s: float, late_s: float, missed: int) -> None:
         """Take one cycle."""
-        place = math.floor((period_s - self._period_s) / BIN_S) + HALF_BINS
+        bin_ = math.floor((period_s - self._period_s) / BIN_S) + HALF_BINS
         with self._lock:
             at = self._count % KEPT
             self._periods_s[at], self._late_s[at] = period_s, late_s
             self._count += 1
             self._missed += missed
             self._longest_s = period_s if self._count == 1 else max(self._longest_s, period_s)
-            self._bins[min(max(place, 0), 2 * HALF_BINS - 1)] += 1
+            self._bins[min(max(bin_, 0), 2 * HALF_BINS - 1)] += 1
 
     def statistics(self) -> PaceStatistics:
         """Return what was measured so far."""

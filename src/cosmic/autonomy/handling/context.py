@@ -8,13 +8,13 @@ from typing import Protocol
 from typing_extensions import override
 
 from cosmic.autonomy.calibrating.registry import CalibrationRegistry
+from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.autonomy.handling.force import ForceWatch
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Jaws, PlateFrame
 from cosmic.autonomy.handling.retrying_move import RetryingMove, way_back
 from cosmic.autonomy.handling.settings import HandlingSettings, of_arm
 from cosmic.autonomy.handling.sight import LastSeen, LiveImage, map_at
-from cosmic.autonomy.places import PlatformPlaces
 from cosmic.autonomy.procedures.failures import failure_of
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps, UnitOperation
 from cosmic.autonomy.procedures.waits import Resource
@@ -55,7 +55,7 @@ class SharedWorkspace:
     seen : LastSeen
         By which a frozen camera is known.
     plate, probe : Resource
-        The plate with table and view of it, and the place in front of the probe: where several
+        The plate with table and view of it, and the position in front of the probe: where several
         arms work, each is used by one at a time.
     arms : dict of str to HandlingContext
         Where several work, each by its gripper's name.
@@ -104,7 +104,7 @@ class Calibration:
     Attributes
     ----------
     frame : PlateFrame
-        About which place the plate turns.
+        About which point the plate turns.
     probe_off_um : (float, float)
         How far the probe's tip is from where its stages say, in the frame of the gripper.
     seen_off_um : (float, float)
@@ -203,8 +203,8 @@ class HandlingContext:
         for name in (settings.gripper, settings.probe, *filter(None, [settings.other])):
             work.tool(name)
         rig.vico.camera(settings.camera)
-        if isinstance(places := work.vision.places, PlatformPlaces):
-            work.calibration.registry = places.registry
+        if isinstance(positions := work.vision.transform, PlatformTransform):
+            work.calibration.registry = positions.registry
         forces.open()
         return work
 
@@ -242,7 +242,7 @@ class HandlingContext:
 
     @property
     def vision(self) -> VicoApplication:
-        """The application behind cameras and places."""
+        """The application behind cameras and positions."""
         return vision_of(self.vico)
 
     def tool(self, name: str) -> ToolSettings:
@@ -292,12 +292,12 @@ class HandlingContext:
         """Return how much higher above the plate a tip is than its stages say."""
         return self.calibration.up_um.get(tool.name, 0.0)
 
-    # Moving; places are those of a tool's tip
+    # Moving; positions are those of a tool's tip
 
     def at(
         self, tool: ToolSettings, x_um: float, y_um: float, z_um: float | None = None
     ) -> dict[str, float]:
-        """Return where the axes of a tool stand with its tip at a place."""
+        """Return where the axes of a tool stand with its tip at a position."""
         targets = axis_targets(tool, x_um, y_um)
         if z_um is not None:
             targets[tool.z_axis] = z_um - tool.tip_um[2] - self.up_um(tool)
@@ -307,7 +307,7 @@ class HandlingContext:
         """Begin to move; to be yielded."""
         return RetryingMove(
             lambda: self.mico.move(dict(targets), wait=False),
-            to_a_place=True,
+            to_a_position=True,
             back=way_back(self.mico, targets),
         )
 
@@ -337,9 +337,9 @@ class HandlingContext:
 
     def learn_height(self, *, held: bool) -> None:
         """Make grasps a little higher after one that held, and lower after one that missed."""
-        places = self.settings.places
-        stray = self.stray_um + (places.raise_um if held else -places.lower_um)
-        self.stray_um = min(max(stray, -places.stray_um), places.stray_um)
+        positions = self.settings.places
+        stray = self.stray_um + (positions.raise_um if held else -positions.lower_um)
+        self.stray_um = min(max(stray, -positions.stray_um), positions.stray_um)
 
     # Looking
 
@@ -351,7 +351,7 @@ class HandlingContext:
         """Return the map of an image for things at a height above the plate."""
         plate_um = self.vision.settings.plate_um
         tool = self.settings.gripper if self.beside_another else None
-        return map_at(self.vision.places, image, plate_um + height_um, tool)
+        return map_at(self.vision.transform, image, plate_um + height_um, tool)
 
     def mapped_near(self, image: CameraImage, height_um: float) -> PixelMap:
         """Return the map of whichever of the two heights measured is nearer."""

@@ -9,7 +9,7 @@ from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.grasp import Carry
 from cosmic.autonomy.handling.plate import PlateFrame, Reach
 from cosmic.autonomy.handling.prepare import clear_image
-from cosmic.autonomy.handling.put_away import GIVEN_UP, Wipe, bin_place
+from cosmic.autonomy.handling.put_away import GIVEN_UP, Wipe, bin_position
 from cosmic.autonomy.handling.survey import NONE_LEFT, Choose, none_left, ways_of
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.frame.errors import MoveRefused
@@ -30,16 +30,16 @@ def front(work: HandlingContext) -> float:
 
 
 def behind_um(work: HandlingContext) -> float:
-    """Return x of the place where an arm is out of the other's way with a fibre."""
-    places, pair = work.settings.places, work.settings.pair
-    return (places.hold_x_um - pair.behind_um) * work.jaws.forward
+    """Return x of the position where an arm is out of the other's way with a fibre."""
+    positions, pair = work.settings.places, work.settings.pair
+    return (positions.hold_x_um - pair.behind_um) * work.jaws.forward
 
 
 def hidden(work: HandlingContext, way: Reach) -> bool:
     """Return whether a fibre lies where an arm at the probe, or the probe itself, may hide it."""
-    places, side = work.settings.places, front(work)
+    positions, side = work.settings.places, front(work)
     nearest_um = float((side * way.line_um[:, 1]).max())
-    return nearest_um > side * places.hold_y_um - work.settings.pair.hidden_um
+    return nearest_um > side * positions.hold_y_um - work.settings.pair.hidden_um
 
 
 def over(work: HandlingContext) -> bool:
@@ -120,7 +120,7 @@ class CarryInTurn(Carry):
 
 
 class Withdraw(FibreOperation):
-    """Probe and arm draw back from each other, and leave the place to the other arm."""
+    """Probe and arm draw back from each other, and leave the position to the other arm."""
 
     name = "draw back from the probe"
 
@@ -143,7 +143,7 @@ class WipeInTurn(Wipe):
     @override
     def steps(self, work: HandlingContext) -> Steps:
         yield work.go_up(max(work.settings.places.travel_um, work.height_now()))
-        yield work.go(bin_place(work))
+        yield work.go(bin_position(work))
         try:
             # Without leave to touch: the gate knows what stands there.
             yield work.go_up(LOW_UM)
@@ -184,7 +184,7 @@ class ClearAway(FibreOperation):
 
 
 class SeeSides(FibreOperation):
-    """Where the places of one arm are in the frame of another, by the maps of both."""
+    """Where the positions of one arm are in the frame of another, by the maps of both."""
 
     name = "see both sides"
 

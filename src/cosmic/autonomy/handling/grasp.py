@@ -29,7 +29,7 @@ class HeldShape:
     Attributes
     ----------
     ahead_um, aside_um, way_um : ndarray, shape (n,), float64
-        Of places along it, from the jaws' tip: along the jaws, in y, and along the fibre. Ends
+        Of positions along it, from the jaws' tip: along the jaws, in y, and along the fibre. Ends
         where the fibre turns back.
     """
 
@@ -110,15 +110,15 @@ class TestGrasp(FibreOperation):
 
     @override
     def steps(self, work: HandlingContext) -> Steps:
-        fibre, places = work.held_fibre(), work.settings.places
+        fibre, positions = work.held_fibre(), work.settings.places
         before = ahead_of_jaws(fibre)
         x, y = work.tip_now(work.gripper)
         with work.mico.collision.contact("grasp"):
-            yield work.go_up(places.test_um)
-        yield work.go(work.at(work.gripper, x, y + places.test_aside_um))
+            yield work.go_up(positions.test_um)
+        yield work.go(work.at(work.gripper, x, y + positions.test_aside_um))
         image = yield work.image()
         assert isinstance(image, CameraImage)
-        if seen_at(work, fibre, image, in_jaws(work, fibre), places.test_um):
+        if seen_at(work, fibre, image, in_jaws(work, fibre), positions.test_um):
             fibre.held = True
             work.learn_height(held=True)
             return
@@ -169,10 +169,10 @@ class Carry(FibreOperation):
 
     @override
     def steps(self, work: HandlingContext) -> Steps:
-        fibre, places = work.held_fibre(), work.settings.places
+        fibre, positions = work.held_fibre(), work.settings.places
         yield work.go_up(work.hold_tip_um)
-        x = places.hold_x_um * work.jaws.forward
-        yield work.go(work.at(work.gripper, x, places.hold_y_um, work.hold_tip_um))
+        x = positions.hold_x_um * work.jaws.forward
+        yield work.go(work.at(work.gripper, x, positions.hold_y_um, work.hold_tip_um))
         image = yield work.image()
         assert isinstance(image, CameraImage)
         fibre.images["held"] = image

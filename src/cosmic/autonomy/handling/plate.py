@@ -1,4 +1,4 @@
-"""Places on the plate that stay the same while it turns, and the turn that suits a gripper."""
+"""Positions on the plate that stay the same while it turns, and the turn that suits a gripper."""
 
 import math
 from collections.abc import Sequence
@@ -12,16 +12,16 @@ from cosmic.vico.core.pixel_map import Floats
 
 @dataclass(frozen=True, slots=True)
 class PlateFrame:
-    """The plate, turning about a place on the platform."""
+    """The plate, turning about a position on the platform."""
 
     centre_um: tuple[float, float] = (0.0, 0.0)
 
     def on_plate(self, platform_um: Floats, angle_deg: float) -> Floats:
-        """Return where places lie on the plate, which stands at `angle_deg`; shape (n, 2)."""
+        """Return where positions lie on the plate, which stands at `angle_deg`; shape (n, 2)."""
         return np.asarray((platform_um - np.array(self.centre_um)) @ _turn(angle_deg))
 
     def on_platform(self, plate_um: Floats, angle_deg: float) -> Floats:
-        """Return where places on the plate are on the platform."""
+        """Return where positions on the plate are on the platform."""
         return np.asarray(plate_um @ _turn(angle_deg).T + np.array(self.centre_um))
 
 
@@ -56,7 +56,7 @@ class Candidate:
         return replace(self, line_um=line_um)
 
     @property
-    def place_um(self) -> tuple[float, float]:
+    def position_um(self) -> tuple[float, float]:
         """Its middle on the plate."""
         x, y = self.line_um.mean(axis=0).tolist()
         return x, y
@@ -134,7 +134,7 @@ def reaches(
 
 
 def along(line: Floats, way_um: float) -> Floats:
-    """Return the place so far along a line from its begin."""
+    """Return the position so far along a line from its begin."""
     way = ways(line)
     return np.array([np.interp(way_um, way, line[:, 0]), np.interp(way_um, way, line[:, 1])])
 

@@ -128,7 +128,7 @@ class MakeReady(FibreOperation):
     def steps(self, work: HandlingContext) -> Steps:
         if work.ready:
             return
-        settings, places = work.settings, work.settings.places
+        settings, positions = work.settings, work.settings.places
         for tool in self._tools(work):
             for name in (tool.x_axis, tool.y_axis, *filter(None, [tool.z_axis])):
                 work.mico[name].set_closed_loop_frequency(settings.frequency_hz)
@@ -141,9 +141,11 @@ class MakeReady(FibreOperation):
             other = work.tool(settings.other)
             yield work.go({other.x_axis: OTHER_BACK_UM * (-1.0 if other.forward[0] > 0.0 else 1.0)})
         # What may be left between the jaws falls where fibres are put away.
-        yield work.go(work.at(work.gripper, places.bin_x_um * work.jaws.forward, places.bin_y_um))
+        yield work.go(
+            work.at(work.gripper, positions.bin_x_um * work.jaws.forward, positions.bin_y_um)
+        )
         with work.mico.collision.contact("grasp"):
-            yield work.go_up(places.bin_um)
+            yield work.go_up(positions.bin_um)
         yield from zero_jaws(work)
         yield work.go({work.gripper.z_axis: self._high(work)})
         yield from zoom_to(work, settings.zoom)
@@ -184,14 +186,16 @@ class CalibratePlate(Calibrated):
 
     @override
     def measure(self, work: HandlingContext) -> Steps:
-        place = work.settings.calibration
-        residual = yield from calibrate_at(work, place.place_x_um, place.place_y_um, place.place_um)
-        self.kept(work, residual, "px", place.residual_px)
+        position = work.settings.calibration
+        residual = yield from calibrate_at(
+            work, position.place_x_um, position.place_y_um, position.position_um
+        )
+        self.kept(work, residual, "px", position.residual_px)
 
     @override
     def check(self, work: HandlingContext, entry: CalibrationEntry) -> Holds:
-        place = work.settings.calibration
-        return entry if (yield from still_at(work, place.place_um, follow=True)) else None
+        position = work.settings.calibration
+        return entry if (yield from still_at(work, position.position_um, follow=True)) else None
 
 
 class CalibrateHeld(Calibrated):
@@ -202,11 +206,11 @@ class CalibrateHeld(Calibrated):
 
     @override
     def measure(self, work: HandlingContext) -> Steps:
-        place = work.settings.calibration
+        position = work.settings.calibration
         residual = yield from calibrate_at(
-            work, place.place_x_um, place.place_y_um, work.hold_tip_um
+            work, position.place_x_um, position.place_y_um, work.hold_tip_um
         )
-        self.kept(work, residual, "px", place.residual_px)
+        self.kept(work, residual, "px", position.residual_px)
 
     @override
     def check(self, work: HandlingContext, entry: CalibrationEntry) -> Holds:
@@ -218,7 +222,7 @@ def still_at(
 ) -> Generator[Yielded, object, bool]:
     """Look whether the tip is where the map has it; one that is near is followed, if wanted."""
     settings = work.settings.calibration
-    yield from to_place(work, settings.place_x_um, settings.place_y_um)
+    yield from to_position(work, settings.place_x_um, settings.place_y_um)
     with work.mico.collision.contact("grasp"):
         yield work.go_up(z_um)
         image = yield work.image()
@@ -238,8 +242,8 @@ def still_at(
     return True
 
 
-def to_place(work: HandlingContext, x_um: float, y_um: float) -> Steps:
-    """Take the gripper over a place, its jaws as far open as is counted."""
+def to_position(work: HandlingContext, x_um: float, y_um: float) -> Steps:
+    """Take the gripper over a position, its jaws as far open as is counted."""
     yield work.go_up(max(work.settings.places.travel_um, work.height_now()))
     yield work.go(work.at(work.gripper, x_um * work.jaws.forward, y_um))
     if not in_step(work):
@@ -254,7 +258,7 @@ def calibrate_at(
     Returns the residual, px.
     """
     tool, travel = work.gripper, work.settings.places.travel_um
-    yield from to_place(work, x_um, y_um)
+    yield from to_position(work, x_um, y_um)
     begun = work.vico.calibrated
     with work.mico.collision.contact("grasp"):
         yield work.go_up(z_um)
@@ -266,16 +270,17 @@ def calibrate_at(
 
 def clear_image(work: HandlingContext) -> Steps:
     """Take gripper and probe out of the image."""
-    places = work.settings.places
-    yield work.go_up(max(places.travel_um, work.height_now()))
+    positions = work.settings.places
+    yield work.go_up(max(positions.travel_um, work.height_now()))
     yield from retract_probe(work)
-    x, y = places.away_x_um * work.jaws.forward, places.bin_y_um
+    x, y = positions.away_x_um * work.jaws.forward, positions.bin_y_um
     yield work.go(
-        work.at(work.gripper, x, y) | work.at(work.probe, places.hold_x_um, places.probe_away_y_um)
+        work.at(work.gripper, x, y)
+        | work.at(work.probe, positions.hold_x_um, positions.probe_away_y_um)
     )
 
 
-class ComparePlaces(Calibrated):
+class ComparePositions(Calibrated):
     """Where the probe's tip is in the frame of the gripper, on one image with both."""
 
     name = "see probe and gripper"
@@ -337,13 +342,13 @@ def see_both(work: HandlingContext) -> Generator[Yielded, object, tuple[TipOff, 
 
 def beside_jaws(work: HandlingContext) -> Steps:
     """Hold the jaws where fibres are pushed, and the probe beside them: both in one image."""
-    places, settings = work.settings.places, work.settings.calibration
-    hold_x = places.hold_x_um * work.jaws.forward
-    yield work.go_up(max(places.travel_um, work.height_now()))
-    yield work.go(work.at(work.gripper, hold_x, places.hold_y_um))
+    positions, settings = work.settings.places, work.settings.calibration
+    hold_x = positions.hold_x_um * work.jaws.forward
+    yield work.go_up(max(positions.travel_um, work.height_now()))
+    yield work.go(work.at(work.gripper, hold_x, positions.hold_y_um))
     yield work.go_up(work.hold_tip_um)
     beside = hold_x + settings.compare_beside_um * work.jaws.forward
-    before = places.hold_y_um + settings.compare_before_um
+    before = positions.hold_y_um + settings.compare_before_um
     # Aside while it is far back, then straight ahead: nothing is beside its way.
     yield work.go({work.probe.x_axis: beside - work.probe.tip_um[0]})
     yield work.go(work.at(work.probe, beside, before))
@@ -356,9 +361,9 @@ class TurnOn(FibreOperation):
 
     @override
     def steps(self, work: HandlingContext) -> Steps:
-        places = work.settings.places
+        positions = work.settings.places
         yield from retract_probe(work)
-        yield work.go_up(max(places.travel_um, work.height_now()))
+        yield work.go_up(max(positions.travel_um, work.height_now()))
         largest = work.settings.grasp.largest_turn_deg
         angle = work.table_deg + TURN_ON_DEG
         yield work.go({work.table: angle if angle <= largest else angle - 2.0 * largest})

@@ -29,22 +29,22 @@ class ToBin(FibreOperation):
 
     @override
     def steps(self, work: HandlingContext) -> Steps:
-        places = work.settings.places
+        positions = work.settings.places
         if not work.beside_another:  # who may have the probe just then
             yield from retract_probe(work)
-        yield work.go_up(max(places.travel_um, work.height_now()))
+        yield work.go_up(max(positions.travel_um, work.height_now()))
         if work.held_fibre().bending is not None:
             yield from self._look_on_the_way(work)
-        yield work.go(bin_place(work))
+        yield work.go(bin_position(work))
         with work.mico.collision.contact("grasp"):
-            yield work.go_up(places.bin_um)
+            yield work.go_up(positions.bin_um)
 
     @staticmethod
     def _look_on_the_way(work: HandlingContext) -> Steps:
         """See that a measured fibre is still there: one that fell must not be measured again."""
-        fibre, places = work.held_fibre(), work.settings.places
-        x = places.view_x_um * work.jaws.forward
-        yield work.go(work.at(work.gripper, x, places.view_y_um))
+        fibre, positions = work.held_fibre(), work.settings.places
+        x = positions.view_x_um * work.jaws.forward
+        yield work.go(work.at(work.gripper, x, positions.view_y_um))
         image = yield work.image()
         assert isinstance(image, CameraImage)
         if not seen_at(work, fibre, image, in_jaws(work, fibre), work.height_now()):
@@ -52,10 +52,10 @@ class ToBin(FibreOperation):
             work.shared.dropped.append(fibre)
 
 
-def bin_place(work: HandlingContext) -> dict[str, float]:
+def bin_position(work: HandlingContext) -> dict[str, float]:
     """Return where the gripper's axes stand above the bin."""
-    places = work.settings.places
-    return work.at(work.gripper, places.bin_x_um * work.jaws.forward, places.bin_y_um)
+    positions = work.settings.places
+    return work.at(work.gripper, positions.bin_x_um * work.jaws.forward, positions.bin_y_um)
 
 
 class Release(FibreOperation):
@@ -65,14 +65,14 @@ class Release(FibreOperation):
 
     @override
     def steps(self, work: HandlingContext) -> Steps:
-        places, forward = work.settings.places, work.jaws.forward
+        positions, forward = work.settings.places, work.jaws.forward
         gap = work.gap_um or 0.0
         yield from move_jaws(work, work.settings.grasp.gap_um - gap)
         with work.mico.collision.contact("grasp"):
-            yield work.go_up(places.travel_um)
+            yield work.go_up(positions.travel_um)
         # Each time elsewhere: what is seen may lie on the plate and not hang at the jaws.
-        y = places.view_y_um + ASIDE_UM * work.held_fibre().looks
-        yield work.go(work.at(work.gripper, places.view_x_um * forward, y))
+        y = positions.view_y_um + ASIDE_UM * work.held_fibre().looks
+        yield work.go(work.at(work.gripper, positions.view_x_um * forward, y))
 
     @override
     def verify(self, work: HandlingContext) -> Steps | None:
@@ -98,9 +98,9 @@ def see_released(work: HandlingContext) -> Steps:
 def _hangs(work: HandlingContext, fibre: HeldFibre, image: CameraImage) -> bool:
     """Return whether something lies where the fibre would: what sticks goes with one jaw."""
     line, apart = in_jaws(work, fibre), 0.5 * (work.gap_um or 0.0)
-    places = (line + np.array([0.0, y]) for y in (0.0, apart, -apart))
+    positions = (line + np.array([0.0, y]) for y in (0.0, apart, -apart))
     height = work.height_now()
-    return any(seen_at(work, fibre, image, place, height) for place in places)
+    return any(seen_at(work, fibre, image, position, height) for position in positions)
 
 
 class Wipe(FibreOperation):
@@ -110,9 +110,9 @@ class Wipe(FibreOperation):
 
     @override
     def steps(self, work: HandlingContext) -> Steps:
-        places = work.settings.places
-        yield work.go_up(max(places.travel_um, work.height_now()))
-        yield work.go(bin_place(work))
+        positions = work.settings.places
+        yield work.go_up(max(positions.travel_um, work.height_now()))
+        yield work.go(bin_position(work))
         with work.mico.collision.contact("grasp"):
             yield work.go_up(work.grasp_um)
             for _ in range(SHAKES):
@@ -121,7 +121,7 @@ class Wipe(FibreOperation):
             x, y = work.tip_now(work.gripper)
             yield work.go(work.at(work.gripper, x, y + WIPE_UM))
             yield work.go(work.at(work.gripper, x - WIPE_UM * work.jaws.forward * 0.5, y))
-            yield work.go_up(places.bin_um)
+            yield work.go_up(positions.bin_um)
 
 
 class Finish(FibreOperation):

@@ -88,7 +88,7 @@ def _where_foretold(work: HandlingContext, fibre: HeldFibre, image: CameraImage)
 
 
 def _matching(found: list[SeenFibre], fibre: HeldFibre) -> SeenFibre | None:
-    """Return the fibre that is meant, known by its place and length."""
+    """Return the fibre that is meant, known by its position and length."""
     wanted, length = fibre.reach.line_um, fibre.reach.candidate.length_um
     fitting = []
     for each in found:

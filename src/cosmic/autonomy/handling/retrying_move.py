@@ -48,8 +48,8 @@ class RetryingMove:
     ----------
     order : callable
         Orders the movement and returns it.
-    to_a_place : bool
-        It leads to a place, whatever it begins from: where an axis has not come on, it is ordered
+    to_a_position : bool
+        It leads to a position, whatever it begins from: an axis that has not come on is ordered
         again as well.
     back : callable or None
         Orders a little of the way back, or returns None. Where an axis runs into something, as it
@@ -65,11 +65,11 @@ class RetryingMove:
         self,
         order: Callable[[], Movement],
         *,
-        to_a_place: bool = False,
+        to_a_position: bool = False,
         back: Callable[[], Movement | None] | None = None,
     ) -> None:
         self._order = order
-        self._to_a_place = to_a_place
+        self._to_a_position = to_a_position
         self._back = back
         self._backing: Movement | None = None
         self._left, self._unanswered, self._bumps = TRIES - 1, UNANSWERED - 1, BUMPS
@@ -111,7 +111,7 @@ class RetryingMove:
     def _goes_on(self) -> bool:
         """Return whether what ended the movement is no reason to end; it is ordered again then."""
         error = None if self._movement is None else self._movement.exception()
-        if not self._to_a_place or not isinstance(error, DeviceError):
+        if not self._to_a_position or not isinstance(error, DeviceError):
             return False
         if isinstance(error, DeviceTimeout) and self._left > 0:
             self._left -= 1
@@ -154,12 +154,12 @@ class RetryingMove:
 
 def way_back(mico: Mico, names: Iterable[str]) -> Callable[[], Movement | None]:
     """Return what orders a little of the way back to where these axes stand now."""
-    began = {name: _place(mico, name) for name in names}
+    began = {name: _position(mico, name) for name in names}
 
     def order() -> Movement | None:
         targets = {}
         for name, start in began.items():
-            now = _place(mico, name)
+            now = _position(mico, name)
             if start is not None and now is not None:
                 most = BACK_DEG if mico[name].unit == "deg" else BACK_UM
                 targets[name] = now + min(max(start - now, -most), most)
@@ -168,6 +168,6 @@ def way_back(mico: Mico, names: Iterable[str]) -> Callable[[], Movement | None]:
     return order
 
 
-def _place(mico: Mico, name: str) -> float | None:
+def _position(mico: Mico, name: str) -> float | None:
     axis = mico[name]
     return axis.angle_deg if axis.unit == "deg" else axis.position_um

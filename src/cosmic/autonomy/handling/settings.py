@@ -21,9 +21,9 @@ class PairSettings(StrictModel):
     behind_um : float
         How far behind that an arm waits with its fibre, and draws back to from the probe.
     beside_um : float
-        How far beside the place before the probe it waits, towards the operator.
+        How far beside the position before the probe it waits, towards the operator.
     hidden_um : float
-        How far from that place, towards the operator, fibres must lie to be taken while the other
+        How far from there, towards the operator, fibres must lie to be taken while the other
         arm is there: nearer they may be hidden.
     probe_back_um : float
         How far the probe draws back between two fibres.
@@ -39,8 +39,8 @@ class PairSettings(StrictModel):
     stuck: int = Field(3, ge=1)
 
 
-class PlaceSettings(StrictModel):
-    """Where things are done: places of the middle between the jaws' tips, on the platform.
+class PositionSettings(StrictModel):
+    """Where things are done: positions of the middle between the jaws' tips, on the platform.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class PlaceSettings(StrictModel):
     away_x_um : float
         Out of the image, so that the whole sample can be seen.
     probe_away_y_um : float
-        Place of the probe's tip while nothing is measured.
+        Position of the probe's tip while nothing is measured.
     """
 
     travel_um: float = Field(400.0, gt=0.0)
@@ -111,7 +111,7 @@ class GraspSettings(StrictModel):
     close_enough_um : float
         How far beside the middle between the jaws a fibre may lie when they close.
     corrections : int
-        How often their place is corrected by image.
+        How often their position is corrected by image.
     tries : int
         How often a grasp is tried.
     shift_um : float
@@ -234,7 +234,7 @@ class HandlingSettings(StrictModel):
     zoom: float = Field(0.58, gt=0.0)
     frequency_hz: float = Field(10000.0, ge=1.0, le=18500.0)
     re_survey: int = Field(0, ge=0)
-    places: PlaceSettings = Field(default_factory=PlaceSettings)
+    places: PositionSettings = Field(default_factory=PositionSettings)
     grasp: GraspSettings = Field(default_factory=GraspSettings)
     push: PushSettings = Field(default_factory=PushSettings)
     calibration: CalibrationSettings = Field(default_factory=CalibrationSettings)
@@ -265,10 +265,10 @@ def of_arm(settings: HandlingSettings, gripper: str) -> HandlingSettings:
     Each stays on its own side, so that neither is ever in the other's way. Fibres are let go
     from where the arms travel: the table, with all that stands up from it, turns below.
     """
-    pair, places, grasp = settings.pair, settings.places, settings.grasp
+    pair, positions, grasp = settings.pair, settings.places, settings.grasp
     own = {
-        "hold_x_um": min(places.hold_x_um, -pair.apart_um),
-        "bin_um": max(places.bin_um, places.travel_um),
+        "hold_x_um": min(positions.hold_x_um, -pair.apart_um),
+        "bin_um": max(positions.bin_um, positions.travel_um),
     }
     # Of two fibres, one before the probe and one drawn back, neither reaches the other.
     longest_um = pair.apart_um + pair.behind_um / 2.0 + grasp.inside_um
@@ -280,7 +280,7 @@ def of_arm(settings: HandlingSettings, gripper: str) -> HandlingSettings:
         update={
             "gripper": gripper,
             "other": "right" if gripper == "left" else "left",
-            "places": places.model_copy(update=own),
+            "places": positions.model_copy(update=own),
             "grasp": grasp.model_copy(update=sides),
         }
     )

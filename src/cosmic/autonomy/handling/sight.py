@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from cosmic.autonomy.places import PlatformPlaces
+from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, DeviceTimeout, NotAvailable
 from cosmic.frame.operation import Task
@@ -189,8 +189,8 @@ def trace_along(image: CameraImage, line_px: Floats, reach_px: float) -> Trace:
     ahead = ahead / np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-9)
     normal = np.column_stack([ahead[:, 1], -ahead[:, 0]])
     offsets = np.arange(-2.0 * reach_px, 2.0 * reach_px + 0.5, 0.5)
-    places = points[:, None, :] + offsets[None, :, None] * normal[:, None, :]
-    rows, columns = np.rint(places[..., 1]).astype(int), np.rint(places[..., 0]).astype(int)
+    samples = points[:, None, :] + offsets[None, :, None] * normal[:, None, :]
+    rows, columns = np.rint(samples[..., 1]).astype(int), np.rint(samples[..., 0]).astype(int)
     height, width = pixels.shape
     inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
     if not inside.mean() > 0.8:
@@ -213,14 +213,14 @@ def _spaced(line: Floats) -> Floats:
 
 
 def map_at(
-    places: object, image: CameraImage, height_um: float, tool: str | None = None
+    samples: object, image: CameraImage, height_um: float, tool: str | None = None
 ) -> PixelMap:
     """Return the map for things at a height; raises `NotAvailable` where it was not measured."""
-    if not isinstance(places, PlatformPlaces):
+    if not isinstance(samples, PlatformTransform):
         raise NotAvailable(
             "pixels cannot be converted to positions: micromanipulation is not hosted here"
         )
-    return places.map_of(image, height_um, tool)
+    return samples.map_of(image, height_um, tool)
 
 
 RESTARTS: Final = 5

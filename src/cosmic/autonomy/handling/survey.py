@@ -144,7 +144,7 @@ def _lonely(work: HandlingContext, candidate: Candidate) -> str:
 
 def same_fibre(one: Candidate, other: Candidate) -> bool:
     """Return whether two sightings on the plate are of one fibre."""
-    (x0, y0), (x1, y1) = one.place_um, other.place_um
+    (x0, y0), (x1, y1) = one.position_um, other.position_um
     near = abs(x0 - x1) < SAME_UM and abs(y0 - y1) < SAME_UM
     return near and abs(one.length_um - other.length_um) < SAME_LENGTH * other.length_um
 

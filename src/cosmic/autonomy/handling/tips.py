@@ -4,10 +4,10 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
+from cosmic.autonomy.coordinate_transform import REACH_PX, PlatformTransform
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.plate import PlateFrame
 from cosmic.autonomy.handling.sight import map_at
-from cosmic.autonomy.places import REACH_PX, PlatformPlaces
 from cosmic.autonomy.tools import expected, tip_um
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.vico.core.image import CameraImage
@@ -60,13 +60,13 @@ def tip_off(work: HandlingContext, image: CameraImage, tool: ToolSettings) -> Ti
 def shift_maps(work: HandlingContext, off_um: Off) -> None:
     """Have the maps made by the gripper follow its tip, which is now off by so much.
 
-    What lies on the plate keeps its place there: the rotation centre goes along.
+    What lies on the plate keeps its position there: the rotation centre goes along.
     """
-    places = work.vision.places
-    if not isinstance(places, PlatformPlaces):
+    positions = work.vision.transform
+    if not isinstance(positions, PlatformTransform):
         raise NotAvailable("micromanipulation is not hosted here: there are no maps")
     camera = work.settings.camera or work.vision.first_camera
-    places.calibrations.shift(camera, work.gripper.name, (-off_um[0], -off_um[1]))
+    positions.calibrations.shift(camera, work.gripper.name, (-off_um[0], -off_um[1]))
     x, y = work.calibration.frame.centre_um
     work.calibration.frame = PlateFrame((x - off_um[0], y - off_um[1]))
 
@@ -80,7 +80,7 @@ def see_tip(
     if tip is None:
         return NotSeen("its position is unknown")
     try:
-        mapped = map_at(work.vision.places, image, tip[2])
+        mapped = map_at(work.vision.transform, image, tip[2])
     except CosmicError as exc:
         return NotSeen(str(exc))
     wanted = expected(tool, mapped, tip[:2], positions, REACH_PX)

@@ -1,4 +1,4 @@
-"""About which place the plate turns, by a fibre that is followed from angle to angle."""
+"""About which point the plate turns, by a fibre that is followed from angle to angle."""
 
 from collections.abc import Generator
 from typing import Final
@@ -45,7 +45,9 @@ class FindRotationCentre(Calibrated):
             raise OperationFailed("no fibre", "no fibre on the plate is clear enough to follow")
         yield from clear_image(work)
         begun = work.table_deg
-        nearest = sorted(work.shared.candidates, key=lambda each: float(np.hypot(*each.place_um)))
+        nearest = sorted(
+            work.shared.candidates, key=lambda each: float(np.hypot(*each.position_um))
+        )
         why = ""
         for candidate in nearest[:MOST_FIBRES]:
             try:
@@ -71,7 +73,7 @@ def _followed(
     work: HandlingContext, candidate: Candidate, begun_deg: float
 ) -> Generator[Yielded, object, RotationFit]:
     angles: list[float] = []
-    places: list[Floats] = []
+    lines: list[Floats] = []
     for away in AWAY_DEG:
         yield work.go({work.table: begun_deg + away})
         image = yield work.image()
@@ -82,8 +84,8 @@ def _followed(
         if seen is None:
             raise NotAvailable(f"the fibre was lost at {angle:.0f} degrees")
         angles.append(angle)
-        places.append(_in_order(seen.line_um, wanted))
-    return best_circle(angles, places)
+        lines.append(_in_order(seen.line_um, wanted))
+    return best_circle(angles, lines)
 
 
 def _nearest(
@@ -113,7 +115,7 @@ def _in_order(line: Floats, wanted: Floats) -> Floats:
     return points if nearer else turned
 
 
-def best_circle(angles_deg: list[float], places: list[Floats]) -> RotationFit:
+def best_circle(angles_deg: list[float], lines: list[Floats]) -> RotationFit:
     """Return the surest circle of those that both ends and the middle go round.
 
     Raises
@@ -124,7 +126,7 @@ def best_circle(angles_deg: list[float], places: list[Floats]) -> RotationFit:
     fits: list[RotationFit] = []
     refusal = CalibrationRefused("rotation centre: no fibre was followed")
     for index in range(3):
-        way = [(float(each[index][0]), float(each[index][1])) for each in places]
+        way = [(float(each[index][0]), float(each[index][1])) for each in lines]
         try:
             fits.append(fit_rotation(angles_deg, way))
         except CalibrationRefused as exc:
@@ -136,7 +138,7 @@ def best_circle(angles_deg: list[float], places: list[Floats]) -> RotationFit:
 
 def _put_in_force(work: HandlingContext, frame: PlateFrame) -> None:
     """Take a new centre; what was seen on the plate before lies a little elsewhere in its frame."""
-    # Seen at the angle of the survey, places were right on the platform, whatever the centre.
+    # Seen at the angle of the survey, points were right on the platform, whatever the centre.
     old, angle = work.calibration.frame, work.shared.survey_deg
 
     def again(line: Floats) -> Floats:

@@ -18,7 +18,7 @@ from cosmic.autonomy.procedures.procedure import (
     Node,
     NodeSteps,
     Part,
-    Place,
+    TreePosition,
     perform,
 )
 from cosmic.autonomy.procedures.tree import OPERATION, NodeState, Outline
@@ -40,9 +40,9 @@ class Sequence(Node[W]):
     kind = "sequence"
 
     @override
-    def steps(self, place: Place[W]) -> NodeSteps:
+    def steps(self, position: TreePosition[W]) -> NodeSteps:
         for number, part in enumerate(self.parts):
-            yield from perform(part, place.child(number))
+            yield from perform(part, position.child(number))
 
 
 class Retry(Node[W]):
@@ -83,19 +83,19 @@ class Retry(Node[W]):
         self.only: Final = None if only is None else frozenset(only)
 
     @override
-    def steps(self, place: Place[W]) -> NodeSteps:
-        context = place.context
+    def steps(self, position: TreePosition[W]) -> NodeSteps:
+        context = position.context
         for attempt in range(1, self.times + 1):
             mark = len(context.begun)
             try:
-                yield from perform(self.parts[0], place.child(0, attempt=attempt))
+                yield from perform(self.parts[0], position.child(0, attempt=attempt))
                 return
             except OperationFailed as exc:
                 if attempt == self.times or not self._worth_another(exc):
                     raise
             yield from context.undo_back(mark)
             for between in self.parts[1:]:
-                yield from perform(between, place.child(1, attempt=attempt))
+                yield from perform(between, position.child(1, attempt=attempt))
 
     def _worth_another(self, failure: OperationFailed) -> bool:
         if isinstance(failure, (ProcedureStopped, UndoFailed)):
@@ -118,19 +118,19 @@ class Fallback(Node[W]):
         super().__init__(name, *parts)
 
     @override
-    def steps(self, place: Place[W]) -> NodeSteps:
+    def steps(self, position: TreePosition[W]) -> NodeSteps:
         last = len(self.parts) - 1
         for number, part in enumerate(self.parts):
-            mark = len(place.context.begun)
+            mark = len(position.context.begun)
             try:
-                yield from perform(part, place.child(number))
+                yield from perform(part, position.child(number))
                 return
             except ProcedureStopped:
                 raise
             except OperationFailed:
                 if number == last:
                     raise
-            yield from place.context.undo_failed(mark)
+            yield from position.context.undo_failed(mark)
 
 
 class Guard(Node[W]):
@@ -159,13 +159,13 @@ class Guard(Node[W]):
         self.cause: Final = cause
 
     @override
-    def steps(self, place: Place[W]) -> NodeSteps:
-        context = place.context
+    def steps(self, position: TreePosition[W]) -> NodeSteps:
+        context = position.context
         mark = len(context.begun)
         watch = Watch(lambda: self.condition(context.work))
         if watch.broken():
             raise self._failure(watch, "it was true before the part started")
-        branch = Branch(perform(self.parts[0], place.child(0)), context.control)
+        branch = Branch(perform(self.parts[0], position.child(0)), context.control)
         try:
             while not watch.broken():
                 branch.go()
@@ -198,16 +198,16 @@ class Parallel(Node[W]):
     """Parts side by side in one thread, so that their waits overlap; ends when all have ended.
 
     Where one fails, the others are ended at once, and all that they did is undone. In a pause
-    each goes on to its own next place of rest.
+    each goes on to its own next position of rest.
     """
 
     kind = "parallel"
 
     @override
-    def steps(self, place: Place[W]) -> NodeSteps:
-        contexts = [place.context.fork() for _ in self.parts]
+    def steps(self, position: TreePosition[W]) -> NodeSteps:
+        contexts = [position.context.fork() for _ in self.parts]
         branches = [
-            Branch(perform(part, place.child(number, context=context)), context.control)
+            Branch(perform(part, position.child(number, context=context)), context.control)
             for number, (part, context) in enumerate(zip(self.parts, contexts, strict=True))
         ]
         failed: int | None = None
@@ -231,10 +231,10 @@ class Parallel(Node[W]):
             left = [branch.end() for branch in branches]
         if failure is None:
             for context in contexts:
-                place.context.begun.extend(context.begun)
+                position.context.begun.extend(context.begun)
             return
         yield branches[0].until_ended(*left)
-        yield from self._give_up(place.context, contexts, failed, failure)
+        yield from self._give_up(position.context, contexts, failed, failure)
 
     @staticmethod
     def _give_up(
@@ -269,15 +269,15 @@ class Repeat(Node[W]):
         self.until: Final = until
 
     @override
-    def steps(self, place: Place[W]) -> NodeSteps:
-        context = place.context
+    def steps(self, position: TreePosition[W]) -> NodeSteps:
+        context = position.context
         number = 0
         while not self.until(context.work):
             number += 1
             mark = len(context.begun)
-            context.tree.reset(place.path)
+            context.tree.reset(position.path)
             yield SAFE_POINT
-            yield from perform(self.parts[0], place.child(0, round_=number))
+            yield from perform(self.parts[0], position.child(0, round_=number))
             del context.begun[mark:]
 
 
@@ -315,8 +315,8 @@ class Holding(Node[W]):
         self.needs: Final = needs
 
     @override
-    def steps(self, place: Place[W]) -> NodeSteps:
-        context = place.context
+    def steps(self, position: TreePosition[W]) -> NodeSteps:
+        context = position.context
         needed = sorted(self.needs(context.work), key=lambda each: each.rank)
         wanted = [each for each in needed if each not in context.holds]
         ranks = [each.rank for each in (*context.holds, *wanted)]
@@ -329,31 +329,33 @@ class Holding(Node[W]):
             for each in wanted:
                 each.ask(token)
                 if not each.held_by(token):
-                    context.tree.change(place.path, NodeState.QUEUED, f"waits for {each.name}")
+                    context.tree.change(position.path, NodeState.QUEUED, f"waits for {each.name}")
                     yield ForTurn(each, token, context.control)
             if wanted:
                 names = " and ".join(each.name for each in wanted)
-                context.tree.change(place.path, NodeState.HOLDING, f"has {names}")
+                context.tree.change(position.path, NodeState.HOLDING, f"has {names}")
             mine.holds = (*context.holds, *wanted)
-            yield from self._held(Place(mine, place.path, place.attempt, place.round))
+            yield from self._held(
+                TreePosition(mine, position.path, position.attempt, position.round)
+            )
         finally:
             for each in wanted:
                 each.give_back(token)
 
-    def _held(self, place: Place[W]) -> NodeSteps:
-        mark = len(place.context.begun)
+    def _held(self, position: TreePosition[W]) -> NodeSteps:
+        mark = len(position.context.begun)
         failure: OperationFailed | None = None
         try:
-            yield from perform(self.parts[0], place.child(0))
+            yield from perform(self.parts[0], position.child(0))
         except ProcedureStopped:
             raise
         except OperationFailed as exc:
             failure = exc
             if self.parts[1:]:
-                yield from place.context.undo_failed(mark)
+                yield from position.context.undo_failed(mark)
         try:
             for leaving in self.parts[1:]:
-                yield from perform(leaving, place.child(1))
+                yield from perform(leaving, position.child(1))
         except OperationFailed as exc:
             if failure is None or isinstance(exc, ProcedureStopped):
                 raise
@@ -380,11 +382,11 @@ class Role(Node[W]):
         self.work_of: Final = work_of
 
     @override
-    def steps(self, place: Place[W]) -> NodeSteps:
-        context = place.context
+    def steps(self, position: TreePosition[W]) -> NodeSteps:
+        context = position.context
         own = context.fork()
         own.work, own.begun = self.work_of(context.work), context.begun
-        yield from perform(self.parts[0], place.child(0, context=own))
+        yield from perform(self.parts[0], position.child(0, context=own))
 
 
 def outline_of(part: Part[W], role: str = "") -> Outline:

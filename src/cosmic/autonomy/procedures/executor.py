@@ -13,8 +13,8 @@ from cosmic.autonomy.procedures.procedure import (
     Branch,
     ExecutionContext,
     NodeSteps,
-    Place,
     Procedure,
+    TreePosition,
     perform,
 )
 from cosmic.autonomy.procedures.tree import ProcedureTreeState
@@ -87,7 +87,7 @@ class Executor(Generic[W]):
     def _whole(self) -> NodeSteps:
         context = ExecutionContext(self._work, self._tree, self._control)
         try:
-            yield from perform(self._procedure.root, Place(context))
+            yield from perform(self._procedure.root, TreePosition(context))
         except ProcedureStopped:
             raise
         except OperationFailed as failure:

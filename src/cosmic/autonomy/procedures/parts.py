@@ -1,4 +1,4 @@
-"""All that a procedure is written with, in one place to import from."""
+"""All that a procedure is written with, in one position to import from."""
 
 from cosmic.autonomy.procedures.combinators import (
     Fallback,

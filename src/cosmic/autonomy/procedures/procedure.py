@@ -45,7 +45,7 @@ class Node(ABC, Generic[W]):
         self.parts: Final = parts
 
     @abstractmethod
-    def steps(self, place: "Place[W]") -> NodeSteps:
+    def steps(self, position: "TreePosition[W]") -> NodeSteps:
         """Carry the parts out."""
 
 
@@ -114,7 +114,7 @@ class ExecutionContext(Generic[W]):
 
 
 @dataclass(frozen=True, slots=True)
-class Place(Generic[W]):
+class TreePosition(Generic[W]):
     """Where in the tree a part is carried out.
 
     Attributes
@@ -139,9 +139,9 @@ class Place(Generic[W]):
         context: ExecutionContext[W] | None = None,
         attempt: int | None = None,
         round_: int | None = None,
-    ) -> "Place[W]":
-        """Return the place of a part below this one."""
-        return Place(
+    ) -> "TreePosition[W]":
+        """Return the position of a part below this one."""
+        return TreePosition(
             context or self.context,
             (*self.path, number),
             self.attempt if attempt is None else attempt,
@@ -149,7 +149,7 @@ class Place(Generic[W]):
         )
 
 
-def perform(part: Part[W], place: Place[W]) -> NodeSteps:
+def perform(part: Part[W], position: TreePosition[W]) -> NodeSteps:
     """Carry out `part` and tell of its begin and its end.
 
     Raises
@@ -157,15 +157,15 @@ def perform(part: Part[W], place: Place[W]) -> NodeSteps:
     OperationFailed
         It failed; what it means to the parts above is theirs to say.
     """
-    tree, path = place.context.tree, place.path
+    tree, path = position.context.tree, position.path
     failure: OperationFailed | None = None
     is_operation = isinstance(part, UnitOperation)
-    tree.begin(path, place.attempt, place.round)
+    tree.begin(path, position.attempt, position.round)
     try:
         if isinstance(part, UnitOperation):
-            yield from _operate(part, place)
+            yield from _operate(part, position)
         else:
-            yield from part.steps(place)
+            yield from part.steps(position)
     except GeneratorExit:
         tree.end(path, NodeState.ENDED)
         raise
@@ -183,10 +183,10 @@ def perform(part: Part[W], place: Place[W]) -> NodeSteps:
         raise failure
 
 
-def _operate(operation: UnitOperation[W], place: Place[W]) -> NodeSteps:
-    context = place.context
+def _operate(operation: UnitOperation[W], position: TreePosition[W]) -> NodeSteps:
+    context = position.context
     operation.precondition(context.work)
-    entry = BegunOperation(operation, place.path, context.work)
+    entry = BegunOperation(operation, position.path, context.work)
     context.begun.append(entry)
     try:
         steps = operation.run(context.work)
@@ -194,7 +194,7 @@ def _operate(operation: UnitOperation[W], place: Place[W]) -> NodeSteps:
             yield from steps
         looking = operation.verify(context.work)
         if looking is not None:
-            context.tree.change(place.path, NodeState.VERIFYING)
+            context.tree.change(position.path, NodeState.VERIFYING)
             yield from looking
     except CosmicError:
         entry.failed = True

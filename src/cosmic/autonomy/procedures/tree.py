@@ -221,10 +221,10 @@ class ProcedureTreeState:
     def reset(self, path: Path) -> None:
         """Forget what the parts below `path` were at: a new round begins."""
         with self._lock:
-            for place, event in self._events.items():
-                if len(place) > len(path) and place[: len(path)] == path:
-                    self._events[place] = NodeEvent(
-                        place, event.name, event.kind, NodeState.WAITING, role=event.role
+            for below, event in self._events.items():
+                if len(below) > len(path) and below[: len(path)] == path:
+                    self._events[below] = NodeEvent(
+                        below, event.name, event.kind, NodeState.WAITING, role=event.role
                     )
 
     def rest(self, *, resting: bool) -> None:

@@ -56,9 +56,9 @@ class RunControl:
         """The wait between two looks at something that cannot tell of its end."""
         return LOOK_WALL_S * self.clock.rate or LOOK_S
 
-    def rests_at(self, place: SafePoint) -> bool:
+    def rests_at(self, point: SafePoint) -> bool:
         """Tell whether the run is to rest at `place`."""
-        return self.stepping if isinstance(place, OperationEnd) else self.pausing
+        return self.stepping if isinstance(point, OperationEnd) else self.pausing
 
     @contextmanager
     def carrying_out(self) -> Generator[None]:
@@ -151,15 +151,15 @@ class ForTime(Pending):
 class ForRest(Pending):
     """The end of a pause; ready at once where nobody wants one."""
 
-    def __init__(self, control: RunControl, place: SafePoint) -> None:
+    def __init__(self, control: RunControl, point: SafePoint) -> None:
         self._control = control
-        self._place = place
+        self._point = point
         self._turn = control.turn
 
     @property
     @override
     def resting(self) -> bool:
-        return self._control.turn == self._turn and self._control.rests_at(self._place)
+        return self._control.turn == self._turn and self._control.rests_at(self._point)
 
     @override
     def ready(self) -> bool:
@@ -384,7 +384,7 @@ class ForTurn(Pending):
     @property
     @override
     def resting(self) -> bool:
-        # Nothing is lost by waiting: in a pause this is as good a place of rest as any.
+        # Nothing is lost by waiting: in a pause this is as good a position of rest as any.
         return (self._control.pausing or self._control.stepping) and not self.ready()
 
     @override

@@ -9,7 +9,7 @@ from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.prepare import (
     CalibrateHeld,
     CalibratePlate,
-    ComparePlaces,
+    ComparePositions,
     InitialiseAgain,
     MakeReady,
     TurnOn,
@@ -30,7 +30,10 @@ def calibrated(settings: HandlingSettings) -> tuple[Part[HandlingContext], ...]:
     return (
         CheckDrift(),
         *((heights,) if chosen.heights else ()),
-        *(_tried(settings, each) for each in (CalibratePlate(), CalibrateHeld(), ComparePlaces())),
+        *(
+            _tried(settings, each)
+            for each in (CalibratePlate(), CalibrateHeld(), ComparePositions())
+        ),
         *((_tried(settings, TouchJaw()),) if chosen.touch else ()),
     )
 
@@ -49,7 +52,7 @@ def build_calibrate(
     everything: tuple[FibreOperation, ...] = (
         CalibratePlate(),
         CalibrateHeld(),
-        ComparePlaces(),
+        ComparePositions(),
         TouchJaw(),
         *((CalibrateZooms(),) if zooms else ()),
     )

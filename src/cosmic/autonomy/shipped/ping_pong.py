@@ -151,5 +151,5 @@ def _probe(work: HandlingContext) -> tuple[Resource, ...]:
 
 
 def _view(work: HandlingContext) -> tuple[Resource, ...]:
-    """Return the place before the probe where whoever is there would hide the fibre."""
+    """Return the position before the probe where whoever is there would hide the fibre."""
     return (work.shared.probe,) if hidden(work, work.held_fibre().reach) else ()

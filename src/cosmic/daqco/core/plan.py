@@ -128,11 +128,11 @@ def _taken(channel: ChannelSettings, board: BoardInfo, half: int) -> tuple[str, 
         return (channel.input,)
     number = board.inputs.index(channel.input)
     # NI pairs ai0 with ai8, ai16 with ai24: within each block of sixteen.
-    block, place = divmod(number, 16)
-    if place >= 8 or number >= 2 * half:
+    block, offset = divmod(number, 16)
+    if offset >= 8 or number >= 2 * half:
         raise _limit(
             f"{channel.name}: {channel.input} is the second half of a pair; give its partner "
-            f"{board.inputs[block * 16 + place - 8]}"
+            f"{board.inputs[block * 16 + offset - 8]}"
         )
     return channel.input, board.inputs[number + 8]
 

@@ -33,7 +33,7 @@ class ConsoleInput(QPlainTextEdit):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._history: list[str] = []
-        self._place = 0
+        self._index = 0
         self._draft = ""
         self.blockCountChanged.connect(self.updateGeometry)
 
@@ -65,19 +65,19 @@ class ConsoleInput(QPlainTextEdit):
             text = ""  # an empty line ends a block, blanks typed for us do not keep it open
         elif not self._history or self._history[-1] != text:
             self._history = [*self._history, text][-_MOST_HISTORY:]
-        self._place = len(self._history)
+        self._index = len(self._history)
         self._draft = ""
         self.clear()
         self.submitted.emit(text)
 
     def _recall(self, step: int) -> None:
-        place = self._place + step
-        if not 0 <= place <= len(self._history):
+        index = self._index + step
+        if not 0 <= index <= len(self._history):
             return
-        if self._place == len(self._history):
+        if self._index == len(self._history):
             self._draft = self.toPlainText()
-        self._place = place
-        self.set_text(self._draft if place == len(self._history) else self._history[place])
+        self._index = index
+        self.set_text(self._draft if index == len(self._history) else self._history[index])
 
     def _complete(self) -> None:
         before = self._before_cursor()

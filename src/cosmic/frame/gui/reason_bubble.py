@@ -47,7 +47,7 @@ class ReasonBubble(QLabel):
         self._field = field
         field.destroyed.connect(self._on_field_destroyed)
         self._follow(field)
-        self._place()
+        self._arrange()
 
     def dismiss(self, field: QWidget | None = None) -> None:
         """Take the note away, if it belongs to `field`; None takes away any."""
@@ -74,7 +74,7 @@ class ReasonBubble(QLabel):
             self._followed.append(widget)
             widget = widget.parentWidget()
 
-    def _place(self) -> None:
+    def _arrange(self) -> None:
         field, window = self._field, self.parentWidget()
         if field is None:
             return
@@ -93,7 +93,7 @@ class ReasonBubble(QLabel):
     @override
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() in _FOLLOWED:
-            self._place()
+            self._arrange()
         return super().eventFilter(watched, event)
 
     @override

@@ -26,7 +26,7 @@ SCRATCH: Final = Shade(wall=0.86, lumen=0.86, wall_part=0.5)
 
 @dataclass(frozen=True, slots=True)
 class Dirt:
-    """Dust and scratches; places on the plate in um, on the sensor as a part of its sides.
+    """Dust and scratches; points on the plate in um, on the sensor as a part of its sides.
 
     Attributes
     ----------
@@ -98,12 +98,12 @@ def soil(
     """
     sigma = view.sigma_px(float(plate[2, 3]))
     scale = view.px_um_at(float(plate[2, 3]))
-    places = view.image_px(on_plate(dirt.specks[:, :2], plate))
+    points = view.image_px(on_plate(dirt.specks[:, :2], plate))
     height, width = layer.shape
     reach = 4.0 * sigma + 60.0 * scale
-    seen = ((places > -reach) & (places < [width + reach, height + reach])).all(axis=1)
-    for place, (_, _, radius, passes) in zip(places[seen], dirt.specks[seen], strict=True):
-        speck(layer, place, radius * scale, sigma, passes)
+    seen = ((points > -reach) & (points < [width + reach, height + reach])).all(axis=1)
+    for point, (_, _, radius, passes) in zip(points[seen], dirt.specks[seen], strict=True):
+        speck(layer, point, radius * scale, sigma, passes)
     for ends in dirt.scratches:
         line = view.image_px(on_plate(ends, plate))
         stroke(layer, line, SCRATCH_UM * scale, sigma, SCRATCH)

@@ -12,7 +12,7 @@ from cosmic.twin.optics.canvas import Layer
 Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
 MARGIN_PX: Final = 192
-"""So many places across and down from which an image's noise may be cut."""
+"""So many points across and down from which an image's noise may be cut."""
 
 ZERO: Final = 32768
 ONE: Final = 6000.0

@@ -50,7 +50,7 @@ class ViewSettings(StrictModel):
     rotation_deg : float
         By which the camera is turned against the platform, counter-clockwise from above.
     centre_x_um, centre_y_um : float
-        Place on the plate in the middle of the image at the lowest zoom.
+        Point on the plate in the middle of the image at the lowest zoom.
     zoom_shift_x_px, zoom_shift_y_px : float
         How far the image wanders on the sensor from the lowest to the highest zoom.
     magnification_low, magnification_high : float

@@ -61,17 +61,17 @@ def stroke(layer: Layer, line_px: Floats, half_px: float, sigma_px: float, shade
     darken(layer, where, 1.0 - table[index] * ends)
 
 
-def speck(layer: Layer, place_px: Floats, radius_px: float, sigma_px: float, passes: float) -> None:
+def speck(layer: Layer, point_px: Floats, radius_px: float, sigma_px: float, passes: float) -> None:
     """Darken a layer in a soft round spot; blur makes it wider and fainter."""
     square = radius_px * radius_px
     spread = math.sqrt(0.5 * square + sigma_px * sigma_px)
     peak = (1.0 - passes) * square / (2.0 * spread * spread)
     if peak < FAINTEST:
         return
-    where = patch(layer, place_px[None, :], 0.0, spread)
+    where = patch(layer, point_px[None, :], 0.0, spread)
     if where is None:
         return
-    ((x, y),) = where.cells(place_px[None, :])
+    ((x, y),) = where.cells(point_px[None, :])
     per_cell = -0.5 * (where.cell / spread) ** 2
     across = np.exp(per_cell * (np.arange(where.width, dtype=np.float32) - x) ** 2)
     down = np.exp(per_cell * (np.arange(where.height, dtype=np.float32) - y) ** 2)
@@ -156,7 +156,7 @@ def _distances(where: Patch, line: Floats, reach: float, sigma: float) -> tuple[
 
 
 def _edges(along: Single, length: float, sigma: float, *, first: bool, last: bool) -> Single:
-    """Return how far places along a segment lie inside a fibre's square ends, 0 to 1."""
+    """Return how far points along a segment lie inside a fibre's square ends, 0 to 1."""
     inside = np.ones_like(along)
     if first:
         inside *= np.interp(along / sigma, _EDGE_AT, _EDGE).astype(np.float32)

@@ -134,10 +134,10 @@ class Subjects:
         offsets = self._force_side.offsets
         found = []
         for link, slide, parts in self._bodies:
-            place = slide.at(values)
+            position = slide.at(values)
             if not offsets.still:
-                place = added(place, offsets.at(link.partition("_")[0], at_s))
-            found += [Solid(link, part + place) for part in parts]
+                position = added(position, offsets.at(link.partition("_")[0], at_s))
+            found += [Solid(link, part + position) for part in parts]
         return tuple(found)
 
     def _flat(self, state: FibreState) -> Lying:
@@ -228,7 +228,7 @@ def _outwards(relative_um: Floats, towards: int) -> Floats:
 
 
 def _at(line: Floats, u: Floats) -> Floats:
-    """Return y and z of a line at places along x, shape (n, 2); beyond its end as at its end."""
+    """Return y and z of a line at points along x, shape (n, 2); beyond its end as at its end."""
     slope = (line[-1, 1:] - line[-2, 1:]) / max(float(line[-1, 0] - line[-2, 0]), 1e-9)
     beyond = np.maximum(u - line[-1, 0], 0.0)[:, None]
     inner = [np.interp(u, line[:, 0], column) for column in line[:, 1:].T]

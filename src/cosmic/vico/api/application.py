@@ -13,12 +13,12 @@ from cosmic.frame.errors import ConfigError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Task
 from cosmic.frame.task_application import TaskApplication
-from cosmic.vico.api.places import Places
+from cosmic.vico.api.coordinate_transform import CoordinateTransform
 from cosmic.vico.core.camera_libraries import CameraLibraries
 from cosmic.vico.core.camera_unit import CameraUnit
 from cosmic.vico.core.image import Circumstances
 from cosmic.vico.core.lens_control import PeripheralThread
-from cosmic.vico.core.settings import Backend, CameraPlace, VicoSettings
+from cosmic.vico.core.settings import Backend, CameraConfig, VicoSettings
 from cosmic.vico.core.zoom_scale import ZoomScale
 from cosmic.vico.hw.interface import CameraInfo, CameraLibrary, CameraSettings, Frame
 from cosmic.vico.hw.peripherals import Lens, LensAxis, Light
@@ -42,7 +42,7 @@ class VicoApplication(TaskApplication):
         By the camera's name, in the order of the platform file.
     position_source : callable or None
         Returns where every axis was at a platform time; called in the cameras' threads.
-    places : Places or None
+    points : Points or None
         What joins pixels and platform, where micromanipulation is hosted as well.
     """
 
@@ -65,14 +65,14 @@ class VicoApplication(TaskApplication):
         self.libraries = CameraLibraries(make_library)
         self.zoom_scale: ZoomScale = settings.lens.zoom_scale()
         self.position_source: Callable[[float], Mapping[str, float]] | None = None
-        self.places: Places | None = None
+        self.transform: CoordinateTransform | None = None
         self.found: tuple[CameraInfo, ...] = ()
         self.peripherals = PeripheralThread(
             open_lens, open_light, clock, policy, timeout_s=settings.lens.timeout_s
         )
         self.units: dict[str, CameraUnit] = {
-            place.name: CameraUnit(place, self.libraries, self._circumstances, policy)
-            for place in settings.camera
+            config.name: CameraUnit(config, self.libraries, self._circumstances, policy)
+            for config in settings.camera
         }
         direct = Qt.ConnectionType.DirectConnection
         self.peripherals.state_changed.connect(self._on_state_changed, direct)
@@ -169,13 +169,13 @@ class VicoApplication(TaskApplication):
     # What was known of a frame
 
     def _circumstances(
-        self, place: CameraPlace, frame: Frame, settings: CameraSettings
+        self, config: CameraConfig, frame: Frame, settings: CameraSettings
     ) -> Circumstances:
         """Tell what was set in the middle of an exposure; in the camera's thread."""
         middle_s = frame.exposed_s + 0.5 * settings.exposure_s
         history = self.peripherals.history
-        zoom = history.counts_at(LensAxis.ZOOM, middle_s) if place.behind_lens else None
-        focus = history.counts_at(LensAxis.FOCUS, middle_s) if place.behind_lens else None
+        zoom = history.counts_at(LensAxis.ZOOM, middle_s) if config.behind_lens else None
+        focus = history.counts_at(LensAxis.FOCUS, middle_s) if config.behind_lens else None
         positions = self.position_source(middle_s) if self.position_source is not None else {}
         return Circumstances(
             exposure_s=settings.exposure_s,
@@ -183,20 +183,20 @@ class VicoApplication(TaskApplication):
             zoom_counts=zoom,
             focus_counts=focus,
             light_percent=history.light_at(middle_s),
-            scale_um_px=self._scale_um_px(place, zoom, settings.binning),
+            scale_um_px=self._scale_um_px(config, zoom, settings.binning),
             positions=positions,
         )
 
     def _scale_um_px(
-        self, place: CameraPlace, zoom_counts: float | None, binning: int
+        self, config: CameraConfig, zoom_counts: float | None, binning: int
     ) -> float | None:
         """Return what a pixel is: as calibrated where it was, else as the lens is built."""
-        if self.places is not None:
-            scale = self.places.scale_um_px(place.name, zoom_counts)
+        if self.transform is not None:
+            scale = self.transform.scale_um_px(config.name, zoom_counts)
             if scale is not None:
                 return scale * binning
-        if not place.behind_lens:
-            return None if place.scale_um_px is None else place.scale_um_px * binning
+        if not config.behind_lens:
+            return None if config.scale_um_px is None else config.scale_um_px * binning
         if zoom_counts is None:
             return None
         return self.zoom_scale.scale_um_px(zoom_counts, binning)

@@ -18,6 +18,7 @@ from cosmic.frame.network.transport import Rule
 from cosmic.frame.operation import Task
 from cosmic.frame.renamed import Renamed
 from cosmic.vico.api.application import VicoApplication
+from cosmic.vico.api.camera_coordinates import CameraCoordinates
 from cosmic.vico.api.camera_images import (
     CameraImages,
     ImageWait,
@@ -25,10 +26,9 @@ from cosmic.vico.api.camera_images import (
     RemoteImages,
     always,
 )
-from cosmic.vico.api.camera_places import CameraPlaces
 from cosmic.vico.api.camera_shape import CameraShape
 from cosmic.vico.api.camera_shown import FormatShown, LinkShown, Seen, formats_shown, links_shown
-from cosmic.vico.api.places import Places, RotationShown
+from cosmic.vico.api.coordinate_transform import CoordinateTransform, RotationShown
 from cosmic.vico.api.sent_image import SentImage, SentSeen
 from cosmic.vico.core.camera_recordings import ImageRecordingState
 from cosmic.vico.core.image import CameraImage
@@ -48,7 +48,7 @@ BACKGROUND_FRAMES = 8
 
 
 @checked_class
-class CameraHandle(CameraPlaces, CameraShape, Declared):
+class CameraHandle(CameraCoordinates, CameraShape, Declared):
     """One camera: its images, settings, recordings and what machine vision finds; any thread.
 
     It has the shape of a bluesky detector without importing bluesky.
@@ -91,7 +91,7 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
     @state
     def title(self) -> str:
         """What the operator reads."""
-        return self._unit.place.shown
+        return self._unit.config.shown
 
     @property
     @override
@@ -167,7 +167,7 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
     def sent_latest(self) -> SentImage | None:
         """Return the newest whole image as it travels to another station."""
         newest = self.latest()
-        return None if newest is None else SentImage.of(newest, self._places)
+        return None if newest is None else SentImage.of(newest, self._transform)
 
     @override
     def next_image(self, timeout_s: float = 5.0, since_s: float | None = None) -> CameraImage:
@@ -186,7 +186,7 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
     def await_image(self, since_s: float | None = None) -> ImageWait:
         """Begin to wait for a whole image exposed from `since_s` on; None is now."""
         since = self.clock.now_s() if since_s is None else since_s
-        return ImageWait(self._thread, since, self._places)
+        return ImageWait(self._thread, since, self._transform)
 
     def image_since(self, since_s: float) -> CameraImage | None:
         """Return the newest whole image if it was exposed at `since_s` of platform time or later.
@@ -207,7 +207,7 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
 
         def take(image: CameraImage) -> None:
             if wanted is None or wanted():
-                receiver(SentImage.of(image, self._places))
+                receiver(SentImage.of(image, self._transform))
 
         return self._thread.subscribe(take)
 
@@ -218,7 +218,7 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
         """Call `receiver` with whole images as a view shows them, while they are `wanted`."""
 
         def take(image: CameraImage) -> None:
-            receiver(SentImage.of(image, self._places))
+            receiver(SentImage.of(image, self._transform))
 
         return self._unit.live.subscribe(take, wanted or always)
 
@@ -431,9 +431,9 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
     @property
     @state
     def rotation(self) -> RotationShown | None:
-        """About which place the plate turns; None while it was not measured."""
-        places = self._application.places
-        return places.rotation_centre(self.name) if places is not None else None
+        """About which point the plate turns; None while it was not measured."""
+        transform = self._application.transform
+        return transform.rotation_centre(self.name) if transform is not None else None
 
     @property
     @override
@@ -442,8 +442,8 @@ class CameraHandle(CameraPlaces, CameraShape, Declared):
 
     @property
     @override
-    def _places(self) -> Places | None:
-        return self._images.places
+    def _transform(self) -> CoordinateTransform | None:
+        return self._images.transform
 
     @property
     @override

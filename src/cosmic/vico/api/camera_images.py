@@ -14,7 +14,7 @@ from cosmic.frame.operation import Operation
 from cosmic.frame.threads import forbid_waiting_here, may_wait_here
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.camera_shown import Seen
-from cosmic.vico.api.places import Places
+from cosmic.vico.api.coordinate_transform import CoordinateTransform
 from cosmic.vico.api.sent_image import ReceivedImage, SentImage, SentSeen
 from cosmic.vico.core.camera_recordings import ImageRecordingState
 from cosmic.vico.core.camera_thread import CameraThread
@@ -41,7 +41,7 @@ class CameraImages(Protocol):
 
     @property
     @abstractmethod
-    def places(self) -> Places | None:
+    def transform(self) -> CoordinateTransform | None:
         """What joins pixels and platform."""
 
     @property
@@ -88,8 +88,8 @@ class LocalImages(CameraImages):
 
     @property
     @override
-    def places(self) -> Places | None:
-        return self._application.places
+    def transform(self) -> CoordinateTransform | None:
+        return self._application.transform
 
     @property
     @override
@@ -224,7 +224,7 @@ class RemoteImages(CameraImages):
     def __init__(self, camera: SendingCamera, policy: FailurePolicy) -> None:
         self._camera = camera
         self._jobs = JobQueue(f"images of {camera.name}", policy)
-        self._places: Places | None = None
+        self._transform: CoordinateTransform | None = None
         self._shown: ReceivedImage | None = None
         self._seen: Seen | None = None
         self._looked: dict[str, float] = {}
@@ -237,9 +237,9 @@ class RemoteImages(CameraImages):
         """Images are being sent, because somebody looks, and have come."""
         return "shown" in self._ends and self._came_s > 0.0
 
-    def join_places(self, places: Places) -> None:
+    def join_transform(self, transform: CoordinateTransform) -> None:
         """Say what joins pixels and platform."""
-        self._places = places
+        self._transform = transform
 
     # What a handle asks
 
@@ -250,8 +250,8 @@ class RemoteImages(CameraImages):
 
     @property
     @override
-    def places(self) -> Places | None:
-        return self._places
+    def transform(self) -> CoordinateTransform | None:
+        return self._transform
 
     @property
     @override

@@ -27,8 +27,8 @@ from cosmic.vico.core.recording.snap import save_image
 from cosmic.vico.hw.interface import CameraInfo, CameraSettings, Trigger
 
 if TYPE_CHECKING:
+    from cosmic.vico.api.coordinate_transform import CoordinateTransform
     from cosmic.vico.api.fibres import PlacedFibre
-    from cosmic.vico.api.places import Places
 
 SUFFIXES: Final = (".tif", ".tiff", ".png")
 WAIT_S: Final = 5.0
@@ -89,7 +89,7 @@ class CameraShape:
 
     @property
     @abstractmethod
-    def _places(self) -> "Places | None":
+    def _transform(self) -> "CoordinateTransform | None":
         """What joins pixels and platform."""
 
     # Plans
@@ -169,9 +169,9 @@ class CameraShape:
 
     def _measured(self, image: CameraImage) -> dict[str, object]:
         # Imported here: it loads OpenCV and scipy.
-        from cosmic.vico.api.fibres import place_fibres
+        from cosmic.vico.api.fibres import locate_fibres
 
-        found = place_fibres(image, self._places)
+        found = locate_fibres(image, self._transform)
         longest = max(found, key=lambda each: each.length_px, default=None)
         return {
             "fibres": len(found),

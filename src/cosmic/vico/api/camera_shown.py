@@ -20,7 +20,7 @@ DESCRIPTIONS = {
     "focus": "how sharp the image is",
     "fibres": "find fibres and measure them",
     "fibre track": "follow one fibre from image to image",
-    "place track": "follow one place from image to image",
+    "place track": "follow one point from image to image",
     "tools": "measure the ends of grippers and probe",
     "tips": "find the tips of grippers and probe",
 }

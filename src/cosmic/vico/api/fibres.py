@@ -6,7 +6,7 @@ import numpy as np
 
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.renamed import Renamed
-from cosmic.vico.api.places import Places
+from cosmic.vico.api.coordinate_transform import CoordinateTransform
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.vision.algorithms import grey
 from cosmic.vico.core.vision.fibre import Fibre
@@ -16,7 +16,7 @@ from cosmic.vico.core.vision.grey import Floats
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedFibre(Fibre):
-    """A fibre found on one image, with its size and place where those can be told.
+    """A fibre found on one image, with its size and point where those can be told.
 
     Attributes
     ----------
@@ -59,26 +59,30 @@ class PlacedFibre(Fibre):
         return None if self.scale_um_px is None else value_px * self.scale_um_px
 
 
-def place_fibres(image: CameraImage, places: Places | None) -> list[PlacedFibre]:
+def locate_fibres(image: CameraImage, transform: CoordinateTransform | None) -> list[PlacedFibre]:
     """Find the fibres on an image and say how long they are and where."""
-    reason = "micromanipulation is not hosted here" if places is None else places.problem(image)
-    return [_placed(each, image, places, reason) for each in find_fibres(grey(image.data))]
+    reason = (
+        "micromanipulation is not hosted here" if transform is None else transform.problem(image)
+    )
+    return [_located(each, image, transform, reason) for each in find_fibres(grey(image.data))]
 
 
-def _placed(fibre: Fibre, image: CameraImage, places: Places | None, reason: str) -> PlacedFibre:
+def _located(
+    fibre: Fibre, image: CameraImage, transform: CoordinateTransform | None, reason: str
+) -> PlacedFibre:
     scale = image.circumstances.scale_um_px
     doubts = list(fibre.doubts)
     if scale is None:
         doubts.append("no um: the scale of this image is not known")
     lines: list[Floats | None] = [None, None, None]
-    if places is None or reason:
-        doubts.append(f"no place on the platform: {reason}")
+    if transform is None or reason:
+        doubts.append(f"no point on the platform: {reason}")
     else:
         wanted = (fibre.centre_line_px, fibre.ends_px, fibre.grasp_points_px)
         try:
-            lines = [_on_platform(each, image, places) for each in wanted]
+            lines = [_on_platform(each, image, transform) for each in wanted]
         except NotAvailable as exc:
-            doubts.append(f"no place on the platform: {exc}")
+            doubts.append(f"no point on the platform: {exc}")
     centre_line_um, ends_um, grasp_points_um = lines
     known = {each.name: getattr(fibre, each.name) for each in fields(Fibre)}
     return PlacedFibre(
@@ -91,6 +95,6 @@ def _placed(fibre: Fibre, image: CameraImage, places: Places | None, reason: str
     )
 
 
-def _on_platform(points_px: Floats, image: CameraImage, places: Places) -> Floats:
-    found = [places.platform_um(image, (float(x), float(y))) for x, y in points_px]
+def _on_platform(points_px: Floats, image: CameraImage, transform: CoordinateTransform) -> Floats:
+    found = [transform.platform_um(image, (float(x), float(y))) for x, y in points_px]
     return np.array(found, dtype=np.float64).reshape(-1, 2)

@@ -123,10 +123,10 @@ class LensHandle(Declared):
         """
         application = self._application
         unit = application.unit(camera or application.first_camera)
-        if not unit.place.behind_lens:
-            raise NotAvailable(f"{unit.place.name} has a lens of its own; there is no motor")
+        if not unit.config.behind_lens:
+            raise NotAvailable(f"{unit.config.name} has a lens of its own; there is no motor")
         self._search = application.begin(
-            f"Autofocus of {unit.place.name}",
+            f"Autofocus of {unit.config.name}",
             lambda task: find_focus(task, unit, self._thread, application.clock),
         )
         return self._search

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cosmic.frame.errors import NotAvailable
 from cosmic.vico.api.camera_shown import Seen
-from cosmic.vico.api.places import Pixel, Places
+from cosmic.vico.api.coordinate_transform import CoordinateTransform, Pixel
 from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.tool_tips import TipSeen
@@ -35,17 +35,17 @@ class PlateMap:
     down_um: Pixel
 
     @classmethod
-    def of(cls, image: CameraImage, places: Places) -> "PlateMap":
+    def of(cls, image: CameraImage, transform: CoordinateTransform) -> "PlateMap":
         """Return the map of an image; raises `NotAvailable` where it was not calibrated."""
         height, width = image.data.shape[:2]
-        corner = places.platform_um(image, (0.0, 0.0))
-        right = places.platform_um(image, (float(width), 0.0))
-        down = places.platform_um(image, (0.0, float(height)))
+        corner = transform.platform_um(image, (0.0, 0.0))
+        right = transform.platform_um(image, (float(width), 0.0))
+        down = transform.platform_um(image, (0.0, float(height)))
         return cls(corner, _step(corner, right, width), _step(corner, down, height))
 
-    def to_um(self, place_px: Pixel) -> Pixel:
+    def to_um(self, point_px: Pixel) -> Pixel:
         """Return x and y on the platform."""
-        (x, y), (x0, y0) = place_px, self.corner_um
+        (x, y), (x0, y0) = point_px, self.corner_um
         (xr, yr), (xd, yd) = self.right_um, self.down_um
         return x0 + x * xr + y * xd, y0 + x * yr + y * yd
 
@@ -97,9 +97,9 @@ class SentImage:
         return int(self.data.nbytes)
 
     @classmethod
-    def of(cls, image: CameraImage, places: Places | None) -> "SentImage":
+    def of(cls, image: CameraImage, transform: CoordinateTransform | None) -> "SentImage":
         """Return what is sent of an image; a simulated camera draws it here."""
-        plate, problem = _plate(image, places)
+        plate, problem = _plate(image, transform)
         frame, known = image.frame, image.circumstances
         return cls(
             image.camera,
@@ -147,14 +147,16 @@ class SentImage:
         )
 
 
-def _plate(image: CameraImage, places: Places | None) -> tuple[PlateMap | None, str]:
-    if places is None:
+def _plate(
+    image: CameraImage, transform: CoordinateTransform | None
+) -> tuple[PlateMap | None, str]:
+    if transform is None:
         return None, NOT_HOSTED
-    problem = places.problem(image)
+    problem = transform.problem(image)
     if problem:
         return None, problem
     try:
-        return PlateMap.of(image, places), ""
+        return PlateMap.of(image, transform), ""
     except NotAvailable as exc:
         return None, str(exc)
 
@@ -192,7 +194,7 @@ def _plain(fibre: Fibre) -> Fibre:
 
 
 def _plain_tip(tip: TipSeen) -> TipSeen:
-    x, y = tip.place_px
+    x, y = tip.point_px
     return TipSeen(tip.name, (float(x), float(y)), tip.certain)
 
 
@@ -206,6 +208,6 @@ def received_seen(sent: object) -> Seen | None:
     return sent.received() if isinstance(sent, SentSeen) else None
 
 
-def same_place(one_um: Sequence[float], other_um: Sequence[float], within_um: float) -> bool:
-    """Return whether two places are the same but for `within_um`."""
+def same_point(one_um: Sequence[float], other_um: Sequence[float], within_um: float) -> bool:
+    """Return whether two points are the same but for `within_um`."""
     return all(abs(a - b) <= within_um for a, b in zip(one_um, other_um, strict=True))

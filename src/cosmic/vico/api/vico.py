@@ -21,8 +21,13 @@ from cosmic.frame.weakly import weakly
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.camera import CameraHandle
 from cosmic.vico.api.camera_images import RemoteImages
+from cosmic.vico.api.coordinate_transform import (
+    CalibrationShown,
+    CoordinateTransform,
+    Pixel,
+    RotationShown,
+)
 from cosmic.vico.api.lens import LensHandle, LightHandle
-from cosmic.vico.api.places import CalibrationShown, Pixel, Places, RotationShown
 from cosmic.vico.api.sent_image import NOT_HOSTED, ReceivedImage
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.hw.interface import CameraInfo, Pixels
@@ -115,7 +120,7 @@ class Vico(Declared):
         self._application = application
         self._handles = {name: CameraHandle(application, name) for name in application.cameras}
         self._lens, self._light = LensHandle(application), LightHandle(application)
-        self._on_images: PlacesOnImages | None = None
+        self._on_images: ImageTransform | None = None
         # At once: a call that still waits in a queue when a plain object goes would reach what is
         # no more.
         direct = Qt.ConnectionType.DirectConnection
@@ -128,8 +133,8 @@ class Vico(Declared):
 
     @override
     def prepare(self, key: str, policy: FailurePolicy) -> None:
-        """Read places from the images that come."""
-        self._on_images = PlacesOnImages(self)
+        """Read points from the images that come."""
+        self._on_images = ImageTransform(self)
 
     @override
     def made_companion(self) -> Companion:
@@ -167,7 +172,7 @@ class Vico(Declared):
             raise ConfigError(f"there is no camera {chosen!r}; the platform has: {known}")
         handle = handles[chosen]
         if self._on_images is not None and isinstance(handle.images, RemoteImages):
-            handle.images.join_places(self._on_images)
+            handle.images.join_transform(self._on_images)
         return handle
 
     @property
@@ -229,27 +234,27 @@ class Vico(Declared):
             No image came in time.
         """
         # Imported here: it loads OpenCV and scipy.
-        from cosmic.vico.api.fibres import place_fibres
+        from cosmic.vico.api.fibres import locate_fibres
 
         image = self.camera(camera).next_image(timeout_s)
-        return place_fibres(image, self._places)
+        return locate_fibres(image, self._transform)
 
-    # Places on the platform
+    # Points on the platform
 
     @property
-    def _places(self) -> Places | None:
-        return self._on_images or self._application.places
+    def _transform(self) -> CoordinateTransform | None:
+        return self._on_images or self._application.transform
 
     @property
     def tools(self) -> Sequence[str]:
-        """What can be moved to a place in an image, and what calibrates, such as "left"."""
+        """What can be moved to a point in an image, and what calibrates, such as "left"."""
         return () if self.away else self._tools
 
     @property
     @state
     def _tools(self) -> tuple[str, ...]:
-        places = self._application.places
-        return tuple(places.targets) if places is not None else ()
+        transform = self._application.transform
+        return tuple(transform.targets) if transform is not None else ()
 
     @property
     def calibrated(self) -> Sequence[CalibrationShown]:
@@ -259,14 +264,14 @@ class Vico(Declared):
     @property
     @state
     def _calibrated(self) -> tuple[CalibrationShown, ...]:
-        places = self._application.places
-        return tuple(places.calibrated) if places is not None else ()
+        transform = self._application.transform
+        return tuple(transform.calibrated) if transform is not None else ()
 
     def calibrate_stage(self, tool: str, camera: str = "") -> Task:
         """Begin to measure where on the platform the pixels of a camera lie, by moving a tool.
 
         The tip of `tool` must be in the image and sharp, near the height that matters. It goes
-        to nine places about where it stands, through the gate, and back.
+        to nine points about where it stands, through the gate, and back.
 
         Raises
         ------
@@ -278,7 +283,7 @@ class Vico(Declared):
         return self.camera(camera).calibrate_stage(tool)
 
     def find_rotation_centre(self, camera: str = "") -> Task:
-        """Begin to measure about which place the plate turns, by a fibre that lies on it.
+        """Begin to measure about which point the plate turns, by a fibre that lies on it.
 
         The table turns by 24 degrees to both sides, through the gate, and back.
 
@@ -290,7 +295,7 @@ class Vico(Declared):
         return self.camera(camera).find_rotation_centre()
 
     def rotation_centre(self, camera: str = "") -> RotationShown | None:
-        """Return about which place the plate turns, as a camera saw it last; None before."""
+        """Return about which point the plate turns, as a camera saw it last; None before."""
         return self.camera(camera).rotation
 
     # Recording

@@ -14,7 +14,7 @@ from cosmic.vico.core.levels import FULL_SCALE
 from cosmic.vico.hw.interface import Frame, FrameStatus, PixelFormat, Pixels
 
 MOST_FRAMES: Final = 1000
-# A place darker than this part of the mean is an edge of the field, not uneven light.
+# A point darker than this part of the mean is an edge of the field, not uneven light.
 DARKEST_PART: Final = 0.1
 
 
@@ -148,7 +148,7 @@ def _kind(frame: Frame, binning: int) -> _Kind:
 
 
 def _gain(mean: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
-    """Return what makes every place of `mean` as bright as its average, each layer for itself."""
+    """Return what makes every point of `mean` as bright as its average, each layer for itself."""
     level = mean.mean(axis=(0, 1))
     if not np.all(level >= 1.0):
         raise ConfigError(

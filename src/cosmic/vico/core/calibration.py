@@ -38,7 +38,7 @@ class Plane:
 
 @dataclass(frozen=True, slots=True)
 class RotationCentre:
-    """About which place a rotary axis turns, with when that was measured."""
+    """About which point a rotary axis turns, with when that was measured."""
 
     axis: str
     fit: RotationFit

@@ -1,4 +1,4 @@
-"""Measure the map from stage to image, and the table's rotation centre, from places tracked."""
+"""Measure the map from stage to image, and the table's rotation centre, from points tracked."""
 
 import itertools
 import math
@@ -58,7 +58,7 @@ class MapFit:
     Attributes
     ----------
     rms_px, max_px : float
-        Distance between where the places used were seen and where the map says.
+        Distance between where the points used were seen and where the map says.
     outliers : tuple of str
         Sightings left out, each with how far off it is.
     """
@@ -75,38 +75,38 @@ def fit_map(sightings: Sequence[Sighting], *, limit_px: float = LARGEST_RMS_PX) 
     Raises
     ------
     CalibrationRefused
-        Too few places, too close together or on a line; too many outliers; residual above
+        Too few points, too close together or on a line; too many outliers; residual above
         `limit_px` RMS; the two axes are seen at different scales.
     """
-    places = np.array([each.platform_um for each in sightings], dtype=np.float64).reshape(-1, 2)
+    points = np.array([each.platform_um for each in sightings], dtype=np.float64).reshape(-1, 2)
     seen = np.array([each.image_px for each in sightings], dtype=np.float64).reshape(-1, 2)
-    if not (np.isfinite(places).all() and np.isfinite(seen).all()):
-        raise CalibrationRefused("calibration: a place or a pixel is not a number; track again")
-    _check_places(places, seen)
-    kept = _inliers(places, seen)
+    if not (np.isfinite(points).all() and np.isfinite(seen).all()):
+        raise CalibrationRefused("calibration: a point or a pixel is not a number; track again")
+    _check_points(points, seen)
+    kept = _inliers(points, seen)
     left_out = np.flatnonzero(~kept).tolist()
-    fitted, residuals_px = _least_squares(places[kept], seen[kept])
-    off_px = np.linalg.norm(fitted.to_px(places) - seen, axis=1)
+    fitted, residuals_px = _least_squares(points[kept], seen[kept])
+    off_px = np.linalg.norm(fitted.to_px(points) - seen, axis=1)
     outliers = tuple(
         f"{sightings[i].label or f'point {i + 1}'}: {off_px[i]:.1f} px off" for i in left_out
     )
     if len(left_out) > OUTLIER_SHARE * len(sightings) or kept.sum() < FEWEST_POINTS:
         raise CalibrationRefused(
-            f"calibration: {len(left_out)} of {len(sightings)} places do not fit the others "
+            f"calibration: {len(left_out)} of {len(sightings)} points do not fit the others "
             f"({'; '.join(outliers)}); look whether the right thing was tracked and stands sharp"
         )
-    _check_places(places[kept], seen[kept])
+    _check_points(points[kept], seen[kept])
     rms_px = float(np.sqrt(np.mean(residuals_px**2)))
     _check_map(fitted, rms_px, limit_px)
     return MapFit(fitted, rms_px, float(residuals_px.max()), outliers)
 
 
-def _check_places(places: Floats, seen: Floats) -> None:
-    if len(places) < FEWEST_POINTS:
+def _check_points(points: Floats, seen: Floats) -> None:
+    if len(points) < FEWEST_POINTS:
         raise CalibrationRefused(
-            f"calibration: {len(places)} places, at least {FEWEST_POINTS} are needed"
+            f"calibration: {len(points)} points, at least {FEWEST_POINTS} are needed"
         )
-    asked = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
+    asked = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if not asked[1] > NARROWEST * asked[0]:
         raise CalibrationRefused(
             "calibration: the stage moved along a line only; move in both directions"
@@ -115,7 +115,7 @@ def _check_places(places: Floats, seen: Floats) -> None:
     spread_px = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)[1] / math.sqrt(len(seen))
     if not spread_px >= SMALLEST_SPREAD_PX:
         raise CalibrationRefused(
-            f"calibration: the places seen spread by {spread_px:.1f} px across, "
+            f"calibration: the points seen spread by {spread_px:.1f} px across, "
             f"{SMALLEST_SPREAD_PX:g} px are needed; move further, and see that what is tracked "
             "moves with the stage"
         )
@@ -134,35 +134,35 @@ def _check_map(fitted: PixelMap, rms_px: float, limit_px: float) -> None:
         )
 
 
-def _least_squares(places: Floats, seen: Floats) -> tuple[PixelMap, Floats]:
-    """Return the map and how far each place is from it, px."""
-    centre_um, centre_px = places.mean(axis=0), seen.mean(axis=0)
-    away = places - centre_um
+def _least_squares(points: Floats, seen: Floats) -> tuple[PixelMap, Floats]:
+    """Return the map and how far each point is from it, px."""
+    centre_um, centre_px = points.mean(axis=0), seen.mean(axis=0)
+    away = points - centre_um
     solution = np.linalg.lstsq(away, seen - centre_px, rcond=None)[0]
     error = away @ solution - (seen - centre_px)
-    # Two coordinates a place; six numbers of the map are taken from them.
-    freedom = max(1, 2 * len(places) - 6)
+    # Two coordinates a point; six numbers of the map are taken from them.
+    freedom = max(1, 2 * len(points) - 6)
     fitted = PixelMap(
         as_matrix(solution.T),
         as_pair(centre_um),
         as_pair(centre_px),
         math.sqrt(float(np.sum(error**2)) / freedom),
         as_matrix(np.linalg.inv(away.T @ away)),
-        len(places),
+        len(points),
     )
     return fitted, np.asarray(np.linalg.norm(error, axis=1))
 
 
-def _inliers(places: Floats, seen: Floats) -> npt.NDArray[np.bool_]:
+def _inliers(points: Floats, seen: Floats) -> npt.NDArray[np.bool_]:
     """Return which sightings agree with most of the others (least median of squares)."""
-    best_px, kept = math.inf, np.ones(len(places), dtype=np.bool_)
-    for triple in _triples(len(places)):
-        corners = np.column_stack([places[triple], np.ones(3)])
-        if abs(np.linalg.det(corners)) < 1e-6 * max(1.0, float(np.ptp(places)) ** 2):
+    best_px, kept = math.inf, np.ones(len(points), dtype=np.bool_)
+    for triple in _triples(len(points)):
+        corners = np.column_stack([points[triple], np.ones(3)])
+        if abs(np.linalg.det(corners)) < 1e-6 * max(1.0, float(np.ptp(points)) ** 2):
             continue
         affine = np.linalg.solve(corners, seen[triple])
         off_px = np.linalg.norm(
-            np.column_stack([places, np.ones(len(places))]) @ affine - seen, axis=1
+            np.column_stack([points, np.ones(len(points))]) @ affine - seen, axis=1
         )
         middle_px = float(np.median(off_px))
         if middle_px < best_px:
@@ -170,8 +170,8 @@ def _inliers(places: Floats, seen: Floats) -> npt.NDArray[np.bool_]:
     for _ in range(3):
         if kept.sum() < FEWEST_POINTS:
             return kept
-        fitted, near_px = _least_squares(places[kept], seen[kept])
-        off_px = np.linalg.norm(fitted.to_px(places) - seen, axis=1)
+        fitted, near_px = _least_squares(points[kept], seen[kept])
+        off_px = np.linalg.norm(fitted.to_px(points) - seen, axis=1)
         limit_px = max(OUTLIER_PX, 4.0 * float(np.median(near_px)))
         kept = off_px <= limit_px
     return kept
@@ -189,12 +189,12 @@ def _triples(count: int) -> Iterator[list[int]]:
 
 @dataclass(frozen=True, slots=True)
 class RotationFit:
-    """About which place the table turns.
+    """About which point the table turns.
 
     Attributes
     ----------
     rms_um, max_um : float
-        How far the places seen are from the circle, at the angle each was seen at.
+        How far the points seen are from the circle, at the angle each was seen at.
     std_um : float
         Standard deviation of the centre, in the direction that is known least.
     sense : int
@@ -212,7 +212,7 @@ class RotationFit:
 
 def fit_rotation(
     angles_deg: Sequence[float],
-    places_um: Sequence[Pair],
+    points_um: Sequence[Pair],
     *,
     limit_um: float = LARGEST_RMS_UM,
     limit_std_um: float = LARGEST_CENTRE_STD_UM,
@@ -226,9 +226,9 @@ def fit_rotation(
         `limit_um` RMS, or a centre less sure than `limit_std_um`.
     """
     angles = np.radians(np.asarray(angles_deg, dtype=np.float64))
-    places = np.asarray(places_um, dtype=np.float64).reshape(-1, 2)
-    _check_angles(angles, places)
-    found = min((_circle(angles, places, sense) for sense in (1, -1)), key=lambda each: each.rms_um)
+    points = np.asarray(points_um, dtype=np.float64).reshape(-1, 2)
+    _check_angles(angles, points)
+    found = min((_circle(angles, points, sense) for sense in (1, -1)), key=lambda each: each.rms_um)
     if not found.radius_um >= SMALLEST_RADIUS_UM:
         raise CalibrationRefused(
             f"rotation centre: what is tracked goes round at {found.radius_um:.0f} um, at least "
@@ -247,13 +247,13 @@ def fit_rotation(
     return found
 
 
-def _check_angles(angles: Floats, places: Floats) -> None:
-    if len(angles) != len(places):
+def _check_angles(angles: Floats, points: Floats) -> None:
+    if len(angles) != len(points):
         raise CalibrationRefused(
-            f"rotation centre: {len(angles)} angles and {len(places)} places; one place an angle"
+            f"rotation centre: {len(angles)} angles and {len(points)} points; one point an angle"
         )
-    if not (np.isfinite(angles).all() and np.isfinite(places).all()):
-        raise CalibrationRefused("rotation centre: an angle or a place is not a number")
+    if not (np.isfinite(angles).all() and np.isfinite(points).all()):
+        raise CalibrationRefused("rotation centre: an angle or a point is not a number")
     different = len(np.unique(np.round(np.degrees(angles))))
     if different < FEWEST_ANGLES:
         raise CalibrationRefused(
@@ -268,7 +268,7 @@ def _check_angles(angles: Floats, places: Floats) -> None:
         )
 
 
-def _circle(angles: Floats, places: Floats, sense: int) -> RotationFit:
+def _circle(angles: Floats, points: Floats, sense: int) -> RotationFit:
     """Fit centre and spoke; that the angles are known makes it linear, and surer than a circle."""
     cosine, sine = np.cos(angles), sense * np.sin(angles)
     ones, zeros = np.ones_like(angles), np.zeros_like(angles)
@@ -278,8 +278,8 @@ def _circle(angles: Floats, places: Floats, sense: int) -> RotationFit:
             np.column_stack([zeros, ones, sine, cosine]),
         ]
     )
-    solution = np.linalg.lstsq(design, places.T.reshape(-1), rcond=None)[0]
-    error = (design @ solution - places.T.reshape(-1)).reshape(2, -1)
+    solution = np.linalg.lstsq(design, points.T.reshape(-1), rcond=None)[0]
+    error = (design @ solution - points.T.reshape(-1)).reshape(2, -1)
     off_um = np.linalg.norm(error, axis=0)
     freedom = max(1, 2 * len(angles) - 4)
     covariance = np.linalg.inv(design.T @ design) * float(np.sum(error**2)) / freedom

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from threading import RLock
 
 from cosmic.frame.errors import CosmicError, NotConnectedError
-from cosmic.vico.core.settings import Backend, CameraPlace
+from cosmic.vico.core.settings import Backend, CameraConfig
 from cosmic.vico.hw.interface import Camera, CameraInfo, CameraLibrary
 
 logger = logging.getLogger(__name__)
@@ -33,8 +33,8 @@ class CameraLibraries:
                 self._libraries[backend] = self._make(backend)
             return self._libraries[backend]
 
-    def open(self, place: CameraPlace) -> Camera:
-        """Open the camera that `place` names, or the first that no other place has.
+    def open(self, config: CameraConfig) -> Camera:
+        """Open the camera that `place` names, or the first that no other point has.
 
         Raises
         ------
@@ -42,21 +42,21 @@ class CameraLibraries:
             It is not there; the text lists those there are.
         """
         with self._lock:
-            library = self.library(place.backend)
-            key = place.key or self._free_key(library, place)
+            library = self.library(config.backend)
+            key = config.key or self._free_key(library, config)
             camera = library.open(key)
-            self._taken[place.name] = (place.backend, key)
+            self._taken[config.name] = (config.backend, key)
             return camera
 
-    def _free_key(self, library: CameraLibrary, place: CameraPlace) -> str:
-        others = {taken for name, taken in self._taken.items() if name != place.name}
+    def _free_key(self, library: CameraLibrary, config: CameraConfig) -> str:
+        others = {taken for name, taken in self._taken.items() if name != config.name}
         there = library.cameras()
         for info in there:
-            if (place.backend, info.key) not in others:
+            if (config.backend, info.key) not in others:
                 return info.key
         known = ", ".join(info.key for info in there) or "none"
         raise NotConnectedError(
-            f"{place.name}: {library.name} has no camera that is free; there are: {known}"
+            f"{config.name}: {library.name} has no camera that is free; there are: {known}"
         )
 
     def found(self) -> tuple[CameraInfo, ...]:

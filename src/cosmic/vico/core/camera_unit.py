@@ -13,7 +13,7 @@ from cosmic.vico.core.camera_recordings import CameraRecordings
 from cosmic.vico.core.camera_thread import CameraThread
 from cosmic.vico.core.image import CameraImage, Circumstances
 from cosmic.vico.core.live_view import LiveView
-from cosmic.vico.core.settings import CameraPlace
+from cosmic.vico.core.settings import CameraConfig
 from cosmic.vico.core.vision.algorithms import make_chain
 from cosmic.vico.core.vision.chain import Analysis
 from cosmic.vico.core.vision_thread import VisionThread
@@ -21,7 +21,7 @@ from cosmic.vico.hw.interface import Camera, CameraSettings, Frame, PixelFormat,
 
 logger = logging.getLogger(__name__)
 
-CircumstancesOf = Callable[[CameraPlace, Frame, CameraSettings], Circumstances]
+CircumstancesOf = Callable[[CameraConfig, Frame, CameraSettings], Circumstances]
 
 
 class CameraUnit:
@@ -41,40 +41,40 @@ class CameraUnit:
 
     def __init__(
         self,
-        place: CameraPlace,
+        config: CameraConfig,
         libraries: CameraLibraries,
         circumstances: CircumstancesOf,
         policy: FailurePolicy,
     ) -> None:
-        self._place = place
+        self._config = config
         self._libraries = libraries
         self.background = Background()
         self.chain = make_chain()
         for state in self.chain.states:
-            self.chain.switch(state.name, on=state.name in place.algorithms)
+            self.chain.switch(state.name, on=state.name in config.algorithms)
         self.thread = CameraThread(
-            place.name,
-            lambda: libraries.open(self._place),
+            config.name,
+            lambda: libraries.open(self._config),
             self._prepare,
-            lambda frame, settings: circumstances(self._place, frame, settings),
+            lambda frame, settings: circumstances(self._config, frame, settings),
             policy,
         )
         self.recordings = CameraRecordings(self.thread, policy)
-        self.jobs = JobQueue(f"images of {place.name}", policy)
-        self.vision: VisionThread[Analysis] = VisionThread(place.name, self._analyse, policy)
-        self.live = LiveView(place.name, self.corrected, policy)
+        self.jobs = JobQueue(f"images of {config.name}", policy)
+        self.vision: VisionThread[Analysis] = VisionThread(config.name, self._analyse, policy)
+        self.live = LiveView(config.name, self.corrected, policy)
         self.thread.subscribe(self._collect)
         self.thread.subscribe(self.live.put)
         self.thread.subscribe(self.vision.put)
 
     @property
-    def place(self) -> CameraPlace:
+    def config(self) -> CameraConfig:
         """Which camera it is meant to be."""
-        return self._place
+        return self._config
 
     def use(self, key: str) -> None:
         """Take the images with another camera of the same backend."""
-        self._place = self._place.model_copy(update={"key": key})
+        self._config = self._config.model_copy(update={"key": key})
         self.thread.reopen()
 
     def shown(self) -> CameraImage | None:
@@ -111,7 +111,7 @@ class CameraUnit:
         try:
             self.background.add(image.frame, self._binning())
         except ConfigError as exc:
-            logger.warning("%s: %s", self._place.name, exc)
+            logger.warning("%s: %s", self._config.name, exc)
 
     def corrected(self, image: CameraImage) -> CameraImage:
         """Return an image without the background, where there is one that fits."""
@@ -132,18 +132,18 @@ class CameraUnit:
 
     def _prepare(self, camera: Camera) -> CameraSettings:
         """Return what is configured, and what the camera has where nothing is."""
-        place, now, ranges = self._place, camera.settings, camera.ranges
+        config, now, ranges = self._config, camera.settings, camera.ranges
         roi = now.roi
-        if place.binning != now.binning:
+        if config.binning != now.binning:
             width, height = camera.info.sensor_px
-            roi = Roi(0, 0, width // place.binning, height // place.binning)
-        pixel_format = PixelFormat(place.pixel_format)
+            roi = Roi(0, 0, width // config.binning, height // config.binning)
+        pixel_format = PixelFormat(config.pixel_format)
         return CameraSettings(
-            exposure_s=now.exposure_s if place.exposure_s is None else place.exposure_s,
-            gain_db=now.gain_db if place.gain_db is None else place.gain_db,
-            rate_hz=now.rate_hz if place.rate_hz is None else place.rate_hz,
+            exposure_s=now.exposure_s if config.exposure_s is None else config.exposure_s,
+            gain_db=now.gain_db if config.gain_db is None else config.gain_db,
+            rate_hz=now.rate_hz if config.rate_hz is None else config.rate_hz,
             roi=roi,
-            binning=place.binning,
+            binning=config.binning,
             pixel_format=pixel_format if pixel_format in ranges.pixel_formats else now.pixel_format,
             trigger=now.trigger,
         )

@@ -183,10 +183,10 @@ class FocusSearch:
         self._here.append((position, measure))
         if len(self._here) < self._frames:
             return
-        places, measures = zip(*self._here, strict=True)
+        points, measures = zip(*self._here, strict=True)
         if self._frames > 1:
             self._variances.append(float(np.var(measures, ddof=1)))
-        self._sweep.append((float(np.mean(places)), float(np.mean(measures))))
+        self._sweep.append((float(np.mean(points)), float(np.mean(measures))))
         self._curve.append(self._sweep[-1])
         self._here.clear()
         self._targets.pop(0)
@@ -208,13 +208,13 @@ class FocusSearch:
             self._refine(max(self._sweep, key=lambda each: each[1])[0])
             return
         index = int(np.argmax([measure for _, measure in self._sweep]))
-        place = self._sweep[index][0]
+        point = self._sweep[index][0]
         if 0 < index < len(self._sweep) - 1:
-            self._fit(place)
-        elif min(place - self._low, self._high - place) < self._fine_step:
-            self._fail(FocusFault.AT_END, f"widen the range beyond {place:g}")
+            self._fit(point)
+        elif min(point - self._low, self._high - point) < self._fine_step:
+            self._fail(FocusFault.AT_END, f"widen the range beyond {point:g}")
         elif self._sweeps < MOST_SWEEPS:
-            self._refine(place)
+            self._refine(point)
         else:
             self._fail(FocusFault.NOISE, "its peak moves from sweep to sweep; light it better")
 

@@ -32,16 +32,16 @@ def vertex(points: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
 
     None where the points make none.
     """
-    places, measures = np.array(points, dtype=np.float64).T
-    if len(places) < 4 or measures.min() <= 0.0:
+    positions, measures = np.array(points, dtype=np.float64).T
+    if len(positions) < 4 or measures.min() <= 0.0:
         return None
-    middle, width = places.mean(), np.ptp(places)
-    design = np.vander((places - middle) / width, 3)
+    middle, width = positions.mean(), np.ptp(positions)
+    design = np.vander((positions - middle) / width, 3)
     inverse = np.linalg.pinv(design.T @ design)
     curve = inverse @ design.T @ np.log(measures)
     error = np.log(measures) - design @ curve
     second, first = float(curve[0]), float(curve[1])
-    covariance = inverse * float(error @ error) / (len(places) - 3)
+    covariance = inverse * float(error @ error) / (len(positions) - 3)
     if not second < -LEAST_SIGNIFICANCE * math.sqrt(float(covariance[0, 0])):
         return None
     slope = np.array([first / (2.0 * second**2), -1.0 / (2.0 * second), 0.0])

@@ -13,7 +13,7 @@ Matrix = tuple[Pair, Pair]
 
 @dataclass(frozen=True, slots=True)
 class PixelMap:
-    """Where a place on the platform is seen in the image, for one zoom and one height.
+    """Where a point on the platform is seen in the image, for one zoom and one height.
 
     Pixels are those of the whole sensor, unbinned; (0, 0) is the middle of the upper left one.
     `for_window` gives the map for images of a part of the sensor, or binned.
@@ -23,13 +23,13 @@ class PixelMap:
     matrix_px_um : two rows of two
         What a move of the platform does in the image.
     centre_um, centre_px : (float, float)
-        Mean of the places it was measured with, and where that is seen.
+        Mean of the points it was measured with, and where that is seen.
     noise_px : float
-        Standard deviation of one coordinate of one place that was tracked.
+        Standard deviation of one coordinate of one point that was tracked.
     leverage_um2 : two rows of two
-        Inverse of the sum of squares of the measured places about their mean; 1/um^2.
+        Inverse of the sum of squares of the measured points about their mean; 1/um^2.
     points : int
-        How many places it rests on.
+        How many points it rests on.
     """
 
     matrix_px_um: Matrix
@@ -72,12 +72,12 @@ class PixelMap:
         return float(large / small - 1.0)
 
     def to_px(self, platform_um: npt.ArrayLike) -> Floats:
-        """Return where places are seen; shape (..., 2), as x, y."""
+        """Return where points are seen; shape (..., 2), as x, y."""
         away = np.asarray(platform_um, dtype=np.float64) - self.centre_um
         return np.asarray(away @ np.array(self.matrix_px_um).T + self.centre_px)
 
     def to_um(self, image_px: npt.ArrayLike) -> Floats:
-        """Return which places are seen at points of the image; shape (..., 2), as x, y."""
+        """Return which points are seen at points of the image; shape (..., 2), as x, y."""
         away = np.asarray(image_px, dtype=np.float64) - self.centre_px
         return np.asarray(away @ np.linalg.inv(np.array(self.matrix_px_um)).T + self.centre_um)
 
@@ -125,7 +125,7 @@ def as_pair(values: Floats) -> Pair:
 def between(first: PixelMap, second: PixelMap, share: float) -> PixelMap:
     """Return the map `share` of the way from `first` to `second`, 0 to 1.
 
-    The scale goes evenly in its logarithm, as zoom lenses are built. The place on the optical
+    The scale goes evenly in its logarithm, as zoom lenses are built. The point on the optical
     axis stays the same while the scale changes, so that every other goes with the size of a pixel.
     """
     one, other = np.array(first.matrix_px_um), np.array(second.matrix_px_um)
@@ -138,11 +138,11 @@ def between(first: PixelMap, second: PixelMap, share: float) -> PixelMap:
     size = [math.exp(-each) for each in (log_one, log_scale, log_other)]
     alike = math.isclose(size[0], size[2], rel_tol=1e-3)
     weight = share if alike else (size[1] - size[0]) / (size[2] - size[0])
-    place_um = (1.0 - weight) * first.to_um(seen_px) + weight * second.to_um(seen_px)
+    point_um = (1.0 - weight) * first.to_um(seen_px) + weight * second.to_um(seen_px)
     unsure = max(first, second, key=lambda each: float(np.trace(each.leverage_um2)))
     return PixelMap(
         as_matrix(matrix),
-        as_pair(place_um),
+        as_pair(point_um),
         as_pair(seen_px),
         max(first.noise_px, second.noise_px),
         unsure.leverage_um2,

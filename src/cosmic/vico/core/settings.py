@@ -12,7 +12,7 @@ from cosmic.vico.core.tool_settings import ToolSettings
 Backend = Literal["simulated", "aravis", "opencv", "dc1394", "harvesters"]
 
 
-class CameraPlace(StrictModel):
+class CameraConfig(StrictModel):
     """One camera of the platform: where to find it and how it begins.
 
     Attributes
@@ -73,7 +73,7 @@ class VicoSettings(StrictModel):
     table_axis: str = ""
     sources: Annotated[tuple[str, ...], Field(strict=False)] = ()
     producers: Annotated[tuple[str, ...], Field(strict=False)] = ()
-    camera: Annotated[tuple[CameraPlace, ...], Field(strict=False)] = ()
+    camera: Annotated[tuple[CameraConfig, ...], Field(strict=False)] = ()
     tool: Annotated[tuple[ToolSettings, ...], Field(strict=False)] = ()
     lens: MotorLensSettings = Field(default_factory=lambda: MotorLensSettings(backend="none"))
     light: LampSettings = Field(default_factory=lambda: LampSettings(backend="none"))

@@ -16,7 +16,7 @@ from cosmic.frame.operation import Progress, Task
 from cosmic.vico.api.camera import CameraHandle
 
 REFUSED: Final = state_look(State.REFUSED).glyph
-TIP: Final = "Measure where on the platform the pixels lie: a tool goes to nine places and back"
+TIP: Final = "Measure where on the platform the pixels lie: a tool goes to nine points and back"
 
 
 class CalibrateButton(QToolButton):

@@ -14,7 +14,7 @@ from cosmic.frame.gui.build import named
 from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.overrides import override
-from cosmic.vico.api.places import Pixel
+from cosmic.vico.api.coordinate_transform import Pixel
 from cosmic.vico.api.vico import Vico
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.gui.calibrate_menu import CalibrateButton
@@ -294,8 +294,8 @@ class CameraView(QWidget):
             self.say("")
         self.row.show_running(self._camera.running, self._camera.problem)
 
-    def _on_pointed(self, place_px: Pixel | None) -> None:
-        self._pointed = place_px
+    def _on_pointed(self, point_px: Pixel | None) -> None:
+        self._pointed = point_px
         self._show_pointer()
 
     def _show_pointer(self) -> None:

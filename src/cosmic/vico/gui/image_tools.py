@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QMenu
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.theme import State, state_look
 from cosmic.vico.api.camera import CameraHandle
-from cosmic.vico.api.places import Pixel
+from cosmic.vico.api.coordinate_transform import Pixel
 from cosmic.vico.gui.image_view import CameraImageView, Layer, Tool
 from cosmic.vico.gui.measures import MeasureLayer
 from cosmic.vico.gui.tool_row import ToolRow
@@ -75,12 +75,12 @@ class ImageTools(QObject):
         self._target = target
         self.told.emit(f"click where {target} is to go; Esc ends it")
 
-    def _on_clicked(self, place_px: Pixel) -> None:
-        if not self._view.is_inside(place_px):
+    def _on_clicked(self, point_px: Pixel) -> None:
+        if not self._view.is_inside(point_px):
             self._refuse("that is outside the image")
             return
         try:
-            self.told.emit(self._camera.click_to_move(place_px, self._target))
+            self.told.emit(self._camera.click_to_move(point_px, self._target))
         except CosmicError as exc:
             self._refuse(str(exc))
 
@@ -101,14 +101,14 @@ class ImageTools(QObject):
         self.measures.clear()
         self._view.redraw()
 
-    def _on_menu(self, place: QPointF) -> None:
-        near = self.measures.at(place, self._view)
+    def _on_menu(self, point: QPointF) -> None:
+        near = self.measures.at(point, self._view)
         if near is not None:
             self.measures.chosen = near
             self._view.redraw()
         menu = self.make_menu()
         menu.aboutToHide.connect(menu.deleteLater)
-        menu.popup(self._view.mapToGlobal(place.toPoint()))
+        menu.popup(self._view.mapToGlobal(point.toPoint()))
 
     def make_menu(self) -> QMenu:
         """Return the menu of the right button."""

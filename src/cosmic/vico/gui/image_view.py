@@ -21,7 +21,7 @@ from PySide6.QtWidgets import QToolTip, QWidget
 from cosmic.frame.gui.painting import saved
 from cosmic.frame.gui.theme import current_palette
 from cosmic.frame.overrides import override
-from cosmic.vico.api.places import Pixel
+from cosmic.vico.api.coordinate_transform import Pixel
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.gui.image_item import CameraImageItem
 from cosmic.vico.gui.levels import Levels
@@ -34,7 +34,7 @@ class Layer(Protocol):
     def paint(self, painter: QPainter, view: "CameraImageView") -> None:
         """Draw, in coordinates of the screen; `view.to_screen` brings pixels there."""
 
-    def tip(self, place: QPointF, view: "CameraImageView") -> str:  # noqa: ARG002 - for those who say
+    def tip(self, point: QPointF, view: "CameraImageView") -> str:  # noqa: ARG002 - for those who say
         """Return what to say when the operator points there; empty for nothing."""
         return ""
 
@@ -45,15 +45,15 @@ class Tool(Protocol):
     cursor: Qt.CursorShape
 
     @abstractmethod
-    def press(self, place_px: Pixel) -> None:
+    def press(self, point_px: Pixel) -> None:
         """Take the button going down there."""
 
     @abstractmethod
-    def move(self, place_px: Pixel) -> None:
+    def move(self, point_px: Pixel) -> None:
         """Take the mouse coming there, with the button down or not."""
 
     @abstractmethod
-    def release(self, place_px: Pixel) -> None:
+    def release(self, point_px: Pixel) -> None:
         """Take the button being let go there."""
 
     @abstractmethod
@@ -155,16 +155,16 @@ class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
         """Pixels of the screen for one of the image."""
         return abs(self.to_screen.m11()) * float(self.devicePixelRatioF())
 
-    def pixel_at(self, place: QPointF) -> Pixel:
-        """Return the pixel below a place of the widget; it may lie outside the image."""
+    def pixel_at(self, point: QPointF) -> Pixel:
+        """Return the pixel below a point of the widget; it may lie outside the image."""
         inverse, _ = self.to_screen.inverted()
-        there = inverse.map(place)
+        there = inverse.map(point)
         return there.x(), there.y()
 
-    def is_inside(self, place_px: Pixel) -> bool:
+    def is_inside(self, point_px: Pixel) -> bool:
         """Tell whether the image has such a pixel."""
         width, height = self.size_px
-        x, y = place_px
+        x, y = point_px
         return -0.5 <= x < width - 0.5 and -0.5 <= y < height - 0.5
 
     def fit(self) -> None:
@@ -232,8 +232,8 @@ class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
     @override
     def viewportEvent(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
-            place = QPointF(event.pos())
-            told = (layer.tip(place, self) for layer in reversed(self.layers))
+            point = QPointF(event.pos())
+            told = (layer.tip(point, self) for layer in reversed(self.layers))
             QToolTip.showText(event.globalPos(), next((text for text in told if text), ""), self)
             return True
         return bool(super().viewportEvent(event))

@@ -54,7 +54,7 @@ def line(painter: QPainter, begin: QPointF, end: QPointF, made: QPen) -> None:
 
 def label(
     painter: QPainter,
-    place: QPointF,
+    point: QPointF,
     text: str,
     colour: QColor,
     room: QRectF,
@@ -62,7 +62,7 @@ def label(
     gap: float = 8.0,
     taken: Sequence[QRectF] = (),
 ) -> QRectF:
-    """Write `text` beside a place on a dark ground, inside `room`; returns where it stands.
+    """Write `text` beside a point on a dark ground, inside `room`; returns where it stands.
 
     It goes below each of the labels `taken` that it would cover.
     """
@@ -70,7 +70,7 @@ def label(
     metrics = QFontMetricsF(font)
     width = max(metrics.horizontalAdvance(part) for part in text.splitlines())
     height = metrics.height() * len(text.splitlines())
-    box = QRectF(place.x() + gap, place.y() - height - gap, width + STEP_PX, height + 4.0)
+    box = QRectF(point.x() + gap, point.y() - height - gap, width + STEP_PX, height + 4.0)
     box.moveLeft(min(max(box.left(), room.left() + 2), room.right() - box.width() - 2))
     box.moveTop(min(max(box.top(), room.top() + 2), room.bottom() - box.height() - 2))
     for other in sorted(taken, key=QRectF.top):

@@ -59,8 +59,8 @@ class Histogram:
 
     def percentile(self, percent: float) -> float:
         """Return the brightness that `percent` of the pixels do not exceed."""
-        place = int(np.searchsorted(np.cumsum(self.shares), percent / 100.0))
-        return min(place, BINS - 1) * (self.full + 1) / BINS
+        index = int(np.searchsorted(np.cumsum(self.shares), percent / 100.0))
+        return min(index, BINS - 1) * (self.full + 1) / BINS
 
     def levels(self, cut_percent: float = 0.3) -> Levels:
         """Return levels that leave `cut_percent` of the pixels black, and as many white."""

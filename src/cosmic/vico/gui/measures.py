@@ -9,7 +9,7 @@ from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QPainter, QPainterPath
 
 from cosmic.frame.overrides import override
-from cosmic.vico.api.places import Pixel
+from cosmic.vico.api.coordinate_transform import Pixel
 from cosmic.vico.gui.image_view import CameraImageView, Layer
 from cosmic.vico.gui.ink import HALO, PINK, YELLOW, label, pen, stroke
 from cosmic.vico.gui.texts import length_text
@@ -70,9 +70,9 @@ class MeasureLayer(Layer):
         """Take them all away."""
         self.measures, self.chosen = [], None
 
-    def at(self, place: QPointF, view: CameraImageView) -> Measure | None:
-        """Return the measurement that is drawn near a place on the screen."""
-        here = (place.x(), place.y())
+    def at(self, point: QPointF, view: CameraImageView) -> Measure | None:
+        """Return the measurement that is drawn near a point on the screen."""
+        here = (point.x(), point.y())
         for measure in reversed(self.measures):
             ends = [view.to_screen.map(QPointF(*each)).toTuple() for each in measure.points]
             if any(_distance(here, begin, end) < NEAR_PX for begin, end in pairwise(ends)):
@@ -102,9 +102,9 @@ class MeasureLayer(Layer):
         for each in points:
             painter.drawEllipse(each, 3.5, 3.5)
         if measure.text:
-            place = points[1] if len(points) == 3 else (points[0] + points[1]) / 2.0
+            point = points[1] if len(points) == 3 else (points[0] + points[1]) / 2.0
             text = f"{measure.text} (other zoom)" if other else measure.text
-            label(painter, place, text, colour, QRectF(view.rect()))
+            label(painter, point, text, colour, QRectF(view.rect()))
 
 
 def _distance(here: Pixel, begin: Pixel, end: Pixel) -> float:

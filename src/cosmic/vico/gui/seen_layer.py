@@ -48,8 +48,8 @@ class SeenLayer(Layer):
             self._paint_tip(painter, view, tip)
 
     @override
-    def tip(self, place: QPointF, view: CameraImageView) -> str:
-        return next((text for box, text in self.labels if box.contains(place)), "")
+    def tip(self, point: QPointF, view: CameraImageView) -> str:
+        return next((text for box, text in self.labels if box.contains(point)), "")
 
     @property
     def _taken(self) -> list[QRectF]:
@@ -76,21 +76,21 @@ class SeenLayer(Layer):
             return
         middle = line_px[len(line_px) // 2]
         text = fibre_text(fibre, scale)
-        place = to.map(QPointF(*middle))
-        box = label(painter, place, text, colour, QRectF(view.rect()), gap=14.0, taken=self._taken)
+        point = to.map(QPointF(*middle))
+        box = label(painter, point, text, colour, QRectF(view.rect()), gap=14.0, taken=self._taken)
         said = "certain" if fibre.certain else f"{NOT_SURE}: " + "; ".join(fibre.doubts)
         self.labels.append((box, f"Fibre, {said}"))
 
     def _paint_tip(self, painter: QPainter, view: CameraImageView, tip: TipSeen) -> None:
-        place = view.to_screen.map(QPointF(*tip.place_px))
+        point = view.to_screen.map(QPointF(*tip.point_px))
         colour = SKY if tip.certain else ORANGE
         path = QPainterPath()
         for dx, dy in ((9.0, 0.0), (0.0, 9.0)):
-            path.moveTo(place - QPointF(dx, dy))
-            path.lineTo(place + QPointF(dx, dy))
+            path.moveTo(point - QPointF(dx, dy))
+            path.lineTo(point + QPointF(dx, dy))
         stroke(painter, path, pen(colour, 2.0))
         text = tip.name if tip.certain else f"{tip.name}, {NOT_SURE}"
-        box = label(painter, place, text, WHITE, QRectF(view.rect()), gap=4.0, taken=self._taken)
+        box = label(painter, point, text, WHITE, QRectF(view.rect()), gap=4.0, taken=self._taken)
         self.labels.append((box, f"Tip of {text}"))
 
 

@@ -247,7 +247,7 @@ def _choose(box: QComboBox, texts: list[str], value: object, values: tuple[objec
 def _fitting(begin_px: int, size_px: int, accepted: Range, sensor_px: int) -> tuple[int, int]:
     """Return the least begin and size that cover the wish and that the camera can do.
 
-    Cameras place a region in the steps in which they size it.
+    Cameras point a region in the steps in which they size it.
     """
     step, least = max(1, round(accepted.step)), round(accepted.low)
     begin = begin_px // step * step

@@ -17,7 +17,7 @@ TOOLS: Final = {
     "angle": ("Angle", "Measure an angle: click one arm, the vertex, the other arm"),
     "region": ("Region", "Read only a part of the sensor: press, drag, let go"),
 }
-MOVE_TIP: Final = "Move something to the place you click in the image"
+MOVE_TIP: Final = "Move something to the point you click in the image"
 
 
 class ToolRow(QWidget):

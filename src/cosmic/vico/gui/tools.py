@@ -7,7 +7,7 @@ from PySide6.QtCore import QObject, QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QPainter
 
 from cosmic.frame.overrides import override
-from cosmic.vico.api.places import Pixel
+from cosmic.vico.api.coordinate_transform import Pixel
 from cosmic.vico.gui.image_view import CameraImageView, Layer, Tool
 from cosmic.vico.gui.ink import HALO, SKY, label, pen
 from cosmic.vico.gui.measures import Measure, MeasureLayer
@@ -25,18 +25,18 @@ class DistanceTool(Tool):
         self._open: Measure | None = None
 
     @override
-    def press(self, place_px: Pixel) -> None:
-        self._open = Measure([place_px, place_px], self._scale())
+    def press(self, point_px: Pixel) -> None:
+        self._open = Measure([point_px, point_px], self._scale())
         self._layer.add(self._open)
 
     @override
-    def move(self, place_px: Pixel) -> None:
+    def move(self, point_px: Pixel) -> None:
         if self._open is not None:
-            self._open.points[1] = place_px
+            self._open.points[1] = point_px
 
     @override
-    def release(self, place_px: Pixel) -> None:
-        self.move(place_px)
+    def release(self, point_px: Pixel) -> None:
+        self.move(point_px)
         if self._open is None:
             return
         (x0, y0), (x1, y1) = self._open.points
@@ -59,24 +59,24 @@ class AngleTool(Tool):
         self._open: Measure | None = None
 
     @override
-    def press(self, place_px: Pixel) -> None:
+    def press(self, point_px: Pixel) -> None:
         if self._open is None:
-            self._open = Measure([place_px, place_px], self._scale())
+            self._open = Measure([point_px, point_px], self._scale())
             self._layer.add(self._open)
             return
-        self._open.points[-1] = place_px
+        self._open.points[-1] = point_px
         if len(self._open.points) == 3:
             self._open = None
         else:
-            self._open.points.append(place_px)
+            self._open.points.append(point_px)
 
     @override
-    def move(self, place_px: Pixel) -> None:
+    def move(self, point_px: Pixel) -> None:
         if self._open is not None:
-            self._open.points[-1] = place_px
+            self._open.points[-1] = point_px
 
     @override
-    def release(self, place_px: Pixel) -> None: ...
+    def release(self, point_px: Pixel) -> None: ...
 
     @override
     def cancel(self) -> None:
@@ -102,18 +102,18 @@ class RoiTool(QObject):
         self._begin: Pixel | None = None
         self._end: Pixel | None = None
 
-    def press(self, place_px: Pixel) -> None:
+    def press(self, point_px: Pixel) -> None:
         """Begin a corner."""
-        self._begin = self._end = self._inside(place_px)
+        self._begin = self._end = self._inside(point_px)
 
-    def move(self, place_px: Pixel) -> None:
+    def move(self, point_px: Pixel) -> None:
         """Draw the other corner along."""
         if self._begin is not None:
-            self._end = self._inside(place_px)
+            self._end = self._inside(point_px)
 
-    def release(self, place_px: Pixel) -> None:
+    def release(self, point_px: Pixel) -> None:
         """Choose what lies between."""
-        self.move(place_px)
+        self.move(point_px)
         box = self.box
         self.cancel()
         if box is not None and min(box[2:]) >= LEAST_ROI_PX:
@@ -132,9 +132,9 @@ class RoiTool(QObject):
         left, top = round(x0 + 0.5), round(y0 + 0.5)
         return left, top, round(x1 + 0.5) - left, round(y1 + 0.5) - top
 
-    def _inside(self, place_px: Pixel) -> Pixel:
+    def _inside(self, point_px: Pixel) -> Pixel:
         width, height = self._view.size_px
-        x, y = place_px
+        x, y = point_px
         return min(max(x, -0.5), width - 0.5), min(max(y, -0.5), height - 0.5)
 
 
@@ -154,12 +154,12 @@ class RoiLayer(Layer):
         for made in (pen(HALO, 3.0), pen(SKY, 1.5, dashed=True)):
             painter.setPen(made)
             painter.drawRect(box)
-        place = QPointF(box.left(), box.top())
-        label(painter, place, f"{width} × {height} px", SKY, QRectF(view.rect()), gap=0.0)
+        point = QPointF(box.left(), box.top())
+        label(painter, point, f"{width} × {height} px", SKY, QRectF(view.rect()), gap=0.0)
 
 
 class ClickTool(QObject):
-    """One click: a place.
+    """One click: a point.
 
     Signals
     -------
@@ -173,14 +173,14 @@ class ClickTool(QObject):
         super().__init__(parent)
         self.cursor = Qt.CursorShape.PointingHandCursor
 
-    def press(self, place_px: Pixel) -> None:
-        """Tell the place."""
-        self.clicked.emit(place_px)
+    def press(self, point_px: Pixel) -> None:
+        """Tell the point."""
+        self.clicked.emit(point_px)
 
-    def move(self, place_px: Pixel) -> None:
+    def move(self, point_px: Pixel) -> None:
         """Do nothing: only the click counts."""
 
-    def release(self, place_px: Pixel) -> None:
+    def release(self, point_px: Pixel) -> None:
         """Do nothing: the press was the click."""
 
     def cancel(self) -> None:

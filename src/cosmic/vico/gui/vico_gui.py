@@ -46,8 +46,8 @@ class VicoWidget(QWidget):
         for view in self.gui.cameras.values():
             side.addWidget(view)
         side.addWidget(self.gui.lens)
-        for place in range(len(self.gui.cameras)):
-            side.setStretchFactor(place, 1)
+        for index in range(len(self.gui.cameras)):
+            side.setStretchFactor(index, 1)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(side)

@@ -447,7 +447,7 @@ class AravisLibrary(BaseCameraLibrary[AravisCamera]):
     fake : bool
         Also offer the fake camera that Aravis has inside, Fake_1, without a network.
     library : ctypes.CDLL or object
-        What tests put in Aravis' place.
+        What tests put in Aravis' position.
 
     Raises
     ------
@@ -503,11 +503,11 @@ class AravisLibrary(BaseCameraLibrary[AravisCamera]):
         """Return a new ArvCamera."""
         # Left to itself Aravis takes the first network card over which the camera answers, which
         # need not be the one that its images can come back by; a full list settles that.
-        places = self._places()
-        if key not in places:
-            places = self._places(anew=True)
+        addresses = self._addresses()
+        if key not in addresses:
+            addresses = self._addresses(anew=True)
         text, fault = "", DeviceFault.COMMUNICATION
-        if key in places and self._is_free(key, places[key]):
+        if key in addresses and self._is_free(key, addresses[key]):
             try:
                 with _discovery:
                     return int(self._calls.checked(f"camera {key}", "arv_camera_new", key.encode()))
@@ -515,12 +515,12 @@ class AravisLibrary(BaseCameraLibrary[AravisCamera]):
                 text, fault = f" ({exc})", exc.fault
         raise self._not_there(
             key,
-            self._places(anew=key in places),
+            self._addresses(anew=key in addresses),
             f"Check cable, power and, with GigE Vision, the network addresses{text}",
             fault,
         )
 
-    def _places(self, *, anew: bool = False) -> dict[str, str]:
+    def _addresses(self, *, anew: bool = False) -> dict[str, str]:
         """Return the address of each camera, "" where it has none."""
         if anew:
             self.cameras()

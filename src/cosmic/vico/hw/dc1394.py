@@ -246,7 +246,7 @@ class Dc1394Library(BaseCameraLibrary[Dc1394Camera]):
         Seconds a count of the shutter, for cameras that know no absolute values (their manual
         says it); 0 makes their exposure unavailable.
     library : ctypes.CDLL or object
-        What tests put in the library's place.
+        What tests put in the library's position.
 
     Raises
     ------

@@ -375,7 +375,7 @@ class OpenCvLibrary(BaseCameraLibrary[OpenCvCamera]):
     sysfs : Path
         Where Linux lists video devices.
     make_capture : callable
-        cv2.VideoCapture, or what tests put in its place for devices and addresses.
+        cv2.VideoCapture, or what tests put in its position for devices and addresses.
     """
 
     def __init__(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cosmic.autonomy.bending.elastica import cantilever
-from cosmic.autonomy.bending.fit import fit_bending, places_um
+from cosmic.autonomy.bending.fit import fit_bending, positions_um
 from cosmic.autonomy.bending.plan import plan_spans
 from cosmic.autonomy.bending.result import BendingError, BendingResult, Quality
 from cosmic.autonomy.bending.settings import FitSettings
@@ -92,8 +92,8 @@ def test_the_slope_does_not_care_about_an_offset_of_the_nominal_places() -> None
 def test_places_follow_the_encoders_whichever_way_the_fibre_points(towards: float) -> None:
     spans = pushed(rig(towards=towards))
     wrong = [dataclasses.replace(spans[0], nominal_um=spans[0].nominal_um + 9.0), *spans[1:]]
-    places = places_um(wrong)
-    for (one, other), (span, after) in zip(pairwise(places), pairwise(spans), strict=True):
+    positions = positions_um(wrong)
+    for (one, other), (span, after) in zip(pairwise(positions), pairwise(spans), strict=True):
         assert one - other == pytest.approx(span.nominal_um - after.nominal_um)
 
 

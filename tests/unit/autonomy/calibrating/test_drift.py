@@ -7,12 +7,12 @@ import pytest
 from cosmic.autonomy.calibrating.drift import DRIFT, CheckDrift, follow
 from cosmic.autonomy.calibrating.registry import CalibrationEntry
 from cosmic.autonomy.calibrations import Calibrations
+from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.autonomy.handling.context import Calibration, Measured
 from cosmic.autonomy.handling.plate import PlateFrame
 from cosmic.autonomy.handling.prepare import HELD, PLATE, PROBE
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.tips import TipOff
-from cosmic.autonomy.places import PlatformPlaces
 from cosmic.frame.clock import ManualClock
 from unit.autonomy.test_calibrations import plane
 
@@ -32,7 +32,7 @@ class Work:
         self.finished: list[object] = []
         self.vision = self
         self.first_camera = "top"
-        self.places = PlatformPlaces.__new__(PlatformPlaces)
+        self.places = PlatformTransform.__new__(PlatformTransform)
         self.places.calibrations = Calibrations(["top"], ["left"], None)
         self.places.calibrations.add_plane("top", "left", plane(0.0, 12.0))
         registry = self.calibration.registry

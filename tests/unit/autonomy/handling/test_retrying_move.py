@@ -94,7 +94,7 @@ def test_a_cancelled_movement_is_not_ordered_again():
 
 def test_a_way_to_a_place_is_ordered_again_where_an_axis_did_not_come_on():
     moves = [Moved(DeviceTimeout("no progress")), Moved()]
-    assert RetryingMove(lambda: moves.pop(0), to_a_place=True).wait(20.0) == "there"
+    assert RetryingMove(lambda: moves.pop(0), to_a_position=True).wait(20.0) == "there"
 
 
 def test_steps_are_not_for_some_of_them_may_have_been_made():
@@ -112,7 +112,7 @@ def test_an_axis_that_never_comes_on_is_told_in_the_end():
         return Moved(DeviceTimeout("no progress"))
 
     with pytest.raises(DeviceTimeout, match="no progress"):
-        RetryingMove(order, to_a_place=True).wait(20.0)
+        RetryingMove(order, to_a_position=True).wait(20.0)
     assert len(orders) == TRIES
 
 
@@ -134,14 +134,14 @@ def bumping(times: int) -> tuple[Callable[[], Moved], Callable[[], Moved], list[
 
 def test_an_axis_that_runs_into_something_goes_back_a_little_and_tries_again():
     order, back, told = bumping(2)
-    assert RetryingMove(order, to_a_place=True, back=back).wait(20.0) == "there"
+    assert RetryingMove(order, to_a_position=True, back=back).wait(20.0) == "there"
     assert told == ["on", "back", "on", "back", "on"]
 
 
 def test_an_obstacle_that_stays_is_told_after_some_tries():
     order, back, told = bumping(100)
     with pytest.raises(DeviceError, match="ran into it"):
-        RetryingMove(order, to_a_place=True, back=back).wait(20.0)
+        RetryingMove(order, to_a_position=True, back=back).wait(20.0)
     assert told.count("back") == BUMPS
     assert told.count("on") == BUMPS + 1
 
@@ -152,12 +152,12 @@ def test_a_way_back_that_is_refused_is_not_gone():
     def refused() -> Moved:
         raise MoveRefused(MoveVerdict(allowed=False, reason=Reason.COLLISION, text="no"))
 
-    assert RetryingMove(order, to_a_place=True, back=refused).wait(20.0) == "there"
+    assert RetryingMove(order, to_a_position=True, back=refused).wait(20.0) == "there"
     assert told == ["on", "on"]
 
 
 def test_a_way_on_which_nothing_leads_back_ends_at_an_obstacle():
     order, _, told = bumping(1)
     with pytest.raises(DeviceError, match="ran into it"):
-        RetryingMove(order, to_a_place=True).wait(20.0)
+        RetryingMove(order, to_a_position=True).wait(20.0)
     assert told == ["on"]

@@ -144,13 +144,13 @@ def test_the_probe_is_seen_bending_the_fibre() -> None:
     assert seen_um == pytest.approx(beside_um, rel=0.05)
 
 
-def _seen_below(bench: ImageBench, place_px: Grey) -> float:
+def _seen_below(bench: ImageBench, point_px: Grey) -> float:
     """Return how far below a place in the image a dark fibre crosses its column."""
-    column = bench.image()[:, round(float(place_px[0]))]
+    column = bench.image()[:, round(float(point_px[0]))]
     rows = np.arange(len(column))
-    near = np.abs(rows - place_px[1]) < 90
+    near = np.abs(rows - point_px[1]) < 90
     dark = np.where(near, np.median(column) - column, 0.0).clip(min=5.0) - 5.0
-    return float((dark * rows).sum() / dark.sum() - place_px[1])
+    return float((dark * rows).sum() / dark.sum() - point_px[1])
 
 
 def test_a_tool_hides_the_fibre_below_it() -> None:

@@ -137,8 +137,8 @@ def _ei_ticks(low: float, high: float) -> list[tuple[float, str]]:
     """Return the places and names of 1, 2 and 5 of each decade, in logarithms."""
     decades = range(math.floor(low), math.floor(high) + 1)
     values = [digit * 10.0**decade for decade in decades for digit in (1, 2, 5)]
-    places = [(math.log10(value), f"{value:g}") for value in values]
-    return [(place, name) for place, name in places if low <= place <= high]
+    ticks = [(math.log10(value), f"{value:g}") for value in values]
+    return [(tick, name) for tick, name in ticks if low <= tick <= high]
 
 
 def _count_ticks(top: float) -> list[tuple[float, str]]:

@@ -85,10 +85,10 @@ def interpolate(values: Samples, first_sample: int, edges: Edges) -> Columns:
     edges : ndarray, shape (columns + 1,)
         Places of the columns' edges, in samples; all between the first and the last sample.
     """
-    places = np.clip(edges - first_sample, 0.0, values.shape[1] - 1.0)
-    before = np.minimum(places.astype(np.int64), max(0, values.shape[1] - 2))
+    indices = np.clip(edges - first_sample, 0.0, values.shape[1] - 1.0)
+    before = np.minimum(indices.astype(np.int64), max(0, values.shape[1] - 2))
     after = np.minimum(before + 1, values.shape[1] - 1)
-    share = places - before
+    share = indices - before
     line = values[:, before] * (1.0 - share) + values[:, after] * share
     return Columns(
         np.minimum(line[:, :-1], line[:, 1:]).astype(np.float32),

@@ -109,8 +109,8 @@ class TrackFibre:
 
 
 @algorithm
-class TrackPlace:
-    """A place on the image, followed by how it looks; the result is a `Track`."""
+class TrackPoint:
+    """A point on the image, followed by how it looks; the result is a `Track`."""
 
     name = "place track"
 
@@ -141,7 +141,7 @@ class TrackPlace:
                 return Unavailable(str(exc))
             self._tracker = fresh
         if self._tracker is None:
-            return Unavailable("no place is followed")
+            return Unavailable("no point is followed")
         return self._tracker.follow(data)
 
 

@@ -11,10 +11,10 @@ from cosmic.vico.core.vision.smoothing import arc_lengths
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Exit:
-    """How a branch leaves its crossing: place, direction and curvature."""
+    """How a branch leaves its crossing: point, direction and curvature."""
 
     branch: int
-    place: Floats
+    point: Floats
     direction: Floats
     curvature: float
 
@@ -38,8 +38,8 @@ def leaving(branch: Branch, number: int, end: int, half_width: float) -> Exit:
     bow = 2.0 * np.array([x[0], y[0]]) if order == 2 else np.zeros(2)
     curvature = float(slope[0] * bow[1] - slope[1] * bow[0]) / speed**3
     most = 0.3 / half_width
-    place = np.array([x[-1], y[-1]])
-    return Exit(number, place, slope / speed, float(np.clip(curvature, -most, most)))
+    point = np.array([x[-1], y[-1]])
+    return Exit(number, point, slope / speed, float(np.clip(curvature, -most, most)))
 
 
 def turn(first: Floats, last: Floats) -> float:
@@ -49,7 +49,7 @@ def turn(first: Floats, last: Floats) -> float:
 
 def bending(first: Exit, last: Exit) -> float:
     """Return how much a curve must leave its bow to enter by one branch and leave by another."""
-    way = last.place - first.place
+    way = last.point - first.point
     gap = float(np.linalg.norm(way))
     if gap < 1e-6 or first.branch == last.branch:
         # A fibre has ends: a branch is not joined to itself.

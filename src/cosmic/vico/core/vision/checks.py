@@ -154,11 +154,11 @@ def continued(lines: list[Floats], widths: list[float]) -> set[int]:
     ]
     if not ends:
         return found
-    places = np.array([place for _, place, _ in ends])
-    for first, last in cKDTree(places).query_pairs(4.0 * max(widths) + 30.0):
-        i, place, out = ends[first]
+    points = np.array([point for _, point, _ in ends])
+    for first, last in cKDTree(points).query_pairs(4.0 * max(widths) + 30.0):
+        i, point, out = ends[first]
         j, other, other_out = ends[last]
-        way = other - place
+        way = other - point
         gap = float(np.linalg.norm(way))
         if gap > 2.0 * (widths[i] + widths[j]) + 30.0:
             continue

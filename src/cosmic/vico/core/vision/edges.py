@@ -63,7 +63,7 @@ class Blob(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """An edge as a straight line, position over place along it.
+    """An edge as a straight line, position over point along it.
 
     Attributes
     ----------
@@ -78,13 +78,13 @@ class Line:
     slope_std: float
     kept: float
 
-    def at(self, place: float) -> float:
+    def at(self, abscissa: float) -> float:
         """Return the edge's position."""
-        return self.offset + self.slope * (place - self.middle)
+        return self.offset + self.slope * (abscissa - self.middle)
 
-    def std_at(self, place: float) -> float:
+    def std_at(self, abscissa: float) -> float:
         """Return its standard deviation there."""
-        return math.hypot(self.std, self.slope_std * (place - self.middle))
+        return math.hypot(self.std, self.slope_std * (abscissa - self.middle))
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ class Body:
 def turned(
     image: Pixels, at_px: Pair, forward: Pair, *, back: float, ahead: float, aside: float
 ) -> Frame:
-    """Return the surroundings of a place, turned; beyond the image its rim goes on."""
+    """Return the surroundings of a point, turned; beyond the image its rim goes on."""
     ahead_of, side = np.array(forward), np.array([-forward[1], forward[0]])
     origin = np.array(at_px) - back * ahead_of - aside * side
     columns, rows = math.ceil(back + ahead) + 1, math.ceil(2.0 * aside) + 1
@@ -149,7 +149,7 @@ def levels(frame: Frame) -> Levels | None:
 
 
 def blobs(frame: Frame, greys: Levels, width: float) -> list[Blob]:
-    """Return the bodies that come from behind, by their place aside; thin things are none."""
+    """Return the bodies that come from behind, by their point aside; thin things are none."""
     mask = (frame.pixels < greys.body + BODY_LEVEL * greys.contrast).astype(np.uint8)
     size = max(3, round(0.5 * width))
     shape = cv2.getStructuringElement(cv2.MORPH_RECT, (size, size))
@@ -220,21 +220,21 @@ def _edge(
     return _straight(at[usable].astype(np.float64), position.astype(np.float64), len(at))
 
 
-def _straight(place: Floats, position: Floats, asked: int) -> Line | None:
+def _straight(abscissa: Floats, position: Floats, asked: int) -> Line | None:
     """Fit a line, leaving out what lies off it."""
     away = np.abs(position - np.median(position))
     kept = away <= max(3.0, 4.0 * float(np.median(away)))
     for _ in range(3):
         if kept.sum() < FEWEST_PROFILES:
             return None
-        fit = _Fit.of(place[kept], position[kept])
-        error = np.abs(fit.error(place, position))
+        fit = _Fit.of(abscissa[kept], position[kept])
+        error = np.abs(fit.error(abscissa, position))
         kept = error <= max(CLIP_PX, 3.0 * 1.4826 * float(np.median(error[kept])))
     count = int(kept.sum())
     if count < FEWEST_PROFILES:
         return None
-    fit = _Fit.of(place[kept], position[kept])
-    error = fit.error(place[kept], position[kept])
+    fit = _Fit.of(abscissa[kept], position[kept])
+    error = fit.error(abscissa[kept], position[kept])
     sigma = SHARED_NOISE * math.sqrt(float(error @ error) / (count - 2))
     return Line(
         fit.offset,
@@ -253,11 +253,11 @@ class _Fit(NamedTuple):
     power: float
 
     @classmethod
-    def of(cls, place: Floats, position: Floats) -> "_Fit":
-        middle, offset = float(place.mean()), float(position.mean())
-        along = place - middle
+    def of(cls, abscissa: Floats, position: Floats) -> "_Fit":
+        middle, offset = float(abscissa.mean()), float(position.mean())
+        along = abscissa - middle
         power = float(along @ along)
         return cls(middle, offset, float(along @ (position - offset)) / power, power)
 
-    def error(self, place: Floats, position: Floats) -> Floats:
-        return position - self.offset - self.slope * (place - self.middle)
+    def error(self, abscissa: Floats, position: Floats) -> Floats:
+        return position - self.offset - self.slope * (abscissa - self.middle)

@@ -81,7 +81,7 @@ def leaving(line: Floats, width: float) -> Floats:
 
 
 def bent(line: Floats, outward: Floats, along: Floats) -> Floats:
-    """Return places along a line, straight on beyond its last point."""
+    """Return points along a line, straight on beyond its last point."""
     outward = outward / max(float(np.linalg.norm(outward)), 1e-9)
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     s = np.concatenate([[0.0], np.cumsum(steps)])
@@ -91,7 +91,7 @@ def bent(line: Floats, outward: Floats, along: Floats) -> Floats:
 
 
 def crossing(along: Floats, mean: Floats, inside: Flags, height: float, level: Level) -> End:
-    """Return the first place that stays below half of the height."""
+    """Return the first point that stays below half of the height."""
     if not height > 0.4 * level.contrast:
         return End(EndKind.LOST, 0.0, level.width)
     scaled = mean / height
@@ -107,8 +107,8 @@ def crossing(along: Floats, mean: Floats, inside: Flags, height: float, level: L
         share = (scaled[index] - 0.5) / (scaled[index] - scaled[index + 1])
         slope = max(float(scaled[index] - scaled[index + 1]) / (along[1] - along[0]), 1e-3)
         noise = level.noise / max(height, 1e-6) / np.sqrt(max(1.0, level.width)) / slope
-        place = float(along[index] + share * (along[1] - along[0]))
-        return End(EndKind.FREE, place, float(np.hypot(0.15, 0.7 * noise)))
+        point = float(along[index] + share * (along[1] - along[0]))
+        return End(EndKind.FREE, point, float(np.hypot(0.15, 0.7 * noise)))
     if limit < len(along):
         return End(EndKind.BORDER, float(along[max(0, limit - 1)]), 0.5)
     return End(EndKind.BODY, 0.0, level.width)

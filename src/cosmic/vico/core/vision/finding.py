@@ -245,17 +245,17 @@ def clear_around(scene: Scene, line: Floats, width: float) -> npt.NDArray[np.boo
     """Return where nothing but the fibre lies within a gripper's reach."""
     reach = 1.5 * width + 6.0
     inside = ((line > reach) & (line < scene.corner - reach)).all(axis=1)
-    places = scene.reduced(line)
+    points = scene.reduced(line)
     edge = int(np.ceil(reach / scene.factor)) + 2
-    low = np.maximum(np.floor(places.min(axis=0)).astype(int) - edge, 0)
-    high = np.ceil(places.max(axis=0)).astype(int) + edge + 1
+    low = np.maximum(np.floor(points.min(axis=0)).astype(int) - edge, 0)
+    high = np.ceil(points.max(axis=0)).astype(int) + edge + 1
     part = scene.taken[low[1] : high[1], low[0] : high[0]]
     own = np.zeros(part.shape, np.uint8)
-    strip(own, places - low, width / scene.factor + 3.0)
+    strip(own, points - low, width / scene.factor + 3.0)
     ground = ((part == 0) | (own > 0)).astype(np.uint8)
     distance = np.minimum(cv2.distanceTransform(ground, cv2.DIST_L2, 3), 1e6)
     last = np.array(part.shape)[::-1] - 1
-    columns, rows = np.clip(np.round(places - low).astype(int), 0, last).T
+    columns, rows = np.clip(np.round(points - low).astype(int), 0, last).T
     return np.asarray(inside & (distance[rows, columns] * scene.factor > reach))
 
 

@@ -134,7 +134,7 @@ def touched(pixel: tuple[int, int], labels: npt.NDArray[np.int32]) -> list[int]:
 
 
 def with_nodes(each: Branch, nodes: list[Floats]) -> None:
-    """Add the places of its nodes to a branch."""
+    """Add the points of its nodes to a branch."""
     parts = [each.points]
     if each.nodes[0] != FREE:
         parts.insert(0, nodes[each.nodes[0]][None])

@@ -38,7 +38,7 @@ class Strand:
     half_width : float
         Likewise.
     joints : list of ndarray
-        Places of the crossings it goes through.
+        Points of the crossings it goes through.
     """
 
     points: Floats
@@ -53,7 +53,7 @@ class Joint:
     """Nodes so near to each other that they are one crossing."""
 
     stubs: list[Stub]
-    place: Floats
+    point: Floats
     partner: dict[Stub, Stub] = field(default_factory=dict)
     doubts: dict[Stub, list[str]] = field(default_factory=lambda: defaultdict(list))
 
@@ -157,10 +157,10 @@ def make_joints(graph: Graph, bridges: set[int], group: list[int]) -> dict[int, 
         for end, node in enumerate(each.nodes):
             if node != FREE:
                 stubs[group[node]].append((index, end))
-    places: dict[int, list[Floats]] = defaultdict(list)
+    points: dict[int, list[Floats]] = defaultdict(list)
     for node, label in enumerate(group):
-        places[label].append(graph.nodes[node])
-    return {label: Joint(found, np.mean(places[label], axis=0)) for label, found in stubs.items()}
+        points[label].append(graph.nodes[node])
+    return {label: Joint(found, np.mean(points[label], axis=0)) for label, found in stubs.items()}
 
 
 @cache
@@ -266,7 +266,7 @@ def follow(
         if ahead is not None:
             points = trimmed(points[::-1], half_width[index], at[exit_stub])[::-1]
             if len(at[exit_stub].stubs) > 2:
-                strand.joints.append(at[exit_stub].place)
+                strand.joints.append(at[exit_stub].point)
         parts.append(points)
         stub = ahead
     strand.points = np.concatenate(parts)

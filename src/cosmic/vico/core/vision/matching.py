@@ -88,7 +88,7 @@ class Template:
         self._slope_noise = SLOPE_NOISE * _noise_variance(self.pixels) * self.pixels.size
 
     def find(self, image: Pixels, around_px: Pair, reach_px: float) -> Match | None:
-        """Look for the template's centre within `reach_px` of a place; None off the image."""
+        """Look for the template's centre within `reach_px` of a point; None off the image."""
         rows, columns = self.pixels.shape
         left, right = _span(around_px[0], reach_px, columns, image.shape[1])
         top, bottom = _span(around_px[1], reach_px, rows, image.shape[0])
@@ -103,9 +103,9 @@ class Template:
         at_rim = x in (0, scores.shape[1] - 1) or y in (0, scores.shape[0] - 1)
         middle_x, middle_y = 0.5 * (columns - 1), 0.5 * (rows - 1)
         start = (x + _top(scores[y], x) + middle_x, y + _top(scores[:, x], y) + middle_y)
-        place, std_px = self._refine(window, start)
+        point, std_px = self._refine(window, start)
         return Match(
-            (float(left + place[0]), float(top + place[1])),
+            (float(left + point[0]), float(top + point[1])),
             std_px,
             score,
             _rival(scores, x, y, (columns, rows)),
@@ -122,26 +122,26 @@ class Template:
         if not np.linalg.cond(normal) < 1e8:
             return start, math.inf
         inverse = np.linalg.inv(normal)
-        place = np.array(start)
+        point = np.array(start)
         variance = 0.0
         for _ in range(ROUNDS):
-            error = self._error(window, place)
+            error = self._error(window, point)
             variance = float(error @ error) / max(1, error.size - 4)
             step = inverse @ (gradients.T @ error)
-            place -= step
+            point -= step
             if float(np.abs(step).max()) < 1e-3:
                 break
-        if not float(np.abs(place - start).max()) <= 1.0:
+        if not float(np.abs(point - start).max()) <= 1.0:
             return start, math.inf
         # Noise has slopes as well, and along a straight edge no others: they tell nothing.
         known = float(np.linalg.eigvalsh(normal).min()) - self._slope_noise
         std_px = math.sqrt(variance / known) if known > 0.0 else math.inf
-        return (float(place[0]), float(place[1])), math.hypot(std_px, FLOOR_PX)
+        return (float(point[0]), float(point[1])), math.hypot(std_px, FLOOR_PX)
 
-    def _error(self, window: Floats32, place: Floats) -> Floats:
+    def _error(self, window: Floats32, point: Floats) -> Floats:
         """Return the image there less the template, at the template's brightness."""
         rows, columns = self.pixels.shape
-        there = cv2.getRectSubPix(window, (columns, rows), (float(place[0]), float(place[1])))
+        there = cv2.getRectSubPix(window, (columns, rows), (float(point[0]), float(point[1])))
         away = there - there.mean()
         mine = self.pixels - self.pixels.mean()
         power = float(np.vdot(away, away))

@@ -42,7 +42,7 @@ def kink_angles_deg(line: Floats, width: float) -> list[float]:
     around = (angle[index + 2 * half] - angle[index + half]) + (
         angle[index - half] - angle[index - 2 * half]
     )
-    # On a bow the neighbourhood turns as much as the place itself; at a kink it does not.
+    # On a bow the neighbourhood turns as much as the point itself; at a kink it does not.
     excess = np.degrees(turn - around)
     size = np.where(np.sign(excess) == np.sign(turn), np.abs(excess), 0.0)
     found = []
@@ -62,7 +62,7 @@ def kink_index(angles_deg: list[float], length: float) -> float:
 
 
 def grasp_points(line: Floats, width: float, free: np.ndarray) -> Floats:
-    """Return up to two places for grippers: free around, straight, near either end.
+    """Return up to two points for grippers: free around, straight, near either end.
 
     `free` says for each point whether nothing else lies within a gripper's reach.
     """

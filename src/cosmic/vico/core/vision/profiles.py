@@ -20,11 +20,11 @@ class Profiles:
     Attributes
     ----------
     across : ndarray, shape (m,)
-        Places along the normal, pixels.
+        Points along the normal, pixels.
     height : ndarray, shape (n, m)
         What stands out from the ground at each point of the line; fibre positive.
     clear : ndarray of bool, shape (n, m)
-        Whether the place is ground or this fibre, as far as is known.
+        Whether the point is ground or this fibre, as far as is known.
     noise : float
         Standard deviation of a single pixel of the ground.
     ground, tilt : ndarray, shape (n,)
@@ -47,7 +47,7 @@ class Edges:
     Attributes
     ----------
     left, right : ndarray, shape (n,)
-        Places along the normal; NaN where there is no edge where one is expected.
+        Points along the normal; NaN where there is no edge where one is expected.
     contrast : ndarray, shape (n,)
         Height of each cross section.
     mean : ndarray, shape (m,)
@@ -62,13 +62,13 @@ class Edges:
 
 
 def sample(image: Floats32, x: Floats32, y: Floats32) -> Floats32:
-    """Return grey levels at places, the border repeated outside."""
+    """Return grey levels at points, the border repeated outside."""
     found = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(found, dtype=np.float32)
 
 
 def within(scene: "Scene", x: Floats32, y: Floats32) -> Flags:
-    """Return which places lie on the image."""
+    """Return which points lie on the image."""
     right, bottom = scene.corner + 0.5
     return np.asarray((x >= -0.5) & (x <= right) & (y >= -0.5) & (y <= bottom))
 
@@ -98,17 +98,17 @@ class Scene:
         return np.array([columns - 1.0, rows - 1.0])
 
     def full(self, points: Floats) -> Floats:
-        """Return places of the reduced image in full-size pixels."""
+        """Return points of the reduced image in full-size pixels."""
         return points * self.factor + 0.5 * (self.factor - 1)
 
-    def reduced(self, places: Floats) -> Floats:
-        """Return full-size places in pixels of the reduced image."""
-        return (places - 0.5 * (self.factor - 1)) / self.factor
+    def reduced(self, points: Floats) -> Floats:
+        """Return full-size points in pixels of the reduced image."""
+        return (points - 0.5 * (self.factor - 1)) / self.factor
 
-    def reduced_by_axis(self, places: Floats32) -> Floats32:
+    def reduced_by_axis(self, points: Floats32) -> Floats32:
         """Return full-size x, or y, in pixels of the reduced image."""
         shift, factor = np.float32(0.5 * (self.factor - 1)), np.float32(self.factor)
-        return np.asarray((places - shift) / factor)
+        return np.asarray((points - shift) / factor)
 
 
 def cross_sections(
@@ -196,7 +196,7 @@ def typical_section(height: Floats32, good: Flags) -> Floats:
 
 
 def level_crossing(mean: Floats, across: Floats32, level: float, side: int) -> float:
-    """Return the outermost place on one side at which the typical section has a level."""
+    """Return the outermost point on one side at which the typical section has a level."""
     order = np.argsort(side * across)
     x, y = across[order], mean[order]
     above = np.nonzero(y[:-1] >= level)[0]
@@ -219,8 +219,8 @@ def find_edges(profiles: Profiles, height: Floats32, good: Flags, width: float) 
     scaled = height / np.maximum(contrast, 1e-6)[:, None].astype(np.float32)
     expected = [level_crossing(mean, across, 0.5, side) for side in (-1, 1)]
     found = [
-        edge_near(scaled, across, place, side, 0.35 * width + 1.0)
-        for place, side in zip(expected, (-1, 1), strict=True)
+        edge_near(scaled, across, point, side, 0.35 * width + 1.0)
+        for point, side in zip(expected, (-1, 1), strict=True)
     ]
     inner = [level_crossing(mean, across, 0.75, side) for side in (-1, 1)]
     outer = [level_crossing(mean, across, 0.25, side) for side in (-1, 1)]
@@ -228,14 +228,14 @@ def find_edges(profiles: Profiles, height: Floats32, good: Flags, width: float) 
     return Edges(found[0], found[1], contrast, mean, steep / 1.349)
 
 
-def edge_near(scaled: Floats32, across: Floats32, place: float, side: int, most: float) -> Floats:
+def edge_near(scaled: Floats32, across: Floats32, point: float, side: int, most: float) -> Floats:
     """Return where each section falls below half, outwards, nearest to `place`; NaN if nowhere."""
-    if not np.isfinite(place):
+    if not np.isfinite(point):
         return np.full(len(scaled), np.nan)
     inner, outer = (scaled[:, :-1], scaled[:, 1:]) if side > 0 else (scaled[:, 1:], scaled[:, :-1])
     falls = (inner >= 0.5) & (outer < 0.5)
     start = across[:-1] if side > 0 else across[1:]
-    away = np.where(falls, np.abs(start - np.float32(place))[None, :], np.float32(np.inf))
+    away = np.where(falls, np.abs(start - np.float32(point))[None, :], np.float32(np.inf))
     best = np.argmin(away, axis=1)
     rows = np.arange(len(scaled))
     drop = np.maximum(inner[rows, best] - outer[rows, best], 1e-9)

@@ -55,7 +55,7 @@ class Pieces:
     Attributes
     ----------
     order : ndarray of int
-        Flat places of their pixels, piece after piece.
+        Flat points of their pixels, piece after piece.
     firsts, areas : ndarray of int
         Where each piece begins in `order`, and its number of pixels.
     """
@@ -68,9 +68,9 @@ class Pieces:
     def of(cls, mask: Mask) -> "Pieces":
         """Return the pieces of a mask."""
         _, labels = cv2.connectedComponents(mask, connectivity=8)
-        places = np.flatnonzero(mask)
-        found = labels.ravel()[places]
-        order = places[np.argsort(found, kind="stable")]
+        points = np.flatnonzero(mask)
+        found = labels.ravel()[points]
+        order = points[np.argsort(found, kind="stable")]
         areas = np.bincount(found)[1:] if len(found) else np.zeros(0, np.intp)
         firsts = np.concatenate([[0], np.cumsum(areas)[:-1]]) if len(areas) else areas
         return cls(order, firsts.astype(np.intp), areas)

@@ -133,8 +133,8 @@ def _summed(
     # The scatter of few parts is itself uncertain; that of all bins is not.
     scatter = 1.4826 * _middle(np.abs(mean - typical), seen)
     scatter = np.maximum(scatter, float(np.median(scatter)))
-    place = np.bincount(at, away, size).reshape(shape)[:, full].sum(axis=0)
-    return Samples(place / count.sum(axis=0), typical, 1.25 * scatter / math.sqrt(shape[0]))
+    point = np.bincount(at, away, size).reshape(shape)[:, full].sum(axis=0)
+    return Samples(point / count.sum(axis=0), typical, 1.25 * scatter / math.sqrt(shape[0]))
 
 
 def _middle(values: Floats, seen: Flags) -> Floats:
@@ -246,7 +246,7 @@ def _model(x: Floats, state: Floats) -> tuple[Floats, Floats]:
 
 
 def _bar(x: Floats, half: float, blur: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return a blurred bar, and how it changes with its half width, its place and its blur."""
+    """Return a blurred bar, and how it changes with its half width, its point and its blur."""
     sides = np.array([half - x, half + x]) / blur
     right, left = np.exp(-0.5 * sides * sides) * (1.0 / math.sqrt(2.0 * math.pi))
     bar = 0.5 * erf(sides * math.sqrt(0.5)).sum(axis=0)

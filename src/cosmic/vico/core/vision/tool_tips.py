@@ -18,14 +18,14 @@ class TipSeen:
 
     Attributes
     ----------
-    place_px : (float, float)
+    point_px : (float, float)
         Of a gripper the middle between its jaws' inner corners.
     certain : bool
         It can be relied on; what the link "tools" gives says why not.
     """
 
     name: str
-    place_px: tuple[float, float]
+    point_px: tuple[float, float]
     certain: bool
 
 

@@ -40,7 +40,7 @@ class ExpectedTool:
         length = math.hypot(*self.forward)
         numbers = (*self.tip_px, self.width_px, self.gap_px, self.reach_px, self.step_px, length)
         if not all(math.isfinite(each) for each in numbers):
-            raise ConfigError("tool tips: a place or a size expected is not a number")
+            raise ConfigError("tool tips: a point or a size expected is not a number")
         if not (length > 0.0 and self.width_px >= 6.0 and self.gap_px >= 0.0 < self.reach_px):
             raise ConfigError(
                 f"tool tips: a width of {self.width_px:g} px, a gap of {self.gap_px:g} px and a "
@@ -64,7 +64,7 @@ class ToolEnd:
     Attributes
     ----------
     tip_px : (float, float)
-        Middle of the front, between the places of half the contrast.
+        Middle of the front, between the points of half the contrast.
     corners_px : two of (float, float)
         Where the front meets the sides; of a jaw the inner one first.
     std_px : float

@@ -48,7 +48,7 @@ class Track:
 
 
 class TemplateTracker:
-    """Follows one place on the image by how its surroundings look.
+    """Follows one point on the image by how its surroundings look.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class TemplateTracker:
         std_px = math.sqrt(self._variance + match.std_px**2)
         doubt = _why_unsure(match)
         if doubt:
-            # Not learnt from: the next frame is looked at from the last sure place.
+            # Not learnt from: the next frame is looked at from the last sure point.
             self._missed += 1
             return Track(TrackState.UNSURE, position, std_px, match.score, doubt)
         straight = self._missed == 0
@@ -153,7 +153,7 @@ def _why_unsure(match: Match) -> str:
     if match.at_rim:
         return "it lies at the rim of where it was looked for"
     if match.rival > RIVAL_SHARE * match.score:
-        return f"another place looks like it (scores {match.score:.2f} and {match.rival:.2f})"
+        return f"another point looks like it (scores {match.score:.2f} and {match.rival:.2f})"
     if not match.std_px <= LARGEST_STD_PX:
         return "it can slip along an edge"
     return ""

@@ -37,7 +37,7 @@ class CalibrationShown:
 
 @dataclass(frozen=True, slots=True)
 class RotationShown:
-    """About which place on the platform an axis turns the plate.
+    """About which point on the platform an axis turns the plate.
 
     Attributes
     ----------
@@ -54,8 +54,8 @@ class RotationShown:
     measured: datetime
 
 
-class Places(Protocol):
-    """Calibrations in use, how they are measured, and what can be moved to a place in an image.
+class CoordinateTransform(Protocol):
+    """Calibrations in use, how they are measured, and what can be moved to a point in an image.
 
     Any thread. Pixels are those of the image they were read in, its ROI and binning.
     """
@@ -66,10 +66,10 @@ class Places(Protocol):
 
     @abstractmethod
     def problem(self, image: CameraImage) -> str:
-        """Return why pixels of `image` cannot be told as places; empty when they can."""
+        """Return why pixels of `image` cannot be told as points; empty when they can."""
 
     @abstractmethod
-    def platform_um(self, image: CameraImage, place_px: Pixel) -> tuple[float, float]:
+    def platform_um(self, image: CameraImage, point_px: Pixel) -> tuple[float, float]:
         """Return x and y on the platform of what lies on the sample plate at a pixel.
 
         Raises
@@ -84,7 +84,7 @@ class Places(Protocol):
         """What can be moved, such as "left"."""
 
     @abstractmethod
-    def move_to(self, image: CameraImage, place_px: Pixel, what: str) -> str:
+    def move_to(self, image: CameraImage, point_px: Pixel, what: str) -> str:
         """Begin to move the tip of `what` over a pixel and say what was begun; returns at once.
 
         Raises
@@ -109,7 +109,7 @@ class Places(Protocol):
 
     @abstractmethod
     def find_rotation_centre(self, camera: str) -> Task:
-        """Begin to measure about which place the plate turns; raises as `calibrate_stage`."""
+        """Begin to measure about which point the plate turns; raises as `calibrate_stage`."""
 
     @property
     @abstractmethod

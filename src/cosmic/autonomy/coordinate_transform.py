@@ -1,4 +1,4 @@
-"""Pixels and places on the platform: what is calibrated, and moving a tool to a pixel."""
+"""Pixels and positions on the platform: what is calibrated, and moving a tool to a pixel."""
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
@@ -17,7 +17,12 @@ from cosmic.frame.operation import Task
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.core.motion.orders import MoveTo
 from cosmic.vico.api.application import VicoApplication
-from cosmic.vico.api.places import CalibrationShown, Pixel, Places, RotationShown
+from cosmic.vico.api.coordinate_transform import (
+    CalibrationShown,
+    CoordinateTransform,
+    Pixel,
+    RotationShown,
+)
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.pixel_map import PixelMap
 from cosmic.vico.core.tool_settings import ToolSettings, tool_mistakes
@@ -30,7 +35,7 @@ SOURCE: Final = "click"
 REACH_PX: Final = 40.0
 
 
-class PlatformPlaces(Places):
+class PlatformTransform(CoordinateTransform):
     """Joins the cameras of ViCo and the axes of MiCo; any thread.
 
     Parameters
@@ -69,7 +74,7 @@ class PlatformPlaces(Places):
         self.calibrations = Calibrations(vico.units, self._tools, folder)
         self.registry = CalibrationRegistry(folder, clock=vico.clock, version=version)
 
-    # Pixels to places
+    # Pixels to positions
 
     @override
     def scale_um_px(self, camera: str, zoom_counts: float | None) -> float | None:
@@ -91,8 +96,8 @@ class PlatformPlaces(Places):
         return ""
 
     @override
-    def platform_um(self, image: CameraImage, place_px: Pixel) -> tuple[float, float]:
-        x, y = self._plate_map(image).to_um(place_px)
+    def platform_um(self, image: CameraImage, point_px: Pixel) -> tuple[float, float]:
+        x, y = self._plate_map(image).to_um(point_px)
         return float(x), float(y)
 
     def map_of(self, image: CameraImage, height_um: float, tool: str | None = None) -> PixelMap:
@@ -120,7 +125,7 @@ class PlatformPlaces(Places):
         return self.map_of(image, self._vico.settings.plate_um)
 
     def _zoom(self, camera: str, zoom_counts: float | None) -> float | None:
-        return zoom_counts if self._vico.unit(camera).place.behind_lens else 0.0
+        return zoom_counts if self._vico.unit(camera).config.behind_lens else 0.0
 
     # Tools
 
@@ -130,7 +135,7 @@ class PlatformPlaces(Places):
         return tuple(self._tools)
 
     @override
-    def move_to(self, image: CameraImage, place_px: Pixel, what: str) -> str:
+    def move_to(self, image: CameraImage, point_px: Pixel, what: str) -> str:
         tool = self._tool(what)
         running = self._vico.running_task
         if running is not None and not running.done:
@@ -138,7 +143,7 @@ class PlatformPlaces(Places):
         tip = tip_um(tool, self.positions())
         if tip is None:
             raise NotAvailable(f"{what}: its position is unknown; initialise the platform")
-        x_um, y_um = self.map_of(image, tip[2], what).to_um(place_px).tolist()
+        x_um, y_um = self.map_of(image, tip[2], what).to_um(point_px).tolist()
         motions = {
             axis: MoveTo(target, "um") for axis, target in axis_targets(tool, x_um, y_um).items()
         }
@@ -229,17 +234,17 @@ class PlatformPlaces(Places):
         return self._tools[name]
 
 
-def _inside(place_px: Pixel, width: int, height: int) -> bool:
-    return 0.0 <= place_px[0] <= width - 1.0 and 0.0 <= place_px[1] <= height - 1.0
+def _inside(point_px: Pixel, width: int, height: int) -> bool:
+    return 0.0 <= point_px[0] <= width - 1.0 and 0.0 <= point_px[1] <= height - 1.0
 
 
-def join_places(
+def join_transform(
     vico: VicoApplication, mico: MicoApplicationBase, folder: Path | None, version: str = ""
 ) -> None:
-    """Have the pixels of ViCo's cameras mean places on the platform; raises `ConfigError`."""
-    places = PlatformPlaces(vico, mico, folder, version)
+    """Have the pixels of ViCo's cameras mean positions on the platform; raises `ConfigError`."""
+    transform = PlatformTransform(vico, mico, folder, version)
     for unit in vico.units.values():
         for link in map(unit.chain.algorithm, ("tools", "tips")):
             if isinstance(link, FindTools | FindTips):
-                link.expect = places.expected_tools
-    vico.places = places
+                link.expect = transform.expected_tools
+    vico.transform = transform

@@ -25,10 +25,14 @@ class Around:
     """Where everything is at one look; see `Surroundings`."""
 
     def __init__(
-        self, place: "Workplace", values: Mapping[str, float], tools: dict[str, Tool], time_s: float
+        self,
+        workspace: "Workspace",
+        values: Mapping[str, float],
+        tools: dict[str, Tool],
+        time_s: float,
     ) -> None:
         self.tools: Mapping[str, Tool] = tools
-        self._place = place
+        self._workspace = workspace
         self._values = values
         self._time_s = time_s
         self._plate: Floats | None = None
@@ -36,15 +40,15 @@ class Around:
     def plate(self) -> Floats:
         """Return `world_from_plate`, shape (4, 4), um."""
         if self._plate is None:
-            self._plate = self._place.plate(self._values)
+            self._plate = self._workspace.plate(self._values)
         return self._plate
 
     def anchor(self, name: str) -> Point:
-        """Return a tip by name; see `Workplace.tips`."""
-        return self._place.tip(name, self._values, self._time_s)
+        """Return a tip by name; see `Workspace.tips`."""
+        return self._workspace.tip(name, self._values, self._time_s)
 
 
-class Workplace:
+class Workspace:
     """Grippers, fibres, plate and probe; `look` takes them from one moment to the next.
 
     Parameters
