@@ -103,7 +103,7 @@ def test_too_many_wrong_places_are_refused() -> None:
     for index in (0, 4, 7):
         x_px, y_px = sightings[index].image_px
         sightings[index] = replace(sightings[index], image_px=(x_px - 50.0, y_px + 9.0 * index))
-    with pytest.raises(CalibrationRefused, match=r"3 of 9 places.*point 1: .*point 5: .*point 8"):
+    with pytest.raises(CalibrationRefused, match=r"3 of 9 points.*point 1: .*point 5: .*point 8"):
         fit_map(sightings)
 
 
@@ -117,7 +117,7 @@ def test_an_outlier_among_thirty_places_is_found_without_trying_every_triple() -
 @pytest.mark.parametrize(
     ("places", "reason"),
     [
-        (grid()[:3], "3 places, at least 4"),
+        (grid()[:3], "3 points, at least 4"),
         (AXIS_UM + np.outer(np.arange(9.0), [100.0, 50.0]), "along a line only"),
         (np.repeat(AXIS_UM[None], 9, axis=0), "along a line only"),
         (grid(step_um=10.0), "move further"),

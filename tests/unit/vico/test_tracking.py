@@ -146,7 +146,7 @@ def test_two_places_that_look_alike_are_not_told_apart() -> None:
     tracker.start(image, (200.0, 150.0))
     track = tracker.follow(image)
     assert track.state is TrackState.UNSURE
-    assert "another place looks like it" in track.reason
+    assert "another point looks like it" in track.reason
 
 
 def test_what_changes_slowly_is_learnt_anew_and_the_uncertainty_grows() -> None:

@@ -10,7 +10,7 @@ class CalibrationSettings(StrictModel):
 
     Attributes
     ----------
-    place_x_um, place_y_um, position_um : float
+    place_x_um, place_y_um, place_um : float
         Where the gripper is looked at above the plate.
     residual_px : float
         Largest RMS residual of a map.
@@ -75,7 +75,7 @@ class CalibrationSettings(StrictModel):
 
     place_x_um: float = -1900.0
     place_y_um: float = 0.0
-    position_um: float = 12.0
+    place_um: float = 12.0
     residual_px: float = Field(0.5, gt=0.0)
     rotation_std_um: float = Field(3.0, gt=0.0)
     age_s: float = Field(7200.0, gt=0.0)

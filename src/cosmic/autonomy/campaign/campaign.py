@@ -225,7 +225,7 @@ class Campaign:
         self._carry_out()
 
     def pause(self) -> None:
-        """Rest at the next position where that is safe; harmless when it does not run."""
+        """Rest at the next safe point; harmless when it does not run."""
         with self._changed:
             if self._phase is not CampaignPhase.RUNNING:
                 return

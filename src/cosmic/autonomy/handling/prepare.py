@@ -188,14 +188,14 @@ class CalibratePlate(Calibrated):
     def measure(self, work: HandlingContext) -> Steps:
         position = work.settings.calibration
         residual = yield from calibrate_at(
-            work, position.place_x_um, position.place_y_um, position.position_um
+            work, position.place_x_um, position.place_y_um, position.place_um
         )
         self.kept(work, residual, "px", position.residual_px)
 
     @override
     def check(self, work: HandlingContext, entry: CalibrationEntry) -> Holds:
         position = work.settings.calibration
-        return entry if (yield from still_at(work, position.position_um, follow=True)) else None
+        return entry if (yield from still_at(work, position.place_um, follow=True)) else None
 
 
 class CalibrateHeld(Calibrated):

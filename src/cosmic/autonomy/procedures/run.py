@@ -198,7 +198,7 @@ class ProcedureRun(Generic[W]):
         self._ended.wait()
 
     def pause(self) -> None:
-        """Rest at the next position where that is safe; harmless when it does not run."""
+        """Rest at the next safe point; harmless when it does not run."""
         with self._lock:
             if self._state not in (RunState.RUNNING, RunState.PAUSING):
                 return

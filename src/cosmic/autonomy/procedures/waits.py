@@ -384,7 +384,7 @@ class ForTurn(Pending):
     @property
     @override
     def resting(self) -> bool:
-        # Nothing is lost by waiting: in a pause this is as good a position of rest as any.
+        # Nothing is lost by waiting: in a pause this is as good a point of rest as any.
         return (self._control.pausing or self._control.stepping) and not self.ready()
 
     @override

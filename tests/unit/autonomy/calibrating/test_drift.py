@@ -32,9 +32,9 @@ class Work:
         self.finished: list[object] = []
         self.vision = self
         self.first_camera = "top"
-        self.places = PlatformTransform.__new__(PlatformTransform)
-        self.places.calibrations = Calibrations(["top"], ["left"], None)
-        self.places.calibrations.add_plane("top", "left", plane(0.0, 12.0))
+        self.transform = PlatformTransform.__new__(PlatformTransform)
+        self.transform.calibrations = Calibrations(["top"], ["left"], None)
+        self.transform.calibrations.add_plane("top", "left", plane(0.0, 12.0))
         registry = self.calibration.registry
         for name in (PLATE, HELD, PROBE):
             values = {"off_x_um": 1.0, "off_y_um": 2.0} if name == PROBE else {}
@@ -46,7 +46,7 @@ class Work:
             self.calibration.made[name] = Measured(0.0, 0.1, "px")
 
     def place_um(self) -> list[float]:
-        plane = self.places.calibrations.get("top", "left").planes[0]
+        plane = self.transform.calibrations.get("top", "left").planes[0]
         return [float(each) for each in plane.fit.map.to_um(PIXEL)]
 
 

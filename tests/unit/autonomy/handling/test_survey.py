@@ -90,7 +90,9 @@ def test_what_is_not_taken_is_counted_by_its_reason(seen: Seen, problem: str):
 
 def test_two_that_lie_close_together_are_both_left():
     bench = looked(Seen(0.0, 0.0), Seen(40.0, 0.0), Seen(2000.0, 500.0))
-    assert [each.place_um for each in bench.shared.candidates] == [pytest.approx((2000.0, 500.0))]
+    assert [each.position_um for each in bench.shared.candidates] == [
+        pytest.approx((2000.0, 500.0))
+    ]
     assert bench.shared.skip_reasons == {survey.TOO_NEAR: 2}
 
 
@@ -138,7 +140,7 @@ def test_each_is_chosen_once_and_the_last_choice_says_to_look_again():
     for _ in range(2):
         for _ in Choose().run(bench):
             pass
-        places.add(bench.held_fibre().reach.candidate.place_um)
+        places.add(bench.held_fibre().reach.candidate.position_um)
     assert len(places) == 2
     with pytest.raises(OperationFailed) as told:
         next(Choose().run(bench))

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from cosmic.frame.renamed import Renamed
 from cosmic.vico.core.image import CameraImage
 from cosmic.vico.core.vision.tips import find_gripper, find_probe
 from cosmic.vico.core.vision.tool_types import ExpectedTool, GripperTips, NotSeen, ToolEnd
@@ -27,6 +28,7 @@ class TipSeen:
     name: str
     point_px: tuple[float, float]
     certain: bool
+    place_px = Renamed("point_px")
 
 
 def find_tool(image: Pixels, expected: ExpectedTool) -> Found:
