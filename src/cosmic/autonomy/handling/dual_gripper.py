@@ -120,7 +120,7 @@ class CarryInTurn(Carry):
 
 
 class Withdraw(FibreOperation):
-    """Probe and arm draw back from each other, and leave the position to the other arm."""
+    """Probe and arm draw back from each other, and leave the way to the other arm."""
 
     name = "draw back from the probe"
 

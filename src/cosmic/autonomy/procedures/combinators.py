@@ -198,7 +198,7 @@ class Parallel(Node[W]):
     """Parts side by side in one thread, so that their waits overlap; ends when all have ended.
 
     Where one fails, the others are ended at once, and all that they did is undone. In a pause
-    each goes on to its own next position of rest.
+    each goes on to its own next safe point.
     """
 
     kind = "parallel"

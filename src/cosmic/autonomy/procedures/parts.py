@@ -1,4 +1,4 @@
-"""All that a procedure is written with, in one position to import from."""
+"""All that a procedure is written with, for one import."""
 
 from cosmic.autonomy.procedures.combinators import (
     Fallback,
