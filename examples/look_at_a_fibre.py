@@ -66,8 +66,8 @@ def main() -> None:
         measure(rig)
         calibrate(rig)
         rig.mico["right.x"].move_to(-1000.0)
-        places = nearest(rig).ends_um
-        print("ends:", "not known" if places is None else places.round(1).tolist())
+        ends_um = nearest(rig).ends_um
+        print("ends:", "not known" if ends_um is None else ends_um.round(1).tolist())
         record(rig, Path(folder) / "look.mkv")
 
 

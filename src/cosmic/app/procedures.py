@@ -10,9 +10,9 @@ from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.campaign.opening import CampaignHost, open_campaign, read_recipe
 from cosmic.autonomy.campaign.recipe import Recipe
 from cosmic.autonomy.campaign.records import TWIN
+from cosmic.autonomy.coordinate_transform import PlatformTransform
 from cosmic.autonomy.handling.context import Applications, HandlingContext
 from cosmic.autonomy.handling.settings import HandlingSettings
-from cosmic.autonomy.places import PlatformPlaces
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.shipped.calibrate import build_calibrate
 from cosmic.frame.arguments import check_path, checked
@@ -45,10 +45,10 @@ def campaign_on(
 def registry_of(rig: Applications) -> CalibrationRegistry:
     """Return the calibration registry; see `Rig.calibrations`."""
     application = rig.vico.application
-    places = application.places if isinstance(application, VicoApplication) else None
-    if not isinstance(places, PlatformPlaces):
+    transform = application.transform if isinstance(application, VicoApplication) else None
+    if not isinstance(transform, PlatformTransform):
         raise NotAvailable("calibrations need cameras and axes in one program")
-    return places.registry
+    return transform.registry
 
 
 @checked

@@ -130,10 +130,12 @@ class LocalImages(CameraImages):
 class ImageWait(Operation[SentImage]):
     """Ends with the first whole image exposed from `since_s` of platform time on; any thread."""
 
-    def __init__(self, thread: CameraThread, since_s: float, places: Places | None) -> None:
+    def __init__(
+        self, thread: CameraThread, since_s: float, transform: CoordinateTransform | None
+    ) -> None:
         super().__init__(f"next image of {thread.camera_name}")
         self._since_s = since_s
-        self._places = places
+        self._transform = transform
         unsubscribe = thread.subscribe(self._on_image)
         self.add_callback(lambda _ended: unsubscribe())
         self.on_cancel(self._give_up)
@@ -149,7 +151,7 @@ class ImageWait(Operation[SentImage]):
         if self.done or frame.status is not FrameStatus.COMPLETE:
             return
         if frame.exposed_s >= self._since_s:
-            self.finish(SentImage.of(image, self._places))
+            self.finish(SentImage.of(image, self._transform))
 
 
 class SendingCamera(Protocol):

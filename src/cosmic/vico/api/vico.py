@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from cosmic.vico.api.fibres import PlacedFibre
 
 
-class PlacesOnImages(Places):
+class ImageTransform(CoordinateTransform):
     """What each image brings along of its place; movements are begun there. Any thread."""
 
     def __init__(self, vico: "Vico") -> None:
@@ -51,10 +51,10 @@ class PlacesOnImages(Places):
         return image.plate_problem if isinstance(image, ReceivedImage) else NOT_HOSTED
 
     @override
-    def platform_um(self, image: CameraImage, place_px: Pixel) -> tuple[float, float]:
+    def platform_um(self, image: CameraImage, point_px: Pixel) -> tuple[float, float]:
         if not isinstance(image, ReceivedImage) or image.plate is None:
             raise NotAvailable(self.problem(image))
-        x, y = place_px
+        x, y = point_px
         return image.plate.to_um((float(x), float(y)))
 
     @property
@@ -63,9 +63,9 @@ class PlacesOnImages(Places):
         return self._vico.tools
 
     @override
-    def move_to(self, image: CameraImage, place_px: Pixel, what: str) -> str:
-        there_um = self.platform_um(image, place_px)
-        clicked_px = (float(place_px[0]), float(place_px[1]))
+    def move_to(self, image: CameraImage, point_px: Pixel, what: str) -> str:
+        there_um = self.platform_um(image, point_px)
+        clicked_px = (float(point_px[0]), float(point_px[1]))
         camera = self._vico.camera(image.camera)
         if may_wait_here():
             return camera.click(clicked_px, there_um, what)

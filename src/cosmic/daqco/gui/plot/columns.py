@@ -83,7 +83,7 @@ def interpolate(values: Samples, first_sample: int, edges: Edges) -> Columns:
     Parameters
     ----------
     edges : ndarray, shape (columns + 1,)
-        Places of the columns' edges, in samples; all between the first and the last sample.
+        Positions of the columns' edges, in samples; all between the first and the last sample.
     """
     indices = np.clip(edges - first_sample, 0.0, values.shape[1] - 1.0)
     before = np.minimum(indices.astype(np.int64), max(0, values.shape[1] - 2))

@@ -15,7 +15,7 @@ from cosmic.frame.gui.palette import DARK
 
 Flags = npt.NDArray[np.bool_]
 Reals = npt.NDArray[np.float64]
-Places = npt.NDArray[np.int64]
+ColumnIndices = npt.NDArray[np.int64]
 
 OFF_PX: Final = 4.0
 
@@ -155,7 +155,9 @@ class Raster:
             painter.setBrush(QColor(colour))
             self._paint_rects(painter, at, tops[same], heights[same])
 
-    def _paint_rects(self, painter: QPainter, at: Places, tops: Reals, heights: Reals) -> None:
+    def _paint_rects(
+        self, painter: QPainter, at: ColumnIndices, tops: Reals, heights: Reals
+    ) -> None:
         there = np.isfinite(tops)
         count = int(np.count_nonzero(there))
         if not count:
@@ -168,7 +170,7 @@ class Raster:
         rects[:, 3] = heights[there]
         painter.drawRects(*self._rects.drawargs())
 
-    def _extents(self, rows: Places, at: Places, begin: int) -> tuple[Reals, Reals]:
+    def _extents(self, rows: ColumnIndices, at: ColumnIndices, begin: int) -> tuple[Reals, Reals]:
         """Return top and height in pixels, each joined to the column before."""
         low, high = self.ring.low[np.ix_(rows, at)], self.ring.high[np.ix_(rows, at)]
         before = (at - 1) % self.width
