@@ -13,8 +13,8 @@ from contract.station_rig import connected, free_port, listening
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, ScaleSettings
+from cosmic.daqco.hw.interface import Source
 from cosmic.daqco.hw.sim_library import SimulatedLibrary
-from cosmic.daqco.hw.sim_signal import Source
 from cosmic.frame.clock import WallClock
 from cosmic.frame.failure import Failure, FailurePolicy
 from cosmic.frame.network.application import RemoteApplication

@@ -159,7 +159,7 @@ def rows(model: type[BaseModel]) -> Iterator[tuple[str, str, str, str]]:
     required = schema.get("required", [])
     for key, described in schema["properties"].items():
         parts = (described, described.get("items", {}), described.get("additionalProperties", {}))
-        if any("$ref" in part for part in parts):
+        if any("$ref" in part for part in parts if isinstance(part, dict)):
             continue
         # The schema does not tell what a factory makes; here they make empty tables only.
         empty: dict[str, Any] | None = {} if described.get("type") == "object" else None
@@ -178,7 +178,8 @@ def _kind(described: dict[str, Any], definitions: dict[str, Any]) -> str:
     if described["type"] == "array":
         return _array(described, definitions)
     if described["type"] == "object":
-        return f"table: {_kind(described['additionalProperties'], definitions)}"
+        entries = described["additionalProperties"]
+        return "table" if entries is True else f"table: {_kind(entries, definitions)}"
     return f"{_TYPES[described['type']]}{_range(described)}"
 
 

@@ -80,7 +80,7 @@ def load_model(path: Path, model: type[M]) -> M:
     return check_model(path, read_toml(path), model)
 
 
-def check_model(path: Path, data: object, model: type[M], *, under: str = "") -> M:
+def check_model(path: Path | str, data: object, model: type[M], *, under: str = "") -> M:
     """Return what was read from `path`, or the table `under` of it, as `model`.
 
     Raises
@@ -94,7 +94,7 @@ def check_model(path: Path, data: object, model: type[M], *, under: str = "") ->
         raise ConfigError("\n".join(_lines(path, exc, under))) from None
 
 
-def _lines(path: Path, error: ValidationError, under: str) -> list[str]:
+def _lines(path: Path | str, error: ValidationError, under: str) -> list[str]:
     table = (under,) if under else ()
     return [
         f"{path}: {_key(table + item['loc'])}: {_reason(item['type'], item['msg'])}{_given(item)}"

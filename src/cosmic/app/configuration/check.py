@@ -13,6 +13,7 @@ from cosmic.app.configuration.references import kept_mistakes, misnamed, recipe_
 from cosmic.app.configuration.scene_fit import misfits
 from cosmic.frame.config import load_model, read_toml
 from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.frame.plugins import Kind, read_options
 from cosmic.frame.units import format_quantity
 from cosmic.mico.core.settings import PositionerSettings
 from cosmic.twin.settings import StageKind, TwinSettings
@@ -40,6 +41,7 @@ def find_mistakes(config: str | Path) -> list[str]:
         lines += kept_mistakes(file, path)
         lines += recipe_mistakes(file, path)
         lines += _network_mistakes(file, path)
+        lines += _backend_mistakes(file, path)
     if file is not None and twin is not None:
         lines += _twin_mistakes(file, path, twin, twin_path)
     if file is not None and file.platform.scene:
@@ -64,6 +66,16 @@ def _network_mistakes(file: PlatformFile, path: Path) -> list[str]:
         return [f"{path}: network: {line}" for line in str(exc).splitlines()]
     except NotAvailable as exc:
         return [f"{path}: network.serve: {exc}"] if file.network.serve else []
+    return []
+
+
+def _backend_mistakes(file: PlatformFile, path: Path) -> list[str]:
+    if file.daqco is None:
+        return []
+    try:
+        read_options(Kind.BOARD, file.daqco.backend, file.daqco.options)
+    except ConfigError as exc:
+        return [f"{path}: daqco: {line}" for line in str(exc).splitlines()]
     return []
 
 

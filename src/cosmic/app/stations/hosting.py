@@ -15,7 +15,7 @@ from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.core.left_behind import Closing, OpenRecordings, Outcome
 from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.daqco.hw.factory import make_library
-from cosmic.daqco.hw.sim_signal import Source
+from cosmic.daqco.hw.interface import Source
 from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import Clock
 from cosmic.frame.failure import FailurePolicy
@@ -126,6 +126,7 @@ def _build_daqco(
         clock=site.clock,
         scene_sources=_sources(site.scene),
         clock_sources=settings.clock_sources,
+        options=settings.options,
         seed=site.seed,
     )
     faults.join_simulated("board", library)

@@ -296,7 +296,8 @@ class Daqco(Declared):
         present = self._application.settings
         if settings.directory != present.directory:
             self._folders.folder(settings.directory)
-        if (settings.backend, settings.clock_sources) != (present.backend, present.clock_sources):
+        fixed = [(each.backend, each.options, each.clock_sources) for each in (settings, present)]
+        if fixed[0] != fixed[1]:
             raise ConfigError("driver and clocks of the boards are set in the platform file only")
 
     def configure(self, *, rate_hz: float) -> None:

@@ -75,7 +75,8 @@ class LimitSettings(StrictModel):
 class DaqcoSettings(StrictModel):
     """Section ``[daqco]`` of platform.toml."""
 
-    backend: Literal["simulated", "nidaqmx"] = "simulated"
+    backend: str = Field(default="simulated", min_length=1)
+    options: dict[str, object] = Field(default_factory=dict)
     rate_hz: float = Field(default=1000.0, ge=LOWEST_RATE_HZ, le=HIGHEST_RATE_HZ)
     refresh_hz: float = Field(default=20.0, ge=1.0, le=300.0)
     chunk_s: float = Field(default=0.002, ge=0.001, le=0.1)

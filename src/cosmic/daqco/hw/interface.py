@@ -1,15 +1,17 @@
 """What DAQCo asks of an acquisition board, whoever made it (thesis 4.3, 6.2)."""
 
 from abc import abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.frame.clock import Clock
 from cosmic.frame.errors import DeviceError, DeviceFault
+from cosmic.frame.plugins import Backend
 
 Volts = npt.NDArray[np.float64]
 
@@ -156,6 +158,20 @@ class Board(Protocol):
         """Give the board back; harmless the second time."""
 
 
+class Source(Protocol):
+    """Something that makes a voltage at an input."""
+
+    @abstractmethod
+    def volts(self, times_s: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Return the voltage at each of `times_s`, V; called with increasing times.
+
+        Parameters
+        ----------
+        times_s : ndarray, shape (n,), float64, s
+            Platform time, not after now.
+        """
+
+
 class BoardLibrary(Protocol):
     """The driver behind some boards."""
 
@@ -183,3 +199,30 @@ class BoardLibrary(Protocol):
         NotConnectedError
             There is none of that name.
         """
+
+
+@dataclass(frozen=True, slots=True)
+class BoardContext:
+    """What a platform gives to the driver of its boards.
+
+    Attributes
+    ----------
+    clock : Clock
+        The platform's, which paces simulated boards and stamps the samples of real ones.
+    clock_sources : mapping of str to str
+        Terminals from which boards take their sample clock, by board, such as
+        ``{"Dev2": "/Dev1/ai/SampleClock"}``.
+    scene_sources : mapping of (str, str) to Source, or None
+        What the twin connects to each board and input; None where there is no twin.
+    seed : int
+        Of what is random in simulated boards.
+    """
+
+    clock: Clock
+    clock_sources: Mapping[str, str] = field(default_factory=dict)
+    scene_sources: Mapping[tuple[str, str], Source] | None = None
+    seed: int = 0
+
+
+BoardBackend = Backend[BoardContext, BoardLibrary]
+"""What an entry point of the group ``cosmic.boards`` leads to."""

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 import nidaqmx
 import nidaqmx.stream_readers
@@ -10,11 +10,12 @@ import nidaqmx.system
 from nidaqmx.errors import DaqNotFoundError, Error
 from typing_extensions import override
 
-from cosmic.daqco.hw.interface import BoardInfo, BoardLibrary
+from cosmic.daqco.hw.interface import BoardBackend, BoardContext, BoardInfo, BoardLibrary
 from cosmic.daqco.hw.nidaqmx_board import NidaqmxBoard
 from cosmic.daqco.hw.nidaqmx_errors import board_error
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import DeviceFault, NotConnectedError
+from cosmic.frame.plugins import NoOptions
 
 logger = logging.getLogger(__name__)
 
@@ -115,3 +116,10 @@ def _info(device: Any) -> BoardInfo | None:
 
 def _short(physical: str) -> str:
     return physical.rpartition("/")[2]
+
+
+def _make(_options: NoOptions, context: BoardContext) -> BoardLibrary:
+    return NidaqmxLibrary(context.clock, clock_sources=context.clock_sources)
+
+
+BACKEND: Final = BoardBackend(_make)

@@ -7,12 +7,20 @@ from typing import Final
 from typing_extensions import override
 
 from cosmic.daqco.hw.board_checks import range_in_force
-from cosmic.daqco.hw.interface import BoardInfo, BoardLibrary, InputSettings
+from cosmic.daqco.hw.interface import (
+    BoardBackend,
+    BoardContext,
+    BoardInfo,
+    BoardLibrary,
+    InputSettings,
+    Source,
+)
 from cosmic.daqco.hw.sim_board import SimulatedBoard
 from cosmic.daqco.hw.sim_faults import BoardFaults
-from cosmic.daqco.hw.sim_signal import BoardSignal, Signal, Source
+from cosmic.daqco.hw.sim_signal import BoardSignal, Signal
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import ConfigError, DeviceFault, NotConnectedError
+from cosmic.frame.plugins import NoOptions
 
 PCI_6229: Final = BoardInfo(
     name="Dev",
@@ -125,3 +133,10 @@ class SimulatedLibrary(BoardLibrary):
             owners=self._owners,
             receiver=self._receiver,
         )
+
+
+def _make(_options: NoOptions, context: BoardContext) -> BoardLibrary:
+    return SimulatedLibrary(context.clock, context.scene_sources, seed=context.seed)
+
+
+BACKEND: Final = BoardBackend(_make, simulated=True)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import override
 
-from cosmic.daqco.hw.interface import Volts
+from cosmic.daqco.hw.interface import Source, Volts
 
 # An input with a cable but nothing at its end: a guess from such cables, not from this platform.
 OPEN_NOISE_V: Final = 3e-3
@@ -21,20 +21,6 @@ NOISE_STEPS: Final = 0.8
 STEPS: Final = 2**16
 # Two banks of coprime lengths are added, so that the noise repeats after 10**8 samples only.
 _BANKS: Final = (10_007, 9_973)
-
-
-class Source(Protocol):
-    """Something that makes a voltage at an input."""
-
-    @abstractmethod
-    def volts(self, times_s: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Return the voltage at each of `times_s`, V; called with increasing times.
-
-        Parameters
-        ----------
-        times_s : ndarray, shape (n,), float64, s
-            Platform time, not after now.
-        """
 
 
 class Signal(Protocol):

@@ -6,7 +6,6 @@ from threading import Lock
 from typing import Any, Final
 
 from cosmic.frame.errors import CosmicError, ProtocolError
-from cosmic.frame.network.codec import decode
 from cosmic.frame.network.errors import StationAway
 from cosmic.frame.network.ongoing import Ticket
 from cosmic.frame.network.travelling_errors import from_plain
@@ -58,6 +57,9 @@ class RemoteTasks:
     def on_message(self, message: bytes) -> None:
         """Take what the station tells of a task."""
         try:
+            # Here: without the extra net, where nothing is remote, there is no codec.
+            from cosmic.frame.network.codec import decode
+
             event = decode(message)
             if not (isinstance(event, list) and len(event) == 5 and isinstance(event[0], str)):
                 raise ProtocolError("a broken event came")
