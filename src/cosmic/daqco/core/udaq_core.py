@@ -10,7 +10,8 @@ from typing_extensions import override
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.plan import AcquisitionPlan
 from cosmic.daqco.core.scale import Scale
-from cosmic.daqco.hw.interface import Board, BoardChunk, OverrunError
+from cosmic.daqco.hw.board_group import BoardGroup
+from cosmic.daqco.hw.interface import Board, BoardChunk
 from cosmic.frame.errors import DeviceError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.threads import WorkerThread
@@ -19,10 +20,9 @@ LOOK_S: Final = 0.05
 
 
 class UDaqCore(WorkerThread):
-    """Starts the boards of a plan, joins their chunks and hands them on until it is ended.
+    """Starts the boards of a plan and hands their chunks on until it is ended.
 
-    One object is one acquisition. The chunks of several boards are joined by number; boards that
-    are to stay in step over hours need a common sample clock.
+    One object is one acquisition; its boards are received from by one call (`BoardGroup`).
 
     Parameters
     ----------
@@ -52,9 +52,8 @@ class UDaqCore(WorkerThread):
     ) -> None:
         super().__init__("acquisition", policy, parent)
         self.plan = plan
-        self._boards = [boards[name] for name in plan.boards]
+        self._boards = BoardGroup([boards[name] for name in plan.boards], clocked)
         self._put = put
-        self._clocked = tuple(clocked)
         self._scales = tuple(scales[each.name] for each in plan.channels)
         self._names = tuple(each.name for each in plan.channels)
         in_order = plan.rows == tuple(range(len(plan.rows)))
@@ -75,74 +74,36 @@ class UDaqCore(WorkerThread):
         DeviceError
             A board is gone or taken.
         """
-        rates = set()
-        for board in self._boards:
-            inputs = self.plan.inputs(board.info.name)
-            rates.add(board.configure(inputs, self.plan.rate_hz, self.plan.chunk_samples))
-        if len(rates) > 1:
-            given = ", ".join(f"{rate:g} Hz" for rate in sorted(rates))
-            raise DeviceError(f"the boards make different rates of this one: {given}")
-        self.rate_hz = rates.pop()
-        try:
-            # Who waits for another's sample clock must listen before that clock begins.
-            waiting = [each for each in self._boards if each.info.name in self._clocked]
-            for board in (*waiting, *(each for each in self._boards if each not in waiting)):
-                board.start()
-        except DeviceError:
-            self._stop_boards()
-            raise
+        plan = self.plan
+        inputs = {board: plan.inputs(board) for board in plan.boards}
+        self.rate_hz = self._boards.configure(inputs, plan.rate_hz, plan.chunk_samples)
+        self._boards.start()
         self.start()
 
     @override
     def run_body(self) -> None:
         try:
             while not self.end_requested:
-                pieces = self._pieces()
-                if pieces is not None:
-                    self._put(self._joined(pieces))
+                chunk = self._boards.receive(LOOK_S)
+                if chunk is not None:
+                    self._put(self._scaled(chunk))
         except DeviceError as exc:
             self.failed.emit(exc)
         finally:
-            self._stop_boards()
+            self._boards.stop()
 
-    def _pieces(self) -> list[BoardChunk] | None:
-        """Return the next chunk of every board, or None when the end came first."""
-        pieces: list[BoardChunk] = []
-        for board in self._boards:
-            piece = None
-            while piece is None:
-                if self.end_requested:
-                    return None
-                piece = board.receive(LOOK_S)
-            pieces.append(piece)
-        return pieces
-
-    def _joined(self, pieces: list[BoardChunk]) -> DataChunk:
-        first = pieces[0]
-        for piece in pieces[1:]:
-            if piece.first_sample != first.first_sample:
-                raise OverrunError(
-                    f"the boards are not in step: sample {first.first_sample} and "
-                    f"{piece.first_sample} arrived together"
-                )
-        volts = first.volts
-        if len(pieces) > 1:
-            volts = np.concatenate([piece.volts for piece in pieces])
-            volts = volts if self._rows is None else volts[self._rows]
+    def _scaled(self, chunk: BoardChunk) -> DataChunk:
+        volts = chunk.volts if self._rows is None else chunk.volts[self._rows]
         return DataChunk(
-            first_sample=first.first_sample,
-            time_s=first.time_s,
+            first_sample=chunk.first_sample,
+            time_s=chunk.time_s,
             rate_hz=self.rate_hz,
             channels=self._names,
             volts=volts,
             scales=self._scales,
         )
 
-    def _stop_boards(self) -> None:
-        for board in self._boards:
-            board.stop()
-
     @override
     def request_end(self) -> None:
         super().request_end()
-        self._stop_boards()
+        self._boards.stop()

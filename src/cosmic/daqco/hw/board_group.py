@@ -1,0 +1,121 @@
+"""`BoardGroup`: the boards of one acquisition, received from by one call."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from cosmic.daqco.hw.interface import Board, BoardChunk, InputSettings, OverrunError
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import DeviceError, DeviceFault
+
+
+class BoardGroup:
+    """Boards that acquire together; of any maker, real or simulated.
+
+    Order of calls as of `Board`: `configure`, `start`, `receive` again and again, `stop`. One
+    thread receives; any thread may stop. The boards stay with whoever opened them. Chunks are
+    joined by the numbers of their samples; boards that are to stay in step over hours need a
+    common sample clock.
+
+    Parameters
+    ----------
+    boards : sequence of Board
+        Their inputs follow each other in this order in every chunk.
+    clocked : sequence of str
+        Boards that take their sample clock from another; they are started first.
+    """
+
+    def __init__(self, boards: Sequence[Board], clocked: Sequence[str] = ()) -> None:
+        if not boards:
+            raise ValueError("a group has at least one board")
+        self._boards = tuple(boards)
+        self._clocked = frozenset(clocked)
+        self._pieces: dict[int, BoardChunk] = {}
+
+    def configure(
+        self, inputs: Mapping[str, Sequence[InputSettings]], rate_hz: float, chunk_samples: int
+    ) -> float:
+        """Prepare all boards and return the rate that they really make, Hz.
+
+        Parameters
+        ----------
+        inputs : mapping of str to sequence of InputSettings
+            By board.
+
+        Raises
+        ------
+        LimitError
+            A board does not do what is asked.
+        DeviceError
+            A board is gone or taken, or they make different rates of this one.
+        """
+        rates = {
+            board.configure(inputs[board.info.name], rate_hz, chunk_samples)
+            for board in self._boards
+        }
+        if len(rates) > 1:
+            given = ", ".join(f"{rate:g} Hz" for rate in sorted(rates))
+            raise DeviceError(
+                f"the boards make different rates of this one: {given}",
+                fault=DeviceFault.PARAMETER,
+            )
+        return rates.pop()
+
+    def start(self) -> None:
+        """Begin to acquire on all boards; raises `DeviceError`, and none acquires then."""
+        self._pieces = {}
+        # Who waits for another's sample clock must listen before that clock begins.
+        in_order = sorted(self._boards, key=lambda board: board.info.name not in self._clocked)
+        try:
+            for board in in_order:
+                board.start()
+        except DeviceError:
+            self.stop()
+            raise
+
+    def receive(self, timeout_s: float) -> BoardChunk | None:
+        """Return the next chunk of all boards, or None after `timeout_s` of wall time.
+
+        What some boards have brought by then is kept for the next call. Number and time are those
+        of the first board, the rows those of all boards in their order.
+
+        Raises
+        ------
+        DeviceError
+            `OverrunError` when a board lost samples, or the boards are not in step; a board is
+            gone, or failed. All have stopped, and nothing more comes before the next `start`.
+        """
+        until_s = WALL.now_s() + timeout_s
+        try:
+            for number, board in enumerate(self._boards):
+                # All are looked at: one that failed may be what another waits for.
+                if number not in self._pieces:
+                    piece = board.receive(max(0.0, until_s - WALL.now_s()))
+                    if piece is not None:
+                        self._pieces[number] = piece
+            if len(self._pieces) < len(self._boards):
+                return None
+            pieces, self._pieces = self._pieces, {}
+            return self._joined([pieces[number] for number in range(len(self._boards))])
+        except DeviceError:
+            self.stop()
+            raise
+
+    def stop(self) -> None:
+        """End acquiring; harmless when nothing runs. A `receive` that waits returns None."""
+        for board in self._boards:
+            board.stop()
+
+    def _joined(self, pieces: list[BoardChunk]) -> BoardChunk:
+        first, *others = pieces
+        if not others:
+            return first
+        for board, piece in zip(self._boards[1:], others, strict=True):
+            if piece.first_sample != first.first_sample:
+                raise OverrunError(
+                    f"{board.info.name} is not in step with {self._boards[0].info.name}: its "
+                    f"sample {piece.first_sample} arrived with sample {first.first_sample}; "
+                    f"start again"
+                )
+        volts = np.concatenate([piece.volts for piece in pieces])
+        return BoardChunk(first.first_sample, first.time_s, volts)
