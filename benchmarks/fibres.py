@@ -20,7 +20,7 @@ from benchmarks import figures
 from benchmarks.fibre_images import ROWS, Recipe, Truth, draw
 from benchmarks.figures import Figure, percentile
 from cosmic.vico.api import Fibre, fibre_mask, find_fibres
-from cosmic.vico.core.vision.thinning import skeletonize
+from cosmic.vico.core.vision.graph import skeletonize
 
 NAME = "fibres"
 ORDINARY = (

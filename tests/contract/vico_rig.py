@@ -31,8 +31,13 @@ from cosmic.vico.api.coordinate_transform import (
 )
 from cosmic.vico.api.vico import Vico
 from cosmic.vico.core.image import CameraImage
-from cosmic.vico.core.peripheral_settings import LampSettings, MotorLensSettings, ZoomStepSettings
-from cosmic.vico.core.settings import CameraConfig, VicoSettings
+from cosmic.vico.core.settings import (
+    CameraConfig,
+    LampSettings,
+    MotorLensSettings,
+    VicoSettings,
+    ZoomStepSettings,
+)
 from cosmic.vico.hw.factory import make_lens, make_light
 from cosmic.vico.hw.interface import (
     Camera,

@@ -56,12 +56,13 @@ from cosmic.twin.settings import (
     StageSettings,
     TwinSettings,
 )
-from cosmic.vico.core.peripheral_settings import (
+from cosmic.vico.core.settings import (
+    CameraConfig,
     LampSettings,
     MotorLensSettings,
+    VicoSettings,
     ZoomStepSettings,
 )
-from cosmic.vico.core.settings import CameraConfig, VicoSettings
 from cosmic.vico.core.tool_settings import ToolSettings
 
 # Heading in the page, and the model whose keys its table lists.

@@ -9,17 +9,111 @@ import numpy as np
 
 from cosmic.twin.bonds import Bonds
 from cosmic.twin.centre_line import CentreLine
-from cosmic.twin.clinging import Clinging
 from cosmic.twin.falls import Falls
 from cosmic.twin.fate import Fate, draw_fate
 from cosmic.twin.fibre import Carried, Fibre, Floats
-from cosmic.twin.grasping import between_jaws
+from cosmic.twin.force_settings import ContactSettings
 from cosmic.twin.grip import make_hold
+from cosmic.twin.handling_settings import HandlingSettings
 from cosmic.twin.kinematics import Point
 from cosmic.twin.settings import TwinSettings
 from cosmic.twin.surroundings import Surroundings, Tell
 from cosmic.twin.tools import Tool
 from cosmic.twin.twin_faults import TwinFaults
+
+
+class Clinging:
+    """How a fibre sticks to a jaw, until it is shaken off or wiped off along the plate.
+
+    Parameters
+    ----------
+    key : str
+        Names seed, fibre and grasp: the same key, the same number of tries.
+    position : (float, float, float)
+        Of the jaw's tip, um, world.
+    """
+
+    def __init__(self, handling: HandlingSettings, key: str, position: Point) -> None:
+        self._handling = handling
+        self._chance = random.Random(f"free {key}")
+        self._turns = list(position)
+        self._ways = [0, 0, 0]
+        self._last = position
+        self._wiped_um = 0.0
+
+    def look(self, position: Point, low_um: float) -> str:
+        """Follow the jaw and return "shaken" or "wiped" once the fibre is free, else "".
+
+        Parameters
+        ----------
+        low_um : float
+            Below this height above the plate the fibre touches it.
+        """
+        if self._shaken(position):
+            return "shaken"
+        way = math.dist(position[:2], self._last[:2])
+        self._last = position
+        if position[2] >= low_um:
+            return ""
+        self._wiped_um += way
+        if self._wiped_um < self._handling.wipe_um:
+            return ""
+        self._wiped_um = 0.0
+        return "wiped" if self._chance.random() < self._handling.wipe_frees else ""
+
+    def _shaken(self, position: Point) -> bool:
+        for axis, now in enumerate(position):
+            since = now - self._turns[axis]
+            way = self._ways[axis]
+            if way == 0:
+                if abs(since) >= self._handling.shake_um:
+                    self._ways[axis], self._turns[axis] = (1 if since > 0.0 else -1), now
+            elif since * way > 0.0:
+                self._turns[axis] = now
+            elif abs(since) >= self._handling.shake_um:
+                self._ways[axis], self._turns[axis] = -way, now
+                if self._chance.random() < self._handling.shake_frees:
+                    return True
+        return False
+
+
+def between_jaws(
+    tool: Tool, line: Floats, widest_um: float, contact: ContactSettings
+) -> tuple[float, int] | None:
+    """Return where along a fibre the jaws' tip is and which end is outside.
+
+    None where the jaws do not enclose it, or where a part of it lies under them.
+
+    Parameters
+    ----------
+    line : ndarray, shape (n, 3), float64
+        The fibre's middle, um, world.
+    widest_um : float
+        How far the jaws were open before they closed.
+    """
+    ahead = (line[:, 0] - tool.hold[0]) * tool.towards
+    aside = line[:, 1] - tool.hold[1]
+    half = widest_um / 2.0
+    if (np.abs(aside[ahead < 0.0]) > half).any():
+        return None
+    steep = math.tan(math.radians(contact.grasp_angle_deg))
+    arcs = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))])
+    for after in range(1, len(line)):
+        a0, a1 = float(ahead[after - 1]), float(ahead[after])
+        if (a0 < 0.0) == (a1 < 0.0):
+            continue
+        if abs(float(aside[after] - aside[after - 1])) > steep * abs(a1 - a0):
+            continue
+        part = a0 / (a0 - a1)
+        there = line[after - 1] + part * (line[after] - line[after - 1])
+        if abs(there[1] - tool.hold[1]) > half:
+            continue
+        if abs(there[2] - tool.hold[2]) > contact.grasp_height_um:
+            continue
+        at = float(arcs[after - 1] + part * (arcs[after] - arcs[after - 1]))
+        return at, 1 if a1 > a0 else -1
+    return None
+
 
 CARRYING_UM: Final = 8.0
 """Way within which something may happen to a fibre that is lifted or will be lost."""

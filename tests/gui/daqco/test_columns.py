@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from cosmic.daqco.gui.plot.columns import LiveColumns
 from cosmic.daqco.gui.plot.history import SEGMENT, History
-from cosmic.daqco.gui.plot.live_columns import LiveColumns
 from cosmic.daqco.gui.plot.raster import Look, Raster
 
 RATE_HZ = 15_000.0

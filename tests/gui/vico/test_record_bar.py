@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QMessageBox, QPushButton
 
 from cosmic.frame.file_names import directory_problem, name_problem
-from cosmic.vico.gui.time_lapse_dialog import TimeLapseDialog
+from cosmic.vico.gui.record_bar import TimeLapseDialog
 from gui.vico.fake_vico import Recorded
 
 STAMP = "2026-11-21_12-16-40"

@@ -6,10 +6,9 @@ import pytest
 from pydantic import ValidationError
 
 from cosmic.twin.lens import TwinLens
-from cosmic.twin.lens_motor import LensPhase
+from cosmic.twin.lens_motor import LensPhase, ramp_down, ramp_over
 from cosmic.twin.lens_settings import LensMotorSettings
 from cosmic.twin.light import TwinLight
-from cosmic.twin.ramp import ramp_down, ramp_over
 from cosmic.twin.settings import shipped_settings
 
 SETTINGS = shipped_settings().lens

@@ -6,7 +6,7 @@ import pytest
 from pydantic import ValidationError
 
 from cosmic.frame.errors import ConfigError
-from cosmic.vico.core.peripheral_settings import LampSettings, MotorLensSettings
+from cosmic.vico.core.settings import LampSettings, MotorLensSettings
 from cosmic.vico.core.zoom_scale import ZoomPoint, ZoomScale, zoom_text
 from cosmic.vico.hw.peripherals import LensAxis
 

@@ -1,5 +1,6 @@
 """The fields for one channel (DAQSI.4 to DAQSI.14)."""
 
+import re
 from collections.abc import Sequence
 from typing import Final
 
@@ -16,13 +17,30 @@ from PySide6.QtWidgets import (
 )
 
 from cosmic.daqco.core.settings import EXTREMES_V, ChannelSettings
-from cosmic.daqco.gui.channel_names import channel_name_problem
 from cosmic.daqco.gui.colours import colour_name, readable, swatch
 from cosmic.frame.gui.build import named, push_button, tipped
 from cosmic.frame.gui.palette import OKABE_ITO
 from cosmic.frame.gui.quantity_field import QuantityField
 from cosmic.frame.gui.refusal import show_refusal
 from cosmic.frame.gui.theme import STEP_PX
+
+LONGEST: Final = 60
+_NAME: Final = re.compile(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)?")
+
+
+def channel_name_problem(name: str, others: Sequence[str]) -> str:
+    """Return why a channel cannot be called that; empty when it can."""
+    if not name:
+        return "type a name, such as force"
+    if not _NAME.fullmatch(name):
+        return (
+            "a name begins with a small letter and has small letters, digits and _ "
+            "(and one dot at most), such as probe.force"
+        )
+    if len(name) > LONGEST:
+        return f"the name is longer than {LONGEST} letters"
+    return f"another channel is called {name!r}" if name in others else ""
+
 
 _MODES: Final = {
     "rse": "against ground (RSE)",

@@ -13,19 +13,19 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QMessageBox,
+    QRadioButton,
     QWidget,
 )
 
 from cosmic.daqco.api.daqco import Daqco
 from cosmic.daqco.api.files import NamedFile
+from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.core.recording_format import SUFFIX
-from cosmic.daqco.gui.amounts import recording_text, room_text
-from cosmic.daqco.gui.append_row import append_row
 from cosmic.daqco.gui.asking import Asking
-from cosmic.daqco.gui.file_naming import name_pattern
 from cosmic.frame.errands import Told
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.file_names import NameOption, name_problem
+from cosmic.frame.gui.amounts import duration_text, size_text
 from cosmic.frame.gui.ask_directory import ask_directory
 from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
@@ -35,6 +35,56 @@ from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.theme import STEP_PX, State, number_font
 from cosmic.frame.overrides import override
+
+_TAILS: Final = {
+    NameOption.TIME: "_yyyy-mm-dd_hh-mm-ss",
+    NameOption.NUMBER: "_nnn",
+    NameOption.NONE: "",
+}
+
+
+def name_pattern(base: str, option: NameOption) -> str:
+    """Return the whole name with the format of what is appended."""
+    return f"{base.strip().removesuffix(SUFFIX)}{_TAILS[option]}{SUFFIX}"
+
+
+_OPTIONS: Final = {
+    NameOption.TIME: ("Append with time", "Append date, hour, minute and second of the start"),
+    NameOption.NUMBER: ("Append with number", "Append the next number that is free"),
+    NameOption.NONE: ("Don't append", "Keep the name as it is"),
+}
+
+
+def append_row(group: QButtonGroup) -> QWidget:
+    """Return the options side by side; their property "append" says which is which."""
+    row, layout = tight_row(2 * STEP_PX)
+    for option, (text, tip) in _OPTIONS.items():
+        button = tipped(QRadioButton(text), tip)
+        button.setProperty("append", option.value)
+        button.setChecked(option is NameOption.TIME)
+        group.addButton(button)
+        layout.addWidget(button)
+    layout.addStretch(1)
+    return row
+
+
+LITTLE_ROOM_S: Final = 600.0
+LATE_S: Final = 1.0
+
+
+def recording_text(recording: RecordingState, behind_s: float) -> str:
+    """Return how long and how large a recording is; empty when there has been none."""
+    amount = f"{duration_text(recording.duration_s)}, {size_text(recording.size_bytes)}"
+    if recording.active:
+        return f"recording: {amount}" + (f", {behind_s:.1f} s behind" if behind_s >= LATE_S else "")
+    return f"{recording.path.name}: {amount}" if recording.path is not None else ""
+
+
+def room_text(free_bytes: float, left_s: float) -> str:
+    """Return how much room there is, and for how long."""
+    text = f"{size_text(free_bytes)} free on the disk: {duration_text(left_s)} at this rate"
+    return f"◆ little room: {text}" if left_s < LITTLE_ROOM_S else text
+
 
 T = TypeVar("T")
 

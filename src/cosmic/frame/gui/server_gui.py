@@ -3,21 +3,135 @@
 from collections.abc import Sequence
 from typing import Final
 
-from PySide6.QtCore import QSettings, Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent, QShowEvent
-from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
+from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
+from PySide6.QtGui import QAction, QActionGroup, QCloseEvent, QKeySequence, QShowEvent
+from PySide6.QtWidgets import (
+    QApplication,
+    QDockWidget,
+    QMainWindow,
+    QMenu,
+    QMenuBar,
+    QMessageBox,
+    QTabBar,
+    QWidget,
+)
 
 from cosmic.frame.gui.dock import PanelDock
 from cosmic.frame.gui.keys_dialog import KeyList, KeysDialog
 from cosmic.frame.gui.layout_store import LayoutStore
-from cosmic.frame.gui.menus import ServerMenus
 from cosmic.frame.gui.palette import ThemeName
 from cosmic.frame.gui.screen_fit import DialogFitter, fit_to_screen
-from cosmic.frame.gui.tab_bars import hide_stale_tab_bars
 from cosmic.frame.gui.theme import STEP_PX, apply_theme, current_palette
 from cosmic.frame.gui.top_bar import TopBar
 from cosmic.frame.gui.wheel_guard import WheelGuard
 from cosmic.frame.overrides import override
+
+_THEMES: Final = {"dark": "Dark", "light": "Light"}
+
+
+class ServerMenus(QObject):
+    """File, View and Help; each entry only asks, its window acts."""
+
+    quit_requested = Signal()
+    keys_requested = Signal()
+    theme_requested = Signal(str)
+    reset_layout_requested = Signal()
+
+    def __init__(self, window: QWidget) -> None:
+        super().__init__(window)
+        self._window = window
+        self._about = window.windowTitle()
+        self.bar = QMenuBar()
+        self.bar.setNativeMenuBar(False)  # it shares its row with the messages
+        file = self._menu("&File")
+        self._view = self._menu("&View")
+        help_ = self._menu("&Help")
+        quit_ = self._action(file, "&Quit", "Stop, release the hardware and close", "Ctrl+Q")
+        quit_.triggered.connect(self.quit_requested)
+        self._separator = self._view.addSeparator()
+        self._themes = self._make_themes()
+        reset = self._action(self._view, "&Reset layout", "Put all panels back to their places")
+        reset.triggered.connect(self.reset_layout_requested)
+        keys = self._action(help_, "&Keys", "List every key and what it does", "F1")
+        keys.setShortcutContext(Qt.ShortcutContext.ApplicationShortcut)
+        keys.triggered.connect(self.keys_requested)
+        about = self._action(help_, "&About", "Version and origin of this program")
+        about.triggered.connect(self._on_about)
+
+    def _menu(self, title: str) -> QMenu:
+        menu = self.bar.addMenu(title)
+        menu.setToolTipsVisible(True)
+        return menu
+
+    def _action(self, menu: QMenu, text: str, tip: str, shortcut: str = "") -> QAction:
+        action = menu.addAction(text)
+        action.setToolTip(tip)
+        if shortcut:
+            action.setShortcut(QKeySequence(shortcut))
+        return action
+
+    def _make_themes(self) -> dict[str, QAction]:
+        menu = self._view.addMenu("&Theme")
+        menu.setToolTipsVisible(True)
+        group = QActionGroup(menu)
+        actions: dict[str, QAction] = {}
+        for name, text in _THEMES.items():
+            action = self._action(menu, text, f"Use the {name} theme")
+            action.setCheckable(True)
+            action.setData(name)
+            group.addAction(action)
+            actions[name] = action
+        group.triggered.connect(self._on_theme)
+        return actions
+
+    def add_dock(self, dock: QDockWidget) -> None:
+        """Let the View menu show and hide `dock`."""
+        action = dock.toggleViewAction()
+        action.setToolTip(f"Show or hide the panel {dock.windowTitle()}")
+        self._view.insertAction(self._separator, action)
+
+    def show_theme(self, name: str) -> None:
+        """Tick the theme in force."""
+        self._themes[name].setChecked(True)
+
+    def set_about(self, text: str) -> None:
+        """Give the text of Help > About."""
+        self._about = text
+
+    def _on_theme(self, action: QAction) -> None:
+        self.theme_requested.emit(str(action.data()))
+
+    def _on_about(self) -> None:
+        box = QMessageBox(
+            QMessageBox.Icon.NoIcon,
+            f"About {self._window.windowTitle()}",
+            self._about,
+            QMessageBox.StandardButton.Close,
+            self._window,
+        )
+        box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        box.open()
+
+
+def hide_stale_tab_bars(window: QMainWindow) -> None:
+    """Hide the tab bars that belong to no group of docks as it is now.
+
+    Qt 6 keeps the bar of an earlier arrangement visible, over or below the one in use. Of several
+    for one group the one made last is in use.
+    """
+    docks = window.findChildren(QDockWidget)
+    wanted = {
+        frozenset(each.windowTitle() for each in (dock, *window.tabifiedDockWidgets(dock)))
+        for dock in docks
+    }
+    bars = window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
+    for bar in reversed(bars):
+        group = frozenset(bar.tabText(index).replace("&", "") for index in range(bar.count()))
+        if group in wanted:
+            wanted.remove(group)
+        else:
+            bar.hide()
+
 
 Area = Qt.DockWidgetArea
 Way = Qt.Orientation

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import (
     QMenuBar,
     QSizePolicy,
     QStackedWidget,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
@@ -19,10 +20,65 @@ from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.clearance_meter import Clearance, ClearanceMeter
 from cosmic.frame.gui.controls_sign import ControlsSign
 from cosmic.frame.gui.elided_label import ElidedLabel
-from cosmic.frame.gui.mode_selector import ModeSelector
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.stop_button import StopButton
 from cosmic.frame.gui.theme import LARGE_PX, STEP_PX, State, current_palette, ui_font
+
+MODES: Final = {
+    "MCM": "Manual control: you command every movement",
+    "SCM": "Semi-automatic control: recorded trajectories are executed again",
+    "ECM": "Enhanced manual control: a way around is planned where the straight one collides",
+    "ACM": "Automatic control: whole procedures run without a person",
+}
+
+
+class ModeSelector(QWidget):
+    """Shows the mode in force; a click only asks for another one."""
+
+    mode_requested = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._mode = "MCM"
+        self._buttons: dict[str, QToolButton] = {}
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(0)
+        for name in MODES:
+            button = named(QToolButton(), "modeButton")
+            button.setText(name)
+            button.setCheckable(True)
+            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+            button.clicked.connect(self._on_clicked)
+            row.addWidget(button)
+            self._buttons[name] = button
+            self.set_available(name, "" if name == "MCM" else "not part of this version")
+        self.set_mode("MCM")
+
+    @property
+    def mode(self) -> str:
+        """The mode in force."""
+        return self._mode
+
+    def set_mode(self, name: str) -> None:
+        """Show `name` as the mode in force."""
+        self._mode = name
+        for each, button in self._buttons.items():
+            button.setChecked(each == name)
+
+    def set_available(self, name: str, why_not: str = "") -> None:
+        """Let `name` be chosen, or say in its tooltip why it cannot be."""
+        button = self._buttons[name]
+        button.setEnabled(not why_not)
+        tip = f"{MODES[name]}\nNot available: {why_not}" if why_not else MODES[name]
+        button.setToolTip(tip)
+
+    def _on_clicked(self) -> None:
+        wanted = next(name for name, each in self._buttons.items() if each is self.sender())
+        self.set_mode(self._mode)  # the click alone changes nothing: the owner decides
+        if wanted != self._mode:
+            self.mode_requested.emit(wanted)
+
 
 NO_COLLISION_MODEL = "no collision model"
 _NAMES_SHOWN: Final = 2

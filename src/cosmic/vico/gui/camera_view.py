@@ -14,6 +14,7 @@ from cosmic.frame.gui.build import named
 from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.overrides import override
+from cosmic.vico.api.camera import CameraHandle
 from cosmic.vico.api.coordinate_transform import Pixel
 from cosmic.vico.api.vico import Vico
 from cosmic.vico.core.image import CameraImage
@@ -25,13 +26,28 @@ from cosmic.vico.gui.image_tools import ImageTools
 from cosmic.vico.gui.image_view import CameraImageView
 from cosmic.vico.gui.layers import CornerText, Crosshair, Note, ScaleBar
 from cosmic.vico.gui.levels import Histogram, histogram
-from cosmic.vico.gui.pointer_text import pointer_text
 from cosmic.vico.gui.record_bar import RecordBar
 from cosmic.vico.gui.seen_layer import SeenLayer
 from cosmic.vico.gui.settings_form import SettingsForm
 from cosmic.vico.gui.status_row import StatusRow
 from cosmic.vico.gui.tool_row import ToolRow
 from cosmic.vico.hw.interface import FrameStatus, Trigger
+
+
+def pointer_text(camera: CameraHandle, image: CameraImage | None, point_px: Pixel | None) -> str:
+    """Return point and brightness of a pixel, and where that is on the platform."""
+    if image is None or point_px is None:
+        return ""
+    height, width = image.data.shape[:2]
+    x, y = round(point_px[0]), round(point_px[1])
+    if not (0 <= x < width and 0 <= y < height):
+        return ""
+    value = image.data[y, x]
+    shown = f"{int(value)}" if value.ndim == 0 else ", ".join(f"{int(each)}" for each in value)
+    there_um = camera.platform_um(point_px)
+    where = "" if there_um is None else f"  at {', '.join(f'{v:.1f}' for v in there_um)} µm"
+    return f"{x}, {y} px = {shown}{where}"
+
 
 LOOK_MS: Final = 8
 LEAST_S: Final = 0.025

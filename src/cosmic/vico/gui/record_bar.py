@@ -5,8 +5,13 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final
 
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QIcon, QKeyEvent
 from PySide6.QtWidgets import (
     QComboBox,
+    QDialog,
+    QDialogButtonBox,
+    QFormLayout,
     QHBoxLayout,
     QLabel,
     QSizePolicy,
@@ -23,10 +28,68 @@ from cosmic.frame.gui.overwrite_question import overwrite_question
 from cosmic.frame.gui.task_bar import TaskBar
 from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look
 from cosmic.frame.operation import Task
+from cosmic.frame.overrides import override
 from cosmic.vico.api.camera import CameraHandle
 from cosmic.vico.api.camera_shown import FormatShown
+from cosmic.vico.gui.amount_field import AmountField
 from cosmic.vico.gui.file_fields import FileFields
-from cosmic.vico.gui.time_lapse_dialog import TimeLapseDialog
+
+
+class TimeLapseDialog(QDialog):
+    """Asks for interval and number of images.
+
+    Signals
+    -------
+    agreed(float, int)
+        Interval in seconds, number of images.
+    """
+
+    agreed = Signal(float, int)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Time-lapse")
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.interval = AmountField("Time between images", "s", low=0.1, high=86400.0, value=10.0)
+        self.count = AmountField(
+            "Number of images", "", low=1.0, high=1e6, value=60.0, integers=True
+        )
+        self.total = QLabel()
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
+        self.begin = buttons.addButton("Begin", QDialogButtonBox.ButtonRole.AcceptRole)
+        for each in buttons.buttons():
+            each.setIcon(QIcon())
+        form = QFormLayout(self)
+        form.setSpacing(STEP_PX)
+        form.addRow("One image every", self.interval)
+        form.addRow("Images", self.count)
+        form.addRow("Takes", self.total)
+        form.addRow(buttons)
+        buttons.accepted.connect(self._on_begin)
+        buttons.rejected.connect(self.reject)
+        for field in (self.interval, self.count):
+            field.committed.connect(self._show_total)
+        self._show_total()
+
+    def _show_total(self) -> None:
+        interval_s, count = self.interval.value(), self.count.value()
+        if interval_s is not None and count is not None:
+            self.total.setText(duration_text(interval_s * max(0.0, count - 1.0)))
+
+    def _on_begin(self) -> None:
+        judged = [field.commit() for field in (self.interval, self.count)]
+        interval_s, count = self.interval.value(), self.count.value()
+        if all(judged) and interval_s is not None and count is not None:
+            self.agreed.emit(interval_s, round(count))
+            self.accept()
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            event.accept()  # Enter judges a field here; a dialog would begin at once
+            return
+        super().keyPressEvent(event)
+
 
 STILL: Final = ".png"
 

@@ -7,8 +7,8 @@ import pytest
 
 from cosmic.frame.config import shipped_config_dir
 from cosmic.frame.errors import ConfigError
-from cosmic.twin.optics.outlines import shrunk
 from cosmic.twin.optics.solids import read_solids
+from cosmic.twin.optics.view import shrunk
 
 URDF = shipped_config_dir() / "scenes" / "fiberstation.urdf"
 

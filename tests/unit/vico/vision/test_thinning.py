@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from cosmic.vico.core.vision.thinning import skeletonize
+from cosmic.vico.core.vision.graph import skeletonize
 
 RECORDED = {
     "lines 0": "11b5fdc53bfa0b72",

@@ -1,19 +1,38 @@
 """Where the images of a recording are read from: a video file, or a directory."""
 
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
 from cosmic.frame.errors import RecordingError
-from cosmic.vico.core.recording.ffv1_check import is_intact
 from cosmic.vico.core.recording.planes import from_video_frame
 from cosmic.vico.core.recording.sequence_writer import image_files
 from cosmic.vico.hw.interface import Pixels
 
 if TYPE_CHECKING:
     import av
+
+_FOOTER: Final = 8  # length of the slice in 3 bytes, a status byte, checksum in 4 bytes
+_REVERSED: Final = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
+_START: Final = 0xFFFFFFFF  # undoes what zlib does to the start and the end of a checksum
+
+
+def is_intact(packet: bytes) -> bool:
+    """Return whether the checksums of all slices of a packet are right."""
+    # FFV1 counts bits from the other end than zlib does.
+    turned = packet.translate(_REVERSED)
+    end = len(packet)
+    while end > 0:
+        start = end - _FOOTER - int.from_bytes(packet[end - _FOOTER : end - _FOOTER + 3], "big")
+        if not 0 <= start <= end - _FOOTER:
+            return False
+        if zlib.crc32(memoryview(turned)[start:end], _START) != _START:
+            return False
+        end = start
+    return True
 
 
 class ImageSource(Protocol):
