@@ -1,26 +1,42 @@
-"""Files that the program keeps for itself, and that a person can read: TOML, written whole."""
+"""Files that the program keeps for itself, and that a person can read; whole files in general."""
 
 import math
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Final
+
+PART: Final = ".part"
+"""What follows the name of a file while it is written."""
 
 
-def write_whole(path: Path, text: str) -> None:
+def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file; the old one stays whole until the new one is on the disk.
+
+    Parameters
+    ----------
+    content : str or bytes
+        A text is written in UTF-8 with the line ends of the system.
 
     Raises
     ------
     OSError
-        It cannot be written there, or its folder is missing.
+        It cannot be written there, or its folder is missing; nothing of it is left.
     """
-    fresh = path.with_name(path.name + ".new")
-    with fresh.open("w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    fresh.replace(path)
+    part = path.with_name(path.name + PART)
+    text = isinstance(content, str)
+    try:
+        with part.open("w" if text else "wb", encoding="utf-8" if text else None) as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise
 
 
 def toml_lines(values: Mapping[str, object]) -> str:

@@ -49,7 +49,7 @@ def test_a_number_that_is_not_finite_is_not_kept(value: object) -> None:
 def test_the_old_file_stays_whole_where_the_new_one_cannot_be_made(tmp_path: Path) -> None:
     file = tmp_path / "kept.toml"
     write_whole(file, "old = 1\n")
-    (tmp_path / "kept.toml.new").mkdir()
+    (tmp_path / "kept.toml.part").mkdir()
     with pytest.raises(OSError, match="kept"):
         write_whole(file, "new = 2\n")
     assert file.read_text(encoding="utf-8") == "old = 1\n"

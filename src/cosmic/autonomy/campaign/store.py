@@ -3,7 +3,6 @@
 import hashlib
 import json
 import math
-import os
 import sqlite3
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -42,10 +41,11 @@ from cosmic.autonomy.campaign.storage_format import (
     update,
 )
 from cosmic.autonomy.campaign.store_read import CampaignReader
+from cosmic.frame import kept_file
+from cosmic.frame.kept_file import PART
 from cosmic.frame.platform_services import sync_folder
 
 LOCK: Final = "campaign.lock"
-PART: Final = ".part"
 
 
 class NotWrittenError(CampaignError):
@@ -53,23 +53,16 @@ class NotWrittenError(CampaignError):
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file under another name, see that it is on the disk, and give it its name.
+    """Write a file of a campaign as a whole.
 
     Raises
     ------
     NotWrittenError
         It cannot be written; nothing of it is left.
     """
-    part = path.with_name(path.name + PART)
     try:
-        with part.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
+        kept_file.write_whole(path, data)
     except OSError as exc:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
         raise NotWrittenError(
             f"{path} cannot be written: {exc.strerror or exc}. Completed fibres are saved: "
             "make room, and start the campaign again in the same folder"

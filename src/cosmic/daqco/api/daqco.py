@@ -37,7 +37,7 @@ from cosmic.frame.declaration import Companion, Declared, command, newest, state
 from cosmic.frame.errands import Told
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable, RecordingError
 from cosmic.frame.file_names import NameOption, directory_problem, space_left
-from cosmic.frame.network.application import RemoteApplication
+from cosmic.frame.network.application import remote_api
 from cosmic.frame.network.caller import called_from_elsewhere
 from cosmic.frame.network.transport import Rule
 from cosmic.frame.operation import Task
@@ -595,6 +595,4 @@ def daqco_of(application: CosmicApplicationBase) -> Daqco:
     """
     if isinstance(application, DaqcoApplication):
         return Daqco(application)
-    if isinstance(application, RemoteApplication) and isinstance(application.api, Daqco):
-        return application.api
-    raise TypeError(f"{application!r} is no DAQCo")
+    return remote_api(application, Daqco)

@@ -5,7 +5,7 @@ from typing import Final, Generic, TypeVar
 from PySide6.QtCore import QObject
 from typing_extensions import override
 
-from cosmic.frame.application import GuiFactory
+from cosmic.frame.application import CosmicApplicationBase, GuiFactory
 from cosmic.frame.clock import WALL
 from cosmic.frame.declaration import Declared
 from cosmic.frame.failure import FailurePolicy
@@ -101,3 +101,16 @@ class RemoteApplication(TaskApplication, Generic[D]):
         self.request_end()
         self._link.close()
         self.join()
+
+
+def remote_api(application: CosmicApplicationBase, kind: type[D]) -> D:
+    """Return what an application at another station offers.
+
+    Raises
+    ------
+    TypeError
+        It is none, or it offers something else.
+    """
+    if isinstance(application, RemoteApplication) and isinstance(application.api, kind):
+        return application.api
+    raise TypeError(f"{application!r} does not offer {kind.__name__}")

@@ -14,7 +14,7 @@ from cosmic.frame.clock import Clock
 from cosmic.frame.declaration import Companion, Declared, command, part, state
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.network.application import RemoteApplication
+from cosmic.frame.network.application import remote_api
 from cosmic.frame.operation import Task
 from cosmic.frame.threads import may_wait_here
 from cosmic.frame.weakly import weakly
@@ -336,6 +336,4 @@ def vico_of(application: CosmicApplicationBase) -> Vico:
     """
     if isinstance(application, VicoApplication):
         return Vico(application)
-    if isinstance(application, RemoteApplication) and isinstance(application.api, Vico):
-        return application.api
-    raise TypeError(f"{application!r} is no ViCo")
+    return remote_api(application, Vico)
