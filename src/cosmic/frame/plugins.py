@@ -110,7 +110,9 @@ def find_backend(kind: Kind, name: str) -> Backend[Any, Any]:
     """
     found = [each for each in _entries(kind) if each.name == name]
     if not found:
-        raise ConfigError(not_there("backend", name, names(kind)))
+        known = names(kind)
+        again = "" if known else "; CoSMic's own are missing too: install it again (pip install .)"
+        raise ConfigError(not_there("backend", name, known) + again)
     if len(found) > 1:
         packages = " and ".join(sorted(_package(each) for each in found))
         raise ConfigError(f"backend {name!r} is brought by {packages}: remove all but one")
