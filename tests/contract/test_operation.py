@@ -1,5 +1,6 @@
 """What everybody may rely on who is handed something that takes a while: `Operation`."""
 
+import asyncio
 import logging
 import threading
 import time
@@ -212,3 +213,67 @@ def test_it_says_what_it_is_and_how_it_stands(operation: Operation[None]) -> Non
     assert repr(operation) == "<the work: running>"
     operation.fail(BROKEN)
     assert repr(operation) == "<the work: left.x: no answer>"
+
+
+# Awaited in an event loop
+
+
+def test_who_awaits_it_gets_the_result_from_whichever_thread_ends_it() -> None:
+    operation: Operation[float] = Operation("the movement")
+
+    async def main() -> tuple[float, int]:
+        ticks = 0
+
+        async def tick() -> None:
+            nonlocal ticks
+            while not operation.done:
+                ticks += 1
+                await asyncio.sleep(0.001)
+
+        ticking = asyncio.create_task(tick())
+        threading.Timer(0.05, operation.finish, [5.0]).start()
+        result = await operation
+        await ticking
+        return result, ticks
+
+    result, ticks = asyncio.run(main())
+    assert result == 5.0
+    assert ticks > 3, "the loop was held up"
+
+
+def test_who_awaits_what_has_ended_goes_on_and_what_fails_raises(
+    operation: Operation[None],
+) -> None:
+    async def wait() -> None:
+        await operation
+
+    operation.fail(BROKEN)
+    with pytest.raises(DeviceError, match="no answer"):
+        asyncio.run(wait())
+
+
+def test_a_task_that_is_cancelled_while_it_awaits_cancels_it(operation: Operation[None]) -> None:
+    stopped = threading.Event()
+    operation.on_cancel(stopped.set)
+
+    async def give_up() -> None:
+        async with asyncio.timeout(0.01):
+            await operation
+
+    with pytest.raises(TimeoutError):
+        asyncio.run(give_up())
+    assert stopped.is_set()
+    assert operation.finish(None), "whoever carries it out ends it"
+
+
+def test_several_await_it(operation: Operation[None]) -> None:
+    async def wait() -> None:
+        await operation
+
+    async def main() -> None:
+        waiting = [asyncio.create_task(wait()) for _ in range(3)]
+        await asyncio.sleep(0)
+        operation.finish(None)
+        await asyncio.gather(*waiting)
+
+    asyncio.run(main())

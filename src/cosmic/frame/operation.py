@@ -1,10 +1,11 @@
 """`Operation`: something that takes a while, with its result, its progress and a way to end it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass
 from threading import Condition, Lock, RLock
-from typing import Final, Generic, Self, TypeVar
+from typing import Any, Final, Generic, Self, TypeVar
 
 from typing_extensions import override
 
@@ -59,8 +60,8 @@ class _Told:
 class Operation(Generic[T]):
     """A movement, a task, a call: something under way that ends exactly once; any thread.
 
-    It needs no event loop to end. It has the shape of a bluesky status: `done`, `success`,
-    `exception()`, `add_callback`.
+    It needs no event loop to end, and can be awaited in one. It has the shape of a bluesky status:
+    `done`, `success`, `exception()`, `add_callback`.
 
     Parameters
     ----------
@@ -150,6 +151,33 @@ class Operation(Generic[T]):
         if error is not None:
             raise error
         return self._end.result()
+
+    def __await__(self) -> Generator[Any, None, T]:
+        """Wait for the end in an event loop of asyncio, which goes on meanwhile.
+
+        A task that is cancelled while it awaits the operation cancels it, so that nothing moves
+        for somebody who is gone. In a thread with an event loop.
+        """
+        import asyncio  # here, for most programs do without
+
+        loop = asyncio.get_running_loop()
+        ended: asyncio.Future[None] = loop.create_future()
+
+        def note_end() -> None:
+            if not ended.done():
+                ended.set_result(None)
+
+        def wake(_future: object) -> None:
+            with suppress(RuntimeError):  # the loop was closed
+                loop.call_soon_threadsafe(note_end)
+
+        self._end.add_done_callback(wake)
+        try:
+            yield from ended
+        except asyncio.CancelledError:
+            self.cancel()
+            raise
+        return self.result
 
     @property
     def result(self) -> T:
