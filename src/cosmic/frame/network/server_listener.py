@@ -9,6 +9,7 @@ from typing import Final
 from typing_extensions import override
 
 from cosmic.frame.errors import CosmicError, ProtocolError
+from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.log_folding import tell_folded
 from cosmic.frame.network.addresses import (
     asks,
@@ -70,7 +71,7 @@ class ServerListener(WorkerThread):
         self._lock = Lock()
         self._handlers: dict[str, ConnectionHandler] = {}
         self._gone: Backlog[str] = Backlog(Rule.ALL)
-        self._lanes: dict[str, _Lane] = {}
+        self._calls: dict[str, JobQueue] = {}
         self._refusals = Refusals(station.clock)
         self._woken = Event()
         self._remove: list[Callable[[], None]] = []
@@ -138,11 +139,11 @@ class ServerListener(WorkerThread):
         for handler in self._leaving:
             handler.join_direct()
         with self._lock:
-            lanes, self._lanes = list(self._lanes.values()), {}
-        for lane in lanes:
-            lane.thread.request_end()
-        for lane in lanes:
-            lane.thread.join()
+            queues, self._calls = list(self._calls.values()), {}
+        for calls in queues:
+            calls.request_end()
+        for calls in queues:
+            calls.join()
         self._remove, self._readers = [], []
 
     # Greetings, in the thread "hears"
@@ -218,11 +219,13 @@ class ServerListener(WorkerThread):
         with self._lock:
             if self.end_requested:
                 raise CallRefused("the station closes")
-            if application not in self._lanes:
-                self._lanes[application] = _Lane(application, self._station)
-            lane = self._lanes[application]
-        if not lane.jobs.put(job):
+            if application not in self._calls:
+                name = f"{self._station.name} calls {application}"
+                self._calls[application] = JobQueue(name, self._station.policy)
+            calls = self._calls[application]
+        if calls.waiting >= _JOBS_LIMIT:
             raise CallRefused(f"too many calls wait for {application} already")
+        calls.submit(job, f"a call of {application}")
 
     # Signs of life, in the thread "watches"
 
@@ -266,13 +269,3 @@ class ServerListener(WorkerThread):
             handlers = list(self._handlers.values())
         for each in handlers:
             each.check_motion()
-
-
-class _Lane:
-    """Carries out the calls to one application in a thread, one after the other."""
-
-    def __init__(self, application: str, station: Station) -> None:
-        self.jobs: Backlog[Callable[[], None]] = Backlog(Rule.ALL, max_items=_JOBS_LIMIT)
-        name = f"{station.name} calls {application}"
-        self.thread = InboxReader(name, station.policy, self.jobs, lambda job: job())
-        self.thread.start()

@@ -2,7 +2,6 @@
 
 import os
 import sys
-from collections.abc import Callable
 from html import escape
 from pathlib import Path
 from typing import Final
@@ -35,12 +34,8 @@ from cosmic.autonomy.campaign.report import report_body, report_data, write_repo
 from cosmic.autonomy.campaign.report_table import write_table
 from cosmic.autonomy.campaign.store import CampaignStore, write_whole
 from cosmic.autonomy.campaign.store_read import CampaignReader
-from cosmic.frame.errors import CosmicError
-from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.gui.painting import painting
 from cosmic.frame.gui.stylesheet import PRINTED
-from cosmic.frame.overrides import override
-from cosmic.frame.threads import WorkerThread
 
 FINE: Final = 3
 """Pixels of a drawn figure for one of the page."""
@@ -169,38 +164,6 @@ def write_output(folder: Path, wanted: OutputSettings) -> list[Path]:
         write_table(folder, folder / TABLE)
         written.append(folder / TABLE)
     return written
-
-
-class OutputThread(WorkerThread):
-    """Writes the output of a campaign in a thread of its own: the stop of a window cannot wait.
-
-    Parameters
-    ----------
-    told : callable
-        Called at the end, in this thread, with what was written or why it was not, and with
-        whether all went well.
-    """
-
-    def __init__(
-        self,
-        folder: Path,
-        wanted: OutputSettings,
-        policy: FailurePolicy,
-        told: Callable[[str, bool], object],
-    ) -> None:
-        super().__init__("campaign report", policy)
-        self._folder = folder
-        self._wanted = wanted
-        self._told = told
-
-    @override
-    def run_body(self) -> None:
-        try:
-            written = write_output(self._folder, self._wanted)
-        except CosmicError as exc:
-            self._told(str(exc), False)
-        else:
-            self._told(f"written: {', '.join(str(each) for each in written)}", True)
 
 
 def gui_application() -> QCoreApplication:

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QComboBox, QFileDialog, QLineEdit, QTabWidget, QVB
 
 from cosmic.app.panels.campaign.board import CampaignBoard
 from cosmic.app.panels.campaign.fibre_card import FibreCard
-from cosmic.app.panels.campaign.output import OutputThread
+from cosmic.app.panels.campaign.output import write_output
 from cosmic.app.panels.procedure import ProcedurePort, ProcedureTreePanel
 from cosmic.autonomy.campaign.campaign import Campaign, CampaignPhase
 from cosmic.autonomy.campaign.recipe import Recipe, shipped_recipes
@@ -29,6 +29,8 @@ from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
+from cosmic.frame.job_queue import JobQueue
+from cosmic.frame.operation import Operation
 from cosmic.frame.overrides import override
 
 logger = logging.getLogger(__name__)
@@ -154,7 +156,7 @@ class CampaignPanel(QWidget):
         self._open = open_campaign
         self._home = folder
         self._policy = policy
-        self._writing: OutputThread | None = None
+        self._writing: JobQueue | None = None
         self._campaign: Campaign | None = None
         self._card: FibreRecord | None = None
         self._tell_changed = Relay(self._on_changed)
@@ -317,16 +319,25 @@ class CampaignPanel(QWidget):
             return
         folder, wanted = campaign.store.folder, campaign.recipe.file.output
         self._say("writing the report", State.BUSY)
-        self._writing = OutputThread(folder, wanted, self._policy, self._tell_written)
-        self._writing.start()
+        self._writing = JobQueue("campaign report", self._policy)
+        written = self._writing.submit(lambda: write_output(folder, wanted), "the report")
+        written.add_callback(self._tell_written)
         self.refresh()
 
-    def _on_written(self, text: str, well: bool) -> None:
-        if self._writing is not None:
-            self._writing.join()
-            self._writing = None
-        self._say(text, State.OK if well else State.REFUSED)
+    def _on_written(self, written: Operation[list[Path]]) -> None:
+        self._end_writing()
+        if written.failure is None:
+            files = ", ".join(str(each) for each in written.result)
+            self._say(f"written: {files}", State.OK)
+        else:
+            self._say(str(written.failure))
         self.refresh()
+
+    def _end_writing(self) -> None:
+        writing, self._writing = self._writing, None
+        if writing is not None:
+            writing.request_end()
+            writing.join()
 
     def _say(self, text: str, state: State = State.REFUSED) -> None:
         self.told.set_text(f"{state_look(state).glyph} {text}" if text else "")
@@ -340,5 +351,4 @@ class CampaignPanel(QWidget):
         if campaign is not None and not campaign.over:
             campaign.abort("the window was closed")
             campaign.join()
-        if self._writing is not None:
-            self._writing.join()
+        self._end_writing()
