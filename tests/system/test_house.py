@@ -49,7 +49,8 @@ def watch(event, args):
         if args[1] not in (None, "r", "rb") or (args[0].startswith(root) and not code):
             seen.append(f"{current}: opened {args[0]}")
 
-import ctypes, h5py, logging, numpy, pydantic, PySide6.QtCore  # what they do is their affair
+import ctypes, h5py, logging, numpy, pydantic.fields  # what they do is their affair
+import PySide6.QtCore  # after pydantic: its import hook trips over pydantic's lazy modules
 sys.addaudithook(watch)
 for current in modules:
     importlib.import_module(current)

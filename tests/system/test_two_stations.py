@@ -154,7 +154,7 @@ def test_with_certificates_the_script_works_as_well(stations: Stations) -> None:
         rig.take_control()
         assert rig.stations["fibervision"].holder == "desk", "the name that the certificate proves"
     assert stations.encrypted.end(signal.SIGINT) == 0
-    assert "ends: SIGINT" in stations.encrypted.log
+    assert "ended by SIGINT" in stations.encrypted.log
 
 
 def test_a_station_ends_in_order_and_answers_no_more(stations: Stations) -> None:
@@ -176,6 +176,6 @@ def test_a_station_ends_in_order_and_answers_no_more(stations: Stations) -> None
         move = rig.mico["left.x"].move_by(4000.0, wait=False)
         assert stations.first.end(signal.SIGTERM) == 0
         assert isinstance(move.exception(5.0), cosmic.CosmicError)
-        assert "ends: SIGTERM" in stations.first.log
+        assert "ended by SIGTERM" in stations.first.log
         with pytest.raises(NotAvailable, match="fiberstation is away"):
             rig.stop()

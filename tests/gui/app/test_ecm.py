@@ -316,7 +316,7 @@ def test_the_mode_is_kept_shown_and_logged(
     window = make()
     with caplog.at_level(logging.INFO, logger="cosmic.app"):
         choose_mode(window, qtbot, "ECM")
-    assert "control mode ECM instead of MCM" in caplog.text
+    assert "control mode ECM (was MCM)" in caplog.text
     assert mode_button(window, "ECM").isChecked()
     assert not mode_button(window, "MCM").isChecked()
     window.close()
