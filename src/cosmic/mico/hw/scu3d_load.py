@@ -1,41 +1,91 @@
-"""Finds and loads SmarAct's SCU3DControl library."""
+"""Finds and loads the libraries of SmarAct: SCU3DControl here, others by their description."""
 
 import ctypes
 import ctypes.util
 import struct
 import sys
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from cosmic.frame.errors import DeviceFault, NotConnectedError
 
 
+@dataclass(frozen=True, slots=True)
+class SmaractLibrary:
+    """What is said of one of SmarAct's libraries where it cannot be loaded.
+
+    Attributes
+    ----------
+    windows, linux : str
+        File names under which it is shipped.
+    product, sdk : str
+        What it is called, and what installs it.
+    proof : str
+        A function that no other library has.
+    others : str
+        Controllers that have another one.
+    """
+
+    windows: str
+    linux: str
+    product: str
+    sdk: str
+    proof: str
+    others: str
+
+    @property
+    def name(self) -> str:
+        """File name under which SmarAct ships it for this system."""
+        return self.windows if sys.platform == "win32" else self.linux
+
+    def load(self, path: str = "") -> ctypes.CDLL:
+        """Load it from `path`, or from where the system looks when it is empty.
+
+        Raises
+        ------
+        NotConnectedError
+            There is no such file, it does not fit this Python, or it is another library.
+        """
+        wanted = path or self.name
+        try:
+            library = ctypes.CDLL(_located(wanted))
+        except (OSError, ValueError) as exc:
+            bits = struct.calcsize("P") * 8
+            raise NotConnectedError(
+                f"cannot load SmarAct's library {wanted!r}: {exc}. Install the {self.sdk} "
+                f"({self.windows} on Windows, {self.linux} on Linux) and name the file in "
+                f"platform.toml, [mico] library. This Python has {bits} bit; the library must "
+                f"have too",
+                fault=DeviceFault.COMMUNICATION,
+            ) from exc
+        if not hasattr(library, self.proof):
+            raise NotConnectedError(
+                f"{wanted} was loaded but has no function {self.proof}: it is not SmarAct's "
+                f"{self.product} (the controllers {self.others} have other libraries)",
+                fault=DeviceFault.UNSUPPORTED,
+            )
+        return library
+
+
+SCU3D_CONTROL: Final = SmaractLibrary(
+    windows="SCU3DControl.dll",
+    linux="libscu3dcontrol.so",
+    product="SCU3DControl",
+    sdk="SmarAct SCU SDK",
+    proof="SA_InitDevices",
+    others="MCS and MCS2",
+)
+
+
 def default_library_name() -> str:
     """Return the file name under which SmarAct ships the library for this system."""
-    return "SCU3DControl.dll" if sys.platform == "win32" else "libscu3dcontrol.so"
+    return SCU3D_CONTROL.name
 
 
 def load_library(path: str = "") -> ctypes.CDLL:
-    """Load the vendor's library from `path`, or from where the system looks when it is empty.
-
-    Raises
-    ------
-    NotConnectedError
-        There is no such file, it does not fit this Python, or it is another library.
-    """
-    wanted = path or default_library_name()
-    try:
-        library = ctypes.CDLL(_located(wanted))
-    except (OSError, ValueError) as exc:
-        raise NotConnectedError(
-            _cannot_load(wanted, reason=str(exc)), fault=DeviceFault.COMMUNICATION
-        ) from exc
-    if not hasattr(library, "SA_InitDevices"):
-        raise NotConnectedError(
-            f"{wanted} was loaded but has no function SA_InitDevices: it is not SmarAct's "
-            f"SCU3DControl (the controllers MCS and MCS2 have other libraries)",
-            fault=DeviceFault.UNSUPPORTED,
-        )
-    return library
+    """Load SCU3DControl; see `SmaractLibrary.load`."""
+    return SCU3D_CONTROL.load(path)
 
 
 def _located(wanted: str) -> str:
@@ -43,12 +93,3 @@ def _located(wanted: str) -> str:
     if sys.platform == "win32" and Path(wanted).name == wanted:
         return ctypes.util.find_library(wanted) or wanted
     return wanted
-
-
-def _cannot_load(wanted: str, *, reason: str) -> str:
-    bits = struct.calcsize("P") * 8
-    return (
-        f"cannot load SmarAct's library {wanted!r}: {reason}. Install the SmarAct SCU SDK "
-        f"(SCU3DControl.dll on Windows, libscu3dcontrol.so on Linux) and name the file in "
-        f"platform.toml, [mico] library. This Python has {bits} bit; the library must have too"
-    )

@@ -23,8 +23,9 @@ from ctypes import (
 )
 from typing import Any, Final
 
-from cosmic.frame.errors import DeviceError, DeviceFault, DeviceTimeout, NotConnectedError
+from cosmic.frame.errors import DeviceError, DeviceFault, DeviceTimeout
 from cosmic.vico.hw.camera_frames import buffers_for, copy_rows, empty_pixels
+from cosmic.vico.hw.camera_library import bind_functions, load_camera_library
 from cosmic.vico.hw.interface import CameraSettings, Pixels
 
 logger = logging.getLogger(__name__)
@@ -191,6 +192,12 @@ FALLIBLE: Final[dict[str, Prototype]] = {
 """What takes a `GError **` as well, as its last argument."""
 
 
+_NEEDED: Final = "Aravis 0.8.26 or a later 0.8 is needed (Debian 12: package libaravis-0.8-0)"
+_ADVICE_TO_INSTALL: Final = (
+    "Install Aravis: on Debian and Ubuntu the package libaravis-0.8-0 (apt install libaravis-0.8-0)"
+)
+
+
 def bind(library: object) -> dict[str, Any]:
     """Return every function above by name, with its types set.
 
@@ -204,20 +211,8 @@ def bind(library: object) -> dict[str, Any]:
     NotConnectedError
         A function is missing: the library is older than 0.8.20 or not Aravis.
     """
-    functions = {}
     wanted = PLAIN | {name: (back, (*a, _ERROR)) for name, (back, a) in FALLIBLE.items()}
-    for name, (answer, arguments) in wanted.items():
-        function = getattr(library, name, None)
-        if function is None:
-            raise NotConnectedError(
-                f"the library {LIBRARY_NAME} has no function {name}: Aravis 0.8.26 or a later "
-                f"0.8 is needed (Debian 12: package libaravis-0.8-0)",
-                fault=DeviceFault.UNSUPPORTED,
-            )
-        if isinstance(library, ctypes.CDLL):
-            function.restype, function.argtypes = answer, arguments
-        functions[name] = function
-    return functions
+    return bind_functions(library, wanted, name=LIBRARY_NAME, needed=_NEEDED)
 
 
 def load_library(path: str = "") -> ctypes.CDLL:
@@ -228,15 +223,7 @@ def load_library(path: str = "") -> ctypes.CDLL:
     NotConnectedError
         It is not installed.
     """
-    wanted = path or LIBRARY_NAME
-    try:
-        return ctypes.CDLL(wanted)
-    except OSError as exc:
-        raise NotConnectedError(
-            f"cannot load {wanted}: {exc}. Install Aravis: on Debian and Ubuntu the package "
-            f"libaravis-0.8-0 (apt install libaravis-0.8-0)",
-            fault=DeviceFault.COMMUNICATION,
-        ) from exc
+    return load_camera_library(path or LIBRARY_NAME, _ADVICE_TO_INSTALL)
 
 
 _FAULTS: Final = {

@@ -22,8 +22,9 @@ from ctypes import (
 from dataclasses import dataclass
 from typing import Any, Final
 
-from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
+from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.vico.hw.camera_frames import buffers_for, copy_rows, empty_pixels
+from cosmic.vico.hw.camera_library import bind_functions, load_camera_library
 from cosmic.vico.hw.interface import CameraSettings, Pixels
 
 logger = logging.getLogger(__name__)
@@ -242,6 +243,13 @@ _OTHERS: Final[dict[str, tuple[Any, tuple[Any, ...]]]] = {
 }
 
 
+_NEEDED: Final = "libdc1394 2.2 is needed (Debian: package libdc1394-25)"
+_ADVICE_TO_INSTALL: Final = (
+    "Install libdc1394: on Debian the package libdc1394-25 (apt "
+    "install libdc1394-25); there is none for Windows"
+)
+
+
 def bind(library: object) -> dict[str, Any]:
     """Return every function above by name, with its types set on those of a `ctypes.CDLL`.
 
@@ -250,20 +258,8 @@ def bind(library: object) -> dict[str, Any]:
     NotConnectedError
         A function is missing: it is not libdc1394 2.2.
     """
-    functions = {}
     wanted = _OTHERS | {name: (c_int, arguments) for name, arguments in _STATUS.items()}
-    for name, (answer, arguments) in wanted.items():
-        function = getattr(library, name, None)
-        if function is None:
-            raise NotConnectedError(
-                f"the library {LIBRARY_NAME} has no function {name}: libdc1394 2.2 is needed "
-                f"(Debian: package libdc1394-25)",
-                fault=DeviceFault.UNSUPPORTED,
-            )
-        if isinstance(library, ctypes.CDLL):
-            function.restype, function.argtypes = answer, arguments
-        functions[name] = function
-    return functions
+    return bind_functions(library, wanted, name=LIBRARY_NAME, needed=_NEEDED)
 
 
 def load_library(path: str = "") -> ctypes.CDLL:
@@ -274,15 +270,7 @@ def load_library(path: str = "") -> ctypes.CDLL:
     NotConnectedError
         It is not installed.
     """
-    wanted = path or LIBRARY_NAME
-    try:
-        return ctypes.CDLL(wanted)
-    except OSError as exc:
-        raise NotConnectedError(
-            f"cannot load {wanted}: {exc}. Install libdc1394: on Debian the package "
-            f"libdc1394-25 (apt install libdc1394-25); there is none for Windows",
-            fault=DeviceFault.COMMUNICATION,
-        ) from exc
+    return load_camera_library(path or LIBRARY_NAME, _ADVICE_TO_INSTALL)
 
 
 _FAULTS: Final = {

@@ -18,6 +18,7 @@ from typing import Final, Protocol
 from typing_extensions import override
 
 from cosmic.frame.errors import (
+    CosmicError,
     DeviceFault,
     DeviceTimeout,
     NotConnectedError,
@@ -36,6 +37,8 @@ TRIES: Final = 3
 INTERRUPT: Final = b"\x03"
 """Ctrl-C: ends whatever was begun, and brings the prompt."""
 
+SHOWN_BYTES: Final = 64
+"""Of what came instead of an answer."""
 PROMPT: Final = b"$ "
 _VALUE: Final = re.compile(r"[-+]?(0[xX][0-9a-fA-F]{1,8}|\d{1,10})")
 
@@ -152,8 +155,8 @@ class Registers(Protocol):
         """Give the line back; harmless the second time."""
 
 
-class FrameRegisters(Registers):
-    """Asks in frames, and finds the answer among noise.
+class _SerialRegisters(Registers):
+    """Registers behind a serial line.
 
     Parameters
     ----------
@@ -173,16 +176,31 @@ class FrameRegisters(Registers):
         return self._port.name
 
     @override
+    def close(self) -> None:
+        self._port.close()
+
+    def _unanswered(self, question: str, received: bytes) -> CosmicError:
+        """Return why a question that was asked so often has no answer."""
+        asked = f"{self.name}: asked {question} {self._tries} times"
+        if not received:
+            return DeviceTimeout(
+                f"{asked}, no answer came; is the controller switched on, and is it this port?",
+                fault=DeviceFault.TIMEOUT,
+            )
+        shown = received[-SHOWN_BYTES:].hex(" ")
+        return ProtocolError(f"{asked}, received {shown}, which is no answer")
+
+
+class FrameRegisters(_SerialRegisters):
+    """Asks in frames, and finds the answer among noise."""
+
+    @override
     def read(self, register: int) -> int:
         return self._ask(read_frame(register), register)
 
     @override
     def write(self, register: int, value: int) -> None:
         self._ask(write_frame(register, value), register)
-
-    @override
-    def close(self) -> None:
-        self._port.close()
 
     def _ask(self, question: bytes, register: int) -> int:
         received = b""
@@ -192,13 +210,7 @@ class FrameRegisters(Registers):
             if value is not None:
                 return value
             received += heard
-        asked = f"{self.name}: asked {question.hex(' ')} {self._tries} times"
-        if not received:
-            raise DeviceTimeout(
-                f"{asked}, no answer came; is the controller switched on, and is it this port?",
-                fault=DeviceFault.TIMEOUT,
-            )
-        raise ProtocolError(f"{asked}, received {received[-32:].hex(' ')}, which is no answer")
+        raise self._unanswered(question.hex(" "), received)
 
     def _listen(self, register: int) -> tuple[bytes, int | None]:
         """Return what was received, and the answer in it."""
@@ -217,28 +229,15 @@ class FrameRegisters(Registers):
         return received, value
 
 
-class AsciiRegisters(Registers):
+class AsciiRegisters(_SerialRegisters):
     """Asks in text; an answer counts only when the echo shows that the question came over whole.
 
     A value is asked for twice, and a third time when the two differ.
-
-    Parameters
-    ----------
-    port : SerialPort
-        Closed with this object.
-    tries : int
-        How often a question is asked before it fails.
     """
 
     def __init__(self, port: SerialPort, *, tries: int = TRIES) -> None:
-        self._port = port
-        self._tries = tries
+        super().__init__(port, tries=tries)
         self._in_step = False
-
-    @property
-    @override
-    def name(self) -> str:
-        return self._port.name
 
     @override
     def read(self, register: int) -> int:
@@ -252,10 +251,6 @@ class AsciiRegisters(Registers):
     @override
     def write(self, register: int, value: int) -> None:
         self._ask(f"write {register} {value}", wants_value=False)
-
-    @override
-    def close(self) -> None:
-        self._port.close()
 
     def _value(self, register: int) -> int:
         return self._ask(f"read {register}", wants_value=True)
@@ -272,13 +267,7 @@ class AsciiRegisters(Registers):
             if value is not None:
                 return value
             received += heard
-        asked = f"{self.name}: asked {command!r} {self._tries} times"
-        if not received:
-            raise DeviceTimeout(
-                f"{asked}, no answer came; is the controller switched on, and is it this port?",
-                fault=DeviceFault.TIMEOUT,
-            )
-        raise ProtocolError(f"{asked}, received {received[-64:].hex(' ')}, which is no answer")
+        raise self._unanswered(repr(command), received)
 
     def _interrupt(self) -> bool:
         """Bring the prompt; False when nobody is there."""
