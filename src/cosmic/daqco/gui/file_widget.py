@@ -229,8 +229,7 @@ class UDaqFileWidget(QWidget):
         self._offer_directory()
         recording = self._daqco.recording
         wrong_name = "" if recording.active else name_problem(self.base.text(), SUFFIX)
-        text = self.directory.text()
-        wrong_folder = "" if recording.active else self._daqco.folder_problem(text)
+        wrong_folder = "" if recording.active else self._folder_problem()
         mark_refusal(self.base, wrong_name)
         mark_refusal(self.directory, wrong_folder)
         self._show_name(wrong_name)
@@ -240,6 +239,13 @@ class UDaqFileWidget(QWidget):
         self._enable(wrong_name or wrong_folder)
         self._tell()
         self._show_room(wrong_folder)
+
+    def _folder_problem(self) -> str:
+        """Return why nothing can be recorded there, as a station that is away does too."""
+        try:
+            return self._daqco.folder_problem(self.directory.text())
+        except CosmicError as exc:
+            return str(exc)
 
     def _offer_directory(self) -> None:
         """Take over another usual directory, unless the operator typed one."""
