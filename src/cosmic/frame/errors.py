@@ -160,6 +160,17 @@ _REFUSALS: dict[Reason, type[MoveRefused]] = {
 }
 
 
+def needs_extra(what: str, extra: str) -> str:
+    """Return the text for the operator where a package of an extra is missing.
+
+    Parameters
+    ----------
+    what : str
+        What cannot be done, as the subject of a sentence: "Recording video".
+    """
+    return f"{what} needs the extra {extra!r}: pip install cosmic[{extra}]"
+
+
 def refusal(verdict: MoveVerdict) -> MoveRefused:
     """Return the exception that says `verdict`."""
     return _REFUSALS.get(verdict.reason, MoveRefused)(verdict)

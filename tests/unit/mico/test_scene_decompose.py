@@ -95,5 +95,5 @@ def test_without_the_library_it_says_what_to_install(
 ) -> None:
     write_part(tmp_path, bracket())
     monkeypatch.setitem(sys.modules, "vhacdx", None)
-    with pytest.raises(NotAvailable, match=r"pip install 'cosmic\[decompose\]'"):
+    with pytest.raises(NotAvailable, match=r"needs the extra 'decompose'"):
         decompose_mesh(tmp_path / "part.stl", tmp_path)

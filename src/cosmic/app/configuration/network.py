@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 from pydantic import Field
 
 from cosmic.frame.config import StrictModel
-from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.frame.errors import ConfigError, NotAvailable, needs_extra
 from cosmic.frame.network.caller import Access
 from cosmic.frame.network.station import checked_name
 
@@ -75,10 +75,7 @@ def require_network() -> None:
     """
     missing = [name for name in ("cryptography", "msgpack", "zenoh") if find_spec(name) is None]
     if missing:
-        raise NotAvailable(
-            "stations need the extra 'net', which is not installed here "
-            f"({', '.join(missing)}): install cosmic[net]"
-        )
+        raise NotAvailable(f"{needs_extra('A station', 'net')} (missing: {', '.join(missing)})")
 
 
 def serving(

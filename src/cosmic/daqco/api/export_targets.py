@@ -5,15 +5,16 @@ import math
 from abc import abstractmethod
 from collections.abc import Iterable, Sequence
 from datetime import timedelta
+from importlib import import_module
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 import numpy.typing as npt
-from nptdms import ChannelObject, RootObject, TdmsWriter
 from typing_extensions import override
 
 from cosmic.daqco.api.recording import Recording
+from cosmic.frame.errors import NotAvailable, needs_extra
 
 # Formatting holds the interpreter, and the force limit must not wait for it.
 CSV_VALUES_AT_ONCE: Final = 4096
@@ -66,23 +67,31 @@ class CsvTarget(Target):
         self._file.close()
 
 
+def _load_tdms() -> Any:
+    try:
+        return import_module("nptdms")
+    except ImportError as exc:
+        raise NotAvailable(needs_extra("Export to TDMS", "tdms")) from exc
+
+
 class TdmsTarget(Target):
-    """Groups ``samples``, ``positions`` and ``events``."""
+    """Groups ``samples``, ``positions`` and ``events``; raises `NotAvailable` without npTDMS."""
 
     def __init__(self, recording: Recording, path: Path) -> None:
         self._recording = recording
         self._names = ("time_s", *recording.channels)
         self._properties = [{"unit_string": "s"}, *_channel_properties(recording)]
+        self._tdms = _load_tdms()
         self._file = path.open("wb")
-        self._writer = TdmsWriter(self._file)
+        self._writer = self._tdms.TdmsWriter(self._file)
         self._writer.open()
-        self._writer.write_segment([RootObject(_root_properties(recording))])
+        self._writer.write_segment([self._tdms.RootObject(_root_properties(recording))])
 
     @override
     def write(self, block: Sequence[Values]) -> None:
         self._writer.write_segment(
             [
-                ChannelObject("samples", name, data, properties)
+                self._tdms.ChannelObject("samples", name, data, properties)
                 for name, data, properties in zip(self._names, block, self._properties, strict=True)
             ]
         )
@@ -96,7 +105,10 @@ class TdmsTarget(Target):
             if len(lines) > 1:
                 columns = zip(lines[0], zip(*lines[1:], strict=True), strict=True)
                 self._writer.write_segment(
-                    [ChannelObject(group, str(name), _tdms_data(data)) for name, data in columns]
+                    [
+                        self._tdms.ChannelObject(group, str(name), _tdms_data(data))
+                        for name, data in columns
+                    ]
                 )
 
     @override

@@ -12,14 +12,14 @@ from dataclasses import fields, is_dataclass
 from datetime import UTC, datetime
 from enum import Enum
 from functools import cache
+from importlib import import_module
 from pathlib import Path, PurePath
 from typing import Any, Final, get_type_hints
 
-import msgpack
 import numpy as np
 
 from cosmic.frame.config import StrictModel
-from cosmic.frame.errors import ConfigError, ProtocolError
+from cosmic.frame.errors import ConfigError, NotAvailable, ProtocolError, needs_extra
 from cosmic.frame.network.conform import Mismatch, conform
 from cosmic.frame.network.transfer import known_class, may_travel
 
@@ -35,6 +35,15 @@ _ALIGNMENT: Final = 16
 _DEPTH_LIMIT: Final = 16
 _DIMENSIONS_LIMIT: Final = 8
 _ARRAY, _TIME, _ENUM, _DATA, _TUPLE, _MODEL, _PATH = 1, 2, 3, 4, 5, 6, 7
+
+
+@cache
+def _msgpack() -> Any:
+    """Return the package of the extra `net`: applications are declared without it."""
+    try:
+        return import_module("msgpack")
+    except ImportError as exc:
+        raise NotAvailable(needs_extra("A station", "net")) from exc
 
 
 def encode(value: object, limit_bytes: int = MESSAGE_LIMIT_BYTES) -> bytes:
@@ -92,7 +101,7 @@ def _pack(value: object, arrays: list[np.ndarray[Any, Any]], depth: int = 0) -> 
         return _pack_other(item, arrays, lambda inner: _pack(inner, arrays, depth + 1))
 
     try:
-        packed: bytes = msgpack.packb(value, default=other, strict_types=True)
+        packed: bytes = _msgpack().packb(value, default=other, strict_types=True)
     except (TypeError, ValueError, OverflowError) as exc:
         raise ProtocolError(f"a value cannot travel: {exc}") from exc
     return packed
@@ -102,26 +111,26 @@ def _pack_other(
     item: object, arrays: list[np.ndarray[Any, Any]], pack: Callable[[object], bytes]
 ) -> object:
     if isinstance(item, tuple):
-        return msgpack.ExtType(_TUPLE, pack(list(item)))
+        return _msgpack().ExtType(_TUPLE, pack(list(item)))
     if isinstance(item, np.ndarray):
-        return msgpack.ExtType(_ARRAY, pack(_describe(item, arrays)))
+        return _msgpack().ExtType(_ARRAY, pack(_describe(item, arrays)))
     if isinstance(item, np.generic):
         return item.item()
     if isinstance(item, Enum) and may_travel(type(item)):
-        return msgpack.ExtType(_ENUM, pack([type(item).__name__, item.name]))
+        return _msgpack().ExtType(_ENUM, pack([type(item).__name__, item.name]))
     if isinstance(item, PurePath):
-        return msgpack.ExtType(_PATH, pack([str(item)]))
+        return _msgpack().ExtType(_PATH, pack([str(item)]))
     if isinstance(item, StrictModel) and may_travel(type(item)):
-        return msgpack.ExtType(
+        return _msgpack().ExtType(
             _MODEL, pack([type(item).__name__, item.model_dump(mode="json", warnings=False)])
         )
     if isinstance(item, datetime):
         if item.tzinfo is None:
             raise TypeError("a time without its zone")
-        return msgpack.ExtType(_TIME, struct.pack(">d", item.timestamp()))
+        return _msgpack().ExtType(_TIME, struct.pack(">d", item.timestamp()))
     if is_dataclass(item) and may_travel(type(item)):
         values = [getattr(item, each.name) for each in fields(item) if each.init]
-        return msgpack.ExtType(_DATA, pack([type(item).__name__, values]))
+        return _msgpack().ExtType(_DATA, pack([type(item).__name__, values]))
     raise TypeError(f"{type(item).__name__} is not among the types that travel")
 
 
@@ -151,7 +160,7 @@ class _Reader:
         if depth > _DEPTH_LIMIT:
             raise ProtocolError("a message is nested too deeply")
         try:
-            return msgpack.unpackb(
+            return _msgpack().unpackb(
                 data,
                 ext_hook=lambda code, inner: self._other(code, inner, depth + 1),
                 strict_map_key=False,
@@ -161,7 +170,7 @@ class _Reader:
                 max_array_len=len(data),
                 max_map_len=len(data),
             )
-        except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as exc:
+        except (ValueError, TypeError, _msgpack().UnpackException, RecursionError) as exc:
             raise ProtocolError(f"a broken message came: {exc}") from exc
 
     def _other(self, code: int, data: bytes, depth: int) -> object:

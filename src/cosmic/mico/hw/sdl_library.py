@@ -5,7 +5,7 @@ from importlib import import_module
 from threading import RLock
 from typing import Any, Final
 
-from cosmic.frame.errors import NotConnectedError
+from cosmic.frame.errors import NotConnectedError, needs_extra
 
 _HINTS: Final = {
     # A device is read whether or not a window of SDL has the focus: there is none.
@@ -26,7 +26,9 @@ def load_sdl() -> Any:
             warnings.simplefilter("ignore", UserWarning)
             sdl: Any = import_module("sdl2")  # here: megabytes, for gamepads only
     except (ImportError, OSError) as exc:
-        raise NotConnectedError(f"gamepads need SDL 2, which cannot be loaded: {exc}") from exc
+        raise NotConnectedError(
+            f"SDL 2 cannot be loaded ({exc}). {needs_extra('A gamepad', 'gamepad')}"
+        ) from exc
     return sdl
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
+from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError, needs_extra
 from cosmic.vico.hw.base_camera import BaseCamera, BaseCameraLibrary, Sensor
 from cosmic.vico.hw.camera_frames import FrameNumbers, empty_pixels
 from cosmic.vico.hw.interface import (
@@ -351,8 +351,7 @@ def _harvesters() -> Any:
         from harvesters import core
     except ImportError as exc:
         raise NotConnectedError(
-            "GenTL: the package harvesters is not installed; install CoSMic with its extra "
-            "'gentl', such as: pip install cosmic[gentl]",
+            needs_extra("A GenTL camera", "gentl"),
             fault=DeviceFault.UNSUPPORTED,
         ) from exc
     return core

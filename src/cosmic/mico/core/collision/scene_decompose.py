@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 import trimesh
 
-from cosmic.frame.errors import ConfigError, NotAvailable
+from cosmic.frame.errors import ConfigError, NotAvailable, needs_extra
 from cosmic.mico.core.collision.model import Floats
 from cosmic.mico.core.collision.scene_meshes import FORMATS, mesh_faults, parse_mesh, volume_um3
 
@@ -48,9 +48,7 @@ def decompose_mesh(mesh: Path, out_dir: Path, *, most_pieces: int = 16) -> Decom
     try:
         import vhacdx
     except ImportError as exc:
-        raise NotAvailable(
-            "decomposing needs the library vhacdx: pip install 'cosmic[decompose]'"
-        ) from exc
+        raise NotAvailable(needs_extra("Decomposing a body", "decompose")) from exc
     faces = np.column_stack((np.full(len(whole.faces), 3), whole.faces)).reshape(-1)
     parts = vhacdx.compute_vhacd(
         np.asarray(whole.vertices), faces.astype(np.uint32), maxConvexHulls=most_pieces

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
-from cosmic.frame.errors import RecordingError
+from cosmic.frame.errors import RecordingError, needs_extra
 from cosmic.vico.core.recording.planes import from_video_frame
 from cosmic.vico.core.recording.sequence_writer import image_files
 from cosmic.vico.hw.interface import Pixels
@@ -122,8 +122,11 @@ class VideoSource:
         self._open()
 
     def _open(self) -> None:
-        import av
-
+        try:
+            import av
+        except ImportError as exc:
+            text = f"{self._path}: {needs_extra('Reading video', 'video')}"
+            raise RecordingError(text) from exc
         self.close()
         self._failure = av.FFmpegError
         try:

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from cosmic.frame.errors import RecordingError
+from cosmic.frame.errors import RecordingError, needs_extra
 from cosmic.vico.core.recording.formats import ImageFormat, Traits, traits
 from cosmic.vico.core.recording.planes import to_video_frame
 from cosmic.vico.core.recording.side_row import SideRow
@@ -54,12 +54,13 @@ def _has_pyav() -> bool:
 
 
 def _check_loaded(image_format: ImageFormat, codec: str) -> None:
-    help_ = "choose format tiff or png, or install PyAV again"
+    help_ = "choose format tiff or png"
     try:
         import av
     except ImportError as exc:
         raise RecordingError(
-            f"format {image_format}: PyAV cannot be loaded ({exc}); {help_}"
+            f"format {image_format}: PyAV cannot be loaded ({exc}). "
+            f"{needs_extra('Recording video', 'video')}, or {help_}"
         ) from exc
     try:
         av.Codec(codec, "w")
