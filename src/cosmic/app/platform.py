@@ -15,7 +15,7 @@ from cosmic.app.garbage_watch import GarbageWatch
 from cosmic.app.simulation import SimulationFaults, make_scene
 from cosmic.app.stations.address import StationAddress
 from cosmic.app.stations.hosting import Site, build_applications
-from cosmic.app.stations.joins import join_here, join_stations
+from cosmic.app.stations.joins import join_here, join_stations, join_vision
 from cosmic.app.stations.remote_applications import RemoteApplications, open_stations
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco
@@ -88,6 +88,9 @@ class Platform:
             if name in self.remote.host_of:
                 each.initialize()
         join_stations(self.mico, self.daqco, self.remote, self.policy)
+        axes = self.mico if "mico" in self.remote.host_of else None
+        if axes is not None and isinstance(self.vico, VicoApplication):
+            join_vision(self.vico, axes, self.path)
 
     @cached_property
     def garbage(self) -> GarbageWatch:

@@ -35,6 +35,8 @@ def run(chosen: argparse.Namespace) -> int:
         stations=endpoints_of(chosen),
         certificates=chosen.certificates,
     ) as rig:
+        if chosen.connect:
+            rig.take_control()
         run = rig.calibrate(anew=chosen.anew, zooms=chosen.zooms)
         run.subscribe(_tell)
         try:

@@ -58,6 +58,8 @@ def run(chosen: argparse.Namespace) -> int:
             certificates=chosen.certificates,
         ) as rig,
     ):
+        if chosen.connect:
+            rig.take_control()
         campaign = rig.campaign(recipe, chosen.out)
         at_end.callback(_log_to(chosen.out / LOG))  # after this is known to be its own folder
         if rig.simulated:

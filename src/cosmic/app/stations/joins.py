@@ -1,5 +1,7 @@
 """Joins what one application does to another, in this process or over a line."""
 
+from pathlib import Path
+
 from cosmic.app.stations.hosting import Hosted, Site
 from cosmic.app.stations.remote_applications import RemoteApplications
 from cosmic.autonomy.coordinate_transform import join_transform
@@ -16,6 +18,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.application import RemoteApplication
 from cosmic.frame.version import __version__
 from cosmic.mico.api.application_base import MicoApplicationBase
+from cosmic.vico.api.application import VicoApplication
 
 
 def join_here(own: Hosted, site: Site) -> None:
@@ -27,10 +30,21 @@ def join_here(own: Hosted, site: Site) -> None:
         join_teleoperation(mico, daqco)
         join_positions(daqco.recorder, mico, site.clock)
     if vico is not None and mico is not None:
-        join_stage_positions(vico, mico)
-        kept_in = vico.settings.calibration
-        folder = site.path.parent / kept_in if kept_in else None
-        join_transform(vico, mico, folder, __version__)
+        join_vision(vico, mico, site.path)
+
+
+def join_vision(vico: VicoApplication, mico: MicoApplicationBase, path: Path) -> None:
+    """Join the cameras of this process to the axes, here or at a station.
+
+    Parameters
+    ----------
+    path : Path
+        The platform file, beside which calibrations are kept.
+    """
+    join_stage_positions(vico, mico)
+    kept_in = vico.settings.calibration
+    folder = path.parent / kept_in if kept_in else None
+    join_transform(vico, mico, folder, __version__)
 
 
 def join_stations(

@@ -70,7 +70,7 @@ SCM: Final = "SCM"
 ECM: Final = "ECM"
 ACM: Final = "ACM"
 NO_MICO: Final = "this window has no axes"
-NO_ACM: Final = "procedures need MiCo, DAQCo and ViCo, all in this program"
+NO_ACM: Final = "procedures need MiCo, DAQCo and ViCo, with the cameras in this program"
 NO_ECM: Final = f"{NO_COLLISION_MODEL}; name a scene in the platform file"
 _KEY: Final = "window/mode"
 

@@ -91,8 +91,8 @@ class CampaignDock(QObject):
 
 
 def can_run(platform: Platform) -> bool:
-    """Return whether all that a campaign needs runs in this program."""
-    return {"mico", "daqco", "vico"} <= set(platform.own)
+    """Return whether all that a campaign needs is in use, with the cameras in this program."""
+    return platform.mico is not None and platform.daqco is not None and "vico" in platform.own
 
 
 def campaigns_folder() -> Path:
