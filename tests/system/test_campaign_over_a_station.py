@@ -88,10 +88,9 @@ def test_nothing_is_handled_before_the_control_was_taken(rig: Rig, tmp_path: Pat
     recipe.write_text(RECIPE, encoding="utf-8")
     campaign = rig.campaign(recipe, tmp_path / "out")
     before = rig.mico["left.z"].position_um
-    campaign.start()
-    campaign.join()
+    campaign.run_here()
     assert campaign.phase is CampaignPhase.FAILED
-    assert "control" in campaign.end_reason or "lease" in campaign.end_reason
+    assert "take control first" in campaign.end_reason
     assert rig.mico["left.z"].position_um == pytest.approx(before, abs=0.1)
     with pytest.raises(MoveRefused):
         rig.mico["left.z"].move_by(1.0)
@@ -103,7 +102,6 @@ def test_a_fibre_is_handled_with_the_axes_of_a_station(rig: Rig, tmp_path: Path)
     recipe.write_text(RECIPE, encoding="utf-8")
     rig.take_control()
     campaign = rig.campaign(recipe, tmp_path / "out")
-    campaign.start()
-    campaign.join()
+    campaign.run_here()
     assert campaign.phase is CampaignPhase.ENDED, campaign.end_reason
     assert campaign.progress.good == 1
