@@ -159,3 +159,9 @@ def test_a_recorded_hand_steers_as_a_gamepad_does(said: str) -> None:
     assert numbers[0] == 200.0
     assert 20.0 < numbers[1] < 260.0
     assert 10.0 < numbers[2] < 120.0
+
+
+@example("two_makes.py")
+def test_an_axis_of_each_make_stands_where_it_was_sent(said: str) -> None:
+    assert re.search(r"left\.x stands at -\d", said)
+    assert re.search(r"probe\.x stands at -\d", said)

@@ -21,7 +21,7 @@ from cosmic.frame.clock import Clock
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.version import __version__
 from cosmic.mico.api.application import MicoApplication
-from cosmic.mico.hw.factory import make_controller, make_simulated
+from cosmic.mico.hw.factory import join, make_controller, make_simulated
 from cosmic.mico.hw.interface import Controller
 from cosmic.twin.scene import Scene
 from cosmic.vico.api.application import VicoApplication
@@ -105,7 +105,14 @@ def _build_mico(
         controller, injected = make_simulated(site.scene)
         faults.join("controller", injected)
     else:
-        controller = make_controller(settings.backend, library_path=settings.library)
+        first = make_controller(
+            settings.backend, library_path=settings.library, serials=settings.serials
+        )
+        others = [
+            make_controller(each.backend, library_path=each.library, serials=each.serials)
+            for each in settings.controller
+        ]
+        controller = join([first, *others])
     return MicoApplication(
         controller,
         settings,

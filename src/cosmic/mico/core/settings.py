@@ -185,12 +185,21 @@ class GroupSettings(StrictModel):
     positioners: Names
 
 
+class ControllerSettings(StrictModel):
+    """One more controller library; its devices are numbered behind those before it."""
+
+    backend: Literal["scu3d", "smaractctl"]
+    library: str = ""
+    serials: Annotated[tuple[Serial, ...], Field(strict=False, min_length=1)]
+
+
 class MicoSettings(StrictModel):
     """Section ``[mico]`` of platform.toml."""
 
-    backend: Literal["simulated", "scu3d"] = "simulated"
+    backend: Literal["simulated", "scu3d", "smaractctl"] = "simulated"
     library: str = ""
     serials: Annotated[tuple[Serial, ...], Field(strict=False)] = ()
+    controller: Annotated[tuple[ControllerSettings, ...], Field(strict=False)] = ()
     defaults: MotionDefaults = MotionDefaults()
     jog: JogSettings = JogSettings()
     undo: UndoSettings = UndoSettings()
@@ -210,7 +219,8 @@ class MicoSettings(StrictModel):
             *self._same_channel(),
             *self._beyond_channels(),
             *self._twice("key", self._keys()),
-            *self._twice("serial", [str(serial) for serial in self.serials]),
+            *self._twice("serial", [str(serial) for serial in self.all_serials]),
+            *self._joined_wrongly(),
             *self._unknown_names(),
             *self.mirror.misfits(self.kinds),
             *link_misfits(self.link, self.kinds),
@@ -224,6 +234,19 @@ class MicoSettings(StrictModel):
         if wrong:
             raise ValueError("; ".join(wrong))
         return self
+
+    @property
+    def all_serials(self) -> tuple[Serial, ...]:
+        """Serial numbers of the devices of all controllers, in the order of their numbers."""
+        return (*self.serials, *(serial for each in self.controller for serial in each.serials))
+
+    def _joined_wrongly(self) -> list[str]:
+        if not self.controller:
+            return []
+        if self.backend == "simulated":
+            return ["controller: the simulated platform takes its makes from twin.toml"]
+        missing = "serials: name all devices, so that none takes another's number"
+        return [] if self.serials else [missing]
 
     @property
     def kinds(self) -> dict[str, str]:
@@ -259,7 +282,7 @@ class MicoSettings(StrictModel):
         ]
 
     def _beyond_channels(self) -> list[str]:
-        if self.backend != "scu3d":
+        if self.backend != "scu3d" or self.controller:
             return []
         return [
             f"{each.name}: channel {each.channel}: an SCU has the channels 0 to 2"

@@ -499,7 +499,7 @@ class DeviceManager(QObject):
             self._set_mode(Mode.INITIALISATION)
             self.gate.checker.start()
             try:
-                library_index = open_devices(self.controller, self.settings.serials)
+                library_index = open_devices(self.controller, self.settings.all_serials)
             except DeviceError:
                 self.controller.close()
                 self._arrange({})
