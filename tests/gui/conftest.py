@@ -13,8 +13,8 @@ from typing_extensions import override
 from cosmic.app.configuration import platform_file
 from cosmic.mico.core.collision import collision_manager, scene_loader
 from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
+from cosmic.mico.core.collision.clear_travel import clear_travel
 from cosmic.mico.core.collision.collision_manager import Answering
-from cosmic.mico.core.collision.free_way import free_way
 from cosmic.mico.core.collision.model import BodyPair, SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
 
@@ -71,11 +71,11 @@ class InProcess(Answering):
             return self._sweep.nearest(positions, ignored)
 
     @override
-    def free_way(
+    def clear_travel(
         self, spans: Spans, axis: str, ignored: Set[BodyPair] = frozenset()
     ) -> float | None:
         with _lock:
-            return free_way(self._sweep, spans, axis, ignored)
+            return clear_travel(self._sweep, spans, axis, ignored)
 
 
 def _cached(path: Path) -> SceneModel:

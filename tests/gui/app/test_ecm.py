@@ -94,7 +94,7 @@ def test_in_mcm_a_blocked_move_is_refused_with_a_hint(window: OperatorWindow, qt
     go_to(window, qtbot, "2000")
     qtbot.waitUntil(lambda: bool(reason(window)))
     assert "right_" in reason(window)
-    assert "In mode ECM a way round can be looked for" in reason(window)
+    assert "In mode ECM a detour can be planned" in reason(window)
     assert bar(window).state is PreviewState.NONE
     assert position(card(window, "left.y")) == pytest.approx(-2000.0, abs=1.0)
 

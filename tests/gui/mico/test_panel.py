@@ -171,7 +171,7 @@ def test_initialising_shows_progress_and_can_be_cancelled(qtbot: QtBot) -> None:
         bar, button = part(panel, "progress", QProgressBar), part(panel, "initialise", QPushButton)
         qtbot.waitUntil(bar.isVisible)
         assert not button.isEnabled()
-        assert "under way" in button.toolTip()
+        assert "is running" in button.toolTip()
         qtbot.waitUntil(lambda: "referencing" in part(panel, "progressText", QLabel).text())
         click(qtbot, panel, "cancel")
         message = part(panel, "message", QLabel)

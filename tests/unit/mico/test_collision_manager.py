@@ -14,8 +14,8 @@ from cosmic.frame.errors import NotAvailable, UnknownAxisError
 from cosmic.frame.verdict import MoveVerdict, Reason
 from cosmic.mico.core.collision.answer import Approach, AxisSpan, Spans, SweepAnswer
 from cosmic.mico.core.collision.callback import CollisionCallbackBase, Response
+from cosmic.mico.core.collision.clear_travel import clear_travel
 from cosmic.mico.core.collision.collision_manager import Answering, CollisionManager
-from cosmic.mico.core.collision.free_way import free_way
 from cosmic.mico.core.collision.helper_link import GateProcess, NoAnswerError
 from cosmic.mico.core.collision.model import BodyPair, Contact, SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
@@ -62,12 +62,12 @@ class Inside(Answering):
         return self.sweep.nearest(positions, ignored)
 
     @override
-    def free_way(
+    def clear_travel(
         self, spans: Spans, axis: str, ignored: Set[BodyPair] = frozenset()
     ) -> float | None:
         if self.no_free_way:
             raise NoAnswerError("it was killed")
-        return free_way(self.sweep, spans, axis, ignored)
+        return clear_travel(self.sweep, spans, axis, ignored)
 
 
 def with_contacts() -> SceneModel:

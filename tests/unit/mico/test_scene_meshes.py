@@ -98,7 +98,7 @@ PARTS = {
     "hollow": (hollow, "not convex"),
     "open": (lambda: without_faces(block(), 1), "open: 3 edges"),
     "inside out": (inside_out, "inside out"),
-    "with a face turned": (one_face_turned, "look both ways"),
+    "with a face turned": (one_face_turned, "face both directions"),
     "doubled": (doubled, "twice"),
     "flat": (flat, "no area|no volume|twice"),
     "with a face that is a line": (with_a_line_for_a_face, "no area"),

@@ -22,8 +22,8 @@ from cosmic.frame.operation import Progress, Task
 from cosmic.frame.overrides import override
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.ways import Way
+from cosmic.mico.gui.detour_request import DetourRequest
 from cosmic.mico.gui.mico_widget import MicoWidget
-from cosmic.mico.gui.way_request import WayRequest
 
 logger = logging.getLogger(__name__)
 
@@ -214,7 +214,7 @@ class PathController(QObject):
         self._application = panel.mico.application
         self._scene = scene
         self._preview = preview
-        self._request: WayRequest | None = None
+        self._request: DetourRequest | None = None
         self._task: Task | None = None
         self._answer: Way | MoveVerdict | None = None
         self._path: Way | None = None
@@ -235,7 +235,7 @@ class PathController(QObject):
 
     # Planning
 
-    def plan(self, request: WayRequest) -> None:
+    def plan(self, request: DetourRequest) -> None:
         """Plan a detour; an earlier offer is withdrawn."""
         if self._mico[request.axis].details.in_motion:
             self._refuse(request, f"{request.axis} is moving; wait until it is stationary")
@@ -252,7 +252,7 @@ class PathController(QObject):
         self.offered.emit()
         task.subscribe(partial(self._relay, task))
 
-    def _refuse(self, request: WayRequest, why: str) -> None:
+    def _refuse(self, request: DetourRequest, why: str) -> None:
         """Let the refusal of the straight path stand."""
         text = f"{request.verdict}; no detour was planned: {why}"
         request.refuse(replace(request.verdict, text=text))
@@ -287,7 +287,7 @@ class PathController(QObject):
         request.refuse(verdict)
         self._preview.show_end(f"No detour for {_what(request)}", str(verdict))
 
-    def _offer(self, request: WayRequest, path: Way) -> None:
+    def _offer(self, request: DetourRequest, path: Way) -> None:
         self._path = path
         self._scene.clear_refused()
         self._scene.set_planned(poses_along(path, self._positions()))
@@ -379,7 +379,7 @@ def _length_text(length_um: float) -> str:
     return f"{length_um / _MILLIMETRE_UM:.1f} mm"
 
 
-def _what(request: WayRequest) -> str:
+def _what(request: DetourRequest) -> str:
     return f"{request.axis} to {request.where}"
 
 

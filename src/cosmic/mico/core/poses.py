@@ -18,9 +18,7 @@ from cosmic.frame.kept_file import write_whole
 logger = logging.getLogger(__name__)
 
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_. -]{0,79}", re.ASCII)
-HEAD: Final = (
-    "# Named poses: where axes stand, um (deg of a rotary axis), as the gate counts them.\n"
-)
+HEAD: Final = "# Named poses: positions of axes, um (deg of a rotary axis), in gate coordinates.\n"
 _BARE: Final = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
 
 

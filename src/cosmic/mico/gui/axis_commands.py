@@ -11,7 +11,7 @@ from cosmic.frame.gui.relay import Relay
 from cosmic.frame.verdict import MoveVerdict, Reason
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.gui.way_request import HINT, Goal, WayRequest
+from cosmic.mico.gui.detour_request import HINT, DetourRequest, Goal
 
 Make = Callable[[bool], Movement | StepwiseMove]
 """Makes a movement; the argument is the operator's consent to an unknown position."""
@@ -63,7 +63,7 @@ class AxisCommands(QObject):
         It ended; the text says why, and is empty at its target.
     consent_wanted(ConsentRequest)
         It was refused for an unknown position only.
-    way_wanted(WayRequest)
+    way_wanted(DetourRequest)
         Something stands in its way, and a way round may be looked for.
     noted(str)
         What to say of it meanwhile.
@@ -178,7 +178,7 @@ class AxisCommands(QObject):
 
     def _want_way(self, command: _Command, goal: Goal, verdict: MoveVerdict) -> None:
         self._blocked = command
-        request = WayRequest(
+        request = DetourRequest(
             axis=self._axis_name,
             target=goal.target,
             where=goal.text,

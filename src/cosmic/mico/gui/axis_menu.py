@@ -51,7 +51,9 @@ class AxisMenu(QObject):
             self.reference_requested.emit,
         )
         self._add(
-            "Calibrate sensor", "Moves several millimetres both ways", self.calibrate_requested.emit
+            "Calibrate sensor",
+            "Moves millimetres in both directions",
+            self.calibrate_requested.emit,
         )
         self._add(
             f"To the end stop: {forward}", "Drive forwards until the travel ends", self._on_forward

@@ -25,13 +25,13 @@ class ConsentDialog(QMessageBox):
         self.setIcon(QMessageBox.Icon.NoIcon)
         self.setWindowTitle(f"{request.axis}: position unknown")
         self.setText(
-            f"Nobody knows where {request.axis} stands, so its limits cannot be checked.\n"
+            f"The position of {request.axis} is unknown, so its limits cannot be checked.\n"
             f"You asked it to {request.what}."
         )
-        self.setInformativeText("Make sure that nothing is in its way.")
+        self.setInformativeText("Make sure that its path is clear.")
         role = QMessageBox.ButtonRole
         self.move_anyway = self.addButton("Move anyway", role.DestructiveRole)
-        self.move_anyway.setToolTip("Make this one movement; you answer for the way being free")
+        self.move_anyway.setToolTip("Move anyway. You are responsible for a clear path.")
         self.initialise_first = self.addButton("Initialise first", role.AcceptRole)
         self.initialise_first.setToolTip("Find the reference of every axis in the safe order")
         cancel = self.addButton("Cancel", role.RejectRole)

@@ -115,7 +115,10 @@ class LinkForm(Overlay):
         self.other.addItems(list(others))
         self.ratio = named(QLineEdit("1"), "linkRatio")
         self.ratio.setAccessibleName(f"How far the other axis goes when {axis} goes 1")
-        tipped(self.ratio, f"How far the other goes when {axis} goes 1; below 0 the other way")
+        tipped(
+            self.ratio,
+            f"Travel of the other axis when {axis} moves by 1; negative: reversed",
+        )
         self._why = named(QLabel(""), "linkWhy")
         self._why.setWordWrap(True)
         self._why.hide()

@@ -152,7 +152,7 @@ class MicoHeader(QWidget):
         self._cancel.setEnabled(True)
         for button in self._tips:
             button.setEnabled(False)
-            button.setToolTip(f"Not available: {task.title} is under way")
+            button.setToolTip(f"Not available: {task.title} is running")
         self._timer.start()
         self._on_timer()
 

@@ -53,7 +53,7 @@ class MicoWidget(QWidget):
         A command of this panel was refused, or a jog stopped in front of something.
     undo_planned(object)
         The poses that Undo leads through, while it is asked about or under way; None afterwards.
-    way_wanted(WayRequest)
+    way_wanted(DetourRequest)
         Something stands in the way of a move, while ways round are sought.
     """
 

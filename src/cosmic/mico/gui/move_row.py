@@ -11,7 +11,7 @@ from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.settings import MotionDefaults
-from cosmic.mico.gui.way_request import Goal
+from cosmic.mico.gui.detour_request import Goal
 
 
 class StepField(QuantityField):
@@ -22,7 +22,7 @@ class StepField(QuantityField):
         value = super()._parse()
         if not value > 0.0:
             raise QuantityError(
-                "a step size is above zero and has no sign: the button says the direction, and "
+                "a step size is above zero and has no sign: the button gives the direction, and "
                 "Go to takes a position"
             )
         return value

@@ -37,14 +37,14 @@ class PosesBox(QWidget):
         self.poses = named(tipped(QComboBox(), "Named poses"), "poses")
         self.go = named(push_button("Go", "Move all axes of the pose there, together"), "goPose")
         self.way = named(
-            push_button("Go round", "Go there by a way round what is in between"), "goPoseWay"
+            push_button("Go round", "Go there on a path around what is in between"), "goPoseWay"
         )
         self.remove = named(push_button("Remove", "Forget this pose"), "removePose")
         self.name = named(tipped(QLineEdit(), "Name of the pose to teach"), "poseName")
         self.name.setPlaceholderText("name")
         self.group = tipped(QComboBox(), "Which axes the pose holds")
         self.group.addItems([ALL, *(each.title for each in self._settings_groups())])
-        self.teach = named(push_button("Teach", "Keep where the axes stand now"), "teachPose")
+        self.teach = named(push_button("Teach", "Keep the positions of the axes now"), "teachPose")
         self.told = ElidedLabel()
         self._arrange()
         self.go.clicked.connect(lambda: self._go(way=False))

@@ -24,7 +24,7 @@ from cosmic.mico.core.teleoperation.state import TeleoperationPhase, Teleoperati
 from cosmic.mico.gui.fine_row import FineRow
 from cosmic.mico.gui.input_bars import ForceBar, InputBars
 from cosmic.mico.gui.mapping_table import MappingTable
-from cosmic.mico.gui.phase_sign import PhaseSign
+from cosmic.mico.gui.phase_indicator import PhaseIndicator
 from cosmic.mico.gui.qt_application import qt_application
 from cosmic.mico.gui.steering_keys import SteeringKeys
 from cosmic.mico.hw.input_device import InputKind
@@ -65,7 +65,7 @@ class TeleoperationPanel(QWidget):
             push_button("As configured", "Take this profile as the platform file has it"),
             "profileAsConfigured",
         )
-        self.sign = PhaseSign()
+        self.sign = PhaseIndicator()
         self.rates = ElidedLabel()
         self.bars = InputBars()
         self.force = ForceBar()

@@ -121,7 +121,7 @@ class StartQuestion(QWidget):
             push_button("Go there straight", "All axes together; the gate decides"), "goStraight"
         )
         self.way = named(
-            push_button("Find a way", "Look for a way round what is in between"), "goWay"
+            push_button("Plan a path", "Plan a path around what is in between"), "goWay"
         )
         self.leave = named(push_button("Leave it", "Nothing moves"), "leaveStart")
         row, beside = tight_row(STEP_PX)
@@ -169,7 +169,7 @@ class RunBar(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.run = named(push_button("Run", "Rehearse, then make the movements"), "runTrajectory")
-        self.pause = named(push_button("Pause", "When the line under way is over"), "pause")
+        self.pause = named(push_button("Pause", "After the current line"), "pause")
         self.step = named(push_button("Step", "Make one line, then pause"), "step")
         self.cancel = named(push_button("Cancel", "End it now and stop its axes"), "cancelRun")
         self.loops = tipped(QSpinBox(), "How many times; 0: until it is paused or cancelled")

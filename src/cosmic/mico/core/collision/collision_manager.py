@@ -48,8 +48,10 @@ class Answering(Protocol):
     ) -> Approach | None:
         """See `Sweep.nearest`; raises `NoAnswerError`."""
 
-    def free_way(self, spans: Spans, axis: str, ignored: Set[BodyPair] = _NOBODY) -> float | None:
-        """See `free_way`; raises `NoAnswerError`."""
+    def clear_travel(
+        self, spans: Spans, axis: str, ignored: Set[BodyPair] = _NOBODY
+    ) -> float | None:
+        """See `clear_travel`; raises `NoAnswerError`."""
 
 
 class CollisionManager(Exemptions, CollisionChecker):
@@ -201,7 +203,7 @@ class CollisionManager(Exemptions, CollisionChecker):
             return None, None
         axis, span = axes[0], spans[axes[0]]
         try:
-            free_to = self._process.free_way(spans, axis, ignored)
+            free_to = self._process.clear_travel(spans, axis, ignored)
             if free_to is None or span.now is None or span.end is None:
                 return free_to, None
             sign = 1.0 if span.end > span.now else -1.0
@@ -209,7 +211,7 @@ class CollisionManager(Exemptions, CollisionChecker):
             part = replace(span, low=min(span.now, beyond), high=max(span.now, beyond))
             return free_to, self._process.check({**spans, axis: part}, ignored).approach
         except NoAnswerError as exc:  # the refusal stands without it
-            logger.warning("no answer about the free way of %s: %s", axis, exc)
+            logger.warning("no answer about the clear travel of %s: %s", axis, exc)
             return None, None
 
     def _respond(self, approach: Approach, spans: Spans) -> Response:

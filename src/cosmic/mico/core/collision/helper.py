@@ -17,7 +17,7 @@ from cosmic.frame.garbage import freeze_what_is_loaded
 from cosmic.frame.helper_process import READY, End, encode
 from cosmic.frame.platform_services import end_process_after
 from cosmic.mico.core.collision.answer import Approach, SweepAnswer
-from cosmic.mico.core.collision.free_way import free_way
+from cosmic.mico.core.collision.clear_travel import clear_travel
 from cosmic.mico.core.collision.helper_wire import unpack_spans
 from cosmic.mico.core.collision.sweep import Sweep
 
@@ -39,15 +39,15 @@ def _nearest(sweep: Sweep, payload: Any) -> Approach | None:
     return sweep.nearest(positions, ignored)
 
 
-def _free_way(sweep: Sweep, payload: Any) -> float | None:
+def _clear_travel(sweep: Sweep, payload: Any) -> float | None:
     spans, axis, ignored = payload
-    return free_way(sweep, unpack_spans(spans), axis, ignored)
+    return clear_travel(sweep, unpack_spans(spans), axis, ignored)
 
 
 HANDLERS: Final[Mapping[str, Handler]] = {
     "check": _check,
     "nearest": _nearest,
-    "free_way": _free_way,
+    "clear_travel": _clear_travel,
 }
 
 

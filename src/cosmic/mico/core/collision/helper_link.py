@@ -202,7 +202,9 @@ class GateProcess:
         payload = (dict(positions), ignored)
         return self._ask("nearest", payload, self._answer_s, Approach, NoneType)
 
-    def free_way(self, spans: Spans, axis: str, ignored: Set[BodyPair] = NOBODY) -> float | None:
+    def clear_travel(
+        self, spans: Spans, axis: str, ignored: Set[BodyPair] = NOBODY
+    ) -> float | None:
         """Return how far `axis` may go towards the refused end of its span, in its unit.
 
         Raises
@@ -211,7 +213,7 @@ class GateProcess:
             There is no answer.
         """
         payload = (pack_spans(spans), axis, ignored)
-        return self._ask("free_way", payload, self._answer_s, float, NoneType)
+        return self._ask("clear_travel", payload, self._answer_s, float, NoneType)
 
     def ask(self, kind: str, payload: object, timeout_s: float | None = None) -> object:
         """Put a question of any kind that the process knows and return the answer.
@@ -301,7 +303,7 @@ class GateProcess:
 
     def _stay_down(self, why: str) -> None:
         words = self._end_helper()
-        self._down = f"{why}; it stays down until the devices are searched again"
+        self._down = f"{why}; it stays down. Press Rescan"
         logger.error("the collision gate's process is down: %s\n%s", self._down, words)
 
     def _end_helper(self) -> str:

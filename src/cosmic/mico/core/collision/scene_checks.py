@@ -74,7 +74,7 @@ def _check_travel(model: SceneModel, path: Path, findings: Findings) -> None:
         elif not low - slack <= 0.0 <= high + slack:
             findings.wrong(
                 path,
-                f"drive: {axis} cannot stand at 0, its travel is {low:g} to {high:g}; "
+                f"drive: {axis} cannot be at 0, its travel is {low:g} to {high:g}; "
                 "correct its offset or the limits of its joint",
             )
 

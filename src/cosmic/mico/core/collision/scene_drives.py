@@ -33,7 +33,7 @@ def make_drives(
             drives.append(_drive(each, joint))
     for joint in joints:
         if joint.kind is not JointKind.FIXED and joint.name not in taken:
-            findings.odd(path, f"joint {joint.name!r} has no [[drive]]; it stands still at 0")
+            findings.odd(path, f"joint {joint.name!r} has no [[drive]]; it stays at 0")
     return tuple(drives)
 
 

@@ -188,7 +188,7 @@ def _edge_fault(faces: Indices) -> str:
     count = int(faces.max()) + 1
     edges, counts = np.unique(starts * count + ends, return_counts=True)
     if (counts > 1).any():
-        return "faces stand there twice, or look both ways; remove duplicates, orient them alike"
+        return "faces are listed twice, or face both directions; remove duplicates, orient alike"
     back = (edges % count) * count + edges // count
     missing = int((~np.isin(edges, back)).sum())
     return (

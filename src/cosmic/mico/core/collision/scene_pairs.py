@@ -48,7 +48,7 @@ class Pairing:
             if pair is None:
                 continue
             if pair in found:
-                self._findings.odd(each.where, f"{' and '.join(pair)} stand there twice")
+                self._findings.odd(each.where, f"{' and '.join(pair)} are listed twice")
             found.setdefault(pair, AllowedPair(pair, each.reason))
         return tuple(found.values())
 
@@ -85,7 +85,7 @@ class Pairing:
         for number, each in enumerate(settings.contact):
             where = f"{path}: contact[{number}] ({each.operation})"
             if each.operation in found:
-                self._findings.wrong(where, "an operation of that name stands there already")
+                self._findings.wrong(where, "an operation of that name is listed already")
             pairs = [self._known(bodies, where) for bodies in each.pairs]
             for pair in pairs:
                 if pair is not None and pair not in known:

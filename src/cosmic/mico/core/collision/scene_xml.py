@@ -162,9 +162,7 @@ def _check_unique(file: XmlFile, tag: str, findings: Findings) -> None:
     names = Counter(element.get("name") for element in file.root.findall(tag))
     for name, count in names.items():
         if name and count > 1:
-            findings.wrong(
-                file.path, f"{tag} {name!r} stands there {count} times; rename all but one"
-            )
+            findings.wrong(file.path, f"{tag} {name!r} is there {count} times; rename all but one")
 
 
 def _check_numbers(file: XmlFile, element: Any, name: str, text: str, findings: Findings) -> None:

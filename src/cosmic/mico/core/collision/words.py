@@ -49,7 +49,7 @@ def cannot_judge(reason: str) -> MoveVerdict:
     """Return the refusal of a question that makes no sense to the gate."""
     return refuse(
         Reason.NO_ANSWER,
-        f"the collision check cannot judge this movement: {reason}; nothing was moved",
+        f"the collision check cannot decide this movement: {reason}; nothing was moved",
     )
 
 

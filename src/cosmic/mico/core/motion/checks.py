@@ -529,7 +529,7 @@ def _no_right(request: Request, snapshot: PlatformSnapshot) -> str:
         return ""
     return (
         f"{snapshot.holder} controls the platform now; take over in the window, "
-        "or wait until it is given back"
+        "or wait until it is released"
     )
 
 

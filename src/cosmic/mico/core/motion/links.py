@@ -21,7 +21,7 @@ class Link:
     Attributes
     ----------
     ratio : float
-        How far `second` goes when `first` goes 1, in their units; below 0 the other way.
+        How far `second` goes when `first` goes 1, in their units; below 0 in the other direction.
     """
 
     first: str

@@ -372,7 +372,7 @@ def check_estimate(
     if travel is None or state.kind is not PositionerKind.OPEN_LOOP:
         raise NotAvailable(f"{state.name}: it has a sensor; its position is measured")
     if state.in_motion or not state.activity.at_rest:
-        raise NotAvailable(f"{state.name}: it is moving; set the estimate when it stands")
+        raise NotAvailable(f"{state.name}: it is moving; set the estimate when it is stationary")
     if not (math.isfinite(position) and std >= 0.0):
         text = f"{state.name}: {position!r} ± {std!r} is no estimate"
         raise refusal(refuse(Reason.NOT_FINITE, text, axis=state.name))

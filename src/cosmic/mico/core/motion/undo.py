@@ -309,7 +309,7 @@ class UndoHistory(QObject):
             if state.in_motion and self.group_of(state.name) == entry.group
         ]
         if moving:
-            raise NotAvailable(f"{', '.join(moving)} is moving; undo when it stands")
+            raise NotAvailable(f"{', '.join(moving)} is moving; undo when it is stationary")
 
     def order(self, entry: UndoEntry) -> dict[str, Order]:
         """Begin to move back at the speed of `[mico.undo]`; raises `MoveRefused`, the entry stays.

@@ -176,7 +176,7 @@ class _Binder:
             if facts is None or not facts.has_sensor or not self._trajectory.is_relative(axis):
                 continue
             if axis not in pose.positions:
-                text = f"the pose {name!r} does not say where {axis} stands; teach it with {axis}"
+                text = f"the pose {name!r} has no position of {axis}; teach it with {axis}"
                 self._tell(line, text)
             else:
                 self._zero[axis] = pose.positions[axis]

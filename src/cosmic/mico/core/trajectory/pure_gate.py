@@ -6,8 +6,8 @@ from typing import Protocol
 from typing_extensions import override
 
 from cosmic.mico.core.collision.answer import Approach, Spans, SweepAnswer
+from cosmic.mico.core.collision.clear_travel import clear_travel
 from cosmic.mico.core.collision.collision_manager import Answering, CollisionManager
-from cosmic.mico.core.collision.free_way import free_way
 from cosmic.mico.core.collision.model import BodyPair, SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
 
@@ -44,8 +44,10 @@ class PureAnswers(Answering):
         return self.sweep.nearest(positions, ignored)
 
     @override
-    def free_way(self, spans: Spans, axis: str, ignored: Set[BodyPair] = _NOBODY) -> float | None:
-        return free_way(self.sweep, spans, axis, ignored)
+    def clear_travel(
+        self, spans: Spans, axis: str, ignored: Set[BodyPair] = _NOBODY
+    ) -> float | None:
+        return clear_travel(self.sweep, spans, axis, ignored)
 
 
 class Exempting(Protocol):

@@ -155,9 +155,7 @@ class TrajectoryReader:
         if action is None:
             self._motion(said, None)
         elif self._block is not None and first != "end":
-            raise QuantityError(
-                f"{first!r} cannot stand in a block together; is its 'end' missing?"
-            )
+            raise QuantityError(f"{first!r} cannot be in a block together; is its 'end' missing?")
         else:
             action(rest.strip())
 
@@ -181,7 +179,7 @@ class TrajectoryReader:
 
     def _note(self, key: str, value: str) -> None:
         if key in self._once:
-            raise QuantityError(f"{key!r} stands in line {self._once[key][1]} already")
+            raise QuantityError(f"{key!r} is in line {self._once[key][1]} already")
         if self._statements:
             raise QuantityError(f"{key!r} belongs before the first movement")
         if not value:
@@ -204,9 +202,9 @@ class TrajectoryReader:
             name, _, where = each.strip().partition(" ")
             axis = words.axis_name(name)
             if axis in self._moved:
-                raise QuantityError(f"{axis} moves before line {self._line} tells its start")
+                raise QuantityError(f"{axis} moves before line {self._line} gives its start")
             if axis in self._start:
-                raise QuantityError(f"the start of {axis} stands in line {self._start[axis].line}")
+                raise QuantityError(f"the start of {axis} is in line {self._start[axis].line}")
             value, unit = words.position(where.strip())
             self._start[axis] = Place(value, unit, self._line)
 
@@ -220,7 +218,7 @@ class TrajectoryReader:
 
     def _open_block(self, rest: str, at_s: float | None) -> None:
         if rest:
-            raise QuantityError("'together' stands alone; the movements follow, then 'end'")
+            raise QuantityError("'together' is alone in its line; the movements follow, then 'end'")
         self._block, self._block_line, self._block_at_s = [], self._line, at_s
 
     def _end(self, rest: str) -> None:

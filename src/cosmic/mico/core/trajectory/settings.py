@@ -38,11 +38,11 @@ class MirrorSettings(StrictModel):
         counts = Counter(name for pair in self.pairs for name in set(pair))
         twice = [name for name, count in counts.items() if count > 1]
         if twice:
-            raise ValueError(f"{twice[0]} stands in two pairs")
+            raise ValueError(f"{twice[0]} is in two pairs")
         partners = self.partners()
         for name in self.reversed:
             if name not in partners:
-                raise ValueError(f"reversed: {name} stands in no pair")
+                raise ValueError(f"reversed: {name} is in no pair")
             if partners[name] not in self.reversed:
                 raise ValueError(f"reversed: name {partners[name]} too, which mirrors {name}")
         return self

@@ -95,7 +95,7 @@ class Camera:
     def _scale(width: float, height: float) -> float:
         """Return the scale at which the field of view fills the shorter side."""
         if not (width > 0 and height > 0):
-            raise ValueError(f"a picture of {width} x {height} has no projection")
+            raise ValueError(f"an image of {width} x {height} has no projection")
         return 1.0 / float(np.tan(np.radians(_FIELD_DEG / 2.0)))
 
     def px_mm(self, width: float, height: float) -> float:

@@ -65,7 +65,7 @@ class RefusedLine(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._words = named(ElidedLabel(), "sceneRefused")
-        away = tipped(QToolButton(), "Take the refused movement out of the picture")
+        away = tipped(QToolButton(), "Hide the refused movement")
         away.setText("✕")
         away.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         away.clicked.connect(self.cleared)

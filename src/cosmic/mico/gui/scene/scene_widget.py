@@ -181,7 +181,7 @@ class SceneWidget(QWidget):
         self._view.refresh()
 
     def clear_refused(self) -> None:
-        """Take the refused movement out of the picture."""
+        """Hide the refused movement."""
         self.show_refused(None)
 
     def set_planned(self, path: Path | None, bodies: Sequence[str] = ()) -> None:

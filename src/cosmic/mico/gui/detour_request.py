@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import MoveVerdict
 
-HINT = "In mode ECM a way round can be looked for."
+HINT = "In mode ECM a detour can be planned."
 """Said with a refusal where mode ECM would do something about it."""
 
 
 @dataclass(frozen=True, slots=True)
-class WayRequest:
+class DetourRequest:
     """A way round is wanted, since the straight one was refused.
 
     Attributes

@@ -16,7 +16,7 @@ BUDGET_S: Final = 0.05
 """A refusal must not keep others waiting: what was proved until then is told."""
 
 
-def free_way(
+def clear_travel(
     sweep: Sweep,
     spans: Spans,
     axis: str,

@@ -23,7 +23,7 @@ LOOKS: Final = {
 _SHAPE_PX: Final = 12.0
 
 
-class PhaseSign(QWidget):
+class PhaseIndicator(QWidget):
     """A wide sign; words too long for it are elided, and whole in the tooltip."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
