@@ -97,6 +97,7 @@ def test_nothing_is_handled_before_the_control_was_taken(rig: Rig, tmp_path: Pat
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)
 def test_a_fibre_is_handled_with_the_axes_of_a_station(rig: Rig, tmp_path: Path) -> None:
     recipe = tmp_path / "transport.toml"
     recipe.write_text(RECIPE, encoding="utf-8")
