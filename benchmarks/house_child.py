@@ -27,7 +27,7 @@ REST_MS: Final = 3000
 PAINTING: Final = ("paintEvent", "paint", "paintGL")
 LIBRARY: Final = re.compile(r"/hw/sim")
 """What a movement calls there first, and nothing at rest does, is the call that starts it."""
-BELOW: Final = re.compile(r"/twin/|/sim_[^/]*$|/sim/|/frame/pace\.py$")
+BELOW: Final = re.compile(r"/twin/|/sim_[^/]*$|/sim/|/frame/time_scale\.py$")
 """The simulated controller and its world: below the library that the program calls."""
 
 

@@ -28,13 +28,13 @@ def fault(name: str, **where: object) -> Provoke:
     return lambda bench, _campaign: bench.rig.faults.inject(name, **where)
 
 
-def distrust(_bench: Bench, campaign: Campaign) -> None:
+def mark_unreliable(_bench: Bench, campaign: Campaign) -> None:
     campaign.work.shared.needs_initialisation = True
 
 
 DARK: Final = fault("light_dimmed", amount=0.02)
 PROVOKED: Final = {
-    "initialise again": Way(provoke=distrust),
+    "initialise again": Way(provoke=mark_unreliable),
     "take heights from the file": Way((HEIGHTS,), DARK),
     "turn the table on": Way((PLATE,), DARK),
     "try beside it": Way(provoke=fault("missed_grasp")),

@@ -14,7 +14,7 @@ from typing import Final, Protocol
 
 from typing_extensions import override
 
-from cosmic.frame.pace import Horizon, Pace, PacedHorizon, PacedWorker, Worker
+from cosmic.frame.time_scale import Horizon, ScaledHorizon, ScaledWorker, TimeScale, Worker
 
 
 def wall_now_s() -> float:
@@ -85,7 +85,7 @@ class RatedClock(Clock):
     """A clock that runs `rate` times as fast as the wall.
 
     While a procedure is under way that is the most: it runs as the wall does while a worker is
-    busy, and from when a thread that waits is due until it goes on. See `cosmic.frame.pace`.
+    busy, and from when a thread that waits is due until it goes on. See `cosmic.frame.time_scale`.
 
     Parameters
     ----------
@@ -107,8 +107,8 @@ class RatedClock(Clock):
         self._start_s = wall_now_s()
         self._waits = waits
         # Nobody can be hurried by a clock that is no faster than the wall.
-        self._hurries = rate > 1.0
-        self._pace = Pace(rate, wall_now_s) if waits or self._hurries else None
+        self._accelerated = rate > 1.0
+        self._time_scale = TimeScale(rate, wall_now_s) if waits or self._accelerated else None
 
     @property
     @override
@@ -117,29 +117,29 @@ class RatedClock(Clock):
 
     @override
     def now_s(self) -> float:
-        if self._pace is not None:
-            return self._pace.now_s()
+        if self._time_scale is not None:
+            return self._time_scale.now_s()
         return (wall_now_s() - self._start_s) * self._rate
 
     @override
     def wait(self, condition: threading.Condition, until_s: float) -> None:
-        pace = self._pace
-        if pace is None:
+        time_scale = self._time_scale
+        if time_scale is None:
             left_s = (until_s - self.now_s()) / self._rate
             if left_s > 0.0:
                 condition.wait(min(left_s, threading.TIMEOUT_MAX))
             return
         token = object()
-        left_s = pace.begin_wait(token, condition, until_s)
+        left_s = time_scale.begin_wait(token, condition, until_s)
         if left_s > 0.0:
             try:
                 condition.wait(min(left_s, threading.TIMEOUT_MAX))
             finally:
-                pace.end_wait(token)
+                time_scale.end_wait(token)
 
     @override
     def sleep(self, duration_s: float) -> None:
-        if self._pace is None:
+        if self._time_scale is None:
             if duration_s > 0.0:
                 time.sleep(duration_s / self._rate)
             return
@@ -151,18 +151,22 @@ class RatedClock(Clock):
 
     @override
     def worker(self, *, leads: bool = False) -> Worker:
-        if self._pace is None or not self._hurries:
+        if self._time_scale is None or not self._accelerated:
             return Worker()
-        return PacedWorker(self._pace, leads=leads)
+        return ScaledWorker(self._time_scale, leads=leads)
 
     @property
     @override
     def rate_reached(self) -> float:
-        return self._rate if self._pace is None else self._pace.reached
+        return self._rate if self._time_scale is None else self._time_scale.reached
 
     @override
     def horizon(self) -> Horizon:
-        return PacedHorizon(self._pace) if self._pace is not None and self._waits else Horizon()
+        return (
+            ScaledHorizon(self._time_scale)
+            if self._time_scale is not None and self._waits
+            else Horizon()
+        )
 
 
 class WallClock(RatedClock):

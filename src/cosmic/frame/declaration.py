@@ -14,8 +14,8 @@ from threading import Lock
 from typing import Any, Final, TypeVar, get_args, get_origin, get_type_hints, overload
 
 from cosmic.frame.arguments import checked_class
+from cosmic.frame.background import OnResult, do_and_report
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errands import Told, do_and_tell
 from cosmic.frame.events import Event, Unsubscribe
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.caller import MOVE_LIMIT_S
@@ -255,14 +255,14 @@ class Declared:
         if self._told is not None:
             self._told.emit()
 
-    def carry_out(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
+    def carry_out(self, action: Callable[[], T], told: OnResult[T], *, slow: bool = False) -> None:
         """Do what may have to wait for a line, without waiting in a window's thread.
 
         `told` takes the result, or the `CosmicError` that was raised; here it is called at once,
         unless it is `slow` and there is a thread for that.
         """
         del slow
-        do_and_tell(action, told)
+        do_and_report(action, told)
 
     def prepare(self, key: str, policy: FailurePolicy) -> None:
         """Prepare what a proxy of this class keeps on this side; `key` is that of the part."""

@@ -8,7 +8,7 @@ from cosmic.twin.contacts import Contacts
 from cosmic.twin.felt import Felt, Moment, Push
 from cosmic.twin.fibre import Fibre, Floats, Line
 from cosmic.twin.fibre_state import state_of
-from cosmic.twin.hands import Hands
+from cosmic.twin.gripper_contacts import GripperContacts
 from cosmic.twin.kinematics import Point, Skeleton
 from cosmic.twin.offsets import ToolOffsets
 from cosmic.twin.settings import TwinSettings
@@ -105,7 +105,7 @@ class Workspace:
             Fibre(number, fibre, settings.contact, settings.handling, seed)
             for number, fibre in enumerate(settings.fibres)
         ]
-        self._hands = Hands(
+        self._gripper_contacts = GripperContacts(
             settings, self.fibres, seed, injected=self.faults, tell=self._tell, faults=wander
         )
         self._touches: dict[int, Touch] = {}
@@ -162,13 +162,13 @@ class Workspace:
         self._time_s = time_s
         tools = self._tools(values, time_s)
         around = Around(self, values, tools, time_s)
-        self._hands.look(around)
+        self._gripper_contacts.look(around)
         self._gaps = {name: tool.gap_um for name, tool in tools.items()}
         probe = added(self._probe.at(values), self.offsets.at(PROBE, time_s))
-        self._slack_um = self._hands.slack_um
+        self._slack_um = self._gripper_contacts.slack_um
         pushes = tuple(
             push
-            for fibre in self._hands.held
+            for fibre in self._gripper_contacts.held
             if (push := self._push(fibre, tools, probe, around)) is not None
         )
         if self._contacts is not None:
@@ -176,7 +176,7 @@ class Workspace:
         on_jaws = {name: self._jaw(name, tool, probe) for name, tool in tools.items()}
         self._note(pushes, on_jaws)
         jaw_un = sum(on_jaws.values())
-        return Felt(pushes, jaw_un, self._slack_um, self._hands.gap_um)
+        return Felt(pushes, jaw_un, self._slack_um, self._gripper_contacts.gap_um)
 
     def _nothing_before(self, slack_um: float) -> None:
         """Take note that something may happen after so much way."""
@@ -230,9 +230,9 @@ class Workspace:
         (hold,) = fibre.holds.values()
         strain = fibre.strain(along, force_un)
         if strain > hold.fate.loosen_strain:
-            self._hands.loosen(fibre)
+            self._gripper_contacts.loosen(fibre)
         if strain > hold.fate.break_strain:
-            self._hands.snap(fibre, around, strain)
+            self._gripper_contacts.snap(fibre, around, strain)
             return False
         return True
 

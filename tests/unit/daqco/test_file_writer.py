@@ -27,7 +27,7 @@ from unit.daqco.recording_helpers import FORCE, chunks, header, volts_of
 Usage = namedtuple("Usage", "total used free")
 
 
-class Told:
+class OnResult:
     """What a writer said, and every failure, in the order of coming."""
 
     def __init__(self, policy):
@@ -51,7 +51,7 @@ def policy():
 
 @pytest.fixture
 def told(policy):
-    return Told(policy)
+    return OnResult(policy)
 
 
 @pytest.fixture

@@ -93,7 +93,7 @@ class RemoteStation:
         self._connection = ClientSideConnection(
             address.name, client, lambda: ZenohWire(line), policy
         )
-        self._errands = JobQueue(f"errands to {address.name}", policy)
+        self._background = JobQueue(f"errands to {address.name}", policy)
         self._lock = Lock()
         self._facts: StationFacts | None = None
         self._lease: LeaseState | None = None
@@ -189,15 +189,15 @@ class RemoteStation:
 
     def later(self, what: Callable[[], object], failed: Callable[[CosmicError], object]) -> None:
         """Do `what` in a thread of the station's own, for windows, which must not wait."""
-        self._errands.submit(what, f"an errand to {self.name}").when_failed(failed)
+        self._background.submit(what, f"an errand to {self.name}").when_failed(failed)
 
     def close(self) -> None:
         """Give control back and end the line; any state."""
         for undo in self._undo:
             undo()
         self._undo = []
-        self._errands.request_end()
-        self._errands.join()
+        self._background.request_end()
+        self._background.join()
         self._connection.close()
 
     # What comes from there

@@ -11,7 +11,7 @@ from cosmic.app.platform import Platform
 from cosmic.app.stations.host import StationHost
 from cosmic.app.stations.remote_station import RemoteStation, StationControl
 from cosmic.frame.errors import CosmicError
-from cosmic.frame.gui.controls_sign import ControlAction, ControlsSign
+from cosmic.frame.gui.controls_indicator import ControlAction, ControlsIndicator
 from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.server_gui import CosmicServerGui
 from cosmic.frame.gui.theme import State
@@ -25,7 +25,7 @@ _OFFER: Final = "offer"
 
 
 class StationControls(QObject):
-    """Joins the sign in the top bar to the leases of this station and of those it uses.
+    """Joins the indicator in the top bar to the leases of this station and of those it uses.
 
     Parameters
     ----------
@@ -47,20 +47,20 @@ class StationControls(QObject):
 
     def __init__(
         self,
-        sign: ControlsSign,
+        indicator: ControlsIndicator,
         stations: Sequence[RemoteStation],
         hosts: Mapping[str, Collection[str]],
         own: StationLease | None,
         parent: QWidget,
     ) -> None:
         super().__init__(parent)
-        self._sign = sign
+        self._indicator = indicator
         self._moving = {name: _what_moves(applications) for name, applications in hosts.items()}
         self._stations = {each.name: each for each in stations}
         self._known = {name: StationControl(name) for name in self._stations}
         self._own = own
         self._own_state: LeaseState | None = None
-        sign.action_requested.connect(self._on_action)
+        indicator.action_requested.connect(self._on_action)
         self._say_later = Relay(self._say)
         self._relay, self._own_relay = Relay(self._on_told), Relay(self._on_own_told)
         for each in self._stations.values():
@@ -97,8 +97,8 @@ class StationControls(QObject):
         if len(entries) > 1:
             text = "; ".join(f"{each.what}: {each.who.removeprefix(_OPERATOR)}" for each in entries)
         tip = "\n".join(f"{each.what or 'movements'}: commanded by {each.who}" for each in entries)
-        self._sign.show_holder(text, warn=not entries[0].here, tip=tip)
-        self._sign.set_actions([each.action for each in entries if each.action is not None])
+        self._indicator.show_holder(text, warn=not entries[0].here, tip=tip)
+        self._indicator.set_actions([each.action for each in entries if each.action is not None])
 
     # What is asked for
 

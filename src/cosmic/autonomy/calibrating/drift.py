@@ -36,7 +36,7 @@ class CheckDrift(FibreOperation):
         try:
             gripper, probe = yield from look_at_both(work)
         except NotAvailable:
-            distrust(work)
+            mark_unreliable(work)
             return
         if gripper.certain:
             follow(work, gripper, probe)
@@ -61,7 +61,7 @@ def follow(work: HandlingContext, gripper: TipOff, probe: TipOff) -> None:
     before = known.seen_off_um
     moved = off[0] - before[0], off[1] - before[1]
     if not all(math.hypot(*each) <= settings.drift_far_um for each in (gripper.off_um, moved)):
-        distrust(work)
+        mark_unreliable(work)
         return
     limit_um = max(settings.drift_um, TIMES_STD * gripper.std_um)
     both_um = max(settings.drift_um, TIMES_STD * math.hypot(gripper.std_um, probe.std_um))
@@ -74,7 +74,7 @@ def follow(work: HandlingContext, gripper: TipOff, probe: TipOff) -> None:
     _note(work, gripper, moved, limit_um)
 
 
-def distrust(work: HandlingContext) -> None:
+def mark_unreliable(work: HandlingContext) -> None:
     """Have everything that rests on where the tips are measured anew."""
     for key in (PLATE, HELD, PROBE):
         work.calibration.made.pop(key, None)

@@ -10,7 +10,7 @@ from cosmic.autonomy.calibrating.calibrated import Calibrated
 from cosmic.autonomy.calibrating.registry import CalibrationEntry
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.force import ForceMean
-from cosmic.autonomy.handling.jaws import CLOSED_STD_UM, distrust_gap, move_jaws, note_gap
+from cosmic.autonomy.handling.jaws import CLOSED_STD_UM, mark_gap_unknown, move_jaws, note_gap
 from cosmic.autonomy.handling.prepare import CONTACT, PROBE, retract_probe
 from cosmic.autonomy.handling.push import arm_force_limit, limit_of, put_back
 from cosmic.autonomy.handling.retrying_move import RetryingMove
@@ -41,7 +41,7 @@ class TouchJaw(Calibrated):
             raise NotAvailable("see probe and gripper on one image before they touch")
         if not work.daqco.running:
             work.daqco.start()
-        distrust_gap(work)
+        mark_gap_unknown(work)
         yield from move_jaws(work, -(work.settings.grasp.full_um + settings.touch_closing_um))
         note_gap(work, 0.0, CLOSED_STD_UM)
         before = limit_of(work)

@@ -9,7 +9,7 @@ from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.grasp import Carry
 from cosmic.autonomy.handling.plate import PlateFrame, Reach
 from cosmic.autonomy.handling.prepare import clear_image
-from cosmic.autonomy.handling.put_away import GIVEN_UP, Wipe, bin_position
+from cosmic.autonomy.handling.put_away import SKIPPED, Wipe, bin_position
 from cosmic.autonomy.handling.survey import NONE_LEFT, Choose, none_left, ways_of
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.frame.errors import MoveRefused
@@ -164,7 +164,7 @@ class GoOn(FibreOperation):
     def steps(self, work: HandlingContext) -> Steps:
         fibre = work.fibre
         if fibre is not None:
-            fibre.failure = fibre.failure or OperationFailed(GIVEN_UP, f"fibre {fibre.number}")
+            fibre.failure = fibre.failure or OperationFailed(SKIPPED, f"fibre {fibre.number}")
             fibre.done_s, fibre.stuck = work.clock.now_s(), True
             work.shared.finished.append(fibre)
             work.shared.skipped.append(fibre.reach.candidate)

@@ -26,7 +26,7 @@ def zero_jaws(work: HandlingContext) -> Steps:
     """
     full, count = work.settings.grasp.full_um, work.mico[work.gripper.gap_axis]
     close = -(1.0 + OVER) * full
-    distrust_gap(work)
+    mark_gap_unknown(work)
     yield from move_jaws(work, close)
     yield from move_jaws(work, max(0.0, full - (count.position_um or 0.0)))
     # From closed again: nothing is between jaws that come down no wider than they should be.
@@ -35,7 +35,7 @@ def zero_jaws(work: HandlingContext) -> Steps:
     yield from move_jaws(work, work.settings.grasp.gap_um)
 
 
-def distrust_gap(work: HandlingContext) -> None:
+def mark_gap_unknown(work: HandlingContext) -> None:
     """Have the gate take the jaws to be anywhere: before they are run against their stop."""
     _tell_gate(work, work.mico[work.gripper.gap_axis].position_um or 0.0, None)
 

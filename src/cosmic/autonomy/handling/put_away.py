@@ -14,7 +14,7 @@ from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, St
 from cosmic.vico.core.image import CameraImage
 
 ADHESION: Final = "jaw adhesion"
-GIVEN_UP: Final = "given up"
+SKIPPED: Final = "skipped"
 INTERRUPTED: Final = "interrupted"
 WIPE_UM: Final = 250.0
 ASIDE_UM: Final = 400.0
@@ -167,7 +167,7 @@ class GiveUp(FibreOperation):
         work.shared.skipped.append(fibre.reach.candidate)
         work.fibre = None
         yield SAFE_POINT
-        raise fibre.failure or OperationFailed(GIVEN_UP, f"fibre {fibre.number}")
+        raise fibre.failure or OperationFailed(SKIPPED, f"fibre {fibre.number}")
 
 
 class ClearUp(FibreOperation):

@@ -22,8 +22,8 @@ STAND_BACK_UM: Final = 900.0
 MARGIN_UM: Final = 250.0
 SAME_LENGTH: Final = 0.05
 LOOKS: Final = 2
-FORETOLD_UM: Final = 25.0
-FORETOLD_PART: Final = 0.6
+PREDICTED_UM: Final = 25.0
+PREDICTED_PART: Final = 0.6
 GAP_STD_PX: Final = 2.0
 
 
@@ -56,7 +56,7 @@ class FindAgain(FibreOperation):
             yield work.go(work.at(work.gripper, x - STAND_BACK_UM * work.jaws.forward, y))
         image = yield work.image()
         assert isinstance(image, CameraImage)
-        if not fibre.tries and _where_foretold(work, fibre, image):
+        if not fibre.tries and _where_predicted(work, fibre, image):
             return
         mapped = work.mapped(image)
         line_px = mapped.to_px(fibre.reach.line_um)
@@ -73,12 +73,12 @@ class FindAgain(FibreOperation):
         raise OperationFailed(LOST, f"fibre {fibre.number} was not found where the table turned it")
 
 
-def _where_foretold(work: HandlingContext, fibre: HeldFibre, image: CameraImage) -> bool:
+def _where_predicted(work: HandlingContext, fibre: HeldFibre, image: CameraImage) -> bool:
     """Take note of a fibre that lies where the turn should have brought it."""
     mapped, candidate = work.mapped(image), fibre.reach.candidate
     line_px = mapped.to_px(fibre.reach.line_um)
-    trace = trace_along(image, line_px, FORETOLD_UM / mapped.scale_um_px)
-    if not trace.contrast > FORETOLD_PART * candidate.contrast:
+    trace = trace_along(image, line_px, PREDICTED_UM / mapped.scale_um_px)
+    if not trace.contrast > PREDICTED_PART * candidate.contrast:
         return False
     fibre.line_um, fibre.line_px = fibre.reach.line_um, line_px
     fibre.inside_um = work.settings.grasp.inside_um

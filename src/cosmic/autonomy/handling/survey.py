@@ -24,7 +24,7 @@ TOO_LONG = "too long"
 TOO_CURLED = "too curled"
 TOO_NEAR = "too near to another"
 OUT_OF_FIELD = "out of the field"
-GIVEN_UP = "given up before"
+SKIPPED = "skipped before"
 MEASURED = "measured before"
 OUT_OF_REACH = "out of reach"
 NONE_LEFT = "no fibre"
@@ -32,9 +32,9 @@ LOOK_AGAIN = "look again"
 SAME_UM = 120.0
 SAME_LENGTH = 0.05
 OWN_UM = 1.0
-SPILLED_LENGTH = 0.004
-SPILLED_WIDTH = 0.15
-SPILLED_CURL = 0.006
+DROPPED_LENGTH = 0.004
+DROPPED_WIDTH = 0.15
+DROPPED_CURL = 0.006
 
 
 class Survey(FibreOperation):
@@ -133,7 +133,7 @@ def _candidate(work: HandlingContext, seen: SeenFibre, line_um: Floats) -> Candi
 
 def _lonely(work: HandlingContext, candidate: Candidate) -> str:
     if any(same_fibre(candidate, each) for each in work.shared.skipped):
-        return GIVEN_UP
+        return SKIPPED
     near = (
         distance_um(candidate.line_um, line) < work.settings.grasp.clear_um
         for line in work.shared.lines_um
@@ -165,9 +165,9 @@ def _unlike(one: Candidate, other: HeldFibre) -> float:
     if one.problem:
         return math.inf
     return max(
-        abs(one.length_um / other.length_um - 1.0) / SPILLED_LENGTH,
-        abs(one.width_um / other.width_um - 1.0) / SPILLED_WIDTH,
-        abs(one.curl - other.curl) / SPILLED_CURL,
+        abs(one.length_um / other.length_um - 1.0) / DROPPED_LENGTH,
+        abs(one.width_um / other.width_um - 1.0) / DROPPED_WIDTH,
+        abs(one.curl - other.curl) / DROPPED_CURL,
     )
 
 

@@ -13,7 +13,7 @@ from typing_extensions import override
 from cosmic.autonomy.procedures.operation import Awaited, SafePoint
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import CosmicError
-from cosmic.frame.pace import Worker
+from cosmic.frame.time_scale import Worker
 
 logger = logging.getLogger(__name__)
 

@@ -22,8 +22,8 @@ from cosmic.daqco.core.udaq_buffer import UDaqBuffer
 from cosmic.daqco.core.udaq_core import UDaqCore
 from cosmic.daqco.hw.interface import Board, BoardInfo, BoardLibrary, OverrunError
 from cosmic.frame.application import GuiFactory
+from cosmic.frame.background import BackgroundJobs, OnResult, do_and_report
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errands import Errands, Told, do_and_tell
 from cosmic.frame.errors import ConfigError, CosmicError, DeviceError, NotAvailable
 from cosmic.frame.events import Event, Unsubscribe
 from cosmic.frame.failure import FailurePolicy
@@ -122,7 +122,7 @@ class DaqcoApplication(TaskApplication):
         self._core: UDaqCore | None = None
         self._problem = ""
         self._silence = SilenceWatch(self.guard, policy)
-        self._errands = Errands("DAQCo errands", policy)
+        self._background = BackgroundJobs("DAQCo background", policy)
         self._before_change: tuple[Callable[[DaqcoSettings], None], ...] = ()
         self._failed: Event[str] = Event()
         self._restarts = RestartBudget()
@@ -379,7 +379,9 @@ class DaqcoApplication(TaskApplication):
             self._fail(str(error))
             self.recorder.note("overload", f"computer overloaded, {amount} ({error})")
             if self._restarts.take(WALL.now_s()):
-                self._errands.do(lambda: self._start_again(failed, amount), self._on_started_again)
+                self._background.do(
+                    lambda: self._start_again(failed, amount), self._on_started_again
+                )
             else:
                 self._fail(
                     f"{error}. Acquisition was restarted {MOST_RESTARTS} times within "
@@ -429,12 +431,12 @@ class DaqcoApplication(TaskApplication):
         )
         self.apply(settings.model_copy(update={"scale": scales, "channel": channels}))
 
-    def carry_out(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
+    def carry_out(self, action: Callable[[], T], told: OnResult[T], *, slow: bool = False) -> None:
         """Do `action` and tell how it ended: at once, or in another thread what is `slow`."""
         if slow:
-            self._errands.do(action, told)
+            self._background.do(action, told)
         else:
-            do_and_tell(action, told)
+            do_and_report(action, told)
 
     # The end
 
@@ -447,8 +449,8 @@ class DaqcoApplication(TaskApplication):
     def shut_down(self) -> None:
         """Close the recording, end acquisition, close the boards, end all threads; any state."""
         self.request_end()
-        self._errands.request_end()
-        self._errands.join()
+        self._background.request_end()
+        self._background.join()
         self.recorder.stop()
         self._silence.request_end()
         self._silence.join()

@@ -7,7 +7,7 @@ from typing import Final, Protocol
 import numpy as np
 from typing_extensions import override
 
-from cosmic.daqco.api.channel_flight import ChannelFlight, samples_of
+from cosmic.daqco.api.channel_flyer import ChannelFlyer, samples_of
 from cosmic.daqco.core.chunk import DataChunk, Values
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings
@@ -80,7 +80,7 @@ class ChannelHandle:
         self._clock = clock
         self._average_s = AVERAGE_S
         self._read: tuple[float, float, float] | None = None
-        self._flight: ChannelFlight | None = None
+        self._flyer: ChannelFlyer | None = None
 
     @override
     def __repr__(self) -> str:
@@ -200,23 +200,23 @@ class ChannelHandle:
 
         What an earlier flight has left is forgotten. It fails as `trigger`.
         """
-        if self._flight is not None:
-            self._flight.abandon(NotAvailable(f"{self._channel}: another flight was begun"))
-        flight = ChannelFlight(self._channel, self.name, self._clock)
-        self._flight = flight
-        self._watch(flight.take, flight.ended, flight.abandon)
-        return flight.begun
+        if self._flyer is not None:
+            self._flyer.abandon(NotAvailable(f"{self._channel}: another flight was begun"))
+        flyer = ChannelFlyer(self._channel, self.name, self._clock)
+        self._flyer = flyer
+        self._watch(flyer.take, flyer.ended, flyer.abandon)
+        return flyer.begun
 
     def complete(self) -> PlanStatus:
         """End collecting with what is sampled now; the status ends when that has come.
 
         It fails where samples were lost, or acquisition ended; what came is there all the same.
         """
-        if self._flight is None:
+        if self._flyer is None:
             status = PlanStatus(f"completing {self._channel}")
             status.fail(NotAvailable(f"{self._channel}: complete comes after kickoff"))
             return status
-        return self._flight.complete()
+        return self._flyer.complete()
 
     def describe_collect(self) -> dict[str, DataKeys]:
         """Return what `collect_pages` returns: one stream, which has the name of the channel."""
@@ -228,8 +228,8 @@ class ChannelHandle:
 
     def collect_pages(self) -> Iterator[EventPage]:
         """Yield what has come and was not collected: value and platform time of every sample."""
-        if self._flight is not None:
-            yield from self._flight.pages()
+        if self._flyer is not None:
+            yield from self._flyer.pages()
 
     # How
 

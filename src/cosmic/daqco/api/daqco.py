@@ -32,9 +32,9 @@ from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, LimitSett
 from cosmic.daqco.hw.interface import BoardInfo
 from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.arguments import checked_class
+from cosmic.frame.background import OnResult
 from cosmic.frame.clock import Clock
 from cosmic.frame.declaration import Companion, Declared, command, newest, state, stream
-from cosmic.frame.errands import Told
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable, RecordingError
 from cosmic.frame.file_names import NameOption, directory_problem, space_left
 from cosmic.frame.network.application import remote_api
@@ -245,7 +245,7 @@ class Daqco(Declared):
         return self._application.buffer.subscribe(pieces.take)
 
     @override
-    def carry_out(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
+    def carry_out(self, action: Callable[[], T], told: OnResult[T], *, slow: bool = False) -> None:
         """Do what may have to wait for a line or a disk, without waiting in a window's thread.
 
         `told` takes the result, or the `CosmicError` that was raised. Where the boards are here it

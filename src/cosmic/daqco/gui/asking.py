@@ -8,7 +8,7 @@ from typing import Protocol, TypeVar
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
-from cosmic.frame.errands import Told
+from cosmic.frame.background import OnResult
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.relay import Relay
 
@@ -19,7 +19,7 @@ class CarriesOut(Protocol):
     """What an application offers to its widgets, as far as it matters here."""
 
     @abstractmethod
-    def carry_out(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
+    def carry_out(self, action: Callable[[], T], told: OnResult[T], *, slow: bool = False) -> None:
         """Do `action`; `told(result, error)` at its end, maybe in another thread."""
 
 
@@ -31,7 +31,7 @@ class Asking(QObject):
         self._daqco = daqco
         self._relay = Relay(self._on_told)
 
-    def ask(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
+    def ask(self, action: Callable[[], T], told: OnResult[T], *, slow: bool = False) -> None:
         """Have `action` done and call `told(result, error)`.
 
         At home that is before this returns, unless it is `slow`: then a thread waits for it.

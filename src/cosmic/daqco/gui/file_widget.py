@@ -22,7 +22,7 @@ from cosmic.daqco.api.files import NamedFile
 from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.core.recording_format import SUFFIX
 from cosmic.daqco.gui.asking import Asking
-from cosmic.frame.errands import Told
+from cosmic.frame.background import OnResult
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.file_names import NameOption, name_problem
 from cosmic.frame.gui.amounts import duration_text, size_text
@@ -339,7 +339,7 @@ class UDaqFileWidget(QWidget):
         self._ask(self._name_now, self._on_named, "The name is being completed")
 
     def _ask(
-        self, action: Callable[[], T], told: Told[T], what: str, *, slow: bool = False
+        self, action: Callable[[], T], told: OnResult[T], what: str, *, slow: bool = False
     ) -> None:
         self._error, self._waits = "", what
         self.refresh()

@@ -22,7 +22,7 @@ from cosmic.daqco.hw.sim_faults import BoardFaults
 from cosmic.daqco.hw.sim_signal import Signal
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
-from cosmic.frame.pace import Horizon, Worker
+from cosmic.frame.time_scale import Horizon, Worker
 
 logger = logging.getLogger(__name__)
 

@@ -125,7 +125,7 @@ class _Kind(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class _Wish:
+class _Request:
     kind: _Kind
     text: str = ""
 
@@ -161,7 +161,7 @@ class ConsoleThread(WorkerThread):
         self._on_interrupt = on_interrupt
         self._interrupter = Interrupter()
         self._output = OutputBuffer()
-        self._inbox: SimpleQueue[_Wish] = SimpleQueue()
+        self._inbox: SimpleQueue[_Request] = SimpleQueue()
         self._namespace: dict[str, object] = {
             "__name__": "__console__",
             "sleep": self._interrupter.sleep,
@@ -178,12 +178,12 @@ class ConsoleThread(WorkerThread):
 
     def submit(self, text: str) -> None:
         """Run `text`, one line or a whole block, after what was submitted before."""
-        self._inbox.put(_Wish(_Kind.RUN, text))
+        self._inbox.put(_Request(_Kind.RUN, text))
 
     def complete(self, text: str) -> None:
         """Ask for what `text` could become; answered by `completed` unless code runs."""
         if not self.busy:
-            self._inbox.put(_Wish(_Kind.COMPLETE, text))
+            self._inbox.put(_Request(_Kind.COMPLETE, text))
 
     def take_output(self) -> str:
         """Remove and return what was printed."""
@@ -192,7 +192,7 @@ class ConsoleThread(WorkerThread):
     def interrupt(self) -> None:
         """Break what runs, as Ctrl-C does, and what it waits for."""
         self._interrupter.request()
-        self._inbox.put(_Wish(_Kind.WAKE))
+        self._inbox.put(_Request(_Kind.WAKE))
         if self.busy and self._on_interrupt is not None:
             self._on_interrupt()
 
@@ -223,12 +223,12 @@ class ConsoleThread(WorkerThread):
         while not self.end_requested:
             self._obey(self._inbox.get())
 
-    def _obey(self, wish: "_Wish") -> None:
-        if wish.kind is _Kind.RUN and not self.end_requested:
-            self._run(wish.text)
-        elif wish.kind is _Kind.COMPLETE:
-            self._complete(wish.text)
-        elif wish.kind is _Kind.WAKE:
+    def _obey(self, request: "_Request") -> None:
+        if request.kind is _Kind.RUN and not self.end_requested:
+            self._run(request.text)
+        elif request.kind is _Kind.COMPLETE:
+            self._complete(request.text)
+        elif request.kind is _Kind.WAKE:
             self._forget_block()
 
     def _forget_block(self) -> None:
@@ -256,10 +256,10 @@ class ConsoleThread(WorkerThread):
         self._tell(READING)
         try:
             while not self._interrupter.wanted:
-                wish = self._inbox.get()
-                if wish.kind is _Kind.RUN:
-                    self._write(f"{wish.text}\n")
-                    return f"{wish.text}\n"
+                request = self._inbox.get()
+                if request.kind is _Kind.RUN:
+                    self._write(f"{request.text}\n")
+                    return f"{request.text}\n"
             self._interrupter.clear()
             raise KeyboardInterrupt
         finally:

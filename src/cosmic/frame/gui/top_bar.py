@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 from cosmic.frame.gui.build import named, push_button, restyle, tight_row
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.clearance_meter import Clearance, ClearanceMeter
-from cosmic.frame.gui.controls_sign import ControlsSign
+from cosmic.frame.gui.controls_indicator import ControlsIndicator
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.state_badge import StateBadge
 from cosmic.frame.gui.stop_button import StopButton
@@ -128,7 +128,7 @@ class TopBar(QWidget):
         self._title.setFont(ui_font(LARGE_PX, bold=True))
         self._simulated = Chip("SIMULATED", "simulated", "No hardware is driven: this is the twin")
         self._modes = ModeSelector()
-        self._controls = ControlsSign()
+        self._controls = ControlsIndicator()
         self._clearance = ClearanceMeter()
         self._no_model = Chip(f"▲ {NO_COLLISION_MODEL}", "warning")
         self._no_model.setToolTip(
@@ -240,7 +240,7 @@ class TopBar(QWidget):
         self._modes.set_available(name, why_not)
 
     @property
-    def controls(self) -> ControlsSign:
+    def controls(self) -> ControlsIndicator:
         """Who commands the movements, and what the operator can do about it."""
         return self._controls
 

@@ -7,8 +7,8 @@ from typing import Final
 
 from typing_extensions import override
 
+from cosmic.frame.background import BackgroundJobs
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errands import Errands
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.events import Event, notify
 from cosmic.frame.failure import FailurePolicy
@@ -78,7 +78,7 @@ class ClientSideConnection(WorkerThread):
         self._presence = Presence(station, here=False, why="not connected yet")
         self._presence_changed: Event[Presence] = Event()
         self._tasks = RemoteTasks(self._cancel_task)
-        self._errands = Errands(f"cancels at {station}", policy)
+        self._background = BackgroundJobs(f"cancels at {station}", policy)
         self._session = ClientSession(station, name, policy, clock, self._tasks.on_message)
         self._incoming: list[Incoming] = []
         self._closed = False
@@ -180,8 +180,8 @@ class ClientSideConnection(WorkerThread):
         """As `Transport.close`."""
         self.request_end()
         self.join()
-        self._errands.request_end()
-        self._errands.join()
+        self._background.request_end()
+        self._background.join()
         with self._lock:
             if self._closed:
                 return
@@ -276,7 +276,7 @@ class ClientSideConnection(WorkerThread):
         if may_wait_here():
             self._order(Order.CANCEL, number)
         else:
-            self._errands.do(lambda: self._order(Order.CANCEL, number), lambda *_: None)
+            self._background.do(lambda: self._order(Order.CANCEL, number), lambda *_: None)
 
     def _note_lease(self, *, holds: bool) -> None:
         self._lease_orders += 1

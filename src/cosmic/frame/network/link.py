@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from typing_extensions import override
 
+from cosmic.frame.background import BackgroundJobs
 from cosmic.frame.clock import WALL
 from cosmic.frame.declaration import (
     UNKNOWN,
@@ -18,7 +19,6 @@ from cosmic.frame.declaration import (
     StreamDeclaration,
     declaration_of,
 )
-from cosmic.frame.errands import Errands
 from cosmic.frame.errors import CosmicError, NotAvailable, ProtocolError
 from cosmic.frame.events import Event, Unsubscribe, notify
 from cosmic.frame.failure import FailurePolicy
@@ -239,8 +239,8 @@ class ApplicationLink:
         self.policy = policy
         self._transport = transport
         self._name = name
-        self._errands = Errands(f"{name} errands", policy)
-        self._ends = Errands(f"{name} ends", policy)
+        self._background = BackgroundJobs(f"{name} background", policy)
+        self._ends = BackgroundJobs(f"{name} ends", policy)
         self._keeper = _Keeper(f"{name} elsewhere", self._look, policy)
         self._lock = Lock()
         self._start = ""
@@ -341,7 +341,7 @@ class ApplicationLink:
         """Use the station no more; there everything goes on. Any state."""
         self.let_go()
         self._end_presence()
-        threads = (self._keeper, self._errands, self._ends)
+        threads = (self._keeper, self._background, self._ends)
         for thread in threads:
             thread.request_end()
         for thread in threads:
@@ -418,7 +418,7 @@ class ApplicationLink:
             if error is not None:
                 self._note_refusal(address, str(error))
 
-        self._errands.do(lambda: self._asked_now(address, command, arguments), told)
+        self._background.do(lambda: self._asked_now(address, command, arguments), told)
 
     def _begun_aside(
         self, address: Address, command: CommandDeclaration, arguments: dict[str, object]
@@ -434,7 +434,7 @@ class ApplicationLink:
                 self._note_refusal(address, str(error or ""))
                 task.fail(error or ProtocolError(f"{command.name} began nothing"))
 
-        self._errands.do(lambda: self._asked_now(address, command, arguments), told)
+        self._background.do(lambda: self._asked_now(address, command, arguments), told)
         return task
 
     def _followed(self, begun: RemoteTask) -> Operation[object]:
@@ -450,7 +450,7 @@ class ApplicationLink:
 
     def aside(self, action: Callable[[], Any], told: Callable[[Any, Any], object]) -> None:
         """Do something in a thread that may wait for the line, and tell how it ended."""
-        self._errands.do(action, told)
+        self._background.do(action, told)
 
     def _asked_now(
         self, address: Address, command: CommandDeclaration, arguments: dict[str, object]
@@ -506,7 +506,7 @@ class ApplicationLink:
             with self._lock:
                 self._asked.discard(key)
 
-        self._errands.do(lambda: self._ask(key, address, command, arguments), told)
+        self._background.do(lambda: self._ask(key, address, command, arguments), told)
 
     # What the station tells
 

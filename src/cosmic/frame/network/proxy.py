@@ -13,9 +13,9 @@ from typing import Any, Final, TypeVar, cast
 from typing_extensions import override
 
 from cosmic.frame.arguments import checked
+from cosmic.frame.background import OnResult, do_and_report
 from cosmic.frame.clock import Clock
 from cosmic.frame.declaration import CommandDeclaration, Declared, declaration_of
-from cosmic.frame.errands import Told, do_and_tell
 from cosmic.frame.network.link import Address, ApplicationLink
 from cosmic.frame.threads import may_wait_here
 
@@ -68,10 +68,10 @@ class Proxied(Declared):
         return self._link.missed
 
     @override
-    def carry_out(self, action: Callable[[], T], told: Told[T], *, slow: bool = False) -> None:
+    def carry_out(self, action: Callable[[], T], told: OnResult[T], *, slow: bool = False) -> None:
         del slow  # everything may be
         if may_wait_here():
-            do_and_tell(action, told)
+            do_and_report(action, told)
         else:
             self._link.aside(action, told)
 

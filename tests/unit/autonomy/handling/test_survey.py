@@ -101,7 +101,7 @@ def test_one_that_was_given_up_is_not_chosen_again():
     bench.shared.skipped = list(bench.shared.candidates)
     look(bench, [Seen(20.0, -15.0), Seen(-1500.0, 900.0)])  # type: ignore[list-item]
     assert len(bench.shared.candidates) == 1
-    assert bench.shared.skip_reasons == {survey.GIVEN_UP: 1}
+    assert bench.shared.skip_reasons == {survey.SKIPPED: 1}
 
 
 def test_one_that_was_measured_and_fell_is_known_again_wherever_it_lies():

@@ -119,7 +119,7 @@ CARRYING_UM: Final = 8.0
 """Way within which something may happen to a fibre that is lifted or will be lost."""
 
 
-class Hands:
+class GripperContacts:
     """The grippers' side of the workplace.
 
     Parameters

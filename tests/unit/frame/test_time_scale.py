@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock, ManualClock, RatedClock
 from cosmic.frame.inbox import Inbox
-from cosmic.frame.pace import Pace, PacedHorizon, PacedWorker
+from cosmic.frame.time_scale import ScaledHorizon, ScaledWorker, TimeScale
 
 RATE = 20.0
 
@@ -20,18 +20,18 @@ class Bench:
 
     def __init__(self) -> None:
         self.wall_s = 100.0
-        self.pace = Pace(RATE, lambda: self.wall_s)
-        self.workers: list[PacedWorker] = []
+        self.time_scale = TimeScale(RATE, lambda: self.wall_s)
+        self.workers: list[ScaledWorker] = []
 
-    def worker(self, *, leads: bool = False) -> PacedWorker:
-        self.workers.append(PacedWorker(self.pace, leads=leads))
+    def worker(self, *, leads: bool = False) -> ScaledWorker:
+        self.workers.append(ScaledWorker(self.time_scale, leads=leads))
         return self.workers[-1]
 
     def passes(self, wall_s: float) -> float:
         """Return how much time passes in so much wall time."""
-        before_s = self.pace.now_s()
+        before_s = self.time_scale.now_s()
         self.wall_s += wall_s
-        return self.pace.now_s() - before_s
+        return self.time_scale.now_s() - before_s
 
 
 @pytest.fixture
@@ -41,7 +41,7 @@ def bench() -> Bench:
 
 def test_without_a_procedure_time_runs_at_its_rate_whoever_works(bench: Bench) -> None:
     bench.worker().busy()
-    bench.pace.begin_wait("somebody", threading.Condition(), 1.0)
+    bench.time_scale.begin_wait("somebody", threading.Condition(), 1.0)
     assert bench.passes(2.0) == pytest.approx(40.0)
 
 
@@ -73,15 +73,15 @@ def test_all_who_work_are_waited_for_while_a_procedure_is_under_way(bench: Bench
 def test_whoever_wakes_late_is_waited_for(bench: Bench) -> None:
     bench.worker(leads=True)
     condition = threading.Condition()
-    assert bench.pace.begin_wait("a", condition, 10.0) == pytest.approx(0.5)
-    bench.pace.begin_wait("b", condition, 30.0)
+    assert bench.time_scale.begin_wait("a", condition, 10.0) == pytest.approx(0.5)
+    bench.time_scale.begin_wait("b", condition, 30.0)
     assert bench.passes(1.5) == pytest.approx(10.0 + 1.0)  # due after 0.5 s of the wall
-    bench.pace.end_wait("a")
+    bench.time_scale.end_wait("a")
     assert bench.passes(0.5) == pytest.approx(10.0)
 
 
 def test_a_wait_for_what_has_passed_is_none(bench: Bench) -> None:
-    assert bench.pace.begin_wait("a", threading.Condition(), 0.0) == 0.0
+    assert bench.time_scale.begin_wait("a", threading.Condition(), 0.0) == 0.0
     bench.worker(leads=True)
     assert bench.passes(1.0) == pytest.approx(RATE)
 
@@ -90,15 +90,15 @@ def test_who_waits_while_others_work_is_woken_at_their_end(bench: Bench) -> None
     bench.worker(leads=True)
     working, woken = bench.worker(), list[str]()
 
-    class Told(threading.Condition):
+    class OnResult(threading.Condition):
         @override
         def notify_all(self) -> None:
             woken.append("told")
             super().notify_all()
 
-    condition = Told()
+    condition = OnResult()
     working.busy()
-    assert bench.pace.begin_wait("a", condition, 0.015) == pytest.approx(0.015)
+    assert bench.time_scale.begin_wait("a", condition, 0.015) == pytest.approx(0.015)
     with condition:
         working.idle()  # it holds the lock itself, as many do
     assert woken == ["told"]
@@ -109,7 +109,7 @@ def test_who_waits_while_others_work_is_woken_at_their_end(bench: Bench) -> None
 
 
 def test_the_time_waits_at_the_nearest_horizon_and_makes_up_for_nothing(bench: Bench) -> None:
-    near, far = PacedHorizon(bench.pace), PacedHorizon(bench.pace)
+    near, far = ScaledHorizon(bench.time_scale), ScaledHorizon(bench.time_scale)
     near.move_to(10.0)
     far.move_to(30.0)
     assert bench.passes(2.0) == pytest.approx(10.0)
@@ -124,55 +124,55 @@ def test_the_time_waits_at_the_nearest_horizon_and_makes_up_for_nothing(bench: B
 
 def test_a_horizon_behind_the_time_takes_none_of_it_back(bench: Bench) -> None:
     bench.passes(1.0)
-    now_s = bench.pace.now_s()
-    PacedHorizon(bench.pace).move_to(now_s - 5.0)
+    now_s = bench.time_scale.now_s()
+    ScaledHorizon(bench.time_scale).move_to(now_s - 5.0)
     assert bench.passes(1.0) == 0.0
 
 
 def test_who_hangs_stops_nobody_for_ever(bench: Bench) -> None:
-    hanging, other = PacedHorizon(bench.pace), PacedHorizon(bench.pace)
+    hanging, other = ScaledHorizon(bench.time_scale), ScaledHorizon(bench.time_scale)
     hanging.move_to(1.0)
     other.move_to(500.0)
     assert sum(bench.passes(0.5) for _ in range(10)) == pytest.approx(1.0)
     assert bench.passes(1.0) + bench.passes(1.0) >= 20.0  # it goes on without it
-    hanging.move_to(bench.pace.now_s() + 1.0)  # there it is again, and is waited for
+    hanging.move_to(bench.time_scale.now_s() + 1.0)  # there it is again, and is waited for
     assert bench.passes(2.0) == pytest.approx(1.0)
 
 
 def test_who_waits_is_woken_when_the_time_goes_on_and_does_not_spin_before(bench: Bench) -> None:
     woken = list[str]()
 
-    class Told(threading.Condition):
+    class OnResult(threading.Condition):
         @override
         def notify_all(self) -> None:
             woken.append("told")
             super().notify_all()
 
-    horizon = PacedHorizon(bench.pace)
+    horizon = ScaledHorizon(bench.time_scale)
     horizon.move_to(1.0)
     bench.passes(1.0)
-    assert bench.pace.begin_wait("a", Told(), 1.001) > 0.01
+    assert bench.time_scale.begin_wait("a", OnResult(), 1.001) > 0.01
     horizon.move_to(3.0)
     assert woken == ["told"]
 
 
 def test_the_rate_reached_is_told(bench: Bench) -> None:
-    horizon = PacedHorizon(bench.pace)
+    horizon = ScaledHorizon(bench.time_scale)
     for _ in range(20):
         bench.passes(0.2)
-    assert bench.pace.reached == pytest.approx(RATE)
+    assert bench.time_scale.reached == pytest.approx(RATE)
     for _ in range(20):
-        horizon.move_to(bench.pace.now_s() + 1.0)
+        horizon.move_to(bench.time_scale.now_s() + 1.0)
         bench.passes(0.2)
-    assert bench.pace.reached == pytest.approx(5.0)
+    assert bench.time_scale.reached == pytest.approx(5.0)
 
 
 @pytest.mark.parametrize("rate", [0.5, 1.0])
 def test_a_clock_that_waits_runs_at_its_rate_below_that_of_the_wall_too(rate: float) -> None:
     wall_s = [0.0]
-    pace = Pace(rate, lambda: wall_s[0])
+    time_scale = TimeScale(rate, lambda: wall_s[0])
     wall_s[0] = 10.0
-    assert pace.now_s() == pytest.approx(10.0 * rate)
+    assert time_scale.now_s() == pytest.approx(10.0 * rate)
 
 
 def test_only_a_clock_that_was_told_so_waits() -> None:

@@ -8,11 +8,11 @@ from cosmic.frame.job_queue import JobQueue
 from cosmic.frame.operation import Operation
 
 T = TypeVar("T")
-Told = Callable[[T | None, CosmicError | None], object]
+OnResult = Callable[[T | None, CosmicError | None], object]
 """Takes the result of something, or why there is none."""
 
 
-def do_and_tell(action: Callable[[], T], told: Told[T]) -> None:
+def do_and_report(action: Callable[[], T], told: OnResult[T]) -> None:
     """Do `action` now and tell its result, or the `CosmicError` that it raised."""
     try:
         result = action()
@@ -22,10 +22,10 @@ def do_and_tell(action: Callable[[], T], told: Told[T]) -> None:
         told(result, None)
 
 
-class Errands(JobQueue):
+class BackgroundJobs(JobQueue):
     """Does one after the other what a window must not wait for."""
 
-    def do(self, action: Callable[[], T], told: Told[T]) -> None:
+    def do(self, action: Callable[[], T], told: OnResult[T]) -> None:
         """Have `action` done and `told` how it ended; returns at once, any thread."""
 
         def tell(ended: Operation[T]) -> None:

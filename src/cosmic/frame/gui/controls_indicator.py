@@ -28,7 +28,7 @@ class ControlAction:
     tip: str
 
 
-class ControlsSign(QWidget):
+class ControlsIndicator(QWidget):
     """A chip with a button for each thing that can be done about it; decides nothing itself."""
 
     action_requested = Signal(str)

@@ -68,7 +68,7 @@ class _Wait:
     look_wall_s: float
 
 
-class Pace:
+class TimeScale:
     """A time that runs `rate` times as fast as the wall, and never slower than the smaller of both.
 
     It does not run beyond the nearest horizon, and does not make up for it later. After
@@ -210,22 +210,22 @@ def _wake(waits: Iterable[_Wait]) -> None:
             wait.condition.release()
 
 
-class PacedHorizon(Horizon):
+class ScaledHorizon(Horizon):
     """A horizon of a `Pace`; it is none before it is moved for the first time."""
 
-    def __init__(self, pace: Pace) -> None:
-        self._pace = pace
+    def __init__(self, time_scale: TimeScale) -> None:
+        self._time_scale = time_scale
 
     @override
     def move_to(self, until_s: float) -> None:
-        self._pace.move_horizon(self, until_s)
+        self._time_scale.move_horizon(self, until_s)
 
     @override
     def close(self) -> None:
-        self._pace.move_horizon(self, None)
+        self._time_scale.move_horizon(self, None)
 
 
-class PacedWorker(Worker):
+class ScaledWorker(Worker):
     """A worker that a `Pace` waits for.
 
     Parameters
@@ -234,12 +234,12 @@ class PacedWorker(Worker):
         It is why the time is bound to the wall; see `Pace`.
     """
 
-    def __init__(self, pace: Pace, *, leads: bool) -> None:
-        self._pace = pace
+    def __init__(self, time_scale: TimeScale, *, leads: bool) -> None:
+        self._time_scale = time_scale
         self._leads = leads
         self._lock = threading.Lock()
         self._busy = self._closed = False
-        pace.change(leading=leads)
+        time_scale.change(leading=leads)
 
     @override
     def busy(self) -> None:
@@ -253,11 +253,11 @@ class PacedWorker(Worker):
     def close(self) -> None:
         with self._lock:
             if not self._closed:
-                self._pace.change(busy=-self._busy, leading=-self._leads)
+                self._time_scale.change(busy=-self._busy, leading=-self._leads)
             self._closed, self._busy = True, False
 
     def _become(self, *, busy: bool) -> None:
         with self._lock:
             if not self._closed and busy is not self._busy:
                 self._busy = busy
-                self._pace.change(busy=1 if busy else -1)
+                self._time_scale.change(busy=1 if busy else -1)

@@ -33,7 +33,7 @@ def samples_of(chunk: DataChunk, channel: str, since_s: float) -> Values:
     return values
 
 
-class ChannelFlight:
+class ChannelFlyer:
     """Collects a channel from now on; `take` in the acquisition thread, the rest in any.
 
     Attributes
