@@ -85,7 +85,7 @@ def fill_log() -> None:
 
 
 def look(bench: Stand, moves: int) -> Look:
-    """Look at everything; the axes stand, so that what is under way does not count."""
+    """Look at everything; the axes stand, so that what is running does not count."""
     with suppress(TimeoutError):
         wait_until(lambda: not any(axis.details.in_motion for axis in bench.mico), timeout_s=25.0)
     time.sleep(0.3)

@@ -192,6 +192,6 @@ def test_without_a_limit_a_campaign_outlives_an_overrun(
 
     assert run(tmp_path, monkeypatch, strike, armed=False) == 3
     told = capsys.readouterr().err
-    assert "acquisition goes on after an overrun: " in told
+    assert "acquisition restarted after an overrun: " in told
     assert "that was enough" in told
     check_marked_once(tmp_path / "all.h5")

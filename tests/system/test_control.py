@@ -267,7 +267,7 @@ def test_a_new_set_point_beyond_the_limits_is_refused_and_the_old_one_stays(far:
         assert loop.set_point == 50.0
         assert loop.limits == (-60.0, 60.0)
         assert loop.running
-        with pytest.raises(cosmic.NotAvailable, match="has it already"):
+        with pytest.raises(cosmic.NotAvailable, match="already uses it"):
             far.hold(20.0)
         with pytest.raises(cosmic.DeviceTimeout, match="was not held"):
             loop.wait_settled(timeout_s=0.05)

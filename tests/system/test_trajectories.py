@@ -405,7 +405,7 @@ def test_one_trajectory_runs_at_a_time(mico: Mico) -> None:
     player = mico.trajectories.run(written("wait 500 s\n"), wait=False)
     with pytest.raises(NotAvailable, match="running"):
         mico.trajectories.run(written("wait 1 s\n"))
-    with pytest.raises(NotAvailable, match="under way"):
+    with pytest.raises(NotAvailable, match="is running"):
         mico.initialise()
     player.cancel()
     with pytest.raises(MoveCancelled):

@@ -253,7 +253,7 @@ def test_a_cancelled_calibration_ends_at_once_and_keeps_what_was_known(lab: Lab)
     lower(lab)
     before = lab.rig.vico.calibrated
     task = lab.rig.vico.calibrate_stage("right")
-    with pytest.raises(cosmic.NotAvailable, match="under way"):
+    with pytest.raises(cosmic.NotAvailable, match="is running"):
         lab.rig.vico.camera().click_to_move((900.0, 600.0), "right")
     wait_until(lambda: "place" in task.progress.text)
     task.cancel()

@@ -139,7 +139,9 @@ class PlatformTransform(CoordinateTransform):
         tool = self._tool(what)
         running = self._vico.running_task
         if running is not None and not running.done:
-            raise NotAvailable(f"{running.title} is under way; click to move when it has ended")
+            raise NotAvailable(
+                f"{running.title} is running; wait until it has ended, then click again"
+            )
         tip = tip_um(tool, self.positions())
         if tip is None:
             raise NotAvailable(f"{what}: its position is unknown; initialise the platform")

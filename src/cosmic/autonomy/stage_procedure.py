@@ -134,7 +134,7 @@ class StageProcedure:
         after = self._image(self._clock.now_s())
         if abs(self._zoom(after) - zoom) > 0.5:
             raise CalibrationRefused(
-                "calibration: the zoom was moved meanwhile; leave it, and try again"
+                "calibration: the zoom changed during the measurement; leave it and try again"
             )
         return Plane(
             zoom, float(begun[2]), fit_map(sightings), datetime.now(UTC).replace(microsecond=0)
@@ -169,7 +169,7 @@ class StageProcedure:
         scale = first.circumstances.scale_um_px
         if scale is None:
             raise NotAvailable(
-                f"{self._camera}: about how large a pixel is must be known; give scale_um_px"
+                f"{self._camera}: the approximate pixel size is unknown; set scale_um_px"
             )
         task.report(0.02, f"looking for {self._tool.shown}")
         ahead = np.array(self._tool.forward) / math.hypot(*self._tool.forward)
@@ -184,7 +184,7 @@ class StageProcedure:
             for one, other in pairwise(greys)
         ]
         if strips[0] is None or strips[1] is None:
-            raise NotAvailable(self._unseen("nothing like it moved on the image"))
+            raise NotAvailable(self._unseen("nothing moved in the image as the tool did"))
         back_px = strips[1] - strips[0]
         guess = self._similar(
             position_um - 2.0 * step_um, strips[1] + 0.5 * back_px, step_um, back_px

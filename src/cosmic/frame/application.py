@@ -69,4 +69,4 @@ class CosmicApplicationBase(WorkerThread):
         """Leave the hardware safe, end every thread and release what was opened; any state."""
         self.request_end()
         if not self.join():
-            logger.error("%s does not end: its thread still runs", self.title)
+            logger.error("%s did not end: its thread is still running", self.title)

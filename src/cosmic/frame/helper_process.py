@@ -256,7 +256,7 @@ class HelperProcess:
         try:
             self._pipe.send_bytes(encode((number, kind, payload, limit_s)))
         except OSError as exc:
-            raise HelperFaultError(f"it takes no questions ({type(exc).__name__})") from exc
+            raise HelperFaultError(f"it accepts no requests ({type(exc).__name__})") from exc
 
     def take(self, wait_s: float) -> Reply | None:
         """Return the next answer; None when there is none within `wait_s`.

@@ -175,4 +175,4 @@ class JobQueue(WorkerThread):
 
 
 def _cancelled(operation: Operation[T]) -> OperationCancelled:
-    return OperationCancelled(f"{operation.title} was cancelled before it began")
+    return OperationCancelled(f"{operation.title} was cancelled before it started")

@@ -54,7 +54,7 @@ class TaskApplication(CosmicApplicationBase):
         """
         running = self._running_task
         if running is not None and not running.done:
-            raise NotAvailable(f"{running.title} is under way; cancel it or wait for its end")
+            raise NotAvailable(f"{running.title} is running; cancel it or wait for its end")
         if not self.isRunning() or self.end_requested:
             raise NotAvailable(f"{self.title} is closed")
         task = Task(title)

@@ -284,7 +284,7 @@ def test_rate_and_channels_are_locked_while_recording_and_it_says_why(qtbot, dia
 def test_a_board_that_is_gone_is_told(qtbot, port):
     port.known = ()
     dialog = shown(qtbot, port)
-    assert "there is no such board" in dialog.tree.topLevelItem(0).text(0)
+    assert "not connected" in dialog.tree.topLevelItem(0).text(0)
     assert rows(dialog)[0][1] == "force"
 
 

@@ -241,7 +241,7 @@ def test_what_cannot_be_broken_is_left_behind_in_time(
     panel.run("gate.wait()")
     wait_for(qtbot, panel, "gate.wait()\n")
     assert not panel.shut_down(timeout_s=0.2)
-    assert "does not end" in caplog.text
+    assert "did not end" in caplog.text
     assert sys.stdout is before
     gate.set()
     assert panel.shut_down()

@@ -60,9 +60,9 @@ def test_what_is_calibrated_is_listed_with_its_age(button, camera):
 def test_a_refusal_is_told(button, camera):
     told = []
     button.told.connect(told.append)
-    camera.refuse = "autofocus is under way"
+    camera.refuse = "autofocus is running"
     actions(button)["Move left gripper"].trigger()
-    assert told[-1].endswith("autofocus is under way")
+    assert told[-1].endswith("autofocus is running")
 
 
 def test_without_tools_the_button_is_off_and_says_why(button, camera):

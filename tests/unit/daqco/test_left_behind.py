@@ -177,7 +177,7 @@ def test_repair_refuses_a_file_in_use(
     before = path.read_bytes()
     for more in ([], ["--ended"]):
         assert main(["repair", *more, str(path)]) == 1
-        assert "is in use; it was left alone" in capsys.readouterr().err
+        assert "is in use; it was not changed" in capsys.readouterr().err
     assert path.read_bytes() == before
 
 

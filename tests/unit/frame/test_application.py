@@ -82,4 +82,4 @@ def test_an_application_that_does_not_end_is_said_so(
 
     monkeypatch.setattr(application, "join", never)
     application.shut_down()
-    assert "Counting does not end" in caplog.text
+    assert "Counting did not end" in caplog.text

@@ -227,7 +227,7 @@ def test_an_initialisation_can_be_cancelled():
     with mico(("LLN",), instant=False) as (rig, controller):
         task = rig.initialise(wait=False)
         wait_until(lambda: len(controller.of("reference")) == 1)
-        with pytest.raises(cosmic.NotAvailable, match="under way"):
+        with pytest.raises(cosmic.NotAvailable, match="is running"):
             rig.initialise()
         task.cancel()
         with pytest.raises(cosmic.MoveCancelled):

@@ -305,5 +305,5 @@ def test_a_movement_from_elsewhere_stops_when_whoever_commanded_it_is_gone(make:
     wait_until(lambda: not bench.thread.state.moving)
     assert bench.true_counts(FOCUS) < 7800
     with carrying_out(Call(Caller("vision", "secret"), DeadMan(pulse, 5.0))):
-        assert "not begun: vision is gone" in str(failure(bench.thread.home()))
+        assert "not started: vision is gone" in str(failure(bench.thread.home()))
     assert not bench.thread.state.moving

@@ -128,7 +128,7 @@ def test_what_is_gone_is_lost_and_found_again_when_it_is_back() -> None:
     track = tracker.follow(empty)
     assert track.state is TrackState.LOST
     assert track.position_px is None
-    assert "nothing there looks like it" in track.reason
+    assert "no match was found" in track.reason
     assert tracker.follow(scene((20.0, 0.0))).state is TrackState.FOUND
 
 

@@ -150,7 +150,7 @@ class ProcedureTree(QTreeWidget):
 
     @property
     def front(self) -> str:
-        """Name of the operation that is under way, empty when none is."""
+        """Name of the operation that is running, empty when none is."""
         return self._items[self._front].text(PART) if self._front is not None else ""
 
     def row(self, path: Path) -> tuple[str, ...]:

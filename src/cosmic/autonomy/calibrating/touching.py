@@ -38,7 +38,10 @@ class TouchJaw(Calibrated):
     def measure(self, work: HandlingContext) -> Steps:
         settings = work.settings.calibration
         if PROBE not in work.calibration.made:
-            raise NotAvailable("see probe and gripper on one image before they touch")
+            raise NotAvailable(
+                "probe and gripper must be in one image before they touch; move them closer "
+                "together or zoom out"
+            )
         if not work.daqco.running:
             work.daqco.start()
         mark_gap_unknown(work)
@@ -121,7 +124,7 @@ class TouchJaw(Calibrated):
                 return 0.5 * (before + here)
             before = here
         raise CalibrationRefused(
-            f"nothing was felt within {abs(before - begun):.0f} um of where the image shows the "
+            f"no contact within {abs(before - begun):.0f} um of where the image shows the "
             "jaw; check the sensor, and that the jaws are closed"
         )
 
@@ -135,7 +138,7 @@ class TouchJaw(Calibrated):
         if not abs(apart) <= settings.touch_off_um:
             raise CalibrationRefused(
                 f"touch and image disagree by {apart:.1f} um, at most {settings.touch_off_um:g} "
-                "um are allowed; look whether a tip is bent, and calibrate the image anew"
+                "um are allowed; check for a bent tip, and calibrate the camera again"
             )
         work.calibration.probe_off_um = off_x, felt_y
         values = {"off_y_um": felt_y, "seen_y_um": seen_y, "apart_um": apart, "spread_um": spread}

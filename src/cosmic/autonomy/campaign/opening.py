@@ -134,13 +134,13 @@ def _store(
 def _check_same(info: CampaignInfo, recipe: Recipe, folder: Path, host: CampaignHost) -> None:
     if info.recipe_text != recipe.text:
         raise CampaignError(
-            f"{folder} holds a campaign by another recipe than {recipe.path}: "
-            "go on with that one, or name another folder"
+            f"{folder} holds a campaign by another recipe than {recipe.path}: resume with "
+            "that recipe, or name another folder"
         )
     if info.hardware == host.hardware == TWIN and info.seed != host.seed:
         raise CampaignError(
             f"{folder} holds a campaign on a twin with seed {info.seed}, and this one has seed "
-            f"{host.seed}: its fibres are others. Go on with seed {info.seed}, or name another "
+            f"{host.seed}: its fibres differ. Resume with seed {info.seed}, or name another "
             "folder"
         )
 

@@ -244,7 +244,7 @@ def _summary(data: ReportData) -> list[tuple[str, str]]:
             f"{now.done}: {now.good} good, {now.doubtful} measured but not trusted, "
             f"{now.failed} failed",
         ),
-        ("Cut off by an end of the program", str(now.interrupted)),
+        ("Interrupted by a program exit", str(now.interrupted)),
         ("Good fibres an hour", number(now.good_per_hour)),
         ("Success", f"{number(now.success_percent)} %"),
         ("Median time of a fibre", duration(now.cycle_s)),

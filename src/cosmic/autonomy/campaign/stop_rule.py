@@ -58,7 +58,7 @@ class StopRule:
         if rules.good is not None and now.good >= rules.good:
             return f"{now.good} good fibres"
         if rules.time_s is not None and now.elapsed_s >= rules.time_s:
-            return f"{now.elapsed_s:.0f} s are over"
+            return f"{now.elapsed_s:.0f} s have passed"
         found = now.mean.precision_percent
         precise = rules.precision_percent is not None and found <= rules.precision_percent
         if precise and now.mean.count >= rules.least:

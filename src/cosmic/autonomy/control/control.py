@@ -240,7 +240,9 @@ class Control:
                 raise NotAvailable("the platform is closed")
             other = self._loops.get(sink.name)
             if other is not None and other.running:
-                raise NotAvailable(f"{sink.name}: a control loop has it already; stop that first")
+                raise NotAvailable(
+                    f"{sink.name}: a control loop already uses it; stop that loop first"
+                )
             if other is not None:
                 other.join()
             loop.begin()

@@ -125,7 +125,7 @@ class ControlLoop(WorkerThread):
         self._ending: ControlEnding | None = None
         self._error: CosmicError | None = None
         self._over = Operation[ControlEnding](f"the loop of {source.name}")
-        self._real_time = "it has not begun"
+        self._real_time = "it has not started"
         self._begun_wall_s = 0.0
         self._zero = 0.0
         self.state = ControlState.STARTING

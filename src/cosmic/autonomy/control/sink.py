@@ -47,7 +47,7 @@ class AxisSink:
         self._manager = mico.application.manager
         state = self._axis.details
         if not class_for(state.kind, state.positioner).has_sensor:
-            raise NotAvailable(f"{axis}: it has no sensor; a loop needs to know where it is")
+            raise NotAvailable(f"{axis}: it has no sensor; a loop needs a measured position")
         if not (0.0 < speed < math.inf and 0.0 < travel < math.inf):
             text = f"{axis}: speed and travel of a loop must be numbers above 0"
             raise refusal(refuse(Reason.NOT_FINITE, text, axis=axis))
@@ -101,7 +101,7 @@ class AxisSink:
             raise StoppedError(refuse(Reason.STOPPED, text, axis=self.name))
         state = self._axis.details
         if state.in_motion:
-            raise NotAvailable(f"{self.name} is moving; wait until it stands")
+            raise NotAvailable(f"{self.name} is moving; wait until it is stationary")
         if state.position is None:
             raise NotAvailable(f"{self.name}: no position has been read yet")
         verdict = self._manager.check({self.name: MoveTo(state.position, state.unit)})
@@ -173,7 +173,7 @@ class AxisSink:
         return position is None or not abs(self._target - position) <= most
 
     def _taken(self) -> MoveCancelled:
-        return MoveCancelled(f"{self.name}: somebody else moves it")
+        return MoveCancelled(f"{self.name}: another command is moving it")
 
     def _send(self, target: float) -> None:
         with self._lock:

@@ -140,7 +140,7 @@ class ChannelSource(Source):
         """Take a chunk; acquisition thread."""
         if self._channel not in chunk.channels:
             gone = f"there is no channel {self._channel} any more: renamed, or switched off"
-            self._tell(ConfigError(f"{gone}; begin the loop anew with one there is"))
+            self._tell(ConfigError(f"{gone}; start the loop again with an existing channel"))
             return
         row = chunk.channels.index(self._channel)
         if chunk.scales[row].unit != self._unit:

@@ -375,7 +375,7 @@ class DaqcoApplication(TaskApplication):
             self._fail(str(error))
         else:
             failed, amount = self._core, lost_text(error.lost, self.rate_hz)
-            self.guard.trip_all(f"computer overloaded, {amount}: nobody saw them")
+            self.guard.trip_all(f"computer overloaded, {amount}: they were not processed")
             self._fail(str(error))
             self.recorder.note("overload", f"computer overloaded, {amount} ({error})")
             if self._restarts.take(WALL.now_s()):
@@ -395,7 +395,7 @@ class DaqcoApplication(TaskApplication):
             if failed is None or self._core is not failed or self.end_requested:
                 return
             self.start_acquisition()
-        logger.warning("acquisition goes on after an overrun: %s", amount)
+        logger.warning("acquisition restarted after an overrun: %s", amount)
 
     def _on_started_again(self, _result: None, error: CosmicError | None) -> None:
         if error is not None:

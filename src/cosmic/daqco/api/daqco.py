@@ -489,7 +489,7 @@ class Daqco(Declared):
         known = crossing is not None and math.isfinite(crossing.value)
         reason = crossing.text if crossing is not None else ""
         if not reason and limit.suspended:
-            reason = "not watched: nothing is acquired; armed again when acquisition starts"
+            reason = "not watched: acquisition is off; armed again when it starts"
         elif not reason and self.rate_hz < LOWEST_RATE_HZ:
             reason = f"limits are watched from {LOWEST_RATE_HZ:g} Hz on"
         reaction_ms = None

@@ -155,7 +155,7 @@ class LimitWatch(Companion):
         logger.error("DAQCo %s: %s", self._daqco.elsewhere, text[:500])
 
     def _trip_silent(self, limit: Limit) -> None:
-        why = self._daqco.away or "nothing comes from it"
+        why = self._daqco.away or "it sends nothing"
         text = f"the station that watches the limit of {limit.channel} is silent: {why}"
         now_s = self._daqco.clock.now_s()
         crossing = Crossing(limit.channel, -1, now_s, math.nan, math.nan, "", text)

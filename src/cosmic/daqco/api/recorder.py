@@ -242,7 +242,7 @@ class Recorder:
     def _forbid(self, settings: DaqcoSettings) -> None:
         if self.state.active and restarts(self._application.settings, settings):
             raise NotAvailable(
-                "rate and channels stay as they are while recording; stop the recording first"
+                "rate and channels cannot change while recording; stop the recording first"
             )
 
     # What is written

@@ -52,7 +52,7 @@ def fit_slope(positions: Values, values: Values, unit: str = "") -> Slope:
     way = positions - middle
     spread = float(way @ way)
     if not spread > 0.0:
-        raise RecordingError(f"a slope needs a way; all {count} samples lie at {middle:g}")
+        raise RecordingError(f"a slope needs travel; all {count} samples lie at {middle:g}")
     value = float(way @ values) / spread
     level = float(values.mean())
     residuals = values - level - value * way

@@ -116,7 +116,7 @@ def _broken(path: Path, exc: Exception) -> RecordingError:
 
 
 def _in_use(path: Path) -> Closing:
-    text = f"{path}: is in use; it was left alone. End the program that has it open"
+    text = f"{path}: is in use; it was not changed. Close the program that has it open"
     return Closing(Outcome.IN_USE, path, text)
 
 
@@ -179,7 +179,7 @@ def _close(path: Path, head: bytes, hold: FileHold) -> Closing:
     if lost:
         told += f", of which {lost} blocks are lost with the end of the file"
     if end < size:
-        told += f"; {(size - end) / 1e6:.1f} MB of room given back"
+        told += f"; {(size - end) / 1e6:.1f} MB of disk space released"
     return Closing(Outcome.CLOSED, path, told)
 
 

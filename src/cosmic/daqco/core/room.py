@@ -74,4 +74,4 @@ def cut(path: Path) -> None:
             if end < file.seek(0, os.SEEK_END):
                 file.truncate(end)
     except OSError as exc:  # zeros at the end of a file that is whole harm nobody
-        logger.info("%s: keeps the room that was taken ahead (%s)", path, exc)
+        logger.info("%s: keeps the preallocated space (%s)", path, exc)

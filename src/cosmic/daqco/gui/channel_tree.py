@@ -99,7 +99,7 @@ class ChannelTree(QTreeWidget):
         return self._heading(text)
 
     def _missing(self, board: str) -> QTreeWidgetItem:
-        return self._heading(f"{board}: ◆ there is no such board now")
+        return self._heading(f"{board}: ◆ this board is not connected")
 
     def _heading(self, text: str) -> QTreeWidgetItem:
         top = QTreeWidgetItem([text])

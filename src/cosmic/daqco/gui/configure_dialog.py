@@ -64,9 +64,9 @@ class UDaqConfigureDialog(FieldDialog):
         )
         self.highest = QLabel()
         self.tree = ChannelTree()
-        self.add = push_button("Add input", "Acquire another input of a board")
+        self.add = push_button("Add input", "Add an input of a board")
         self.add.setMenu(QMenu(self.add))
-        self.remove = push_button("Remove", "Acquire this input no more")
+        self.remove = push_button("Remove", "Remove this input")
         self.form = ChannelForm()
         self.message = ElidedLabel()
         self.buttons = button_box(Button.Apply | Button.Ok | Button.Cancel)
@@ -158,8 +158,8 @@ class UDaqConfigureDialog(FieldDialog):
         self.form.lock(reason)
         self.rate.setEnabled(not reason)
         for widget, tip in (
-            (self.add, "Acquire another input of a board"),
-            (self.remove, "Acquire this input no more"),
+            (self.add, "Add an input of a board"),
+            (self.remove, "Remove this input"),
         ):
             widget.setEnabled(not reason)
             widget.setToolTip(reason or tip)
@@ -238,8 +238,8 @@ class UDaqConfigureDialog(FieldDialog):
         highest = self._highest_hz()
         if not self.rate.value() <= highest:
             self.rate.refuse(
-                f"{self._draft.active} active channels allow at most {highest:g} Hz: "
-                "take a lower rate or fewer channels"
+                f"{self._draft.active} active channels allow at most {highest:g} Hz: choose a "
+                "lower rate or fewer channels"
             )
             return False
         self._draft.rate_hz, self._draft.refresh_hz = self.rate.value(), self.refresh.value()

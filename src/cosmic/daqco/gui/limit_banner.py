@@ -41,7 +41,7 @@ class LimitBanner(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._channel = ""
         self.text = ElidedLabel()
-        self.reset = named(push_button("Reset limit", "Forget that it was crossed"), "resetLimit")
+        self.reset = named(push_button("Reset limit", "Reset the limit"), "resetLimit")
         self.reset.clicked.connect(lambda: self.reset_requested.emit(self._channel))
         row = QHBoxLayout(self)
         row.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX // 2)

@@ -37,9 +37,9 @@ class LimitDialog(FieldDialog):
             ValueField("Low limit", empty=True),
             ValueField("High limit", empty=True),
         )
-        self.hysteresis = ValueField("How far the value must come back before a reset")
+        self.hysteresis = ValueField("Hysteresis: how far the value must return before a reset")
         self.armed = tipped(QCheckBox("Armed"), "Crossing the limit stops every actuator at once")
-        self.remove = push_button("Remove limit", "Watch this channel no more")
+        self.remove = push_button("Remove limit", "Disarm the limit of this channel")
         self.message = QLabel()
         self.message.setWordWrap(True)
         self.buttons = button_box(Button.Ok | Button.Cancel)

@@ -43,7 +43,7 @@ def reading(limit: DaqLimit, unit: str, value: float | None) -> LimitReading:
     if not given.armed:
         why = limit.reason or "Arm it in Acquisition > Limits…"
         word = "NOT WATCHED" if limit.reason else "DISARMED"
-        return LimitReading(f"▲ {name}: {word}", "warning", f"Nothing stops at it. {why}")
+        return LimitReading(f"▲ {name}: {word}", "warning", f"It stops nothing. {why}")
     if value is None:
         return LimitReading(f"■ {name}: NO DATA", "alarm", "The channel is not measured")
     left = distance(limit, value)

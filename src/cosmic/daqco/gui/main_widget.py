@@ -57,7 +57,7 @@ class UDaqMainWidget(QWidget):
         self._daqco = daqco
         self.plotter = UDaqPlotter(daqco)
         self.files = UDaqFileWidget(daqco)
-        tip = "End the export; what is written is deleted"
+        tip = "Cancel the export and delete its file"
         self.export_bar = TaskBar(cancel_tip=tip, closable=True)
         self.export_bar.setContentsMargins(STEP_PX, 0, STEP_PX, 0)
         self.state = Chip("STOPPED", tip="Whether samples are acquired")

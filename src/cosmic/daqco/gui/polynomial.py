@@ -57,5 +57,5 @@ def oddity(scale: ScaleSettings) -> str:
     if not np.any(values != values[0]):
         return "every voltage gives the same value"
     if np.any(steps > 0.0) and np.any(steps < 0.0):
-        return "it turns back: two voltages give the same value"
+        return "the scale is not monotonic: two voltages give the same value"
     return ""

@@ -12,7 +12,7 @@ from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.theme import STEP_PX
 
 SPANS_S: Final = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0)
-_LIVE: Final = ("Pause", "Freeze the image; acquisition and recording go on")
+_LIVE: Final = ("Pause", "Freeze the plot; acquisition and recording continue")
 _FROZEN: Final = ("Back to live", "Follow the newest samples again")
 
 
@@ -34,7 +34,7 @@ class ScalingBar(QWidget):
         self.pause = push_button(*_LIVE)
         width = max(push_button(text, "").sizeHint().width() for text, _ in (_LIVE, _FROZEN))
         self.pause.setFixedWidth(width + STEP_PX)
-        self.span = tipped(QComboBox(), "How much time is in the image")
+        self.span = tipped(QComboBox(), "Time span of the plot")
         for span_s in SPANS_S:
             self.span.addItem(f"{span_s:g} s", span_s)
         self.span.setCurrentIndex(SPANS_S.index(10.0))
@@ -42,10 +42,10 @@ class ScalingBar(QWidget):
         self.low, self.high = ValueField("y-axis minimum"), ValueField("y-axis maximum")
         self.step = ValueField("Interval between the labelled lines")
         self.rescale = named(push_button("Rescale", "Apply y-min, y-max and y-interval"), "rescale")
-        self.auto = _toggle("Auto", "Fit the axes to what is in the image, again and again")
+        self.auto = _toggle("Auto", "Keep fitting the axes to the visible data")
         self.auto.setChecked(True)
         self.cursors = _toggle("Cursors", "Show two lines to read values at")
-        self.clear = push_button("Clear", "Forget the history of the image; no file is touched")
+        self.clear = push_button("Clear", "Clear the plotted history; no file is changed")
         self.scales = _toggle("y-axis", "Show the fields for the vertical axes")
         self.scales.setChecked(True)
         self._fields: list[QWidget] = []

@@ -15,7 +15,7 @@ from cosmic.frame.gui.theme import STEP_PX, code_font
 
 REFRESH_MS: Final = 50
 _MOST_LINES: Final = 5000
-_BANNER: Final = "Python console. Ctrl+C or Interrupt breaks what runs, sleep(s) waits.\n"
+_BANNER: Final = "Python console. Ctrl+C or Interrupt stops running code, sleep(s) waits.\n"
 
 
 class ConsolePanel(QWidget):
@@ -60,7 +60,7 @@ class ConsolePanel(QWidget):
         self._output.setReadOnly(True)
         self._output.setFont(code_font())
         self._output.setMaximumBlockCount(_MOST_LINES)
-        self._output.setToolTip("What the console printed")
+        self._output.setToolTip("Console output")
         self._output.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self._prompt = QLabel(PROMPT)
         self._prompt.setFont(code_font())
@@ -70,7 +70,7 @@ class ConsolePanel(QWidget):
         self._input.submitted.connect(self.run)
         self._input.completion_requested.connect(self._on_completion_requested)
         self._input.interrupt_requested.connect(self.interrupt)
-        self._interrupt = push_button("Interrupt", "Break what runs in the console (Ctrl+C)")
+        self._interrupt = push_button("Interrupt", "Interrupt the running code (Ctrl+C)")
         self._interrupt.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._interrupt.clicked.connect(self.interrupt)
 

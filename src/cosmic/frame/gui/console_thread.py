@@ -211,7 +211,7 @@ class ConsoleThread(WorkerThread):
             if self.join(timeout_s / _TRIES):
                 return True
             self.interrupt()
-        logger.warning("what runs in the console does not end; it is left behind")
+        logger.warning("the code in the console did not end and was abandoned")
         if self._streams is not None:
             self._streams.restore()
         _given_up.append(self)

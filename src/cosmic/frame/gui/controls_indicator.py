@@ -58,7 +58,7 @@ class ControlsIndicator(QWidget):
     def show_holder(self, who: str, *, warn: bool = False, tip: str = "") -> None:
         """Say who commands; `warn` where it is not this window."""
         self._chip.setText(f"controls: {who}")
-        self._chip.setToolTip(tip or f"Movements are commanded by {who}")
+        self._chip.setToolTip(tip or f"Motion is controlled by {who}")
         self._chip.set_tone("warning" if warn else "quiet")
 
     def set_actions(self, actions: Sequence[ControlAction]) -> None:

@@ -31,7 +31,7 @@ class _TitleBar(QWidget):
         title = QLabel(dock.windowTitle())
         title.setFont(ui_font(bold=True))
         title.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self._float = _tool_button("❐", "Take this panel out, or put it back")
+        self._float = _tool_button("❐", "Undock this panel, or dock it again")
         self._float.clicked.connect(self._on_float)
         hide = _tool_button("✕", "Hide this panel; the View menu brings it back")
         hide.clicked.connect(dock.close)
@@ -65,9 +65,7 @@ class _FailedBanner(QWidget):
         self.reason = QLabel()
         self.reason.setWordWrap(True)
         self.reason.setTextFormat(Qt.TextFormat.PlainText)
-        self.rescan = push_button(
-            "Rescan", "Look for the devices again and start this application anew"
-        )
+        self.rescan = push_button("Rescan", "Rescan the devices and restart this application")
         row = QHBoxLayout(self)
         row.setContentsMargins(STEP_PX, STEP_PX, STEP_PX, STEP_PX)
         row.addWidget(StateBadge(State.ERROR))

@@ -20,7 +20,7 @@ def overwrite_question(
     box.setWindowTitle("Overwrite it?")
     size = "" if size_bytes is None else f" ({size_text(size_bytes)})"
     box.setText(f"{path.name} exists already{size}.")
-    box.setInformativeText("What is in it will be lost.")
+    box.setInformativeText("Its contents will be lost.")
     agree = box.addButton("Overwrite", QMessageBox.ButtonRole.DestructiveRole)
     cancel = box.addButton(QMessageBox.StandardButton.Cancel)
     box.setDefaultButton(cancel)

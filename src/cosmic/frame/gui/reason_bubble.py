@@ -24,7 +24,7 @@ class ReasonBubble(QLabel):
         self.setObjectName("reasonBubble")
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setWordWrap(True)
-        self.setToolTip("Click to take this note away")
+        self.setToolTip("Click to close this note")
         self.hide()
         self._field: QWidget | None = None
         self._followed: list[QWidget] = []

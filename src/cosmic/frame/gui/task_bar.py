@@ -33,7 +33,7 @@ class TaskBar(QWidget):
         self,
         parent: QWidget | None = None,
         *,
-        cancel_tip: str = "End it now",
+        cancel_tip: str = "Cancel it now",
         closable: bool = False,
     ) -> None:
         super().__init__(parent)

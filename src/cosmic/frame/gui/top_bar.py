@@ -126,14 +126,12 @@ class TopBar(QWidget):
         self._stop = StopButton(stop_key)
         self._title = QLabel(title)
         self._title.setFont(ui_font(LARGE_PX, bold=True))
-        self._simulated = Chip("SIMULATED", "simulated", "No hardware is driven: this is the twin")
+        self._simulated = Chip("SIMULATED", "simulated", "Simulation: no hardware is driven")
         self._modes = ModeSelector()
         self._controls = ControlsIndicator()
         self._clearance = ClearanceMeter()
         self._no_model = Chip(f"▲ {NO_COLLISION_MODEL}", "warning")
-        self._no_model.setToolTip(
-            "Movements within the limits are made without a check for collisions"
-        )
+        self._no_model.setToolTip("Movements within the limits are not checked for collisions")
         self._unwatched = Chip("", "alarm")
         self._contacts = Chip("", "warning")
         self._rate = Chip("", "warning", "The platform's clock does not run in real time")
@@ -141,7 +139,7 @@ class TopBar(QWidget):
         self._message_state = StateBadge(State.ERROR)
         self._message_state.hide()
         self._theme = named(
-            push_button("◐", "Change between the dark and the light theme"), "themeButton"
+            push_button("◐", "Switch between the dark and the light theme"), "themeButton"
         )
         self._theme.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._latched_text = ElidedLabel()
@@ -228,7 +226,7 @@ class TopBar(QWidget):
         self._simulated.setText("SIMULATED" if simulated else "HARDWARE")
         self._simulated.set_tone("simulated" if simulated else "real")
         self._simulated.setToolTip(
-            "No hardware is driven: this is the twin" if simulated else "Real hardware is driven"
+            "Simulation: no hardware is driven" if simulated else "Real hardware is driven"
         )
 
     def set_mode(self, name: str) -> None:
@@ -265,8 +263,8 @@ class TopBar(QWidget):
         """Say loudly which axes are taken out of collision detection."""
         self._unwatched.setText(f"▲ CD OFF: {_short(axes)}")
         self._unwatched.setToolTip(
-            f"Taken out of collision detection: {', '.join(axes)}. Nothing keeps their movements "
-            "from hitting something. Press CD OFF on the card of the axis to watch it again."
+            f"Not checked for collisions: {', '.join(axes)}. Their movements can hit "
+            "something. Press CD OFF on the card of the axis to watch it again."
         )
         self._unwatched.setVisible(bool(axes))
 

@@ -144,7 +144,7 @@ class ImageWait(Operation[SentImage]):
             self._on_image(newest)
 
     def _give_up(self) -> None:
-        self.fail(MoveCancelled(f"{self.title}: nobody waits for it any more"))
+        self.fail(MoveCancelled(f"{self.title}: it is no longer waited for"))
 
     def _on_image(self, image: CameraImage) -> None:
         frame = image.frame

@@ -73,7 +73,7 @@ class Background:
             Not from 1 to 1000.
         """
         if not 1 <= frames <= MOST_FRAMES:
-            raise ConfigError(f"background: {frames} frames; from 1 to {MOST_FRAMES} are taken")
+            raise ConfigError(f"background: {frames} frames; give 1 to {MOST_FRAMES}")
         with self._lock:
             self._taken, self._sum, self._kind = 0, None, None
             self._wanted = frames

@@ -93,7 +93,7 @@ def fit_map(sightings: Sequence[Sighting], *, limit_px: float = LARGEST_RMS_PX) 
     if len(left_out) > OUTLIER_SHARE * len(sightings) or kept.sum() < FEWEST_POINTS:
         raise CalibrationRefused(
             f"calibration: {len(left_out)} of {len(sightings)} points do not fit the others "
-            f"({'; '.join(outliers)}); look whether the right thing was tracked and stands sharp"
+            f"({'; '.join(outliers)}); check that the right object was tracked and is in focus"
         )
     _check_points(points[kept], seen[kept])
     rms_px = float(np.sqrt(np.mean(residuals_px**2)))
@@ -115,9 +115,9 @@ def _check_points(points: Floats, seen: Floats) -> None:
     spread_px = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)[1] / math.sqrt(len(seen))
     if not spread_px >= SMALLEST_SPREAD_PX:
         raise CalibrationRefused(
-            f"calibration: the points seen spread by {spread_px:.1f} px across, "
-            f"{SMALLEST_SPREAD_PX:g} px are needed; move further, and see that what is tracked "
-            "moves with the stage"
+            f"calibration: the points spread over {spread_px:.1f} px across, "
+            f"{SMALLEST_SPREAD_PX:g} px are needed; move further, and check that the tracked "
+            "object moves with the stage"
         )
 
 
@@ -125,12 +125,12 @@ def _check_map(fitted: PixelMap, rms_px: float, limit_px: float) -> None:
     if not rms_px <= limit_px:
         raise CalibrationRefused(
             f"calibration: residual of {rms_px:.2f} px RMS, at most {limit_px:g} px are accepted; "
-            "focus, wait until the stage rests before each image, and measure again"
+            "focus, wait until the stage is stationary before each image, and measure again"
         )
     if not fitted.anisotropy <= LARGEST_ANISOTROPY:
         raise CalibrationRefused(
             f"calibration: one direction is seen {100.0 * fitted.anisotropy:.0f} % larger than "
-            "the other; look whether both axes really moved as told"
+            "the other; check that both axes reached their targets"
         )
 
 
@@ -231,13 +231,16 @@ def fit_rotation(
     found = min((_circle(angles, points, sense) for sense in (1, -1)), key=lambda each: each.rms_um)
     if not found.radius_um >= SMALLEST_RADIUS_UM:
         raise CalibrationRefused(
-            f"rotation centre: what is tracked goes round at {found.radius_um:.0f} um, at least "
-            f"{SMALLEST_RADIUS_UM:g} um are needed; take another thing, and see that it turns along"
+            f"rotation centre: the tracked object moves on a radius of {found.radius_um:.0f} "
+            "um, at least "
+            f"{SMALLEST_RADIUS_UM:g} um are needed; choose another object and check that it "
+            "turns with the table"
         )
     if not found.rms_um <= limit_um:
         raise CalibrationRefused(
             f"rotation centre: residual of {found.rms_um:.1f} um RMS, at most {limit_um:g} um are "
-            "accepted; see that the thing tracked lies fast on the table and the scale is right"
+            "accepted; check that the tracked object is fixed to the table and that the "
+            "scale is right"
         )
     if not found.std_um <= limit_std_um:
         raise CalibrationRefused(

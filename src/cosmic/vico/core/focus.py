@@ -130,7 +130,7 @@ def fresh(frame: Frame, since_s: float) -> bool:
 class FocusFault(StrEnum):
     """Why a sweep found no focus."""
 
-    FLAT = "the image is as sharp everywhere"
+    FLAT = "the sharpness is the same everywhere"
     AT_END = "sharpest at the end of the range"
     NOISE = "the curve is too noisy"
     NO_MEASURE = "an image could not be measured"

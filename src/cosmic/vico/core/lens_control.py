@@ -175,7 +175,7 @@ class PeripheralThread(WorkerThread):
             self._orders = deque(each for each in self._orders if each.of_light)
             self._wake.notify_all()
         for order in dropped:
-            order.task.fail(MoveCancelled("aborted before it began"))
+            order.task.fail(MoveCancelled("aborted before it started"))
 
     def _move(self, title: str, targets: Mapping[LensAxis, int | None]) -> Task:
         call = current_call()

@@ -103,11 +103,11 @@ class Move:
         target = self.targets[axis]
         if target is None:
             return DeviceError(
-                f"{axis} stopped at {state.position_counts} counts before it was home; look "
-                f"whether it turns freely, then home it again",
+                f"{axis} stopped at {state.position_counts} counts before it reached its home "
+                "position; check that it turns freely, then home it again",
                 fault=DeviceFault.REFERENCE,
             )
-        again = "" if state.homed else "; the controller forgot where it is, home it"
+        again = "" if state.homed else "; the controller lost its position, home it"
         return DeviceError(
             f"{axis} stopped at {state.position_counts} counts instead of {target}{again}",
             fault=DeviceFault.OTHER,

@@ -144,7 +144,7 @@ class LensSide:
         if lens is None:
             raise NotAvailable(self.problem or "the platform has no motorised lens")
         if why := move.abandoned:
-            raise MoveCancelled(f"not begun: {why}")
+            raise MoveCancelled(f"not started: {why}")
         try:
             for axis, target in move.targets.items():
                 # Where it stood until now, for frames exposed before it moves.

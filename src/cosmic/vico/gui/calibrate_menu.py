@@ -16,7 +16,7 @@ from cosmic.frame.operation import Progress, Task
 from cosmic.vico.api.camera import CameraHandle
 
 REFUSED: Final = state_look(State.REFUSED).glyph
-TIP: Final = "Measure where on the platform the pixels lie: a tool goes to nine points and back"
+TIP: Final = "Calibrate pixels to platform coordinates: a tool visits nine points and returns"
 
 
 class CalibrateButton(QToolButton):
@@ -65,7 +65,7 @@ class CalibrateButton(QToolButton):
         self.setToolTip(TIP if tools else "Not here: no tool can be moved from this window")
         for tool in tools:
             action = menu.addAction(f"Move {tool}")
-            action.setToolTip("Its tip must be on the image, and sharp")
+            action.setToolTip("Its tip must be in the image and in focus")
             action.triggered.connect(lambda _=False, tool=tool: self._begin_stage(tool))
         action = menu.addAction("Find the table's rotation centre")
         action.setToolTip("Turns the table by 24° to both sides; a fibre must lie near the middle")

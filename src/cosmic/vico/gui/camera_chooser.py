@@ -28,7 +28,7 @@ class CameraChooser(QWidget):
         self.box.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
-        self.rescan = push_button("Rescan", "Look for cameras again")
+        self.rescan = push_button("Rescan", "Rescan cameras")
         self.tasks = TaskBar()
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)

@@ -23,7 +23,7 @@ class ChainPanel(QWidget):
         self._links = QVBoxLayout()
         self._links.setSpacing(STEP_PX // 2)
         self.take = push_button(
-            "Take background", "Even out the light by the image shown: nothing may lie in it"
+            "Take background", "Correct uneven light with the image shown; the field must be empty"
         )
         self.clear = push_button("Clear", "")
         self.reason = ElidedLabel()
@@ -55,7 +55,7 @@ class ChainPanel(QWidget):
         taken = self._camera.has_background
         self.clear.setEnabled(taken)
         self.clear.setToolTip(
-            "Show images as they come" if taken else "No background has been taken"
+            "Remove the background correction" if taken else "No background has been taken"
         )
 
     def _rebuild(self) -> None:

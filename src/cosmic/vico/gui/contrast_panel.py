@@ -202,7 +202,7 @@ class ContrastPanel(QWidget):
             return
         if not low < high:
             field = self.low if self.low.hasFocus() else self.high
-            field.refuse(f"black must be less than white: {low:g} is not below {high:g}")
+            field.refuse(f"Black must be below white: {low:g} is not below {high:g}")
             return
         self.auto.setChecked(False)
         self._take(Levels(low, high))

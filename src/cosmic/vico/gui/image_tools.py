@@ -73,7 +73,7 @@ class ImageTools(QObject):
     def _on_target(self, target: str) -> None:
         self._view.set_tool(self._click)
         self._target = target
-        self.told.emit(f"click where {target} is to go; Esc ends it")
+        self.told.emit(f"click where {target} is to go; press Esc to cancel")
 
     def _on_clicked(self, point_px: Pixel) -> None:
         if not self._view.is_inside(point_px):

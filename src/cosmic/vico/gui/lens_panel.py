@@ -26,7 +26,7 @@ LOOK_MS: Final = 200
 FOCUS_STEPS: Final = (-100, -10, 10, 100)
 NO_LENS: Final = "There is no motorised lens on this platform"
 NO_LIGHT: Final = "There is no lamp on this platform"
-NOT_HOMED: Final = "Home the lens first: where it is, is not known"
+NOT_HOMED: Final = "Home the lens first: its position is unknown."
 
 
 class LensPanel(QWidget):
@@ -54,7 +54,7 @@ class LensPanel(QWidget):
         self.home = named(push_button("Home", ""), "home")
         self.abort = named(push_button("Abort", "Stop both motors now"), "abort")
         self.autofocus = named(push_button("Autofocus", ""), "autofocus")
-        self.camera = tipped(QComboBox(), "The camera whose image is to become sharp")
+        self.camera = tipped(QComboBox(), "Camera to focus")
         self.light = SliderField("Light", "%")
         self.light.set_range(0.0, 100.0)
         self.tasks = TaskBar()
@@ -152,7 +152,7 @@ class LensPanel(QWidget):
             self.badge.set_state(State.ERROR, lens.problem)
             self.name.set_text(lens.problem)
         elif moving or self.tasks.watch.busy:
-            self.badge.set_state(State.BUSY, "a motor moves")
+            self.badge.set_state(State.BUSY, "a motor is moving")
         elif homed:
             self.badge.set_state(State.OK)
         else:
@@ -190,10 +190,10 @@ class LensPanel(QWidget):
 
     def _allow(self, gone: str, unknown: str) -> None:
         """Enable what can be used; what needs a homed lens has a reason of its own."""
-        _enable(self.home, gone, "Run both motors to where counting begins")
+        _enable(self.home, gone, "Home both motors")
         _enable(self.abort, gone, "Stop both motors now")
         nothing = unknown or ("" if self._vico.cameras else "There is no camera")
-        _enable(self.autofocus, nothing, "Look for the sharpest image")
+        _enable(self.autofocus, nothing, "Autofocus: find the sharpest image")
         self.focus.set_usable(unknown)
         self.zoom.set_usable(unknown)
         for name, button in self.steps.items():

@@ -77,7 +77,9 @@ class FocusBars(QWidget):
         self.values: deque[float] = deque(maxlen=BARS)
         self.best = 0.0
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setToolTip("Sharpness over the last seconds; a full bar is the best seen\nClick: anew")
+        self.setToolTip(
+            "Sharpness over the last seconds; a full bar is the best seen\nClick to start again"
+        )
         self.setAccessibleName("Sharpness over the last seconds")
 
     def add(self, value: float) -> None:

@@ -113,13 +113,13 @@ class RecordBar(QWidget):
         super().__init__(parent)
         self._camera = camera
         self._error = ""
-        self.snap = named(push_button("Snap", "Write the image shown to a file"), "snap")
+        self.snap = named(push_button("Snap", "Save the image shown"), "snap")
         self.record = named(push_button("Record", ""), "record")
         self.record.setCheckable(True)
-        self.lapse = push_button("Time-lapse…", "Record one image every so often")
+        self.lapse = push_button("Time-lapse…", "Record a time-lapse")
         self.more = push_button("File…", "Show the fields for name, directory and format")
         self.more.setCheckable(True)
-        self.format = tipped(QComboBox(), "How recordings are written")
+        self.format = tipped(QComboBox(), "File format of recordings")
         self.files = FileFields(camera.directory, camera.name, now=now, elsewhere=camera.elsewhere)
         self.told, self.tasks = ElidedLabel(), TaskBar()
         self.told.setFont(number_font())
@@ -182,10 +182,10 @@ class RecordBar(QWidget):
         away = self._camera.problem if self._camera.elsewhere else ""
         still_wrong = wrong or away or ("" if self._camera.latest() else "There is no image yet")
         chosen = self.chosen
-        wrong = wrong or (chosen.problem if chosen is not None else "There is no format")
+        wrong = wrong or (chosen.problem if chosen is not None else "No format is available")
         wrong = wrong or ("" if self._camera.running else "No images are taken: start the camera")
-        _allow(self.snap, still_wrong, "Write the image shown to a file")
-        _allow(self.lapse, wrong or _busy(recording.active), "Record one image every so often")
+        _allow(self.snap, still_wrong, "Save the image shown")
+        _allow(self.lapse, wrong or _busy(recording.active), "Record a time-lapse")
         self.record.setChecked(recording.active)
         self.record.setText("■ Stop" if recording.active else "● Record")
         _allow(

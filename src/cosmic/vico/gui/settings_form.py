@@ -26,7 +26,7 @@ from cosmic.vico.hw.interface import (
 
 MS: Final = 1e3
 Change = Callable[[CameraSettings], CameraSettings]
-_LACKS: Final = "This camera does not have it"
+_LACKS: Final = "Not available on this camera"
 _GONE: Final = "No camera is connected"
 
 
@@ -51,11 +51,11 @@ class SettingsForm(QObject):
         self.exposure = SliderField("Exposure time", "ms", caption="Exposure")
         self.gain = SliderField("Gain", "dB", caption="Gain")
         self.rate = SliderField("Frames a second", "Hz")
-        self.binning = tipped(QComboBox(), "Pixels joined to one, in each direction")
+        self.binning = tipped(QComboBox(), "Pixels binned into one, in each direction")
         self.pixel_format = tipped(QComboBox(), "How a pixel is coded")
         self.trigger = tipped(QComboBox(), "What starts an exposure")
         self.shoot = push_button("Trigger", "Take one image now")
-        self.full_sensor = push_button("Full sensor", "Read the whole sensor again")
+        self.full_sensor = push_button("Full sensor", "Read the whole sensor")
         self.roi_text, self.reason = QLabel(), ElidedLabel()
         self.panel = QWidget(parent)
         self._build()

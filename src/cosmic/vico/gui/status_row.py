@@ -25,15 +25,15 @@ class StatusRow(QWidget):
         self._since_s, self._since_count = WALL.now_s(), camera.counters.completed
         self._rate_hz: float | None = None
         self.badge = StateBadge(State.UNKNOWN)
-        self.rate = Reading("", "000.0", "Hz", "Images a second that came from the camera")
-        self.completed = Reading("", "00000000", "whole", "Images that came whole")
-        self.failed = Reading(
-            "failed", "00000", "", "Images that came with parts missing; none is shown"
-        )
+        self.rate = Reading("", "000.0", "Hz", "Images received per second")
+        self.completed = Reading("", "00000000", "whole", "Complete images")
+        self.failed = Reading("failed", "00000", "", "Incomplete images; they are not shown")
         self.lost = Reading(
-            "lost", "00000", "", "Images that never came, by the gaps in their numbers"
+            "lost", "00000", "", "Lost images, counted by gaps in the frame numbers"
         )
-        self.dropped = Reading("dropped", "00000", "", "Images that this computer had no room for")
+        self.dropped = Reading(
+            "dropped", "00000", "", "Images dropped because this computer was too slow"
+        )
         self.over = Reading("over-exposed", "00.00", "%", "Share of over-exposed pixels")
         self.focus = Reading(
             "focus", "000000.0", "", "Sharpness of the newest image; larger is sharper"

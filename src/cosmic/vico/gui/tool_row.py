@@ -13,11 +13,14 @@ from cosmic.frame.gui.theme import STEP_PX
 W = TypeVar("W", bound=QWidget)
 
 TOOLS: Final = {
-    "distance": ("Distance", "Measure a distance: press, drag, let go; Del takes the chosen away"),
+    "distance": (
+        "Distance",
+        "Measure a distance: press, drag, release; Del deletes the selected one",
+    ),
     "angle": ("Angle", "Measure an angle: click one arm, the vertex, the other arm"),
-    "region": ("Region", "Read only a part of the sensor: press, drag, let go"),
+    "region": ("Region", "Read only a part of the sensor (ROI): press, drag, release"),
 }
-MOVE_TIP: Final = "Move something to the point you click in the image"
+MOVE_TIP: Final = "Move a tool to the point you click in the image"
 
 
 class ToolRow(QWidget):
@@ -37,8 +40,8 @@ class ToolRow(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.live = named(_button("Live", "", checkable=True), "live")
-        self.fit = _button("Fit", "Show all of the image")
-        self.one_to_one = _button("1:1", "Show each pixel of the camera by one of the screen")
+        self.fit = _button("Fit", "Fit the image to the view")
+        self.one_to_one = _button("1:1", "Show the image 1:1, one camera pixel per screen pixel")
         self.tools = {
             name: named(_button(text, tip, checkable=True), name)
             for name, (text, tip) in TOOLS.items()
@@ -91,7 +94,7 @@ class ToolRow(QWidget):
     def show_running(self, running: bool, problem: str) -> None:
         """Show whether images are taken."""
         self.live.setChecked(running)
-        self.live.setToolTip("End taking images" if running else problem or "Begin to take images")
+        self.live.setToolTip("Stop the camera" if running else problem or "Start the camera")
 
     def show_targets(self, targets: tuple[str, ...], problem: str) -> None:
         """Offer what can be moved; a problem disables the button and stands in its tooltip."""

@@ -268,7 +268,7 @@ class BaseCamera(Camera, ABC):
                 try:
                     self._end()
                 except DeviceError as exc:
-                    logger.warning("%s did not hear that it shall stop: %s", self._whom, exc)
+                    logger.warning("%s did not answer the stop: %s", self._whom, exc)
 
     @override
     def close(self) -> None:
@@ -296,7 +296,7 @@ class BaseCamera(Camera, ABC):
         try:
             self._write(before, None)
         except (DeviceError, ConfigError) as exc:
-            logger.warning("%s: the settings before are not back: %s", self._whom, exc)
+            logger.warning("%s: the previous settings could not be restored: %s", self._whom, exc)
         self._read_back()
 
     def _read_back(self) -> None:

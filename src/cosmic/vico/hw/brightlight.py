@@ -37,7 +37,7 @@ class BrightLight(Light):
     def percent(self) -> float:
         value = self._registers.read(Register.BRIGHTNESS)
         if not 0 <= value <= FULL:
-            raise ProtocolError(f"{self.name}: tells a brightness of {value}, not 0 to {FULL}")
+            raise ProtocolError(f"{self.name}: reports a brightness of {value}, not 0 to {FULL}")
         return value * 100.0 / FULL
 
     @override

@@ -181,7 +181,7 @@ class Dc1394Camera(BaseCamera):
         except DeviceError as exc:
             return str(exc)
         if not sending:
-            return "it was switched off and on, and has forgotten that it should send"
+            return "it was switched off and on and no longer sends images"
         return ""
 
     def _set_speed(self, fast: bool) -> None:

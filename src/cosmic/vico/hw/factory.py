@@ -101,7 +101,7 @@ def _simulated(scene: "Scene | None", clock: Clock, seed: int) -> CameraLibrary:
     from cosmic.vico.hw.sim_camera import SimulatedCameraLibrary
 
     if scene is None or scene.optics is None:
-        raise ConfigError("cameras: simulated: a scene is needed, for there is nothing to see")
+        raise ConfigError("cameras: simulated: a scene is needed")
     return SimulatedCameraLibrary(scene, clock, seed)
 
 
@@ -204,7 +204,7 @@ def _believable(found: Found) -> bool:
         raise
     if anew:
         logger.warning(
-            "%s: both motors count 0, as after switching on; home the lens", found.registers.name
+            "%s: both motors report 0, as after power-up; home the lens", found.registers.name
         )
     return not anew
 

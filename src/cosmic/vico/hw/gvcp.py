@@ -98,7 +98,7 @@ class GvcpWatch:
         if now_s - self._asked_s < _ANSWER_S:
             return ""
         if self._tries >= _TRIES:
-            return f"it answers nothing at {self._peer[0]} any more"
+            return f"it no longer answers at {self._peer[0]} any more"
         self._ask(now_s)
         return ""
 
@@ -140,5 +140,5 @@ class GvcpWatch:
                 privilege = _ACKNOWLEDGE.unpack_from(answer)[4]
                 self.controlled = bool(privilege & _EXCLUSIVE_OR_CONTROL)
                 if not self.controlled:
-                    return "it was started anew and no longer knows this program"
+                    return "it was restarted and dropped this connection"
             return ""

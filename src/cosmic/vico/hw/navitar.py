@@ -105,7 +105,7 @@ class NavitarLens(Lens):
         motor = self._motors[axis]
         if not motor.homed:
             raise NotAvailable(
-                f"{self.name}: {axis} has not been homed, its counts mean nothing; home it first"
+                f"{self.name}: {axis} has not been homed and its position is unknown; home it first"
             )
         limit = self._limit(motor)
         if not 0 <= target_counts <= limit:
@@ -147,7 +147,7 @@ class NavitarLens(Lens):
         elif not moving and motor.homed and counts == 0 and motor.last_counts and motor.target:
             motor.homed = False
             logger.warning(
-                "%s: %s counts from 0 again, unasked: was it switched off? Home it", self.name, axis
+                "%s: %s lost its position (was it switched off?). Home it", self.name, axis
             )
         motor.last_counts = counts
 

@@ -121,7 +121,7 @@ def motor_status(value: int) -> MotorStatus:
     """
     phase = value & 0xFF
     if phase not in {*range(10), 11, 12}:
-        raise ProtocolError(f"the lens tells a status that is not known: {value:#x}")
+        raise ProtocolError(f"the lens reports an unknown status: {value:#x}")
     return MotorStatus(bool(phase), at_home=bool(value & 0x100), at_limit=bool(value & 0x200))
 
 

@@ -164,7 +164,7 @@ class FilmCamera(OpenCvCamera):
                 return None
             raw = self._next_raw()
             if raw is None:
-                logger.info("%s: the film is at its end", self._whom)
+                logger.info("%s: end of the film", self._whom)
                 self._due_s = math.inf
                 return None
             period_s = 1.0 / self._in_force.rate_hz

@@ -155,7 +155,7 @@ def test_what_is_felt_too_early_ends_it_before_any_further_step() -> None:
 
 
 def test_where_nothing_is_felt_it_ends_and_says_so() -> None:
-    with pytest.raises(OperationFailed, match="nothing was felt within 4"):
+    with pytest.raises(OperationFailed, match="no contact within 4"):
         carried_out(Bench(off_um=-999.0))
 
 

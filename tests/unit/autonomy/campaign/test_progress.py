@@ -62,7 +62,7 @@ def test_one_fibre_says_nothing_about_the_pulp() -> None:
         (StopSettings(count=8), 100.0, "8 fibres done"),
         (StopSettings(count=9), 100.0, ""),
         (StopSettings(good=6), 100.0, "6 good fibres"),
-        (StopSettings(count=99, time_s=90.0), 100.0, "100 s are over"),
+        (StopSettings(count=99, time_s=90.0), 100.0, "100 s have passed"),
         (StopSettings(precision_percent=50.0, least=6), 100.0, "mean stiffness known to"),
         (StopSettings(precision_percent=50.0, least=7), 100.0, ""),
         (StopSettings(precision_percent=0.1, least=2), 100.0, ""),

@@ -53,7 +53,7 @@ class Done:
         return self.result
 
     def cancel(self) -> None:
-        """Nothing is under way."""
+        """Nothing is running."""
 
 
 class Axis:

@@ -74,7 +74,7 @@ class CampaignDock(QObject):
 
     @property
     def running(self) -> bool:
-        """True while a campaign that was begun here is under way."""
+        """True while a campaign that was begun here is running."""
         panel = self._late.made
         campaign = panel.campaign if panel is not None else None
         return campaign is not None and not campaign.over

@@ -45,7 +45,7 @@ class AxisRange:
         if not 0.0 < self.step <= self.high - self.low:
             return "step", f"give more than 0 and at most {self.high - self.low:g}"
         if not (self.high - self.low) / self.step <= 100.0:
-            return "step", "that would draw more than 100 lines"
+            return "step", "more than 100 lines would be drawn; enter a larger interval"
         return "", ""
 
     def lines(self) -> tuple[float, ...]:

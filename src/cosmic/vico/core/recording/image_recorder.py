@@ -300,7 +300,7 @@ class ImageRecorder(WorkerThread):
         check_space(directory, self._bytes_per_s * FLUSH_S)
         if self._dropped > self._told_dropped:
             logger.warning(
-                "%s: %d images dropped so far, for they come faster than they can be written",
+                "%s: %d images dropped so far: they arrive faster than they can be written",
                 self.path,
                 self._dropped,
             )

@@ -168,7 +168,11 @@ class FindTools:
         """Find those expected."""
         expected = self.expected if self.expect is None else self.expect(image)
         if not expected:
-            return Unavailable(NO_TOOL if self.expect else "nobody says where the tools should be")
+            return Unavailable(
+                NO_TOOL
+                if self.expect
+                else "the expected tool positions are unknown: calibrate first"
+            )
         data = grey(image.data)
         return MappingProxyType({name: find_tool(data, tool) for name, tool in expected.items()})
 

@@ -76,7 +76,7 @@ class Template:
         self.pixels: Floats32 = image[region.y_px : bottom, region.x_px : right].astype(np.float32)
         if not float(self.pixels.std()) > 0.5:
             raise ConfigError(
-                "tracking: the region is of one grey and cannot be found again; choose one with "
+                "tracking: the region has no contrast and cannot be tracked; choose one with "
                 "edges in it"
             )
         self.centre_px: Pair = (

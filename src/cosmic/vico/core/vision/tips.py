@@ -88,8 +88,8 @@ def _look(image: Pixels, expected: ExpectedTool) -> tuple[Frame, Levels, list[Bl
     found = [] if greys is None else blobs(frame, greys, expected.width_px)
     if greys is None or not found:
         return NotSeen(
-            "no large dark body comes into the part of the image where it is expected; look "
-            "whether it is there, lit and in focus"
+            "no large dark body was found where the tool is expected; check that it is in "
+            "view, lit and in focus"
         )
     return frame, greys, found
 

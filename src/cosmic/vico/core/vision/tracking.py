@@ -145,13 +145,13 @@ def _why_lost(match: Match | None) -> str:
     if match is None:
         return "it left the image"
     if not match.score >= LOST_BELOW:
-        return f"nothing there looks like it (score {match.score:.2f}, {LOST_BELOW:g} is needed)"
+        return f"no match was found (score {match.score:.2f}, {LOST_BELOW:g} is needed)"
     return ""
 
 
 def _why_unsure(match: Match) -> str:
     if match.at_rim:
-        return "it lies at the rim of where it was looked for"
+        return "it lies at the border of the search region"
     if match.rival > RIVAL_SHARE * match.score:
         return f"another point looks like it (scores {match.score:.2f} and {match.rival:.2f})"
     if not match.std_px <= LARGEST_STD_PX:
