@@ -50,7 +50,7 @@ def name_pattern(base: str, option: NameOption) -> str:
 
 _OPTIONS: Final = {
     NameOption.TIME: ("Append with time", "Append date, hour, minute and second of the start"),
-    NameOption.NUMBER: ("Append with number", "Append the next number that is free"),
+    NameOption.NUMBER: ("Append with number", "Append the next free number"),
     NameOption.NONE: ("Don't append", "Keep the name as it is"),
 }
 

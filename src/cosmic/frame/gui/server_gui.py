@@ -50,7 +50,7 @@ class ServerMenus(QObject):
         quit_.triggered.connect(self.quit_requested)
         self._separator = self._view.addSeparator()
         self._themes = self._make_themes()
-        reset = self._action(self._view, "&Reset layout", "Put all panels back to their places")
+        reset = self._action(self._view, "&Reset layout", "Reset all panels to the default layout")
         reset.triggered.connect(self.reset_layout_requested)
         keys = self._action(help_, "&Keys", "List every key and what it does", "F1")
         keys.setShortcutContext(Qt.ShortcutContext.ApplicationShortcut)

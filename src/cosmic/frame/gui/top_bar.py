@@ -27,7 +27,7 @@ from cosmic.frame.gui.theme import LARGE_PX, STEP_PX, State, current_palette, ui
 MODES: Final = {
     "MCM": "Manual control: you command every movement",
     "SCM": "Semi-automatic control: recorded trajectories are executed again",
-    "ECM": "Enhanced manual control: a way around is planned where the straight one collides",
+    "ECM": "Enhanced manual control: a detour is planned where the straight path collides",
     "ACM": "Automatic control: whole procedures run without a person",
 }
 

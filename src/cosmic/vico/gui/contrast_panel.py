@@ -29,7 +29,7 @@ class HistogramPlot(QWidget):
         self.setFixedHeight(HEIGHT_PX + FOOT_PX)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Histogram")
-        self.setToolTip("How often each brightness occurs; the lines are what is black and white")
+        self.setToolTip("Histogram of brightness; the lines mark the black and white levels")
 
     def show_histogram(self, histogram: Histogram, levels: Levels) -> None:
         """Draw another histogram."""
