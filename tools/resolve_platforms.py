@@ -88,11 +88,15 @@ def resolve(uv: str, task: Task, lines: list[str], within_s: float) -> Answer:
     return Answer(task, " ".join(done.stderr.split()))
 
 
-def tasks(core_only: bool, places: list[str]) -> list[Task]:
-    """Return what to resolve; `places` are platform:python, all where empty."""
-    parts = [CORE] if core_only else list(requirements())
-    pairs = [tuple(place.split(":", 1)) for place in places] or list(product(PLATFORMS, PYTHONS))
-    return [Task(part, platform, python) for part in parts for platform, python in pairs]
+def resolve_place(
+    uv: str, parts: dict[str, list[str]], place: tuple[str, str], within_s: float
+) -> list[Answer]:
+    """Ask about all parts for one platform and Python: about all at once, and one by one after."""
+    everything = sorted({line for lines in parts.values() for line in lines})
+    answer = resolve(uv, Task(CORE, *place), everything, within_s)
+    if not answer.problem:
+        return [Answer(Task(part, *place), "") for part in parts]
+    return [resolve(uv, Task(part, *place), lines, within_s) for part, lines in parts.items()]
 
 
 def table(answers: list[Answer]) -> str:
@@ -133,12 +137,16 @@ def main() -> int:
         say("resolving for other platforms: skipped, there is no uv")
         return 0
     parts = requirements()
+    if chosen.core:
+        parts = {CORE: parts[CORE]}
+    places = [tuple(place.split(":", 1)) for place in chosen.places]
+    places = places or list(product(PLATFORMS, PYTHONS))
     try:
         with ThreadPoolExecutor(AT_ONCE) as pool:
-            asked = tasks(chosen.core, chosen.places)
-            answers = list(
-                pool.map(lambda task: resolve(uv, task, parts[task.part], chosen.within), asked)
-            )
+            waiting = [
+                pool.submit(resolve_place, uv, parts, place, chosen.within) for place in places
+            ]
+            answers = [answer for each in waiting for answer in each.result()]
     except (NoNetworkError, subprocess.TimeoutExpired) as exc:
         say(f"resolving for other platforms: skipped, no answer ({str(exc)[-200:]})")
         return 0

@@ -8,6 +8,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
+import tomlkit
+from tomlkit.items import Item
+
 PART: Final = ".part"
 """What follows the name of a file while it is written."""
 
@@ -42,45 +45,37 @@ def write_whole(path: Path, content: str | bytes) -> None:
 def toml_lines(values: Mapping[str, object]) -> str:
     """Return `key = value` lines; what is None is left out.
 
-    Raises
-    ------
-    ValueError
-        A number is not finite.
-    """
-    return "".join(f"{key} = {toml(each)}\n" for key, each in values.items() if each is not None)
-
-
-def toml(value: object) -> str:
-    """Return a value as TOML: a text, number, truth value or date, or a tuple, list or mapping.
+    Values are texts, numbers, truth values or dates, or tuples, lists or mappings of them.
 
     Raises
     ------
     ValueError
         A number is not finite.
     """
+    document = tomlkit.document()
+    for key, each in values.items():
+        if each is not None:
+            document.add(key, _item(each))
+    return tomlkit.dumps(document)
+
+
+def _item(value: object) -> Item:
+    """Return a value as tomlkit writes it."""
     if isinstance(value, Mapping):
-        # Quoted, for a name may hold a point.
-        pairs = (f"{toml(str(key))} = {toml(each)}" for key, each in value.items())
-        return "{ " + ", ".join(pairs) + " }"
+        table = tomlkit.inline_table()
+        for key, each in value.items():
+            table.append(str(key), _item(each))
+        return table
     if isinstance(value, tuple | list):
-        return f"[{', '.join(toml(each) for each in value)}]"
-    if isinstance(value, str):
-        return '"' + "".join(_character(each) for each in value) + '"'
+        array = tomlkit.array()
+        array.extend(_item(each) for each in value)
+        return array
     if isinstance(value, datetime):
-        return value.astimezone(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int):
-        return str(int(value))
-    if not isinstance(value, float):
-        raise TypeError(f"{type(value).__name__} has no form in TOML: {value!r}")
-    if not math.isfinite(value):
-        raise ValueError(f"{value} is not a number to be kept")
-    # repr keeps every digit, so that what is read is what was measured; numpy's own says its type.
-    return repr(float(value))
-
-
-def _character(one: str) -> str:
-    if one in '"\\':
-        return "\\" + one
-    return one if one.isprintable() else f"\\U{ord(one):08X}"
+        return tomlkit.item(value.astimezone(UTC).replace(microsecond=0))
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise ValueError(f"{value} is not a number to be kept")
+        return tomlkit.item(float(value))  # numpy's own says its type
+    if isinstance(value, str | bool | int):
+        return tomlkit.item(value if isinstance(value, str | bool) else int(value))
+    raise TypeError(f"{type(value).__name__} has no form in TOML: {value!r}")

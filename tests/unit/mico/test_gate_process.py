@@ -189,7 +189,7 @@ def test_a_hundred_checks_at_once_are_all_answered_right_and_in_time(gate: GateP
 def test_the_process_loads_neither_qt_nor_what_reads_scenes(gate: GateProcess) -> None:
     loaded = gate.ask("loaded", None)
     assert isinstance(loaded, list)
-    unwanted = {"PySide6", "pydantic", "trimesh", "yourdfpy", "lxml", "OpenGL", "pyqtgraph", "ompl"}
+    unwanted = {"PySide6", "pydantic", "trimesh", "yourdfpy", "lxml", "OpenGL", "pyqtgraph"}
     assert unwanted.isdisjoint(loaded)
 
 

@@ -4,12 +4,13 @@ import logging
 import math
 import re
 import reprlib
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from threading import RLock
 from typing import Final
+
+import tomlkit
 
 from cosmic.frame.config import not_there, read_toml
 from cosmic.frame.errors import ConfigError, NotAvailable
@@ -19,7 +20,6 @@ logger = logging.getLogger(__name__)
 
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_. -]{0,79}", re.ASCII)
 HEAD: Final = "# Named poses: positions of axes, um (deg of a rotary axis), in gate coordinates.\n"
-_BARE: Final = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,41 +151,16 @@ def _misfit(axis: str, kinds: Mapping[str, str]) -> str:
 
 def _replaced(text: str, name: str, pose: Pose | None) -> str:
     """Return `text` with the section of one pose replaced, added, or taken out."""
-    before, inside, after = _parted(text.splitlines(), name)
-    comments = [line for line in inside if line.lstrip().startswith("#")]
-    section: list[str] = []
-    if pose is not None:
-        if before and before[-1].strip() and not inside:
-            before.append("")
-        section = [f"[{_key(name)}]", *comments]
-        section += [f"{_key(axis)} = {float(f'{v:.4f}')}" for axis, v in pose.positions.items()]
-        if after:
-            section.append("")
-    return "\n".join([*before, *section, *after]) + "\n"
-
-
-def _parted(lines: list[str], name: str) -> tuple[list[str], list[str], list[str]]:
-    """Return what stands before, in and after the section of a pose."""
-    before: list[str] = []
-    inside: list[str] = []
-    after: list[str] = []
-    place = before
-    for line in lines:
-        if line.lstrip().startswith("["):
-            if _section(line) == name:
-                place = inside
-            elif place is inside:
-                place = after
-        place.append(line)
-    return before, inside, after
-
-
-def _section(line: str) -> str:
-    try:
-        return next(iter(tomllib.loads(line)), "")
-    except tomllib.TOMLDecodeError:
-        return ""
-
-
-def _key(name: str) -> str:
-    return name if _BARE.fullmatch(name) else f'"{name}"'
+    document = tomlkit.parse(text)
+    if pose is None:
+        document.remove(name)
+        return tomlkit.dumps(document)
+    section = document.get(name)
+    if section is None:
+        section = tomlkit.table()
+        document.append(name, section)
+    for axis in [axis for axis in section if axis not in pose.positions]:
+        del section[axis]
+    for axis, value in pose.positions.items():
+        section[axis] = round(value, 4)
+    return tomlkit.dumps(document)
