@@ -4,6 +4,7 @@ import subprocess
 import sys
 import textwrap
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,7 @@ from cosmic.frame.plugins import (
     plugins,
     read_options,
 )
+from cosmic.vico.hw.factory import make_camera_library
 
 SHIPPED = [each for kind in Kind for each in plugins(kind) if each.package.startswith("cosmic ")]
 
@@ -84,6 +86,11 @@ def test_the_shipped_boards_are_there() -> None:
     assert {"nidaqmx", "simulated"} <= set(names(Kind.BOARD))
 
 
+def test_the_shipped_cameras_are_there() -> None:
+    shipped = {"aravis", "dc1394", "harvesters", "opencv", "simulated"}
+    assert shipped <= set(names(Kind.CAMERA))
+
+
 def test_an_outside_package_is_found_and_makes_what_its_options_say(write_package: Write) -> None:
     module = write_package("labware", POINTS, BOARD)
     assert "our_board" in names(Kind.BOARD)
@@ -136,6 +143,45 @@ def test_a_check_names_file_and_option(
     edit(laboratory, '"our_board"', '"their_board"')
     assert main(["check", str(laboratory)]) == 1
     assert "no backend 'their_board'" in capsys.readouterr().err
+
+
+CAMERA = """
+    from cosmic.frame.config import StrictModel
+    from cosmic.vico.hw.interface import CameraBackend
+    from cosmic.vico.hw.opencv import OpenCvLibrary
+
+    class Options(StrictModel):
+        film: str
+
+    def make(options, context):
+        return OpenCvLibrary(context.clock, sources=[options.film])
+
+    BACKEND = CameraBackend(make, options=Options)
+"""
+
+
+def test_its_camera_is_named_in_a_platform_file_with_its_options(
+    tmp_path: Path, write_package: Write, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_package("filmware", "[cosmic.cameras]\nour_camera = {}:BACKEND\n", CAMERA)
+    folder = tmp_path / "config"
+    assert main(["init", str(folder)]) == 0
+    camera = '[[vico.camera]]\nname = "film"\nbackend = "our_camera"\n\n[[vico.camera]]'
+    edit(
+        folder,
+        "[[vico.camera]]",
+        f"[vico.options.our_camera]\nfilm = 'http://127.0.0.1:9/none'\n\n{camera}",
+    )
+    assert main(["check", str(folder)]) == 0
+    edit(folder, "film = 'http://127.0.0.1:9/none'", "fim = 'a'")
+    capsys.readouterr()
+    assert main(["check", str(folder)]) == 1
+    said = capsys.readouterr().err
+    assert "vico: options of backend 'our_camera': film: key is missing" in said
+    with closing(
+        make_camera_library("our_camera", options={"film": "http://127.0.0.1:9/none"})
+    ) as library:
+        assert [each.key for each in library.cameras()][:1] == ["http://127.0.0.1:9/none"]
 
 
 def test_two_packages_with_one_name_are_refused(write_package: Write) -> None:

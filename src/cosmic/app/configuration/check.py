@@ -1,5 +1,6 @@
 """What `cosmic check` finds wrong in a platform file and in the twin it names."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from cosmic.app.configuration.network import serving
@@ -70,13 +71,20 @@ def _network_mistakes(file: PlatformFile, path: Path) -> list[str]:
 
 
 def _backend_mistakes(file: PlatformFile, path: Path) -> list[str]:
-    if file.daqco is None:
-        return []
-    try:
-        read_options(Kind.BOARD, file.daqco.backend, file.daqco.options)
-    except ConfigError as exc:
-        return [f"{path}: daqco: {line}" for line in str(exc).splitlines()]
-    return []
+    named: list[tuple[str, Kind, str, Mapping[str, object]]] = []
+    if file.daqco is not None:
+        named.append(("daqco", Kind.BOARD, file.daqco.backend, file.daqco.options))
+    if file.vico is not None:
+        options = file.vico.options
+        used = dict.fromkeys([*(each.backend for each in file.vico.camera), *options])
+        named += [("vico", Kind.CAMERA, name, options.get(name, {})) for name in used]
+    lines: list[str] = []
+    for section, kind, name, given in named:
+        try:
+            read_options(kind, name, given)
+        except ConfigError as exc:
+            lines += [f"{path}: {section}: {line}" for line in str(exc).splitlines()]
+    return lines
 
 
 def _named_twin(path: Path) -> str:

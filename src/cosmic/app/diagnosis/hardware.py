@@ -5,14 +5,14 @@ import socket
 import sys
 from collections.abc import Iterator
 from contextlib import closing
-from typing import get_args
 
 from cosmic.app.configuration.platform_file import PlatformFile
 from cosmic.app.diagnosis.finding import Finding, State, carry_out, missing
 from cosmic.daqco.hw.factory import make_library
+from cosmic.frame.plugins import Kind, names
 from cosmic.mico.hw.factory import make_controller
 from cosmic.mico.hw.sdl_input import SdlSource
-from cosmic.vico.hw.factory import Backend, make_camera_library
+from cosmic.vico.hw.factory import make_camera_library
 from cosmic.vico.hw.serial_port import list_ports
 
 LIBRARIES = "Vendors' libraries"
@@ -27,7 +27,7 @@ def hardware(file: PlatformFile) -> list[Finding]:
         LIBRARIES, "scu3d", lambda: _controllers(file), needed=file.mico.backend == "scu3d"
     )
     found += carry_out(LIBRARIES, "nidaqmx", _boards, needed=boards)
-    for backend in get_args(Backend):
+    for backend in names(Kind.CAMERA):
         if backend != "simulated":
             found += _cameras(backend, needed=backend in cameras)
     found += carry_out(LIBRARIES, "gamepads", _gamepads, needed=False)
@@ -50,7 +50,7 @@ def _boards() -> Iterator[Finding]:
     yield Finding(LIBRARIES, "nidaqmx", State.GOOD, f"{library.name}; boards: {names or 'none'}")
 
 
-def _cameras(backend: Backend, *, needed: bool) -> list[Finding]:
+def _cameras(backend: str, *, needed: bool) -> list[Finding]:
     def look() -> Iterator[Finding]:
         with closing(make_camera_library(backend)) as library:
             keys = ", ".join(each.key for each in library.cameras())

@@ -25,7 +25,7 @@ from cosmic.mico.hw.factory import join, make_controller, make_simulated
 from cosmic.mico.hw.interface import Controller
 from cosmic.twin.scene import Scene
 from cosmic.vico.api.application import VicoApplication
-from cosmic.vico.core.settings import Backend, VicoSettings
+from cosmic.vico.core.settings import VicoSettings
 from cosmic.vico.hw.factory import make_camera_library, make_lens, make_light
 from cosmic.vico.hw.interface import CameraLibrary
 from cosmic.vico.hw.peripherals import Lens
@@ -162,13 +162,14 @@ def _build_vico(
     if scene is not None:
         faults.expect("camera")
 
-    def make_library(backend: Backend) -> CameraLibrary:
+    def make_library(backend: str) -> CameraLibrary:
         library = make_camera_library(
             backend,
             clock=site.clock,
             scene=scene,
             sources=settings.sources,
             producers=settings.producers,
+            options=settings.options.get(backend),
             seed=site.seed,
         )
         faults.join_simulated("camera", library)

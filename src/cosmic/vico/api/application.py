@@ -18,7 +18,7 @@ from cosmic.vico.core.camera_libraries import CameraLibraries
 from cosmic.vico.core.camera_unit import CameraUnit
 from cosmic.vico.core.image import Circumstances
 from cosmic.vico.core.lens_control import PeripheralThread
-from cosmic.vico.core.settings import Backend, CameraConfig, VicoSettings
+from cosmic.vico.core.settings import CameraConfig, VicoSettings
 from cosmic.vico.core.zoom_scale import ZoomScale
 from cosmic.vico.hw.interface import CameraInfo, CameraLibrary, CameraSettings, Frame
 from cosmic.vico.hw.peripherals import Lens, LensAxis, Light
@@ -48,7 +48,7 @@ class VicoApplication(TaskApplication):
 
     def __init__(
         self,
-        make_library: Callable[[Backend], CameraLibrary],
+        make_library: Callable[[str], CameraLibrary],
         open_lens: Callable[[], Lens | None],
         open_light: Callable[[], Light | None],
         settings: VicoSettings,

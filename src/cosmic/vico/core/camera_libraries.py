@@ -5,7 +5,7 @@ from collections.abc import Callable
 from threading import RLock
 
 from cosmic.frame.errors import CosmicError, NotConnectedError
-from cosmic.vico.core.settings import Backend, CameraConfig
+from cosmic.vico.core.settings import CameraConfig
 from cosmic.vico.hw.interface import Camera, CameraInfo, CameraLibrary
 
 logger = logging.getLogger(__name__)
@@ -20,13 +20,13 @@ class CameraLibraries:
         Returns the library of a backend; raises `CosmicError` where it is not installed.
     """
 
-    def __init__(self, make: Callable[[Backend], CameraLibrary]) -> None:
+    def __init__(self, make: Callable[[str], CameraLibrary]) -> None:
         self._make = make
         self._lock = RLock()
-        self._libraries: dict[Backend, CameraLibrary] = {}
-        self._taken: dict[str, tuple[Backend, str]] = {}
+        self._libraries: dict[str, CameraLibrary] = {}
+        self._taken: dict[str, tuple[str, str]] = {}
 
-    def library(self, backend: Backend) -> CameraLibrary:
+    def library(self, backend: str) -> CameraLibrary:
         """Return the driver of a backend; raises `CosmicError` where it is not there."""
         with self._lock:
             if backend not in self._libraries:

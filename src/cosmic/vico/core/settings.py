@@ -82,9 +82,6 @@ class LampSettings(StrictModel):
         return self
 
 
-Backend = Literal["simulated", "aravis", "opencv", "dc1394", "harvesters"]
-
-
 class CameraConfig(StrictModel):
     """One camera of the platform: where to find it and how it begins.
 
@@ -104,7 +101,7 @@ class CameraConfig(StrictModel):
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
     title: str = ""
-    backend: Backend = "simulated"
+    backend: str = Field(default="simulated", min_length=1)
     key: str = ""
     behind_lens: bool = False
     scale_um_px: float | None = Field(default=None, gt=0.0)
@@ -138,6 +135,8 @@ class VicoSettings(StrictModel):
         Films, folders of images and addresses, for the backend "opencv".
     producers : tuple of str
         GenTL producers (.cti files), for the backend "harvesters"; empty: those installed.
+    options : dict of str to dict
+        Settings of backends of their own, by backend.
     """
 
     directory: str = ""
@@ -146,6 +145,7 @@ class VicoSettings(StrictModel):
     table_axis: str = ""
     sources: Annotated[tuple[str, ...], Field(strict=False)] = ()
     producers: Annotated[tuple[str, ...], Field(strict=False)] = ()
+    options: dict[str, dict[str, object]] = Field(default_factory=dict)
     camera: Annotated[tuple[CameraConfig, ...], Field(strict=False)] = ()
     tool: Annotated[tuple[ToolSettings, ...], Field(strict=False)] = ()
     lens: MotorLensSettings = Field(default_factory=lambda: MotorLensSettings(backend="none"))

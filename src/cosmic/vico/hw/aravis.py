@@ -10,13 +10,17 @@ from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
+from cosmic.frame.plugins import NoOptions
 from cosmic.vico.hw import aravis_ctypes as arv
 from cosmic.vico.hw.aravis_ctypes import AravisBuffer, AravisCalls, AravisStream
 from cosmic.vico.hw.base_camera import BaseCamera, BaseCameraLibrary, Sensor
 from cosmic.vico.hw.camera_frames import FrameNumbers, FrameTimes, empty_pixels
 from cosmic.vico.hw.gvcp import QUIET_S, GvcpWatch, ask_camera, controlled
 from cosmic.vico.hw.interface import (
+    CameraBackend,
+    CameraContext,
     CameraInfo,
+    CameraLibrary,
     CameraRanges,
     CameraSettings,
     Frame,
@@ -598,3 +602,10 @@ def _taken(key: str) -> NotConnectedError:
         f"ago; close it there",
         fault=DeviceFault.OVERRIDDEN,
     )
+
+
+def _make(_options: NoOptions, context: CameraContext) -> CameraLibrary:
+    return AravisLibrary(context.clock, packet_bytes=context.packet_bytes)
+
+
+BACKEND: Final = CameraBackend(_make)

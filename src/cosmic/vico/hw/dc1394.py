@@ -12,11 +12,15 @@ from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
+from cosmic.frame.plugins import NoOptions
 from cosmic.vico.hw import dc1394_ctypes as dc
 from cosmic.vico.hw.base_camera import BaseCamera, BaseCameraLibrary, Sensor, check_values
 from cosmic.vico.hw.dc1394_ctypes import Dc1394Calls, Dc1394Handle, Dc1394Ring, Taken
 from cosmic.vico.hw.interface import (
+    CameraBackend,
+    CameraContext,
     CameraInfo,
+    CameraLibrary,
     CameraRanges,
     CameraSettings,
     Frame,
@@ -629,3 +633,10 @@ class FrameCount:
         self._last_us = received_us
         self._next += 1
         return self._next - 1
+
+
+def _make(_options: NoOptions, context: CameraContext) -> CameraLibrary:
+    return Dc1394Library(context.clock)
+
+
+BACKEND: Final = CameraBackend(_make)

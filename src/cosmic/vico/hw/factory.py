@@ -3,12 +3,13 @@
 import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal, get_args
+from typing import TYPE_CHECKING, Literal
 
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import ConfigError, CosmicError, DeviceFault, NotConnectedError
+from cosmic.frame.plugins import Kind, make
 from cosmic.vico.hw.brightlight import BrightLight
-from cosmic.vico.hw.interface import CameraLibrary
+from cosmic.vico.hw.interface import CameraContext, CameraLibrary
 from cosmic.vico.hw.navitar import NavitarLens, counts_anew
 from cosmic.vico.hw.navitar_protocol import Found, Product, probe
 from cosmic.vico.hw.peripherals import Lens, LensAxis, Light
@@ -22,20 +23,19 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-Backend = Literal["simulated", "aravis", "opencv", "dc1394", "harvesters"]
 LensBackend = Literal["simulated", "navitar", "none"]
 LightBackend = Literal["simulated", "brightlight", "none"]
-_BACKENDS: Final = get_args(Backend)
 
 
 def make_camera_library(
-    backend: Backend,
+    backend: str,
     *,
     clock: Clock | None = None,
     scene: "Scene | None" = None,
     sources: "Sequence[VideoSource | str | Path]" = (),
     producers: Sequence[Path | str] = (),
     packet_bytes: int = 0,
+    options: Mapping[str, object] | None = None,
     seed: int = 0,
 ) -> CameraLibrary:
     """Return the cameras of `backend`; none is opened, and none stands in for another.
@@ -46,7 +46,8 @@ def make_camera_library(
         "simulated" (views of the twin), "harvesters" (GenTL producers of the vendors, extra
         ``gentl``: the usual way to GigE Vision and USB3 Vision), "aravis" (the same two on
         Linux, without anything of the vendor's), "opencv" (USB cameras, films, folders of
-        images, addresses), "dc1394" (FireWire on Linux).
+        images, addresses), "dc1394" (FireWire on Linux), or what another package brings
+        (`cosmic.frame.plugins`). Only this one is loaded.
     clock : Clock or None
         The platform's, which stamps frames and paces simulated cameras; None is the wall's.
     scene : Scene or None
@@ -57,52 +58,21 @@ def make_camera_library(
         For "harvesters": the ``.cti`` files; empty: those that are installed.
     packet_bytes : int
         For "aravis": size of the packets of a GigE camera; 0 leaves it alone.
+    options : mapping, or None
+        The backend's own settings.
     seed : int
         For "simulated": of its faults.
 
     Raises
     ------
     ConfigError
-        No such backend, or what it needs was not given.
+        No such backend, its options are wrong, or what it needs was not given.
     NotConnectedError
         Its library or package is not installed; the text says what to install.
     """
-    if backend not in _BACKENDS:
-        raise ConfigError(
-            f"cameras: there is no backend {backend!r}; there are {', '.join(_BACKENDS)}"
-        )
-    # Imported here and below, so that each platform loads its own backend only.
-    if backend == "simulated":
-        return _simulated(scene, clock or WALL, seed)
-    if backend == "aravis":
-        from cosmic.vico.hw.aravis import AravisLibrary
-
-        return AravisLibrary(clock or WALL, packet_bytes=packet_bytes)
-    if backend == "opencv":
-        from cosmic.vico.hw.opencv import OpenCvLibrary
-
-        return OpenCvLibrary(clock or WALL, sources=sources)
-    if backend == "dc1394":
-        from cosmic.vico.hw.dc1394 import Dc1394Library
-
-        return Dc1394Library(clock or WALL)
-    from cosmic.vico.hw.harvesters import HarvestersLibrary, installed_producers
-
-    producers = producers or installed_producers()
-    if not producers:
-        raise ConfigError(
-            "cameras: harvesters: no GenTL producer is installed (GENICAM_GENTL64_PATH names "
-            "none): install the vendor's driver, or name its .cti file under producers"
-        )
-    return HarvestersLibrary(clock or WALL, producers=producers)
-
-
-def _simulated(scene: "Scene | None", clock: Clock, seed: int) -> CameraLibrary:
-    from cosmic.vico.hw.sim_camera import SimulatedCameraLibrary
-
-    if scene is None or scene.optics is None:
-        raise ConfigError("cameras: simulated: a scene is needed")
-    return SimulatedCameraLibrary(scene, clock, seed)
+    context = CameraContext(clock or WALL, scene, sources, producers, packet_bytes, seed)
+    library: CameraLibrary = make(Kind.CAMERA, backend, context, options or {})
+    return library
 
 
 def make_lens(

@@ -14,11 +14,21 @@ import numpy as np
 from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError, needs_extra
+from cosmic.frame.errors import (
+    ConfigError,
+    DeviceError,
+    DeviceFault,
+    NotConnectedError,
+    needs_extra,
+)
+from cosmic.frame.plugins import NoOptions
 from cosmic.vico.hw.base_camera import BaseCamera, BaseCameraLibrary, Sensor
 from cosmic.vico.hw.camera_frames import FrameNumbers, empty_pixels
 from cosmic.vico.hw.interface import (
+    CameraBackend,
+    CameraContext,
     CameraInfo,
+    CameraLibrary,
     CameraRanges,
     CameraSettings,
     Frame,
@@ -611,3 +621,16 @@ def _shaped(component: Any, code: str) -> Pixels:
     if code.startswith("BGR"):
         image = image[:, :, ::-1]
     return np.ascontiguousarray(image) if layers == 4 or code[0] == "B" else image.copy()
+
+
+def _make(_options: NoOptions, context: CameraContext) -> CameraLibrary:
+    producers = context.producers or installed_producers()
+    if not producers:
+        raise ConfigError(
+            "cameras: harvesters: no GenTL producer is installed (GENICAM_GENTL64_PATH names "
+            "none): install the vendor's driver, or name its .cti file under producers"
+        )
+    return HarvestersLibrary(context.clock, producers=producers)
+
+
+BACKEND: Final = CameraBackend(_make)

@@ -1,12 +1,21 @@
 """What ViCo asks of a camera, whatever bus it sits on (thesis 3.3.2, 5.2)."""
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import numpy.typing as npt
+
+from cosmic.frame.clock import Clock
+from cosmic.frame.plugins import Backend
+
+if TYPE_CHECKING:
+    from cosmic.twin.scene import Scene
+    from cosmic.vico.hw.opencv_source import VideoSource
 
 Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
@@ -281,3 +290,35 @@ class CameraLibrary(Protocol):
     @abstractmethod
     def close(self) -> None:
         """Give everything back; harmless the second time."""
+
+
+@dataclass(frozen=True, slots=True)
+class CameraContext:
+    """What a platform gives to the driver of some of its cameras.
+
+    Attributes
+    ----------
+    clock : Clock
+        The platform's, which stamps frames and paces simulated cameras.
+    scene : Scene or None
+        What simulated cameras see; None where there is no twin.
+    sources : sequence of VideoSource, str or Path
+        Films, folders of images and addresses, for "opencv".
+    producers : sequence of Path or str
+        GenTL producers, for "harvesters"; empty: those that are installed.
+    packet_bytes : int
+        Size of the packets of a GigE camera, for "aravis"; 0 leaves it alone.
+    seed : int
+        Of what is random in simulated cameras.
+    """
+
+    clock: Clock
+    scene: "Scene | None" = None
+    sources: "Sequence[VideoSource | str | Path]" = ()
+    producers: Sequence[Path | str] = ()
+    packet_bytes: int = 0
+    seed: int = 0
+
+
+CameraBackend = Backend[CameraContext, CameraLibrary]
+"""What an entry point of the group ``cosmic.cameras`` leads to."""

@@ -13,8 +13,19 @@ from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import ConfigError, DeviceFault, NotConnectedError
+from cosmic.frame.plugins import NoOptions
 from cosmic.vico.hw.base_camera import BaseCamera, BaseCameraLibrary
-from cosmic.vico.hw.interface import CameraInfo, CameraRanges, CameraSettings, Frame, Range, Roi
+from cosmic.vico.hw.interface import (
+    CameraBackend,
+    CameraContext,
+    CameraInfo,
+    CameraLibrary,
+    CameraRanges,
+    CameraSettings,
+    Frame,
+    Range,
+    Roi,
+)
 from cosmic.vico.hw.opencv_source import (
     SILENCE_S,
     SYSFS,
@@ -427,3 +438,10 @@ class OpenCvLibrary(BaseCameraLibrary[OpenCvCamera]):
 
 def _can_be_tried(source: VideoSource) -> bool:
     return source.kind is Kind.ADDRESS or (source.kind is not Kind.DEVICE and source.is_there)
+
+
+def _make(_options: NoOptions, context: CameraContext) -> CameraLibrary:
+    return OpenCvLibrary(context.clock, sources=context.sources)
+
+
+BACKEND: Final = CameraBackend(_make)

@@ -11,15 +11,19 @@ import numpy as np
 from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
-from cosmic.frame.errors import DeviceFault, NotConnectedError
+from cosmic.frame.errors import ConfigError, DeviceFault, NotConnectedError
+from cosmic.frame.plugins import NoOptions
 from cosmic.twin.optics.drawing import Drawing
 from cosmic.twin.optics.optics import Optics
 from cosmic.twin.optics.settings import SensorSettings
 from cosmic.twin.scene import Scene
 from cosmic.vico.hw.base_camera import BaseCamera, BaseCameraLibrary, Sensor, check_values
 from cosmic.vico.hw.interface import (
+    CameraBackend,
+    CameraContext,
     CameraCounters,
     CameraInfo,
+    CameraLibrary,
     CameraRanges,
     CameraSettings,
     Frame,
@@ -537,3 +541,13 @@ class _Arrived(Drawing):
             data[self._missing_from :] = 0
         data.flags.writeable = False
         return data
+
+
+def _make(_options: NoOptions, context: CameraContext) -> CameraLibrary:
+    scene = context.scene
+    if scene is None or scene.optics is None:
+        raise ConfigError("cameras: simulated: a scene is needed")
+    return SimulatedCameraLibrary(scene, context.clock, context.seed)
+
+
+BACKEND: Final = CameraBackend(_make, simulated=True)
