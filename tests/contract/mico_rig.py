@@ -4,18 +4,17 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 
-from contract.station_rig import connected, free_port, listening
+from contract.station_rig import connected, connected_in_memory, free_port, listening
 from cosmic.app.platform import build_platform
 from cosmic.frame.clock import WALL
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.network.in_process import InProcessTransport
+from cosmic.frame.network.host import Host
 from cosmic.frame.network.line_settings import Line
 from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Transport
 from cosmic.mico.api.application import MicoApplication
-from cosmic.mico.api.mico import Mico
-from cosmic.mico.api.remote_application import RemoteMicoApplication
-from cosmic.mico.api.station_side import MicoStationSide
+from cosmic.mico.api.elsewhere import MicoElsewhere
+from cosmic.mico.api.mico import Mico, mico_of
 
 
 @dataclass(frozen=True)
@@ -53,7 +52,7 @@ def hosted_mico(rate: float = 20.0, *, cold: bool = False) -> Iterator[HostedMic
         stack.callback(platform.shut_down)
         platform.initialize()
         station = Station("fibres", platform.policy)
-        side = MicoStationSide(application)
+        side = Host("mico", Mico(application, "station"))
         stack.callback(side.close)
         station.host("mico", side)
         yield HostedMico(station, application, Mico(application))
@@ -69,31 +68,29 @@ def reachable(hosted: HostedMico) -> Iterator[HostedMico]:
 
 @contextmanager
 def transport_to(hosted: HostedMico, how: str, name: str = "vision") -> Iterator[Transport]:
-    """Connect a client: `how` is "in-process" or "zenoh"."""
-    if how == "zenoh":
-        with connected(hosted.endpoint, name) as client:
-            yield client
-    else:
-        made = InProcessTransport(hosted.station, name)
-        try:
-            yield made
-        finally:
-            made.close()
+    """Connect a client: `how` is "memory" or "zenoh"."""
+    joined = (
+        connected(hosted.endpoint, name)
+        if how == "zenoh"
+        else connected_in_memory(hosted.station, name)
+    )
+    with joined as client:
+        yield client
 
 
 @contextmanager
 def remote_mico(
     hosted: HostedMico, how: str, name: str = "vision", *, takes_lease: bool = True
-) -> Iterator[tuple[Mico, RemoteMicoApplication, Transport]]:
+) -> Iterator[tuple[Mico, MicoElsewhere, Transport]]:
     """MiCo of the station as a program elsewhere has it."""
     with transport_to(hosted, how, name) as transport:
         if takes_lease:
             transport.take_lease()
-        application = RemoteMicoApplication(transport, FailurePolicy())
+        application = MicoElsewhere(transport, FailurePolicy())
         try:
             application.initialize()
             assert not application.failure, application.failure
-            yield Mico(application), application, transport
+            yield mico_of(application), application, transport
         finally:
             application.shut_down()
 

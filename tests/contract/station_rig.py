@@ -17,7 +17,6 @@ from cosmic.frame.failure import Failure, FailurePolicy
 from cosmic.frame.network.caller import Access, current_call
 from cosmic.frame.network.client_side_connection import ClientSideConnection
 from cosmic.frame.network.dead_man import DeadMan
-from cosmic.frame.network.in_process import InProcessTransport
 from cosmic.frame.network.line_settings import Certificates, Line
 from cosmic.frame.network.remote import remote
 from cosmic.frame.network.server_listener import ServerListener
@@ -26,6 +25,7 @@ from cosmic.frame.network.transport import Transport
 from cosmic.frame.network.zenoh_wire import ZenohWire
 from cosmic.frame.operation import Task
 from cosmic.frame.verdict import MoveVerdict, Reason
+from unit.frame.network.memory_wire import MemoryHub, MemoryWire
 
 VERDICT = MoveVerdict(
     allowed=False,
@@ -189,8 +189,30 @@ def connected(
 
 
 @contextmanager
+def connected_in_memory(
+    station: Station,
+    name: str = "vision",
+    access: Access = Access.MOVE,
+    *,
+    kind: type[ClientSideConnection] = ClientSideConnection,
+) -> Iterator[ClientSideConnection]:
+    """A client in the same process, over a line that is memory."""
+    hub = MemoryHub()
+    listener = ServerListener(station, MemoryWire(hub), {name: access})
+    client = kind(station.name, name, lambda: MemoryWire(hub), FailurePolicy())
+    try:
+        listener.start()
+        client.start()
+        assert client.wait_until_here(10.0), client.state
+        yield client
+    finally:
+        client.close()
+        listener.shut_down()
+
+
+@contextmanager
 def station_rig(transport: str) -> Iterator[StationRig]:
-    """Yield a station and a client of it; `transport` is "in-process" or "zenoh"."""
+    """Yield a station and a client of it; `transport` is "memory" or "zenoh"."""
     policy = FailurePolicy()
     station, application = Station("fibres", policy), Application()
     station.host("stage", application)
@@ -204,9 +226,7 @@ def station_rig(transport: str) -> Iterator[StationRig]:
         def connect(name: str) -> Transport:
             if transport == "zenoh":
                 return stack.enter_context(connected(endpoint, name))
-            made = InProcessTransport(station, name)
-            stack.callback(made.close)
-            return made
+            return stack.enter_context(connected_in_memory(station, name))
 
         rig = StationRig(station, application, connect("vision"), connect)
         policy.subscribe(rig.failures.append)

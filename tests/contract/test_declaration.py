@@ -589,7 +589,7 @@ def test_a_window_has_done_aside_what_it_does_not_wait_for(remote: Rig) -> None:
 def test_nothing_is_made_for_a_stream_that_nobody_receives(
     remote: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cosmic.frame.network.link.LINGER_S", 0.1)
+    monkeypatch.setattr("cosmic.frame.network.remote_stream.LINGER_S", 0.1)
     assert remote.station is not None
     wanted = remote.station.wanted
     for first in range(20):

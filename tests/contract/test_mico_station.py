@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from contract.mico_rig import (
     transport_to,
     wait_for,
 )
+from contract.station_rig import connected_in_memory
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import (
     LimitError,
@@ -26,16 +27,15 @@ from cosmic.frame.errors import (
     UnknownAxisError,
 )
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.network.caller import Access
+from cosmic.frame.network.caller import Access, Caller
+from cosmic.frame.network.client_side_connection import ClientSideConnection
 from cosmic.frame.network.errors import CallRefused, StationAway
-from cosmic.frame.network.in_process import InProcessTransport
 from cosmic.frame.network.transport import Receiver, Rule, Subscription
 from cosmic.frame.operation import Progress
 from cosmic.frame.verdict import Reason
 from cosmic.mico.api.axis import Axis
-from cosmic.mico.api.mico import Mico
-from cosmic.mico.api.remote_application import RemoteMicoApplication
-from cosmic.mico.api.station_words import AxisPositions, StampedState
+from cosmic.mico.api.elsewhere import MicoElsewhere
+from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.motion.orders import Jog, MoveTo, Steer
@@ -60,7 +60,7 @@ def hosted(station: HostedMico, request: pytest.FixtureRequest) -> Iterator[Host
         yield station
 
 
-@pytest.fixture(params=["local", "in-process", "zenoh"])
+@pytest.fixture(params=["local", "memory", "zenoh"])
 def mico(hosted: HostedMico, request: pytest.FixtureRequest) -> Iterator[Mico]:
     """The same thing for a script, wherever it runs."""
     if request.param == "local":
@@ -70,7 +70,7 @@ def mico(hosted: HostedMico, request: pytest.FixtureRequest) -> Iterator[Mico]:
             yield mico
 
 
-@pytest.fixture(params=["in-process", "zenoh"])
+@pytest.fixture(params=["memory", "zenoh"])
 def how(request: pytest.FixtureRequest) -> str:
     kind: str = request.param
     return kind
@@ -358,41 +358,39 @@ def test_the_operator_takes_over_and_what_moved_from_elsewhere_stops(
 
 def test_the_station_stops_what_moves_from_elsewhere_by_itself(hosted: HostedMico) -> None:
     """The thread that moves looks at the dead man; nobody has to tell it."""
-    client = InProcessTransport(hosted.station, "vision")
-    client.take_lease()
-    motion = MoveTo(5_000.0, "um")
-    hosted.mico["left.x"]
+    caller, lease = Caller("vision", "a token"), hosted.station.lease
+    lease.take(caller.name, caller.token)
     hosted.application.manager.device("left.x").set_frequency(0, SLOW_HZ)
-    client.call("mico", "order", {"axis": "left.x", "number": 1, "motion": motion})
+    arguments = {"motion": MoveTo(5_000.0, "um"), "@": ("left.x",)}
+    hosted.station.invoker("mico").invoke(caller, "axes.begin", arguments)
     wait_for(lambda: hosted.mico["left.x"].details.in_motion)
-    client.release_lease()  # the in-process transport cancels nothing
+    lease.release(caller.token)
     wait_for(lambda: not hosted.mico["left.x"].details.in_motion)
     assert (hosted.mico["left.x"].position_um or 0.0) < 4_000.0
-    client.close()
 
 
-def test_what_the_station_carries_out_for_a_client_ends_with_its_lease(hosted: HostedMico) -> None:
-    client = InProcessTransport(hosted.station, "vision")
-    client.take_lease()
-    hosted.application.manager.device("left.x").set_frequency(0, SLOW_HZ)
-    places = ({"left.x": 5_000.0}, {"left.x": 0.0})
-    way = Way({"left.x": 0.0}, places, "straight", 5_000.0, 5_000.0, 1.0)
-    task: Any = client.call("mico", "follow_way", {"way": way})
-    wait_for(lambda: hosted.mico["left.x"].details.in_motion)
-    client.release_lease()
-    with pytest.raises(MoveCancelled, match="given back by vision"):
-        task.wait(5.0)
-    wait_for(lambda: not hosted.mico["left.x"].details.in_motion)
-    assert (hosted.mico["left.x"].position_um or 0.0) < 4_000.0
-    client.close()
+def test_what_the_station_carries_out_for_a_client_ends_with_its_lease(
+    hosted: HostedMico, how: str
+) -> None:
+    with remote_mico(hosted, how) as (mico, _, transport):
+        mico["left.x"].set_closed_loop_frequency(SLOW_HZ)
+        waypoints = ({"left.x": 5_000.0}, {"left.x": 0.0})
+        way = Way({"left.x": 0.0}, waypoints, "straight", 5_000.0, 5_000.0, 1.0)
+        task = mico.follow(way, wait=False)
+        wait_for(lambda: hosted.mico["left.x"].details.in_motion)
+        transport.release_lease()
+        with pytest.raises(MoveCancelled):
+            task.wait(5.0)
+        wait_for(lambda: not hosted.mico["left.x"].details.in_motion)
+        assert (hosted.mico["left.x"].position_um or 0.0) < 4_000.0
 
 
 def test_what_a_program_has_begun_stops_when_it_closes_mico(hosted: HostedMico, how: str) -> None:
     with transport_to(hosted, how) as client:
         client.take_lease()
-        application = RemoteMicoApplication(client, FailurePolicy())
+        application = MicoElsewhere(client, FailurePolicy())
         application.initialize()
-        axis = Mico(application)["left.x"]
+        axis = mico_of(application)["left.x"]
         axis.set_closed_loop_frequency(SLOW_HZ)
         movement = axis.move_to(5_000.0, wait=False)
         wait_for(lambda: hosted.mico["left.x"].details.in_motion)
@@ -406,14 +404,14 @@ def test_what_a_program_has_begun_stops_when_it_closes_mico(hosted: HostedMico, 
 @pytest.mark.defects
 def test_a_mistake_in_the_program_that_moves_stops_the_station(hosted: HostedMico) -> None:
     policy = FailurePolicy()
-    with transport_to(hosted, "in-process") as client:
+    with transport_to(hosted, "memory") as client:
         client.take_lease()
-        application = RemoteMicoApplication(client, policy)
+        application = MicoElsewhere(client, policy)
         try:
             application.initialize()
             policy.report(ValueError("nothing moves"), "here")
             assert not hosted.application.manager.latch.state.latched
-            axis = Mico(application)["left.x"]
+            axis = mico_of(application)["left.x"]
             axis.set_closed_loop_frequency(SLOW_HZ)
             axis.move_to(5_000.0, wait=False)
             wait_for(lambda: hosted.mico["left.x"].details.in_motion)
@@ -424,9 +422,8 @@ def test_a_mistake_in_the_program_that_moves_stops_the_station(hosted: HostedMic
 
 
 def test_when_a_client_takes_the_lease_a_jog_of_the_station_ends(hosted: HostedMico) -> None:
-    client = InProcessTransport(hosted.station, "vision")
-    jog = hosted.mico["left.x"].jog(1, 5.0)
-    try:
+    with transport_to(hosted, "memory") as client:
+        jog = hosted.mico["left.x"].jog(1, 5.0)
         wait_for(lambda: hosted.mico["left.x"].details.in_motion)
         client.take_lease()
         until_s = WALL.now_s() + 3.0
@@ -436,8 +433,6 @@ def test_when_a_client_takes_the_lease_a_jog_of_the_station_ends(hosted: HostedM
         assert jog.done
         with pytest.raises(MoveRefused, match="vision controls"):
             jog.movement.wait(1.0)
-    finally:
-        client.close()
 
 
 def test_a_stop_and_a_halt_need_no_lease(hosted: HostedMico, how: str) -> None:
@@ -448,7 +443,7 @@ def test_a_stop_and_a_halt_need_no_lease(hosted: HostedMico, how: str) -> None:
         holder["left.x"].set_closed_loop_frequency(SLOW_HZ)
         movement = holder["left.x"].move_to(5_000.0, wait=False)
         wait_for(lambda: hosted.mico["left.x"].details.in_motion)
-        viewer.manager.device("left.x").halt(0, "seen from elsewhere")
+        viewer.api["left.x"].halt("seen from elsewhere")
         with pytest.raises(MoveCancelled, match="seen from elsewhere"):
             movement.wait(5.0)
         movement = holder["left.x"].move_to(5_000.0, wait=False)
@@ -465,18 +460,18 @@ def test_a_stop_and_a_halt_need_no_lease(hosted: HostedMico, how: str) -> None:
 
 
 def test_somebody_who_may_only_look_sees_and_stops_and_moves_nothing(hosted: HostedMico) -> None:
-    viewer = InProcessTransport(hosted.station, "viewer", Access.VIEW)
-    application = RemoteMicoApplication(viewer, hosted.application.trajectories.policy)
-    try:
-        application.initialize()
-        assert Mico(application)["left.x"].position_um is not None
-        with pytest.raises((MoveRefused, CallRefused)):
-            Mico(application)["left.x"].move_to(10.0)
-        application.manager.stop("seen")
-        assert hosted.application.manager.latch.state.latched
-    finally:
-        application.shut_down()
-        viewer.close()
+    with connected_in_memory(hosted.station, "viewer", Access.VIEW) as viewer:
+        application = MicoElsewhere(viewer, FailurePolicy())
+        try:
+            application.initialize()
+            mico = mico_of(application)
+            assert mico["left.x"].position_um is not None
+            with pytest.raises((MoveRefused, CallRefused)):
+                mico["left.x"].move_to(10.0)
+            mico.stop("seen")
+            assert hosted.application.manager.latch.state.latched
+        finally:
+            application.shut_down()
 
 
 # --- what overtakes what -----------------------------------------------------------------------
@@ -487,24 +482,24 @@ def test_a_halt_that_overtakes_an_order_keeps_it_from_beginning(
 ) -> None:
     with transport_to(hosted, how) as client:
         client.take_lease()
-        client.call("mico", "halt", {"axis": "left.x", "up_to": 7})
-        order = {"axis": "left.x", "number": 7, "motion": MoveTo(50.0, "um")}
+        client.call("mico", "axes.halt", {"#": 7, "@": ("left.x",)})
+        order: dict[str, object] = {"motion": MoveTo(50.0, "um"), "@": ("left.x",)}
         with pytest.raises(MoveCancelled, match="halted before it started"):
-            client.call("mico", "order", order)
-        client.call("mico", "withdraw", {"numbers": [8]})
-        with pytest.raises(MoveCancelled):
-            client.call("mico", "order", order | {"number": 8})
-        follows = order | {"number": 9, "follows": 3}
+            client.call("mico", "axes.begin", order | {"#": 7})
+        together: Any = client.call(
+            "mico", "begin_together", {"motions": {"left.x": MoveTo(50.0, "um")}, "#": 6}
+        )
+        assert "MoveCancelled" in str(together.result.wait(5.0).error)
         with pytest.raises(MoveCancelled, match="newer command"):
-            client.call("mico", "order", follows)
+            client.call("mico", "axes.begin", order | {"#": 9, "follows": "3"})
     assert hosted.mico["left.x"].position_um == pytest.approx(0.0, abs=1.0)
 
 
 BAD_ORDERS: list[dict[str, object]] = [
     {"motion": Jog(1, 100.0)},
-    {"motion": MoveTo(50.0, "um"), "axis": 5},
+    {"motion": MoveTo(50.0, "um"), "@": (5,)},
     {"motion": "everything"},
-    {"motion": MoveTo(50.0, "um"), "number": 1.0},
+    {"motion": MoveTo(50.0, "um"), "#": 1.0},
     {"motion": MoveTo(50.0, "um"), "token": "x"},
 ]
 
@@ -512,37 +507,38 @@ BAD_ORDERS: list[dict[str, object]] = [
 def test_an_ill_typed_order_moves_nothing(hosted: HostedMico, how: str) -> None:
     with transport_to(hosted, how) as client:
         client.take_lease()
+        nan, left = float("nan"), {"@": ("left.x",)}
         for bad in BAD_ORDERS:
             with pytest.raises(CallRefused):
-                client.call("mico", "order", {"axis": "left.x", "number": 1} | bad)
-        nan = float("nan")
+                client.call("mico", "axes.begin", left | bad)
         for function, arguments in (
-            ("set_zero", {"axis": "left.x", "zero": nan}),
-            ("jog", {"axis": "left.x", "number": 3, "motion": Steer(1, 5.0, 1e9)}),
-            ("link", {"first": "left.x", "second": "left.gripper", "ratio": 1.0}),
-            ("link", {"first": "left.x", "second": "right.x", "ratio": nan}),
+            ("axes.show_from", {"zero": nan} | left),
+            ("axes.begin_jog", {"key": "3", "motion": Steer(1, 5.0, 1e9)} | left),
+            ("add_link", {"first": "left.x", "second": "left.gripper", "ratio": 1.0}),
+            ("add_link", {"first": "left.x", "second": "right.x", "ratio": nan}),
             ("put_pose", {"name": "x", "positions": {"left.x": nan}}),
-            ("find_way", {"targets": {"left.x": 1.0}, "budget_s": 1e9}),
-            ("set_frequency", {"axis": "left.x", "frequency_hz": 0}),
-            ("halt", {"axis": "nowhere"}),
+            ("begin_search", {"targets": {"left.x": 1.0}, "budget_s": 1e9}),
+            ("axes.limit_frequency", {"frequency_hz": 0} | left),
+            ("axes.halt", {"@": ("nowhere",)}),
         ):
-            with pytest.raises((MoveRefused, NotAvailable, UnknownAxisError)):
+            with pytest.raises((MoveRefused, NotAvailable, CallRefused)):
                 client.call("mico", function, arguments)
         client.call("mico", "stop", {"reason": "a\nforged line\x1b[31m" + 500 * "x"})
         reason = hosted.application.manager.latch.state.reason or ""
         assert reason.startswith("a forged line")
         assert len(reason) < 200
         client.call("mico", "reset_stop")
-        senseless = {"axis": "left.x", "number": 2, "motion": Jog(5, nan)}
-        ended: Any = client.call("mico", "jog", senseless)
-        assert ended.wait(5.0).of["left.x"].error is not None
+        begun: Any = client.call(
+            "mico", "axes.begin_jog", {"key": "2", "motion": Jog(5, nan), **left}
+        )
+        assert begun.result.wait(5.0).error is not None
     assert hosted.mico["left.x"].position_um == pytest.approx(0.0, abs=1.0)
 
 
 # --- what is told ------------------------------------------------------------------------------
 
 
-class Deaf(InProcessTransport):
+class Deaf(ClientSideConnection):
     """Hears nothing of any topic."""
 
     def subscribe(self, topic: str, rule: Rule, receiver: Receiver) -> Subscription:
@@ -552,12 +548,13 @@ class Deaf(InProcessTransport):
 
 def test_what_a_call_has_changed_is_known_when_it_returns(hosted: HostedMico) -> None:
     """Topics come when they come; a script must not have to wait for them."""
-    client = Deaf(hosted.station, "vision")
-    client.take_lease()
-    application = RemoteMicoApplication(client, hosted.application.trajectories.policy)
-    try:
+    with ExitStack() as stack:
+        client = stack.enter_context(connected_in_memory(hosted.station, kind=Deaf))
+        client.take_lease()
+        application = MicoElsewhere(client, FailurePolicy())
+        stack.callback(application.shut_down)
         application.initialize()
-        mico = Mico(application)
+        mico = mico_of(application)
         axis = mico["left.x"]
         axis.move_to(60.0)
         assert axis.position_um == pytest.approx(60.0, abs=1.0)
@@ -571,24 +568,18 @@ def test_what_a_call_has_changed_is_known_when_it_returns(hosted: HostedMico) ->
         assert application.manager.latch.state.latched
         application.manager.reset_stop()
         assert not application.manager.latch.state.latched
-    finally:
-        application.shut_down()
-        client.close()
 
 
 def test_an_older_word_changes_nothing(hosted: HostedMico) -> None:
-    with remote_mico(hosted, "in-process", takes_lease=False) as (mico, application, _):
-        manager, now = application.manager, mico["left.x"].details
-        manager.take_event(StampedState(10**9, replace(now, position=1.0), 0.0))
-        manager.take_event(StampedState(10**9 - 1, replace(now, position=2.0), 0.0))
-        manager.take_positions(AxisPositions({"left.x": (10**9 - 1, 3.0, 0.0)}))
-        assert mico["left.x"].position_um == 1.0
-        manager.take_positions(AxisPositions({"left.x": (10**9, 4.0, 0.0)}))
-        assert mico["left.x"].position_um == 4.0
-        manager.lose("the cable is out")
-        manager.take_event(StampedState(10**9 + 1, now, 0.0))
-        assert not mico["left.x"].details.present
-        assert mico["left.x"].error == "the cable is out"
+    with remote_mico(hosted, "memory", takes_lease=False) as (mico, _, _):
+        axis = mico["left.x"]
+        far, now = axis.far, axis.details
+        assert far is not None
+        read_s = hosted.mico["left.x"].details.read_wall_s
+        far.move(1.0, 0.0, read_s + 100.0)
+        assert axis.position_um == 1.0
+        far.move(2.0, 0.0, read_s - 100.0)
+        assert axis.position_um == pytest.approx(now.position, abs=1.0)
 
 
 def test_who_commands_is_told_and_positions_are_told_seldom(hosted: HostedMico, how: str) -> None:
@@ -606,7 +597,8 @@ def test_who_commands_is_told_and_positions_are_told_seldom(hosted: HostedMico, 
         wait_for(lambda: commands)
         heard.close()
         seen.close()
-    assert any("vision script: left.x: MoveTo" in str(each) for each in commands)
+    told = [str(each) for each in commands]
+    assert any("vision: left.x begin" in each and "MoveTo" in each for each in told), told
     assert 1 <= len(positions) <= 31 * took_s + 2
 
 
@@ -627,11 +619,11 @@ def test_what_is_done_at_the_station_is_seen_from_elsewhere(hosted: HostedMico, 
 
 
 def test_a_station_that_is_away_leaves_axes_absent_and_moves_refused(hosted: HostedMico) -> None:
-    with transport_to(hosted, "in-process") as transport:
-        application = RemoteMicoApplication(transport, hosted.application.trajectories.policy)
+    with transport_to(hosted, "memory") as transport:
+        application = MicoElsewhere(transport, FailurePolicy())
         try:
             application.initialize()
-            mico = Mico(application)
+            mico = mico_of(application)
             transport.close()
             wait_for(lambda: application.failure)
             assert mico["left.x"].state is Status.UNKNOWN

@@ -7,8 +7,8 @@ from contract.station_rig import connected
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
-from cosmic.mico.api.mico import Mico
-from cosmic.mico.api.remote_application import RemoteMicoApplication
+from cosmic.mico.api.elsewhere import MicoElsewhere
+from cosmic.mico.api.mico import mico_of
 
 
 def say(text: str) -> None:
@@ -19,9 +19,9 @@ def say(text: str) -> None:
 def main(what: str, endpoint: str) -> None:
     with connected(endpoint, "vision") as client:
         client.take_lease()
-        application = RemoteMicoApplication(client, FailurePolicy())
+        application = MicoElsewhere(client, FailurePolicy())
         application.initialize()
-        axis = Mico(application)["left.x"]
+        axis = mico_of(application)["left.x"]
         ended = threading.Event()
         if what == "jog":
             jog = axis.jog(1, 10.0)

@@ -19,7 +19,7 @@ from cosmic.autonomy.procedures.run import ProcedureRun
 from cosmic.daqco.api.daqco import Daqco, daqco_of
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import NotAvailable
-from cosmic.mico.api.mico import Mico
+from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.vico.api.vico import Vico, vico_of
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class Rig:
 
     def __init__(self, platform: Platform, source: str = "script") -> None:
         self._platform = platform
-        self._mico = Mico(platform.mico, source) if platform.mico is not None else None
+        self._mico = mico_of(platform.mico, source) if platform.mico is not None else None
         self._daqco = daqco_of(platform.daqco) if platform.daqco is not None else None
         self._vico = vico_of(platform.vico) if platform.vico is not None else None
         self._control: Control | None = None

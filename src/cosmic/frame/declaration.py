@@ -20,8 +20,10 @@ from cosmic.frame.events import Event, Unsubscribe
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.caller import MOVE_LIMIT_S
 from cosmic.frame.network.conform import can_check
+from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.transfer import let_travel
 from cosmic.frame.network.transport import CALL_TIMEOUT_S, Rule
+from cosmic.frame.operation import Operation
 
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
@@ -59,6 +61,9 @@ class Need:
     aside : bool
         Such a thread has it done aside, and `Declared.refused` says why it was not done. Only for
         a command that returns nothing.
+    renews : bool
+        It keeps alive what was begun before, and overtakes everything. From elsewhere it is sent
+        without waiting, only the newest word counts, and no state comes back.
     """
 
     moves: bool = False
@@ -69,12 +74,19 @@ class Need:
     remembered_s: float = 0.0
     meanwhile: object = UNKNOWN
     aside: bool = False
+    renews: bool = False
+
+    @property
+    def overtakes(self) -> bool:
+        """It waits for no other command."""
+        return self.at_once or self.renews
 
 
 @dataclass(frozen=True, slots=True)
 class _StateMark:
     unknown: object
     quiet: bool
+    fixed: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +124,7 @@ def command(
     remembered_s: float = ...,
     meanwhile: object = ...,
     aside: bool = ...,
+    renews: bool = ...,
 ) -> Callable[[F], F]: ...
 def command(function: F | None = None, **need: Any) -> F | Callable[[F], F]:
     """Declare a command; the arguments are those of `Need`.
@@ -126,9 +139,13 @@ def command(function: F | None = None, **need: Any) -> F | Callable[[F], F]:
 @overload
 def state(function: F) -> F: ...
 @overload
-def state(*, unknown: object = ..., quiet: bool = ...) -> Callable[[F], F]: ...
+def state(*, unknown: object = ..., quiet: bool = ..., fixed: bool = ...) -> Callable[[F], F]: ...
 def state(
-    function: F | None = None, *, unknown: object = UNKNOWN, quiet: bool = False
+    function: F | None = None,
+    *,
+    unknown: object = UNKNOWN,
+    quiet: bool = False,
+    fixed: bool = False,
 ) -> F | Callable[[F], F]:
     """Declare what a property returns as state: published on change, and read without waiting.
 
@@ -141,10 +158,13 @@ def state(
         by its annotation.
     quiet : bool
         It changes all the time, and nobody is told of it.
+    fixed : bool
+        It is the same for as long as the application runs, and may be large: it is told once.
     """
+    mark = _StateMark(unknown, quiet, fixed)
     if function is not None:
-        return _marked(function, _StateMark(unknown, quiet))
-    return lambda marked: _marked(marked, _StateMark(unknown, quiet))
+        return _marked(function, mark)
+    return lambda marked: _marked(marked, mark)
 
 
 def stream(
@@ -242,6 +262,15 @@ class Declared:
         """How much of the streams did not reach this process."""
         return 0
 
+    @property
+    def moves_elsewhere(self) -> bool:
+        """Something that was begun through this object still moves at another station."""
+        return False
+
+    def wall_s_here(self, wall_s: float) -> float:
+        """Return what the wall clock of this process said when that of the application did."""
+        return wall_s
+
     def on_change(self, listener: Callable[[], object]) -> Unsubscribe:
         """Call `listener()`, in any thread, when anything but streams changed."""
         with _lock:
@@ -267,6 +296,9 @@ class Declared:
     def prepare(self, key: str, policy: FailurePolicy) -> None:
         """Prepare what a proxy of this class keeps on this side; `key` is that of the part."""
 
+    def take_lease_of(self, lease: StationLease) -> None:
+        """Let the lease of the station that hosts it decide who may move."""
+
     def made_companion(self) -> Companion | None:
         """Return what keeps an eye on the station where this is a proxy; None for nothing."""
         return None
@@ -291,6 +323,7 @@ class StateDeclaration:
     kind: Any
     unknown: object
     quiet: bool
+    fixed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -357,7 +390,9 @@ def _declared_by(kind: type[Declared]) -> Declaration:
         elif isinstance(mark, _StateMark):
             _let_travel(where, hints.get("return"))
             unknown = mark.unknown if mark.unknown is not UNKNOWN else _empty(hints["return"])
-            found.state[name] = StateDeclaration(name, hints["return"], unknown, mark.quiet)
+            found.state[name] = StateDeclaration(
+                name, hints["return"], unknown, mark.quiet, mark.fixed
+            )
         elif isinstance(mark, _StreamMark):
             payload = _payload(where, hints)
             topic = mark.topic or name
@@ -391,8 +426,17 @@ def _command(
             required.add(each.name)
     result = hints.get("return")
     let_travel(result)
+    let_travel(result_of(result))
     name = where.rpartition(".")[2]
     return CommandDeclaration(name, need, parameters, frozenset(required), result)
+
+
+def result_of(kind: Any) -> Any:
+    """Return what an operation of that kind ends with, as far as it travels; None: not known."""
+    made = get_origin(kind) or kind
+    if not (isinstance(made, type) and issubclass(made, Operation)):
+        return None
+    return made.sent_kind or next(iter(get_args(kind)), None)
 
 
 def _payload(where: str, hints: dict[str, Any]) -> Any:

@@ -5,7 +5,7 @@ from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass
 from threading import Condition, Lock, RLock
-from typing import Any, Final, Generic, Self, TypeVar
+from typing import Any, ClassVar, Final, Generic, Self, TypeVar
 
 from typing_extensions import override
 
@@ -79,6 +79,21 @@ class Operation(Generic[T]):
     _done = False
     _told: "_Told | None" = None
     _future: Future[T] | None = None
+    sent_kind: ClassVar[Any] = None
+    """What is told of its result to another process; None: what its annotation names."""
+
+    @classmethod
+    def followed(cls, title: str) -> Self:
+        """Return one that stands for another of its kind, which goes on elsewhere."""
+        return cls(title)
+
+    def sent_result(self) -> object:
+        """Return what is told of its result to another process; raises as `result`."""
+        return self.result
+
+    def finish_as_sent(self, sent: Any) -> bool:
+        """End well as the one did of which `sent_result` was told."""
+        return self.finish(sent)
 
     def __init__(self, title: str, *, clock: Clock = WALL) -> None:
         self._title = title

@@ -15,7 +15,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.gui.theme import State
 from cosmic.frame.network.client_side_connection import ClientSideConnection
 from cosmic.frame.threads import declare_gui_thread
-from cosmic.mico.api.remote_application import RemoteMicoApplication
+from cosmic.mico.api.elsewhere import MicoElsewhere
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.gui.mico_widget import MicoWidget, make_mico_gui
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
@@ -38,7 +38,7 @@ def remote_panel(
     with ExitStack() as stack:
         client = stack.enter_context(connected(hosted.endpoint))
         client.take_lease()
-        application = RemoteMicoApplication(client, FailurePolicy(), gui_factory=make_mico_gui)
+        application = MicoElsewhere(client, FailurePolicy(), gui_factory=make_mico_gui)
         stack.callback(application.shut_down)
         stack.callback(declare_gui_thread())
         application.initialize()

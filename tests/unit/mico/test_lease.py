@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.caller import Access, Call, Caller, carrying_out
-from cosmic.frame.network.in_process import InProcessTransport
 from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.station import Station
 from cosmic.frame.verdict import Reason
@@ -122,4 +121,3 @@ def test_a_hosted_application_is_told_of_its_station() -> None:
     station, application = Station("fibres", FailurePolicy()), Application()
     station.host("stage", application)
     assert application.station is station
-    InProcessTransport(station, "vision").close()

@@ -16,6 +16,7 @@ from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.station import Station
 from cosmic.frame.version import __version__
 from cosmic.mico.api.application import MicoApplication
+from cosmic.mico.api.mico import Mico
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.api.vico import Vico
 
@@ -103,13 +104,10 @@ def _opened(how: Serving) -> "Wire":
 
 def _sides(platform: Platform) -> dict[str, object]:
     """Return what answers for each application that runs in this process."""
-    # Imported here: whoever serves nothing loads none of it.
-    from cosmic.mico.api.station_side import MicoStationSide
-
     sides: dict[str, object] = {}
     for name, application in platform.own.items():
         if isinstance(application, MicoApplication):
-            sides[name] = MicoStationSide(application)
+            sides[name] = Host(name, Mico(application, "station"))
         elif isinstance(application, DaqcoApplication):
             sides[name] = Host(name, Daqco(application))
         elif isinstance(application, VicoApplication):

@@ -4,7 +4,6 @@ import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 from cosmic.app.configuration.platform_file import KNOWN_APPLICATIONS
@@ -16,6 +15,7 @@ from cosmic.frame.declaration import Declared
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.application import RemoteApplication
+from cosmic.mico.api.elsewhere import MicoElsewhere
 from cosmic.vico.api.vico import Vico
 
 if TYPE_CHECKING:
@@ -53,10 +53,7 @@ class RemoteApplications:
             return RemoteApplication(
                 title, kind, station.transport, policy, name=name, gui_factory=gui
             )
-        module = import_module(f"cosmic.{name}.api.remote_application")
-        return getattr(module, f"Remote{name.capitalize()}Application")(
-            station.transport, policy, gui_factory=gui
-        )
+        return MicoElsewhere(station.transport, policy, gui_factory=gui)
 
     def close(self) -> None:
         """End every line; any state."""

@@ -73,7 +73,7 @@ class RemoteApplication(TaskApplication, Generic[D]):
         if not self._link.wait_until_known(FIRST_STATE_S):
             return
         until_s = WALL.now_s() + FIRST_DATA_S
-        while not self._link.companion.ready and WALL.now_s() < until_s:
+        while not self._link.ready and WALL.now_s() < until_s:
             WALL.sleep(_LOOK_S)
 
     def initialize_later(self) -> Task:

@@ -1,6 +1,6 @@
 """Who calls, as the code that is called may ask."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -48,6 +48,10 @@ class Caller:
     local: bool = False
 
 
+def _never(_at: tuple[str, ...]) -> bool:
+    return False
+
+
 @dataclass(frozen=True, slots=True)
 class Call:
     """A call being carried out.
@@ -59,10 +63,13 @@ class Call:
     dead_man : DeadMan or None
         To be polled by the thread that moves: it expires when the caller dies, freezes, is cut
         off or loses the lease. None when the function moves nothing.
+    overtaken : callable
+        Returns whether the caller has halted the part at that address since it gave this command.
     """
 
     caller: Caller
     dead_man: DeadMan | None = None
+    overtaken: Callable[[tuple[str, ...]], bool] = _never
 
 
 _current: Final[ContextVar[Call | None]] = ContextVar("cosmic_call", default=None)

@@ -1,26 +1,33 @@
 """Offers a declared application at a station: its commands, its state and its streams."""
 
 import secrets
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
 from functools import partial
 from threading import Event, Lock
 from typing import Any, Final
 
 from typing_extensions import override
 
+from cosmic.frame.clock import WALL
 from cosmic.frame.declaration import (
     CommandDeclaration,
     Declaration,
     Declared,
     declaration_of,
 )
+from cosmic.frame.errors import CosmicError, MoveCancelled
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.network.errors import CallRefused
-from cosmic.frame.network.ongoing import Answered, StateMessage
+from cosmic.frame.network.caller import Call, carrying_out, current_call
+from cosmic.frame.network.errors import CallRefused, RemoteDefect
+from cosmic.frame.network.ongoing import Answered, Ended, StateMessage
 from cosmic.frame.network.remote import Offered, RemoteMark
 from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Presence
+from cosmic.frame.network.travelling_errors import to_plain
+from cosmic.frame.operation import Operation, Progress, Task
 from cosmic.frame.threads import WorkerThread
 
 PUBLISH_EVERY_S: Final = 0.25
@@ -29,7 +36,11 @@ SHORTEST_S: Final = 0.03
 """How long a change waits at most for others to be published with it."""
 KEYS: Final = "@"
 """Argument that says which of the parts with keys are meant, from the application down."""
+NUMBER: Final = "#"
+"""Argument that counts what a client commands: what it halted later is not begun any more."""
 STATE: Final = "state"
+COMMANDS: Final = "commands"
+"""Topic with what clients command."""
 NOW: Final = "now_s"
 
 
@@ -41,6 +52,79 @@ def command_name(parts: tuple[str, ...], command: str) -> str:
 def topic_of(application: str, at: tuple[str, ...], topic: str) -> str:
     """Return what a stream of a part is called on a line."""
     return "/".join((application, *at, topic))
+
+
+class Overtaken:
+    """What each client has halted, and by which of its commands; any thread.
+
+    A halt may arrive before a command that was given before it: that one is void.
+    """
+
+    _MOST: Final = 512
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._halted: OrderedDict[tuple[str, tuple[str, ...]], int] = OrderedDict()
+
+    def note(self, token: str, at: tuple[str, ...], number: int) -> None:
+        """Take note of a halt of the object at an address, and of all its parts."""
+        with self._lock:
+            self._halted[token, at] = max(number, self._halted.get((token, at), 0))
+            self._halted.move_to_end((token, at))
+            while len(self._halted) > self._MOST:
+                self._halted.popitem(last=False)
+
+    def holds(self, token: str, number: int, at: tuple[str, ...]) -> bool:
+        """Return whether a command of that number came too late for what is at `at`."""
+        if not self._halted or not number:
+            return False
+        with self._lock:
+            return any(
+                number <= self._halted.get((token, at[:count]), 0) for count in range(len(at) + 1)
+            )
+
+
+class _Ending:
+    """An operation that another station follows; it ends with what it has changed. Any thread."""
+
+    def __init__(self, operation: Operation[Any], state: Callable[[], StateMessage]) -> None:
+        self._operation = operation
+        self._state = state
+
+    @property
+    def title(self) -> str:
+        """What it is."""
+        return self._operation.title
+
+    @property
+    def done(self) -> bool:
+        """True when it has ended."""
+        return self._operation.done
+
+    def cancel(self) -> None:
+        """Ask it to end."""
+        self._operation.cancel()
+
+    def add_callback(self, callback: Callable[[object], object]) -> None:
+        """Call `callback(self)` at the end."""
+        self._operation.add_callback(lambda _operation: callback(self))
+
+    def wait(self, timeout_s: float | None = None) -> Ended:
+        """Return how it ended; raises `DeviceTimeout`, and nothing that it failed with."""
+        error = self._operation.exception(timeout_s)
+        if error is None:
+            return Ended(self._operation.sent_result(), None, self._state())
+        if not isinstance(error, CosmicError):
+            error = RemoteDefect(f"{type(error).__name__}: {error}")
+        return Ended(None, to_plain(error), self._state())
+
+
+class _TaskEnding(_Ending):
+    """One that tells its progress as well."""
+
+    def subscribe(self, subscriber: Callable[[Progress], object]) -> Callable[[], None]:
+        """Call `subscriber(progress)` at each step."""
+        return self._operation.subscribe(subscriber)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +155,7 @@ class Host:
         self._asked: set[str] = set()
         self._forget: Callable[[], None] = lambda: None
         self._ends: dict[tuple[str, ...], tuple[Declared, list[Callable[[], None]]]] = {}
+        self._overtaken = Overtaken()
 
     # What may be called
 
@@ -96,21 +181,54 @@ class Host:
         self, command: CommandDeclaration, parts: tuple[str, ...], keyed: tuple[bool, ...]
     ) -> Offered:
         need = command.need
-        mark = RemoteMark(need.moves, need.reads, need.at_once, need.limit_s)
+        mark = RemoteMark(need.moves, need.reads, need.overtakes, need.limit_s)
         parameters, required = dict(command.parameters), command.required
         if any(keyed):
             parameters[KEYS] = tuple[str, ...]
             required = required | {KEYS}
+        if need.moves or need.overtakes:
+            parameters[NUMBER] = int
 
         def run(**arguments: Any) -> object:
             found = self._resolved(parts, keyed, arguments.pop(KEYS, ()))
-            result = getattr(found.served, command.name)(**arguments)
-            if need.reads or need.at_once:
+            call = self._in_order(command, found.at, arguments.pop(NUMBER, 0))
+            if not (need.reads or need.renews):
+                self._publish_command(found.at, command.name, arguments)
+            with carrying_out(call) if call is not None else nullcontext():
+                result = getattr(found.served, command.name)(**arguments)
+            if need.reads or need.renews:
                 return result
             self._note_change()
-            return Answered(result, self._message(found))
+            if isinstance(result, Operation):
+                made = _TaskEnding if isinstance(result, Task) else _Ending
+                result = made(result, lambda: self.state(whole=False))
+            return Answered(result, self._message(found, whole=False))
 
         return Offered(command_name(parts, command.name), mark, run, parameters, required)
+
+    def _publish_command(
+        self, at: tuple[str, ...], command: str, arguments: Mapping[str, object]
+    ) -> None:
+        """Publish what a client commands, a line each."""
+        call, station = current_call(), self._station
+        if call is not None and station is not None:
+            said = ", ".join(f"{name}={value!r:.100}" for name, value in arguments.items())
+            line = f"{call.caller.name}: {' '.join((*at[-1:], command))}({said})"
+            station.publish(topic_of(self._name, (), COMMANDS), line[:500])
+
+    def _in_order(
+        self, command: CommandDeclaration, at: tuple[str, ...], number: int
+    ) -> Call | None:
+        """Return the call as the command sees it; raises `MoveCancelled` where it is void."""
+        call = current_call()
+        if call is None:
+            return None
+        token = call.caller.token
+        if command.need.at_once:
+            self._overtaken.note(token, at, number)
+        elif command.need.moves and self._overtaken.holds(token, number, at):
+            raise MoveCancelled(f"{at[-1] if at else self._name}: halted before it started")
+        return replace(call, overtaken=partial(self._overtaken.holds, token, number))
 
     def _resolved(
         self, parts: tuple[str, ...], keyed: tuple[bool, ...], keys: tuple[str, ...]
@@ -134,26 +252,34 @@ class Host:
 
     # What is read
 
-    def state(self) -> StateMessage:
-        """Return the state of everything."""
-        return self._message(_Found((), self._served))
+    def state(self, *, whole: bool = True) -> StateMessage:
+        """Return the state of everything; with a `whole` one what never changes as well."""
+        return self._message(_Found((), self._served), whole=whole)
 
     def now_s(self) -> float:
         """Return what the clock of the application says here."""
         return self._served.clock.now_s()
 
-    def _message(self, found: _Found) -> StateMessage:
+    def _message(self, found: _Found, *, whole: bool) -> StateMessage:
         with self._lock:  # so that a higher number never has older values
             self._number += 1
-            values = _values(found.served)
-            rate = self._served.clock.rate
-            return StateMessage(self._start, self._number, found.at, values, rate)
+            values = _values(found.served, whole=whole)
+            return StateMessage(
+                self._start,
+                self._number,
+                found.at,
+                values,
+                self._served.clock.rate,
+                WALL.now_s(),
+                whole,
+            )
 
     # Hosting
 
     def on_hosted(self, station: Station) -> None:
         """Publish on this station from now on; `close` ends it."""
         self._station = station
+        self._served.take_lease_of(station.lease)
         self._publisher = _Publisher(f"{self._name} publishes", self._publish, station.policy)
         self._follow()
         self._publisher.start()
@@ -179,7 +305,7 @@ class Host:
         station = self._station
         if station is not None:
             self._follow()
-            station.publish(topic_of(self._name, (), STATE), self.state())
+            station.publish(topic_of(self._name, (), STATE), self.state(whole=False))
 
     def _follow(self) -> None:
         """Follow what there is now, and nothing that has gone."""
@@ -220,16 +346,20 @@ class Host:
         return publish
 
 
-def _values(served: Declared) -> dict[str, object]:
+def _values(served: Declared, *, whole: bool) -> dict[str, object]:
     """Return the state of an object and its parts, by name."""
     declaration = declaration_of(type(served))
-    values: dict[str, object] = {name: getattr(served, name) for name in declaration.state}
+    values: dict[str, object] = {
+        name: getattr(served, name)
+        for name, each in declaration.state.items()
+        if whole or not each.fixed
+    }
     for name, part in declaration.parts.items():
         found = getattr(served, name)
         if part.keyed:
-            values[name] = {key: _values(each) for key, each in found.items()}
+            values[name] = {key: _values(each, whole=whole) for key, each in found.items()}
         else:
-            values[name] = _values(found) if found is not None else None
+            values[name] = _values(found, whole=whole) if found is not None else None
     return values
 
 

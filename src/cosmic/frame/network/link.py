@@ -4,8 +4,9 @@ import logging
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import count
 from threading import Lock
-from typing import Any, Final
+from typing import Any, Final, get_origin
 
 from typing_extensions import override
 
@@ -16,33 +17,36 @@ from cosmic.frame.declaration import (
     CommandDeclaration,
     Companion,
     Declared,
-    StreamDeclaration,
     declaration_of,
+    result_of,
 )
-from cosmic.frame.errors import CosmicError, NotAvailable, ProtocolError
-from cosmic.frame.events import Event, Unsubscribe, notify
+from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable, ProtocolError
+from cosmic.frame.events import Event
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.conform import Mismatch, conform
 from cosmic.frame.network.errors import StationAway
-from cosmic.frame.network.host import KEYS, NOW, STATE, command_name, topic_of
-from cosmic.frame.network.ongoing import Answered, Ongoing, StateMessage
+from cosmic.frame.network.host import KEYS, NOW, NUMBER, STATE, command_name, topic_of
+from cosmic.frame.network.ongoing import Answered, Ended, Ongoing, StateMessage
+from cosmic.frame.network.remote_stream import RemoteStream
 from cosmic.frame.network.remote_task import RemoteTask
 from cosmic.frame.network.station_clock import Reading, StationClock
 from cosmic.frame.network.transport import Presence, Rule, Subscription, Transport
-from cosmic.frame.operation import Operation, Progress, Task
+from cosmic.frame.network.travelling_errors import from_plain
+from cosmic.frame.operation import Operation, Progress
 from cosmic.frame.threads import WorkerThread, may_wait_here
 
 logger = logging.getLogger(__name__)
 
 RETRY_S: Final = 0.5
-LINGER_S: Final = 2.0
-"""How long a stream still comes after nobody wants it any more."""
+STOP_LIMIT_S: Final = 1.0
+"""How long the answer to what overtakes everything may take."""
+RENEW_LIMIT_S: Final = 0.2
+"""What keeps something alive is worth nothing later than this."""
+_DRIFT: Final = 2e-4
 _LOOK_S: Final = 0.05
 _CLOCK_S: Final = 20.0
 _READINGS: Final = 5
 _REMEMBERED: Final = 64
-
-Receiver = Callable[[Any], object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,124 +84,7 @@ class _Known:
 
     number: int
     values: dict[str, object]
-
-
-class RemoteStream:
-    """One stream from another station; any thread.
-
-    It comes while somebody wants it, in a thread of its own, and a little longer.
-
-    Parameters
-    ----------
-    on_loss : callable
-        Called when something was lost on the way.
-    """
-
-    def __init__(
-        self,
-        declared: StreamDeclaration,
-        topic: str,
-        transport: Transport,
-        on_loss: Callable[[], object],
-    ) -> None:
-        self._declared = declared
-        self._topic = topic
-        self._transport = transport
-        self._on_loss = on_loss
-        self._lock = Lock()
-        self._came: Event[Any] = Event()
-        self._subscription: Subscription | None = None
-        self._kept = False
-        self._before: object = UNKNOWN
-        self._gaps = 0
-        self._missed = 0
-        self._newest: object = None
-        self._unwanted_wall_s = 0.0
-        self.heard_wall_s = -float("inf")
-
-    @property
-    def newest(self) -> object:
-        """The newest that came; None before the first."""
-        return self._newest
-
-    @property
-    def missed(self) -> int:
-        """How much was wanted and did not reach this process."""
-        return self._missed
-
-    def subscribe(self, receiver: Receiver) -> Unsubscribe:
-        """Call `receiver` with what comes from now on; raises `StationAway` once it is closed."""
-        self._open()
-        end = self._came.subscribe(receiver)
-
-        def unsubscribe() -> None:
-            end()
-            self._unwanted_wall_s = WALL.now_s()
-
-        return unsubscribe
-
-    def keep(self) -> None:
-        """Have it come all the time, whether anybody wants it or not."""
-        self._kept = True
-        self._open()
-
-    def _open(self) -> None:
-        with self._lock:
-            if self._subscription is None:
-                self._before, self._gaps = UNKNOWN, 0
-                self._subscription = self._transport.subscribe(
-                    self._topic, self._declared.rule, self._take
-                )
-
-    def clear(self) -> None:
-        """Forget the newest: it is no longer what there is now."""
-        self._newest = None
-
-    def tidy(self) -> None:
-        """End it where nobody wants it any more; not in a thread that receives."""
-        with self._lock:
-            idle_s = WALL.now_s() - self._unwanted_wall_s
-            if len(self._came) or self._kept or idle_s < LINGER_S:
-                return
-            unwanted, self._subscription = self._subscription, None
-        if unwanted is not None:
-            unwanted.close()
-
-    def close(self) -> None:
-        """Receive no more; any state."""
-        with self._lock:
-            subscription, self._subscription = self._subscription, None
-            self._came = Event()
-        if subscription is not None:
-            subscription.close()
-
-    # In the thread that receives
-
-    def _take(self, payload: object) -> None:
-        if payload is None and self._declared.asks:
-            return  # from now on the station knows that this is wanted
-        try:
-            payload = conform(payload, self._declared.kind)
-        except Mismatch as exc:
-            raise ProtocolError(f"{self._topic}: {exc}") from exc
-        self.heard_wall_s = WALL.now_s()
-        self._count(payload)
-        self._newest = payload
-        self._came.emit(payload)
-
-    def _count(self, payload: object) -> None:
-        before, self._before = self._before, payload
-        if self._declared.rule is not Rule.ALL:
-            return
-        if self._declared.missing is not None:
-            lost = 0 if before is UNKNOWN else self._declared.missing(before, payload)
-        else:
-            gaps = self._subscription.lost if self._subscription is not None else self._gaps
-            lost, self._gaps = gaps - self._gaps, gaps
-        if lost > 0:
-            self._missed += lost
-            logger.error("%s: %d were lost on the way from the station", self._topic, lost)
-            self._on_loss()
+    fixed: dict[str, object]
 
 
 class _Keeper(WorkerThread):
@@ -234,13 +121,19 @@ class ApplicationLink:
     ) -> None:
         self.root = Address(kind)
         self.clock = StationClock()
-        self.companion: Companion = Companion()
-        self.on_change: Callable[[tuple[str, ...]], object] = lambda _at: None
+        self._companions: tuple[Companion, ...] = ()
+        self._changed: Event[tuple[str, ...]] = Event()
         self.policy = policy
         self._transport = transport
         self._name = name
         self._background = BackgroundJobs(f"{name} background", policy)
         self._ends = BackgroundJobs(f"{name} ends", policy)
+        self._commands = BackgroundJobs(f"{name} commands", policy)
+        self._stops = BackgroundJobs(f"{name} stops", policy)
+        self._renewals = BackgroundJobs(f"{name} keeps alive", policy)
+        self._newest: dict[tuple[str, ...], Callable[[], object]] = {}
+        self._numbers = count(1)
+        self._moving: set[Operation[Any]] = set()
         self._keeper = _Keeper(f"{name} elsewhere", self._look, policy)
         self._lock = Lock()
         self._start = ""
@@ -252,11 +145,39 @@ class ApplicationLink:
         self._station = ""
         self._away, self._here = "not connected yet", False
         self._heard_wall_s = self._retry_wall_s = self._clock_wall_s = -float("inf")
+        self._wall_s: tuple[float, float] | None = None
+        self._incomplete = False
         self._ready = threading.Event()
         self._subscription: Subscription | None = None
         self._end_presence: Callable[[], None] = lambda: None
 
+    def join(
+        self, companion: Companion | None, on_change: Callable[[tuple[str, ...]], object]
+    ) -> None:
+        """Tell a proxy of changes, and have its companion keep an eye on the station."""
+        self._changed.subscribe(on_change)
+        if companion is not None:
+            self._companions = (*self._companions, companion)
+            if self._subscription is not None:
+                companion.on_opened()
+
     # What is known
+
+    @property
+    def ready(self) -> bool:
+        """What is known suffices to begin."""
+        return all(each.ready for each in self._companions)
+
+    @property
+    def moves(self) -> bool:
+        """Something that was begun from here still moves."""
+        with self._lock:
+            return bool(self._moving)
+
+    def wall_s_here(self, wall_s: float) -> float:
+        """Return what the wall clock here said when that of the station did."""
+        known = self._wall_s
+        return wall_s if known is None else wall_s + known[0]
 
     @property
     def transport(self) -> Transport:
@@ -322,10 +243,11 @@ class ApplicationLink:
     def open(self) -> None:
         """Begin to use the station; it need not be there yet."""
         topic = topic_of(self._name, (), STATE)
-        self.companion.on_opened()
+        for each in self._companions:
+            each.on_opened()
         for name in declaration_of(self.root.kind).newest.values():
             self.stream(self.root, name).keep()
-        self._subscription = self._transport.subscribe(topic, Rule.LATEST, self._take)
+        self._subscription = self._transport.subscribe(topic, Rule.LATEST, self._on_state)
         self._end_presence = self._transport.presence(self._on_presence)
         self._keeper.start()
 
@@ -341,18 +263,37 @@ class ApplicationLink:
         """Use the station no more; there everything goes on. Any state."""
         self.let_go()
         self._end_presence()
-        threads = (self._keeper, self._background, self._ends)
+        self._end_motion()
+        threads = (
+            self._keeper,
+            self._background,
+            self._commands,
+            self._ends,
+            self._stops,
+            self._renewals,
+        )
         for thread in threads:
             thread.request_end()
         for thread in threads:
             if not thread.join():
                 logger.error("%s does not end", thread.name)
-        self.companion.close()
+        for companion in self._companions:
+            companion.close()
         subscription, self._subscription = self._subscription, None
         if subscription is not None:
             subscription.close()
         for each in list(self._streams.values()):
             each.close()
+
+    def _end_motion(self) -> None:
+        """Have everything stop that was begun here, before this end closes."""
+        with self._lock:
+            moving = list(self._moving)
+        for each in moving:
+            try:
+                each.cancel()
+            except CosmicError as exc:
+                logger.warning("what was begun here stops by the lease only: %s", exc)
 
     # Commands
 
@@ -370,15 +311,34 @@ class ApplicationLink:
         CosmicError
             What the command raised there.
         """
-        if not command.need.reads:
+        need = command.need
+        if not need.reads and not need.renews:
             self._note_refusal(address, "")
-        if not may_wait_here() and command.result is Task and not command.need.at_once:
-            return self._begun_aside(address, command, arguments)
-        if command.need.aside:
-            self._done_aside(address, command, arguments)
-            return None
-        if not command.need.remembered_s:
-            return self._asked_now(address, command, arguments)
+        if need.moves or need.at_once:
+            arguments = {**arguments, NUMBER: next(self._numbers)}
+        return self._manner(command)(address, command, arguments)
+
+    def _manner(
+        self, command: CommandDeclaration
+    ) -> Callable[[Address, CommandDeclaration, dict[str, object]], object]:
+        """Return how a command is given in this thread."""
+        need = command.need
+        if need.renews:
+            return self._renew
+        if need.remembered_s:
+            return self._remembered
+        if may_wait_here():
+            return self._asked_now
+        if need.at_once and command.result in (None, type(None)):
+            return self._overtake
+        if operation_kind(command.result) is not None:
+            return self._begun_aside
+        return self._done_aside if need.aside else self._asked_now
+
+    def _remembered(
+        self, address: Address, command: CommandDeclaration, arguments: dict[str, object]
+    ) -> object:
+        """Return the last answer while it is good; a thread that must not wait gets no newer."""
         key = (address.at, command.name, repr(sorted(arguments.items())))
         at_s, found = self._answers.get(key, (-float("inf"), UNKNOWN))
         if WALL.now_s() - at_s >= command.need.remembered_s:
@@ -409,44 +369,106 @@ class ApplicationLink:
     def _done_aside(
         self, address: Address, command: CommandDeclaration, arguments: dict[str, object]
     ) -> None:
-        """Do something aside where this thread must not wait, else now."""
-        if may_wait_here():
-            self._asked_now(address, command, arguments)
-            return
+        """Do something aside, for a thread that must not wait."""
 
         def told(_result: object, error: CosmicError | None) -> None:
             if error is not None:
                 self._note_refusal(address, str(error))
 
-        self._background.do(lambda: self._asked_now(address, command, arguments), told)
+        self._commands.do(lambda: self._asked_now(address, command, arguments), told)
+
+    def _renew(
+        self, address: Address, command: CommandDeclaration, arguments: dict[str, object]
+    ) -> None:
+        """Keep something alive without waiting: only the newest word counts."""
+        function, sent = self._sent(address, command, arguments)
+        key = (*address.at, command.name)
+
+        def send() -> object:
+            return self._transport.call(self._name, function, sent, timeout_s=RENEW_LIMIT_S)
+
+        def send_newest() -> object:
+            with self._lock:
+                newest = self._newest.pop(key)
+            return newest()
+
+        def told(_result: object, error: CosmicError | None) -> None:
+            if error is not None:
+                logger.warning("%s: %s", function, error)
+
+        with self._lock:
+            waits = key in self._newest
+            self._newest[key] = send
+        if not waits:
+            self._renewals.do(send_newest, told)
+
+    def _overtake(
+        self, address: Address, command: CommandDeclaration, arguments: dict[str, object]
+    ) -> None:
+        """Have done past everything what a thread that must not wait wants; loud where it fails."""
+
+        def told(_result: object, error: CosmicError | None) -> None:
+            if error is not None:
+                where = " ".join((command.name, *address.keys))
+                self.policy.report(error, f"{where} was NOT carried out at the station")
+
+        self._stops.do(lambda: self._asked_now(address, command, arguments), told)
 
     def _begun_aside(
         self, address: Address, command: CommandDeclaration, arguments: dict[str, object]
-    ) -> Task:
-        """Begin something for a thread that must not wait; what forbids it ends the task."""
-        task = Task(command.name.replace("_", " ").capitalize())
+    ) -> Operation[Any]:
+        """Begin something for a thread that must not wait; what forbids it ends the operation."""
+        kind = operation_kind(command.result) or Operation
+        known = kind.followed(command.name.replace("_", " ").strip().capitalize())
+
+        def begin() -> object:
+            if known.cancel_requested:
+                raise MoveCancelled(f"{command.name}: cancelled before it was begun")
+            return self._asked_now(address, command, arguments)
 
         def told(begun: object, error: CosmicError | None) -> None:
             if isinstance(begun, Operation):
-                begun.add_callback(lambda ended: _end_as(ended, task, lambda _: task.finish()))
-                _go_on_as(begun, task)
+                begun.add_callback(lambda ended: _end_as(ended, known))
+                _go_on_as(begun, known)
             else:
                 self._note_refusal(address, str(error or ""))
-                task.fail(error or ProtocolError(f"{command.name} began nothing"))
+                known.fail(error or ProtocolError(f"{command.name} began nothing"))
 
-        self._background.do(lambda: self._asked_now(address, command, arguments), told)
-        return task
+        self._commands.do(begin, told)
+        return known
 
-    def _followed(self, begun: RemoteTask) -> Operation[object]:
+    def _followed(self, begun: RemoteTask, command: CommandDeclaration) -> Operation[Any]:
         """Return what ends as `begun` does, once it is known here what that has changed."""
-        known: Operation[object] = Operation(begun.title)
+        kind = operation_kind(command.result) or Operation
+        known: Operation[Any] = kind.followed(begun.title)
+        if command.need.moves:
+            with self._lock:
+                self._moving.add(known)
 
         def on_end(ended: RemoteTask) -> None:
-            self._ends.do(self._fetch, lambda *_: _end_as(ended, known, known.finish))
+            with self._lock:
+                self._moving.discard(known)
+            how = ended.result if ended.failure is None else None
+            if isinstance(how, Ended) and self._take(how.state):
+                self._end(known, command, how)
+            elif isinstance(how, Ended):
+                self._ends.do(self._fetch, lambda *_: self._end(known, command, how))
+            else:
+                known.fail(ended.failure or ProtocolError(f"{command.name} ended in no known way"))
 
-        begun.add_callback(on_end)
         _go_on_as(begun, known)
+        begun.add_callback(on_end)
         return known
+
+    def _end(self, known: Operation[Any], command: CommandDeclaration, how: Ended) -> None:
+        try:
+            if how.error is not None:
+                known.fail(from_plain(how.error))
+            else:
+                kind = result_of(command.result)
+                known.finish_as_sent(how.result if kind is None else conform(how.result, kind))
+        except (Mismatch, ProtocolError) as exc:
+            known.fail(ProtocolError(f"{command.name} ended with something else: {exc}"))
 
     def aside(self, action: Callable[[], Any], told: Callable[[Any, Any], object]) -> None:
         """Do something in a thread that may wait for the line, and tell how it ended."""
@@ -455,22 +477,28 @@ class ApplicationLink:
     def _asked_now(
         self, address: Address, command: CommandDeclaration, arguments: dict[str, object]
     ) -> object:
-        function = command_name(address.parts, command.name)
-        sent = {**arguments, KEYS: address.keys} if address.keys else arguments
-        timeout_s = command.need.timeout_s
+        function, sent = self._sent(address, command, arguments)
+        timeout_s = STOP_LIMIT_S if command.need.at_once else command.need.timeout_s
         result = self._transport.call(self._name, function, sent, timeout_s=timeout_s)
         if isinstance(result, Answered):
             self._take(result.state)
             result = result.result
-            self.companion.on_commanded(command.name, arguments)
+            for each in self._companions:
+                each.on_commanded(command.name, arguments)
         if isinstance(result, RemoteTask):
-            return self._followed(result)
+            return self._followed(result, command)
         if command.result in (None, Any) or isinstance(result, Ongoing):
             return result
         try:
             return conform(result, command.result)
         except Mismatch as exc:
             raise ProtocolError(f"{self._name}.{function} returned something else: {exc}") from exc
+
+    def _sent(
+        self, address: Address, command: CommandDeclaration, arguments: dict[str, object]
+    ) -> tuple[str, dict[str, object]]:
+        sent = {**arguments, KEYS: address.keys} if address.keys else arguments
+        return command_name(address.parts, command.name), sent
 
     def _ask(
         self,
@@ -510,32 +538,67 @@ class ApplicationLink:
 
     # What the station tells
 
-    def _take(self, payload: object) -> None:
-        """Take state unless a newer one is known; any thread."""
+    def _on_state(self, payload: object) -> None:
+        self._take(payload)
+
+    def _take(self, payload: object) -> bool:
+        """Take state unless a newer one is known; any thread.
+
+        False where the rest of it has to be asked for first: of an application that was started
+        anew, or of a part that is new.
+        """
         if not isinstance(payload, StateMessage):
             raise ProtocolError(f"a {type(payload).__name__} came instead of state")
         told = dict(_flat(self._address(payload.at), payload.values))
         with self._lock:
             first = payload.start != self._start
-            if first and payload.at:
-                return  # of an application that was started anew; what it is follows
+            if (first and payload.at) or not (payload.whole or self._completes(told, first=first)):
+                self._incomplete = True
+                return False
             if first:
                 self._known.clear()
-                self._start = payload.start
+                self._start, self._wall_s = payload.start, None
+            self._note_wall(payload.wall_s)
             newer = [at for at in told if self._number(at) < payload.number]
             changed = [at for at in newer if self._differs(at, told[at])]
             for at in newer:
-                self._known[at] = _Known(payload.number, told[at][1])
+                known = self._known.get(at)
+                fixed = known.fixed if known is not None else {}
+                if payload.whole:
+                    fixed = _fixed(*told[at])
+                self._known[at] = _Known(payload.number, {**fixed, **told[at][1]}, fixed)
             was_away, self._away = self._away, "" if self._here else self._away
             self._heard_wall_s = WALL.now_s()
         if first:
             self.clock.forget(payload.clock_rate)
             self._clock_wall_s = -float("inf")
         if newer:
-            self.companion.on_state(first=first)
+            for each in self._companions:
+                each.on_state(first=first)
         if was_away != self._away:
             changed.append(())
         self._tell(changed)
+        return True
+
+    def _completes(
+        self, told: Mapping[tuple[str, ...], tuple[Address, dict[str, object]]], *, first: bool
+    ) -> bool:
+        """Return whether what never changes is known of all that is told; under the lock."""
+        for at, (address, _) in told.items():
+            known = None if first else self._known.get(at)
+            for name, each in declaration_of(address.kind).state.items():
+                if each.fixed and (known is None or name not in known.fixed):
+                    return False
+        return True
+
+    def _note_wall(self, wall_s: float) -> None:
+        """Reckon by how much the wall clocks differ: a message on its way only adds to it."""
+        now_s = WALL.now_s()
+        offset_s = now_s - wall_s
+        if self._wall_s is not None:
+            before_s, noted_s = self._wall_s
+            offset_s = min(offset_s, before_s + _DRIFT * (now_s - noted_s))
+        self._wall_s = offset_s, now_s
 
     def _address(self, at: tuple[str, ...]) -> Address:
         address, names = self.root, iter(at)
@@ -575,7 +638,7 @@ class ApplicationLink:
 
     def _tell(self, changed: list[tuple[str, ...]]) -> None:
         for at in {*changed, *([()] if changed else [])}:
-            notify(self.on_change, at)
+            self._changed.emit(at)
 
     # The keeper's thread
 
@@ -583,11 +646,15 @@ class ApplicationLink:
         now_s = WALL.now_s()
         streams = list(self._streams.values())
         heard_s = max(self._heard_wall_s, *(each.heard_wall_s for each in streams), -float("inf"))
-        self.companion.look(now_s - heard_s)
+        for companion in self._companions:
+            companion.look(now_s - heard_s)
         for each in streams:
             each.tidy()
         if not self._here:
             return
+        if self._incomplete:
+            self._incomplete = False
+            self._fetch()
         unheard = self._away or now_s - self._heard_wall_s > RETRY_S
         if unheard and now_s - self._retry_wall_s > RETRY_S:
             self._retry_wall_s = now_s
@@ -628,22 +695,32 @@ def _go_on_as(begun: Operation[Any], known: Operation[Any]) -> None:
     known.on_cancel(begun.cancel)
 
 
-def _end_as(ended: Operation[Any], known: Operation[Any], finish: Callable[[Any], object]) -> None:
+def _end_as(ended: Operation[Any], known: Operation[Any]) -> None:
     """End `known` as `ended` did."""
     error = ended.failure
     if error is not None:
         known.fail(error)
     else:
-        finish(ended.result)
+        known.finish_as_sent(ended.sent_result())
+
+
+def operation_kind(result: Any) -> type[Operation[Any]] | None:
+    """Return the kind of operation that a command returns; None where it returns none."""
+    kind = get_origin(result) or result
+    return kind if isinstance(kind, type) and issubclass(kind, Operation) else None
+
+
+def _fixed(address: Address, values: dict[str, object]) -> dict[str, object]:
+    states = declaration_of(address.kind).state
+    return {name: values[name] for name, each in states.items() if each.fixed}
 
 
 def _flat(
     address: Address, values: Mapping[str, object]
 ) -> Iterator[tuple[tuple[str, ...], tuple[Address, dict[str, object]]]]:
     """Yield the state of an object and each of its parts, checked; of parts with keys the keys."""
-    declaration = declaration_of(address.kind)
     own: dict[str, object] = {}
-    for name, part in declaration.parts.items():
+    for name, part in declaration_of(address.kind).parts.items():
         inner = values.get(name)
         if part.optional:
             own[name] = inner is not None
@@ -659,9 +736,17 @@ def _flat(
                 raise ProtocolError(f"a broken part {name} came")
             yield from _flat(address.part(name, key), each)
         own[name] = tuple(inner)
-    try:
-        for name, state in declaration.state.items():
+    yield address.at, (address, {**own, **_conformed(address, values)})
+
+
+def _conformed(address: Address, values: Mapping[str, object]) -> dict[str, object]:
+    """Return the state of an object, checked; what never changes may be left out."""
+    own: dict[str, object] = {}
+    for name, state in declaration_of(address.kind).state.items():
+        if state.fixed and name not in values:
+            continue
+        try:
             own[name] = conform(values[name], state.kind)
-    except (KeyError, Mismatch) as exc:
-        raise ProtocolError(f"state of another version came: {name}: {exc}") from exc
-    yield address.at, (address, own)
+        except (KeyError, Mismatch) as exc:
+            raise ProtocolError(f"state of another version came: {name}: {exc}") from exc
+    return own

@@ -68,6 +68,10 @@ class StateMessage:
         By the name of a property or a part.
     clock_rate : float
         How many seconds of the platform go by in one of the wall.
+    wall_s : float
+        What the wall clock of the station says.
+    whole : bool
+        What never changes is in it as well.
     """
 
     start: str
@@ -75,6 +79,24 @@ class StateMessage:
     at: tuple[str, ...]
     values: dict[str, object]
     clock_rate: float
+    wall_s: float = 0.0
+    whole: bool = True
+
+
+@transferable
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How an operation ended, and the state of the application after it.
+
+    Attributes
+    ----------
+    error : list or None
+        The exception as plain values.
+    """
+
+    result: object
+    error: list[object] | None
+    state: StateMessage
 
 
 @transferable

@@ -37,10 +37,7 @@ class Proxied(Declared):
         self._parts: dict[tuple[str, str | None], Proxied] = {}
         self.prepare(address.keys[-1] if address.keys else "", link.policy)
         if not address.at:
-            companion = self.made_companion()
-            if companion is not None:
-                link.companion = companion
-            link.on_change = self._on_change
+            link.join(self.made_companion(), self._on_change)
 
     @property
     @override
@@ -66,6 +63,15 @@ class Proxied(Declared):
     @override
     def missed(self) -> int:
         return self._link.missed
+
+    @property
+    @override
+    def moves_elsewhere(self) -> bool:
+        return self._link.moves
+
+    @override
+    def wall_s_here(self, wall_s: float) -> float:
+        return self._link.wall_s_here(wall_s)
 
     @override
     def carry_out(self, action: Callable[[], T], told: OnResult[T], *, slow: bool = False) -> None:

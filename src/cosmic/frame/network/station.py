@@ -25,7 +25,7 @@ class Hosted(Protocol):
 
 
 class Station:
-    """What is hosted here; in this process it is used through an `InProcessTransport`.
+    """What is hosted here, for a `ServerListener` to let others in.
 
     Parameters
     ----------

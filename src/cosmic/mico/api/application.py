@@ -11,10 +11,11 @@ from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import CosmicError, DeviceError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.operation import Task
+from cosmic.frame.operation import Operation, Task
 from cosmic.mico.api.application_base import MicoApplicationBase
+from cosmic.mico.api.initialisation import Asker, Confirm, InitialisationRun
 from cosmic.mico.api.trajectory_site import TrajectorySite
-from cosmic.mico.api.ways import Way, way_from_plan
+from cosmic.mico.api.ways import Way, follow, way_from_plan
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT, CollisionChecker
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.collision_manager import CollisionManager
@@ -22,6 +23,7 @@ from cosmic.mico.core.mode import Mode
 from cosmic.mico.core.motion.manager import DeviceManager
 from cosmic.mico.core.motion.undo import Cautions, ClosedGrippers, UndoHistory
 from cosmic.mico.core.path_planner import PathPlanner
+from cosmic.mico.core.sequence.report import SequenceReport
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
 from cosmic.mico.hw.interface import Controller
@@ -69,6 +71,8 @@ class MicoApplication(MicoApplicationBase):
         self.teleoperation = Teleoperation(self.manager, policy, folder=folder)
         self.trajectories = TrajectorySite(self, policy, platform, folder)
         self._failure = ""
+        self._report = SequenceReport(())
+        self._asker = Asker(lambda: True)
         self._forget = policy.on_safe_stop(self.manager.stop)
 
     @property
@@ -117,6 +121,67 @@ class MicoApplication(MicoApplicationBase):
         """
         return self.begin("Looking for devices", self._rescan)
 
+    # Initialisation
+
+    @override
+    def initialise_platform(
+        self,
+        *,
+        skip_known: bool = False,
+        confirm: Confirm | None = None,
+        may_hold: bool = False,
+    ) -> Task:
+        """Carry the initialisation sequence out; returns at once.
+
+        `initialisation_changed` tells how far it is; the arguments are those of
+        `Mico.initialise`.
+
+        Raises
+        ------
+        NotAvailable
+            Another long operation is under way, or something may be held or touched and `may_hold`
+            does not say that this was looked at.
+        """
+        doubts = () if may_hold else self.cautions.reasons()
+        if doubts:
+            raise NotAvailable(
+                f"the initialisation drives every axis: {'; '.join(doubts)}. Put away what is held "
+                "and go clear of it, or initialise with may_hold=True"
+            )
+        run = InitialisationRun(
+            self.manager,
+            skip_known=skip_known,
+            confirm=confirm,
+            on_report=self._on_report,
+        )
+        return self.begin("Initialisation", run.run)
+
+    @property
+    @override
+    def initialisation(self) -> SequenceReport:
+        return self._report
+
+    def _on_report(self, report: SequenceReport) -> None:
+        self._report = report
+        self.initialisation_changed.emit(report)
+
+    def begin_initialisation(self, *, skip_known: bool, may_hold: bool, asks: bool) -> Task:
+        """Begin the sequence for somebody at another station, who `answer`s where it `asks`."""
+        asker = Asker(self._nobody_waits)
+        task = self.initialise_platform(
+            skip_known=skip_known, may_hold=may_hold, confirm=asker.ask if asks else None
+        )
+        self._asker = asker
+        return task
+
+    def _nobody_waits(self) -> bool:
+        task = self.running_task
+        return task is None or task.cancel_requested or self.manager.latch.state.latched
+
+    def answer(self, agreed: bool) -> None:
+        """Answer the question that the sequence asks."""
+        self._asker.answer(agreed)
+
     # Ways round (ECM)
 
     @override
@@ -133,6 +198,29 @@ class MicoApplication(MicoApplicationBase):
         if self.path_planner is None:
             raise NotAvailable(f"{NO_MODEL_TEXT}: without one there is nothing to go round")
         return way_from_plan(self.path_planner.plan_path(targets, budget_s))
+
+    def begin_search(self, targets: Mapping[str, float], budget_s: float) -> Operation[Way]:
+        """Begin to look for a path in the application's thread; raises `NotAvailable`."""
+        found: Operation[Way] = Operation("Looking for a path")
+
+        def search(task: Task) -> None:
+            try:
+                way = self.find_way(targets, budget_s)
+            except CosmicError as exc:
+                found.fail(exc)
+                task.fail(exc)
+            else:
+                found.finish(way)
+                task.finish()
+
+        task = self.begin(found.title, search)
+        task.when_failed(found.fail)
+        found.on_cancel(task.cancel)
+        return found
+
+    @override
+    def follow_way(self, way: Way, source: str) -> Task:
+        return self.begin("Going round", lambda task: follow(self.manager, way, task, source))
 
     def _rescan(self, task: Task) -> None:
         task.report(0.1, "closing and opening the library")

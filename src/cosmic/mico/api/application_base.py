@@ -2,21 +2,25 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from PySide6.QtCore import Signal
 
-from cosmic.frame.errors import CosmicError, MoveRefused, NotAvailable
+from cosmic.frame.errors import CosmicError, MoveRefused
 from cosmic.frame.operation import Task
 from cosmic.frame.task_application import TaskApplication
-from cosmic.mico.api.initialisation import Confirm, InitialisationRun
+from cosmic.mico.api.initialisation import Confirm
 from cosmic.mico.api.ports import CollisionPort, UndoPort
 from cosmic.mico.api.trajectory_site import TrajectorySite
-from cosmic.mico.api.ways import Way, follow
+from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.motion.undo import Cautions
 from cosmic.mico.core.ports import ManagerPort
+from cosmic.mico.core.sequence.report import SequenceReport
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
+
+if TYPE_CHECKING:
+    from cosmic.mico.api.mico import Mico
 
 WAY_BUDGET_S: Final = 1.0
 """How long a way is looked for, in wall time."""
@@ -79,6 +83,7 @@ class MicoApplicationBase(TaskApplication):
             No way was found; the verdict says what blocks.
         """
 
+    @abstractmethod
     def initialise_platform(
         self,
         *,
@@ -97,19 +102,25 @@ class MicoApplicationBase(TaskApplication):
             Another long operation is under way, or something may be held or touched and `may_hold`
             does not say that this was looked at.
         """
-        doubts = () if may_hold else self.cautions.reasons()
-        if doubts:
-            raise NotAvailable(
-                f"the initialisation drives every axis: {'; '.join(doubts)}. Put away what is held "
-                "and go clear of it, or initialise with may_hold=True"
-            )
-        run = InitialisationRun(
-            self.manager,
-            skip_known=skip_known,
-            confirm=confirm,
-            on_report=self.initialisation_changed.emit,
-        )
-        return self.begin("Initialisation", run.run)
+
+    @abstractmethod
+    def follow_way(self, way: Way, source: str) -> Task:
+        """Go a way that was found; returns at once.
+
+        Raises
+        ------
+        NotAvailable
+            Another long operation is under way.
+        """
+
+    @property
+    @abstractmethod
+    def initialisation(self) -> SequenceReport:
+        """How far the initialisation sequence is, or was."""
+
+    def mico(self, source: str) -> "Mico":
+        """Return what it offers, for whoever commands by the name of `source`."""
+        raise NotImplementedError(f"{self!r} does not say what it offers to {source}")
 
     def search_way(self, targets: Mapping[str, float], budget_s: float = WAY_BUDGET_S) -> Task:
         """Look for a way in the application's thread; `way_found` or `way_missing` tells."""
@@ -127,13 +138,3 @@ class MicoApplicationBase(TaskApplication):
                 task.finish()
 
         return self.begin("Looking for a way", search)
-
-    def follow_way(self, way: Way, source: str) -> Task:
-        """Go a way that was found; returns at once.
-
-        Raises
-        ------
-        NotAvailable
-            Another long operation is under way.
-        """
-        return self.begin("Going round", lambda task: follow(self.manager, way, task, source))

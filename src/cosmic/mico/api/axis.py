@@ -1,44 +1,268 @@
 """One axis of the scripted API: ``rig.mico["left.x"]``."""
 
 import math
-from typing import Literal, overload
+import secrets
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from threading import Lock
+from types import TracebackType
+from typing import Final, Literal, Self, overload
+from weakref import WeakKeyDictionary
 
+from PySide6.QtCore import QObject, Qt
 from typing_extensions import override
 
 from cosmic.frame.arguments import checked_class
-from cosmic.frame.errors import NotAvailable, refusal
+from cosmic.frame.declaration import Declared, command, state
+from cosmic.frame.errors import (
+    CosmicError,
+    MoveCancelled,
+    MoveRefused,
+    NotAvailable,
+    refusal,
+)
+from cosmic.frame.events import Event, notify
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.caller import JOG_LIMIT_S, MOVE_LIMIT_S, current_call
 from cosmic.frame.operation import wait_or_cancel
-from cosmic.frame.verdict import Reason, refuse
-from cosmic.mico.api.axis_facts import AxisFacts
-from cosmic.mico.api.axis_shape import AxisMovable
-from cosmic.mico.api.entry import Number, as_number, as_whole
-from cosmic.mico.api.jogging import Jogging
-from cosmic.mico.api.linked import linked_movement
+from cosmic.frame.threads import may_wait_here
+from cosmic.frame.units import AxisUnit
+from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.mico.api.axis_shape import AxisMovable, AxisShape, PlanAxis
+from cosmic.mico.api.entry import Number, as_number, as_whole, finite, one_line, source_of
+from cosmic.mico.api.group import GroupMovement
+from cosmic.mico.api.news import SentMotion
+from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.orders import Motion, MoveBy, MoveTo
-from cosmic.mico.core.motion.positioner import Confidence, class_for
+from cosmic.mico.core.motion.orders import (
+    Calibrate,
+    Jog,
+    Motion,
+    MoveBy,
+    MoveTo,
+    Order,
+    Reference,
+    Steer,
+    Step,
+    ToEndStop,
+)
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState, Status, class_for
 from cosmic.mico.core.ports import ManagerPort
-from cosmic.mico.hw.interface import Direction
+from cosmic.mico.core.settings import MicoSettings, PositionerSettings
+from cosmic.mico.hw.interface import Activity, Direction, PositionerKind
+
+_KEPT: Final = 512
+
+
+class LinkedMovement(Movement):
+    """Ends when all axes have: well at the position of the one that was asked, or badly.
+
+    `parts` has the movement of each axis by name; empty where all were refused.
+    """
+
+    def __init__(self, axis: str) -> None:
+        super().__init__()
+        self._axis = axis
+        self._guarded = Lock()
+        self.parts: Mapping[str, Movement] = {}
+
+    def begin(self, group: GroupMovement) -> None:
+        """Follow `group`; for whoever makes it."""
+        self.parts = group.movements
+        self.on_cancel(group.cancel)
+        for part in self.parts.values():
+            part.add_callback(self._on_part_ended)
+
+    def _on_part_ended(self, _part: Movement) -> None:
+        with self._guarded:
+            if not all(part.done for part in self.parts.values()):
+                return
+        failures = [error for part in self.parts.values() if (error := part.exception())]
+        if failures:
+            told = (each for each in failures if not isinstance(each, MoveCancelled))
+            self.fail(next(told, failures[0]))
+        else:
+            self.finish(self.parts[self._axis].wait())
+
+
+class Jogging:
+    """A continuous movement that goes on while it is renewed; made by `Axis.jog`.
+
+    As a context manager it stops at the end of the block.
+    """
+
+    def __init__(
+        self, movement: Movement, renew: Callable[[], object], end: Callable[[], object]
+    ) -> None:
+        self._movement = movement
+        self._renew = renew
+        self._end = end
+
+    @property
+    def movement(self) -> Movement:
+        """The movement; done when the axis stands."""
+        return self._movement
+
+    @property
+    def done(self) -> bool:
+        """True when it has ended: let go, at a limit, stopped or refused."""
+        return self._movement.done
+
+    def renew(self) -> None:
+        """Keep it alive; call it at least every 0.1 s. Any thread."""
+        self._renew()
+
+    def end(self) -> None:
+        """Let go: the axis stops at once."""
+        if not self.done:
+            self._end()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.end()
+
+
+class OrderBook:
+    """The newest orders that other stations gave an axis, by caller and key; any thread."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._orders: OrderedDict[tuple[str, str], Order | Movement] = OrderedDict()
+
+    def keep(self, key: str, order: Order | Movement) -> None:
+        """Remember an order under the key that its caller gave it."""
+        with self._lock:
+            self._orders[_token(), key] = order
+            while len(self._orders) > _KEPT:
+                self._orders.popitem(last=False)
+
+    def jog(self, key: str) -> Order | None:
+        """Return a jog; None where it was forgotten, or never came."""
+        found = self._orders.get((_token(), key))
+        return found if isinstance(found, Order) else None
+
+    def movement(self, key: str) -> Movement:
+        """Return a movement that another one follows.
+
+        Raises
+        ------
+        MoveCancelled
+            It was forgotten long ago: something else came since.
+        """
+        found = self._orders.get((_token(), key))
+        if found is None:
+            raise MoveCancelled("a newer command came first")
+        return found.movement if isinstance(found, Order) else found
+
+
+def _token() -> str:
+    call = current_call()
+    return "" if call is None else call.caller.token
+
+
+def _unforeseen(_motions: Mapping[str, Motion], _consent: bool) -> MoveVerdict:
+    return refuse(Reason.NO_ANSWER, "the station has not told anything yet")
+
+
+class AxisElsewhere:
+    """What is known here of an axis at another station; any thread.
+
+    Attributes
+    ----------
+    platform : callable
+        Returns what the platform file says.
+    foresee : callable
+        Judges motions by what is known here, where nothing may be waited for.
+    changed : Event
+        Tells the state of the axis, whatever of it has changed.
+    keys : mapping of Movement
+        Under which key the station knows a movement.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.platform: Callable[[], MicoSettings] = lambda: MicoSettings(positioner=())
+        self.foresee: Callable[[Mapping[str, Motion], bool], MoveVerdict] = _unforeseen
+        self.changed: Event[PositionerState] = Event()
+        self.keys: WeakKeyDictionary[Movement, str] = WeakKeyDictionary()
+        self._newest: tuple[float, float, float] | None = None
+        self._seen: tuple[object, object, str, PositionerState] | None = None
+
+    def move(self, position: float, std: float, read_wall_s: float) -> None:
+        """Take note of where it is."""
+        self._newest = (position, std, read_wall_s)
+
+    def state(self, axis: Declared, told: PositionerState) -> PositionerState:
+        """Return the state that was told last, with the newest position; absent while away."""
+        newest, away, seen = self._newest, axis.away, self._seen
+        if seen is not None and seen[0] is told and seen[1] is newest and seen[2] == away:
+            return seen[3]
+        position, std, read_wall_s = told.position, told.std, told.read_wall_s
+        if newest is not None and newest[2] > read_wall_s:
+            position, std, read_wall_s = newest
+        read_wall_s = axis.wall_s_here(read_wall_s)
+        state = replace(told, position=position, std=std, read_wall_s=read_wall_s)
+        if away:
+            sensed = state.kind is not PositionerKind.OPEN_LOOP
+            confidence = Confidence.UNKNOWN if sensed else state.confidence
+            state = replace(
+                state, present=False, in_motion=False, error=away, confidence=confidence
+            )
+        self._seen = (told, newest, away, state)
+        return state
 
 
 @checked_class
-class Axis(AxisFacts):
-    """One positioner, as scripts and widgets command it; any thread.
+class Axis(AxisShape, Declared):
+    """One positioner, as scripts and widgets command it, wherever it is; any thread.
 
     Positions are in `unit` from the user's zero (see `set_zero`). A number may be given as text
     with a unit of its own: ``axis.move_to("0.2 mm")``. It has the shape of a bluesky device
     without importing bluesky; give plans `movable`, which has a name that bluesky admits.
     """
 
+    commander: DeviceCommander
+    """Hears of the axis, and commands it where its device is here."""
+    _far: AxisElsewhere | None = None
+
     def __init__(self, name: str, manager: ManagerPort, commander: DeviceCommander) -> None:
         self._name = name
         self._manager = manager
         self._channel = manager.address(name).channel
         self.commander = commander
-        self._halt = self.halt
-        self._begin = lambda to: self.move_to(to, wait=False)
-        self._movable = AxisMovable(name, manager, self._halt, self._begin)
+        self._orders = OrderBook()
+        self._movable = AxisMovable(self)
+
+    @override
+    def prepare(self, key: str, policy: FailurePolicy) -> None:
+        self._name = key
+        self._far = AxisElsewhere(key)
+        self._movable = AxisMovable(self)
+
+    @property
+    @override
+    def name(self) -> str:
+        """Name of the axis, such as "left.x"."""
+        return self._name
+
+    @property
+    @override
+    def _axis(self) -> PlanAxis:
+        return self
+
+    @property
+    def far(self) -> AxisElsewhere | None:
+        """What is known here where the axis is at another station; None where it is here."""
+        return self._far
 
     @override
     def __repr__(self) -> str:
@@ -51,6 +275,223 @@ class Axis(AxisFacts):
     def movable(self) -> AxisMovable:
         """The axis for plans of bluesky, whose documents forbid the dot in its name."""
         return self._movable
+
+    # What is known
+
+    @property
+    def details(self) -> PositionerState:
+        """Everything known of it, frozen; positions in gate coordinates."""
+        far = self._far
+        return self._manager.state(self._name) if far is None else far.state(self, self._latest)
+
+    @property
+    @state
+    def _latest(self) -> PositionerState:
+        return self._manager.state(self._name)
+
+    @property
+    @state
+    def _linked(self) -> dict[str, float]:
+        return dict(self._manager.links.companions(self._name))
+
+    @property
+    @state
+    def _watched(self) -> bool:
+        model = self._manager.exemptions
+        return model is not None and self._name not in model.taken_out
+
+    @property
+    @state
+    def closed_loop_frequency_hz(self) -> int | None:
+        """What limits the speed of movements to a position, as it was set last; None before."""
+        found = self._manager.device(self._name).container.positioner(self._channel)
+        return found.frequency_hz if found is not None else None
+
+    @property
+    @state(fixed=True)
+    def controller(self) -> str:
+        """Name of the library that drives it."""
+        return self._manager.controller.name
+
+    @property
+    @state(fixed=True)
+    def settings(self) -> PositionerSettings:
+        """What the platform file says of it, or what was found where it says nothing."""
+        for each in self._manager.settings.positioner:
+            if each.name == self._name:
+                return each
+        found = self._manager.device(self._name).container.positioner(self._channel)
+        if found is None:
+            raise NotAvailable(f"{self._name}: it went away just now; rescan")
+        return found.settings
+
+    @property
+    def _platform(self) -> MicoSettings:
+        return self._manager.settings if self._far is None else self._far.platform()
+
+    @property
+    def kind(self) -> PositionerKind:
+        """linear, rotary or open-loop."""
+        return self.details.kind
+
+    @property
+    def unit(self) -> AxisUnit:
+        """Unit of its positions: "um" or "deg"."""
+        return self.details.unit
+
+    @property
+    def state(self) -> Status:
+        """OK, BUSY, ERROR, or UNKNOWN when its device does not answer."""
+        return self.details.status
+
+    @property
+    def activity(self) -> Activity:
+        """What the controller says it is doing."""
+        return self.details.activity
+
+    @property
+    def error(self) -> str:
+        """What is wrong with it; empty when nothing is."""
+        return self.details.error
+
+    @property
+    def confidence(self) -> Confidence:
+        """How well its position is known: known, estimated (counted steps) or unknown."""
+        return self.details.confidence
+
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """Soft limits (low, high) in `unit` from the user's zero; None without a sensor."""
+        return self.details.shown_limits
+
+    @property
+    def collision_detection(self) -> bool:
+        """Whether its movements are checked for collisions; set it to take the axis out (CL.13).
+
+        Raises
+        ------
+        NotAvailable
+            It is set, and there is no collision model.
+        """
+        return self._watched
+
+    @collision_detection.setter
+    def collision_detection(self, on: bool) -> None:
+        self.watch(on, source=self.commander.source)
+
+    @property
+    def linked_to(self) -> dict[str, float]:
+        """How far each axis linked to it goes when it goes 1; empty where it is linked to none."""
+        return self._linked
+
+    @property
+    def position_um(self) -> float | None:
+        """Position in um; counted from steps without a sensor; None before the first reading.
+
+        Raises
+        ------
+        NotAvailable
+            The axis is rotary: use `angle_deg`.
+        """
+        return self._position("um", "angle_deg")
+
+    @property
+    def position_std_um(self) -> float:
+        """Standard deviation of the position in um: 0 where it is measured, inf where unknown.
+
+        It grows with the steps of an axis without sensor, until its end stop or
+        `set_estimate` says where it is.
+
+        Raises
+        ------
+        NotAvailable
+            The axis is rotary.
+        """
+        self._position("um", "angle_deg")
+        return self.details.std
+
+    @property
+    def angle_deg(self) -> float | None:
+        """Angle in degrees; None before the first reading.
+
+        Raises
+        ------
+        NotAvailable
+            The axis is not rotary: use `position_um`.
+        """
+        return self._position("deg", "position_um")
+
+    def _position(self, unit: AxisUnit, other: str) -> float | None:
+        state = self.details
+        if state.unit != unit:
+            raise NotAvailable(f"{self._name} is a {state.kind} axis: use {other}")
+        return state.shown_position
+
+    def subscribe(self, callback: Callable[[PositionerState], None]) -> Callable[[], None]:
+        """Call `callback(state)` after each change; returns the function that ends it.
+
+        It is called in the device's thread and must return at once; a position in motion is read
+        about 20 times a second.
+        """
+        if self._far is not None:
+            return self._far.changed.subscribe(callback)
+
+        def on_state(state: PositionerState) -> None:
+            if state.name == self._name:
+                notify(callback, state)
+
+        direct = Qt.ConnectionType.DirectConnection
+        connection = self.commander.state_changed.connect(on_state, direct)
+
+        def unsubscribe() -> None:
+            QObject.disconnect(connection)
+
+        return unsubscribe
+
+    @override
+    def on_change(self, listener: Callable[[], object]) -> Callable[[], None]:
+        """Call `listener()` when anything but its position has changed."""
+        if self._far is not None:
+            return super().on_change(listener)
+        before: PositionerState | None = None
+
+        def look(now: PositionerState) -> None:
+            nonlocal before
+            like = before is not None and replace(before, position=now.position, std=now.std) == now
+            before = now
+            if not like:
+                listener()
+
+        return self.subscribe(look)
+
+    @override
+    def note_change(self) -> None:
+        super().note_change()
+        if self._far is not None:
+            self._far.changed.emit(self.details)
+
+    def check(self, position: Number, *, consent: bool = False) -> MoveVerdict:
+        """Return the gate's answer to `move_to(position)`, without moving."""
+        try:
+            target = self._number(position) + self.details.zero
+        except MoveRefused as exc:
+            return exc.verdict
+        motion = MoveTo(target, self.unit)
+        if self._far is None:
+            return self._manager.check({self._name: motion}, consent=consent)
+        if not may_wait_here():
+            return self._far.foresee({self._name: motion}, consent)
+        try:
+            return self.check_motion(motion, consent=consent)
+        except MoveRefused as exc:
+            return exc.verdict
+        except CosmicError as exc:
+            return refuse(Reason.NO_ANSWER, f"the station does not answer: {exc}")
+
+    @command
+    def check_motion(self, motion: SentMotion, *, consent: bool = False) -> MoveVerdict:
+        """Return the gate's answer to a motion in gate coordinates, without moving."""
+        return self._manager.check({self._name: motion}, consent=consent)
 
     # Moving
 
@@ -98,17 +539,97 @@ class Axis(AxisFacts):
         target = self._number(position) + self.details.zero
         return self._send(MoveTo(target, self.unit), consent=consent, follows=after)
 
-    def _send(self, motion: Motion, *, consent: bool, follows: Movement | None = None) -> Movement:
-        if self.linked_to:
-            return linked_movement(
-                self._manager,
-                self._name,
-                motion,
-                source=self.commander.source,
+    def _send(
+        self, motion: SentMotion, *, consent: bool, follows: Movement | None = None
+    ) -> Movement:
+        far = self._far
+        if far is None:
+            return self._begin(motion, consent=consent, follows=follows)
+        key = secrets.token_hex(8)
+        before = "" if follows is None else far.keys.get(follows, "forgotten")
+        begun = self.begin(
+            motion, consent=consent, key=key, follows=before, source=self.commander.source
+        )
+        far.keys[begun] = key
+        return begun
+
+    @command(moves=True)
+    def begin(
+        self,
+        motion: SentMotion,
+        *,
+        consent: bool = False,
+        key: str = "",
+        follows: str = "",
+        source: str = "script",
+    ) -> Movement:
+        """Begin a motion in gate coordinates; a refusal is how it ends.
+
+        Parameters
+        ----------
+        key : str
+            How whoever commands it will name it.
+        follows : str
+            Key of the movement that must still be the newest of this axis.
+        """
+        before = self._orders.movement(follows) if follows else None
+        begun = self._begin(motion, consent=consent, follows=before, source=source)
+        if key:
+            self._orders.keep(key, begun)
+        return begun
+
+    def _begin(
+        self,
+        motion: Motion,
+        *,
+        consent: bool,
+        follows: Movement | None = None,
+        source: str = "",
+    ) -> Movement:
+        if isinstance(motion, MoveTo | MoveBy) and self.linked_to:
+            return self._begin_linked(motion, consent=consent, follows=follows, source=source)
+        return self._order(motion, consent=consent, follows=follows, source=source).movement
+
+    def _order(
+        self,
+        motion: Motion,
+        *,
+        consent: bool,
+        follows: Movement | None = None,
+        source: str = "",
+    ) -> Order:
+        if current_call() is None:
+            return self.commander.order(self._channel, motion, consent=consent, follows=follows)
+        order = Order(
+            self._channel,
+            motion,
+            self._manager.lease.local_token,
+            source_of(source),
+            consent,
+            follows=follows,
+            guard=self._manager.lease.guard(),
+        )
+        self._manager.device(self._name).submit(order)
+        return order
+
+    def _begin_linked(
+        self, motion: Motion, *, consent: bool, follows: Movement | None, source: str
+    ) -> LinkedMovement:
+        """Move this axis and those linked to it; a refusal fails the movement."""
+        whole = LinkedMovement(self._name)
+        before = follows.parts if isinstance(follows, LinkedMovement) else None
+        try:
+            orders = self._manager.order_together(
+                {self._name: motion},
+                source=source_of(source or self.commander.source),
                 consent=consent,
-                follows=follows,
+                follows=before,
             )
-        return self.commander.send(self._channel, motion, consent=consent, follows=follows)
+        except CosmicError as exc:
+            whole.fail(exc)
+            return whole
+        whole.begin(GroupMovement.of(orders))
+        return whole
 
     @overload
     def move_by(
@@ -169,17 +690,15 @@ class Axis(AxisFacts):
         frequency_hz : int
             Of an SCU 1 to 18500 Hz; the configured default where it is not given.
         """
-        defaults = self._manager.settings.defaults
+        defaults = self._platform.defaults
         volts = defaults.amplitude_v if amplitude_v is None else amplitude_v
         hertz = defaults.frequency_hz if frequency_hz is None else frequency_hz
-        movement = self.commander.move_steps(
-            self._channel,
+        motion = Step(
             as_whole(steps, "steps", self._name),
-            amplitude_v=as_number(volts, "V", self._name),
-            frequency_hz=as_whole(hertz, "Hz", self._name),
-            consent=consent,
+            as_number(volts, "V", self._name),
+            as_whole(hertz, "Hz", self._name),
         )
-        return self._result(movement, wait=wait)
+        return self._result(self._sent(motion, consent=consent), wait=wait)
 
     def jog(self, direction: int, speed: Number | None = None, *, consent: bool = False) -> Jogging:
         """Move on and on until it is let go, not renewed for a quarter second, or at a limit.
@@ -196,7 +715,7 @@ class Axis(AxisFacts):
         MoveRefused
             `direction` or `speed` is no sensible number.
         """
-        jog = self._manager.settings.jog
+        jog = self._platform.jog
         state = self.details
         by_steps = not class_for(state.kind, state.positioner).has_sensor
         unit = "Hz" if by_steps else state.unit
@@ -205,8 +724,44 @@ class Axis(AxisFacts):
         if direction not in (1, -1) or not 0.0 < wanted <= state.frequency_range_hz[1]:
             text = f"{self._name}: jog in direction 1 or -1 with a speed above 0"
             raise refusal(refuse(Reason.NOT_FINITE, text, axis=self._name))
-        order = self.commander.jog(self._channel, direction, wanted, consent=consent)
-        return Jogging(order, self.commander)
+        motion = Jog(direction, wanted)
+        if self._far is None:
+            order = self._order(motion, consent=consent)
+            return Jogging(
+                order.movement,
+                lambda: self.commander.renew_jog(order),
+                lambda: self.commander.stop(self._channel, "jog ended"),
+            )
+        key = secrets.token_hex(8)
+        movement = self.begin_jog(motion, key, consent=consent, source=self.commander.source)
+        return Jogging(movement, lambda: self.renew(key), lambda: self.halt("jog ended"))
+
+    @command(moves=True, limit_s=JOG_LIMIT_S)
+    def begin_jog(
+        self, motion: Jog | Steer, key: str, *, consent: bool = False, source: str = "script"
+    ) -> Movement:
+        """Begin to move on and on, while `renew` comes with the same key."""
+        if isinstance(motion, Steer) and not 0.0 < motion.dead_man_s <= MOVE_LIMIT_S:
+            text = (
+                f"{self._name}: a dead-man time is at most {MOVE_LIMIT_S:g} s, "
+                f"not {motion.dead_man_s:g}"
+            )
+            raise refusal(refuse(Reason.LIMIT, text, axis=self._name, limit=MOVE_LIMIT_S, unit="s"))
+        order = self._order(motion, consent=consent, source=source)
+        self._orders.keep(key, order)
+        return order.movement
+
+    @command(moves=True, renews=True, limit_s=JOG_LIMIT_S)
+    def renew(self, key: str, velocity: float | None = None) -> None:
+        """Keep a jog alive; one that is steered at another signed velocity."""
+        order = self._orders.jog(key)
+        if order is None:
+            return
+        device = self._manager.device(self._name)
+        if velocity is None:
+            device.renew_jog(order)
+        else:
+            device.steer_jog(order, finite(velocity, f"{self._name}: a speed"))
 
     @overload
     def calibrate(self, *, wait: Literal[True] = True, consent: bool = False) -> float | None: ...
@@ -216,8 +771,7 @@ class Axis(AxisFacts):
 
     def calibrate(self, *, wait: bool = True, consent: bool = False) -> float | Movement | None:
         """Calibrate the sensor: moves several millimetres both ways; otherwise as `move_to`."""
-        movement = self.commander.calibrate(self._channel, consent=consent)
-        return self._result(movement, wait=wait)
+        return self._result(self._sent(Calibrate(), consent=consent), wait=wait)
 
     @overload
     def reference(self, *, wait: Literal[True] = True, consent: bool = False) -> float | None: ...
@@ -227,8 +781,7 @@ class Axis(AxisFacts):
 
     def reference(self, *, wait: bool = True, consent: bool = False) -> float | Movement | None:
         """Find the reference, which may sweep the whole travel; otherwise as `move_to`."""
-        movement = self.commander.reference(self._channel, consent=consent)
-        return self._result(movement, wait=wait)
+        return self._result(self._sent(Reference(), consent=consent), wait=wait)
 
     @overload
     def move_to_end_stop(
@@ -247,14 +800,19 @@ class Axis(AxisFacts):
         if direction not in list(Direction):
             text = f"{self._name}: the end stop is 'forward' or 'backward', not {direction!r}"
             raise refusal(refuse(Reason.WRONG_KIND, text, axis=self._name))
-        movement = self.commander.move_to_end_stop(
-            self._channel, Direction(direction), consent=consent
-        )
-        return self._result(movement, wait=wait)
+        motion = ToEndStop(Direction(direction))
+        return self._result(self._sent(motion, consent=consent), wait=wait)
 
-    def halt(self) -> None:
+    def _sent(self, motion: SentMotion, *, consent: bool) -> Movement:
+        """Begin what an axis does alone; the gate refuses it while the axis is linked."""
+        if self._far is None:
+            return self._order(motion, consent=consent).movement
+        return self._send(motion, consent=consent)
+
+    @command(at_once=True)
+    def halt(self, why: str = "stopped") -> None:
         """Stop this axis; nothing is latched and other axes go on."""
-        self._manager.device(self._name).halt(self._channel, "stopped")
+        self._manager.device(self._name).halt(self._channel, one_line(why))
 
     @staticmethod
     def _result(movement: Movement, *, wait: bool) -> float | Movement | None:
@@ -272,13 +830,16 @@ class Axis(AxisFacts):
             raise NotAvailable(f"{self._name}: no position has been read yet")
         if state.confidence is Confidence.UNKNOWN:
             raise NotAvailable(f"{self._name}: its position is unknown; initialise it first")
-        self._set_zero(state.position)
+        self.show_from(state.position)
 
     def clear_zero(self) -> None:
         """Show positions as the controller counts them."""
-        self._set_zero(0.0)
+        self.show_from(0.0)
 
-    def _set_zero(self, zero: float) -> None:
+    @command(moves=True, aside=True)
+    def show_from(self, zero: float) -> None:
+        """Show positions relative to `zero`, in gate coordinates."""
+        finite(zero, f"{self._name}: a zero")
         self._manager.device(self._name).set_zero(self._channel, zero)
 
     def set_estimate(self, position: Number, *, std_um: Number | None = 5.0) -> None:
@@ -300,7 +861,12 @@ class Axis(AxisFacts):
         """
         where = self._number(position) + self.details.zero
         std = math.inf if std_um is None else as_number(std_um, "um", self._name)
-        self._manager.device(self._name).set_estimate(self._channel, where, std)
+        self.place_at(where, std)
+
+    @command(moves=True, aside=True)
+    def place_at(self, position: float, std: float) -> None:
+        """Say where an axis without sensor stands, in gate coordinates; see `set_estimate`."""
+        self._manager.device(self._name).set_estimate(self._channel, position, std)
 
     def set_closed_loop_frequency(self, frequency_hz: Number) -> None:
         """Limit the speed of movements to a position, of an SCU 1 to 18500 Hz.
@@ -314,12 +880,32 @@ class Axis(AxisFacts):
         if not class_for(state.kind, state.positioner).has_sensor:
             text = f"{self._name}: it has no sensor; give the frequency with the steps"
             raise refusal(refuse(Reason.WRONG_KIND, text, axis=self._name))
-        hertz = as_whole(frequency_hz, "Hz", self._name)
-        low, high = state.frequency_range_hz
-        if not low <= hertz <= high:
-            text = f"{self._name}: frequency {hertz} Hz is outside {low} to {high} Hz"
-            limit = float(high if hertz > high else low)
+        self.limit_frequency(as_whole(frequency_hz, "Hz", self._name))
+
+    @command(moves=True, aside=True)
+    def limit_frequency(self, frequency_hz: int) -> None:
+        """Limit the speed of movements to a position; raises as `set_closed_loop_frequency`."""
+        low, high = self.details.frequency_range_hz
+        if not low <= frequency_hz <= high:
+            text = f"{self._name}: frequency {frequency_hz} Hz is outside {low} to {high} Hz"
+            limit = float(high if frequency_hz > high else low)
             raise refusal(
-                refuse(Reason.LIMIT, text, axis=self._name, value=hertz, limit=limit, unit="Hz")
+                refuse(
+                    Reason.LIMIT,
+                    text,
+                    axis=self._name,
+                    value=float(frequency_hz),
+                    limit=limit,
+                    unit="Hz",
+                )
             )
-        self._manager.device(self._name).set_frequency(self._channel, hertz)
+        self._manager.device(self._name).set_frequency(self._channel, frequency_hz)
+
+    @command(moves=True, aside=True)
+    def watch(self, on: bool, *, source: str = "script") -> None:
+        """Check its movements for collisions, or no longer; raises as `collision_detection`."""
+        model = self._manager.exemptions
+        if model is None:
+            raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the platform file")
+        change = model.take_in if on else model.take_out
+        change(self._name, source=source_of(source))

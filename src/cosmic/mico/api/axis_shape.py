@@ -1,13 +1,13 @@
 """The shape that bluesky expects of an axis: what `Axis` and `AxisMovable` share."""
 
 import math
-from collections.abc import Callable
-from typing import Final
+from abc import abstractmethod
+from typing import Final, Literal, Protocol
 
 from typing_extensions import override
 
 from cosmic.frame.arguments import checked_class
-from cosmic.frame.errors import CosmicError, MoveRefused, refusal
+from cosmic.frame.errors import CosmicError, refusal
 from cosmic.frame.plan_shape import (
     DataKeys,
     Readings,
@@ -21,12 +21,36 @@ from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.api.entry import Number, as_number
 from cosmic.mico.api.move_status import MoveStatus, refused
 from cosmic.mico.core.motion.movement import Movement
-from cosmic.mico.core.motion.orders import MoveTo
 from cosmic.mico.core.motion.positioner import PositionerState
-from cosmic.mico.core.ports import ManagerPort
 
 # How far from a target an axis still counts as standing at it: more than the noise of any sensor.
 STANDS_AT: Final = {"um": 1.0, "deg": 0.1}
+
+
+class PlanAxis(Protocol):
+    """What of an axis its shape is made of."""
+
+    @property
+    @abstractmethod
+    def details(self) -> PositionerState:
+        """Everything known of it."""
+
+    @property
+    @abstractmethod
+    def controller(self) -> str:
+        """Name of the library that drives it."""
+
+    @abstractmethod
+    def check(self, position: Number, *, consent: bool = False) -> MoveVerdict:
+        """Return the gate's answer to `move_to(position)`, without moving."""
+
+    @abstractmethod
+    def move_to(self, position: Number, *, wait: Literal[False], consent: bool = False) -> Movement:
+        """Begin to move to `position`."""
+
+    @abstractmethod
+    def halt(self) -> None:
+        """Stop it."""
 
 
 @checked_class
@@ -34,42 +58,35 @@ class AxisShape:
     """Movable, Readable, Configurable, Locatable, Stoppable and Checkable, without bluesky."""
 
     parent: None = None
-    _name: str
-    _manager: ManagerPort
-    _halt: Callable[[], None]
-    _begin: Callable[[Number], Movement]
     _asked: tuple[float, MoveStatus] | None = None
 
     @property
+    @abstractmethod
     def name(self) -> str:
         """Name of the axis, such as "left.x"."""
-        return self._name
+
+    @property
+    @abstractmethod
+    def _axis(self) -> PlanAxis:
+        """What moves."""
 
     @property
     def _now(self) -> PositionerState:
-        return self._manager.state(self._name)
-
-    def check(self, position: Number, *, consent: bool = False) -> MoveVerdict:
-        """Return the gate's answer to `move_to(position)`, without moving."""
-        state = self._now
-        try:
-            target = as_number(position, state.unit, self._name) + state.zero
-        except MoveRefused as exc:
-            return exc.verdict
-        return self._manager.check({self._name: MoveTo(target, state.unit)}, consent=consent)
+        return self._axis.details
 
     def check_value(self, value: Number) -> None:
         """Raise `MoveRefused` where `move_to(value)` would; for bluesky's check_limits."""
-        verdict = self.check(value)
+        verdict = self._axis.check(value)
         if not verdict.allowed:
             raise refusal(verdict)
 
     def set(self, value: Number) -> MoveStatus:
         """Start to move to `value` and return a bluesky status; a refusal is how it fails."""
-        state, what = self._now, f"{self._name} to {value}"
+        state = self._now
+        what = f"{state.name} to {value}"
         try:
-            target = as_number(value, state.unit, self._name) + state.zero
-            status = MoveStatus(what, self._begin(value))
+            target = as_number(value, state.unit, state.name) + state.zero
+            status = MoveStatus(what, self._axis.move_to(value, wait=False))
         except CosmicError as exc:
             return refused(what, exc)
         self._asked = target, status
@@ -83,7 +100,7 @@ class AxisShape:
         """
         if success is True and self._asked is not None:  # whatever it is, this stops
             self._asked[1].finish()
-        self._halt()
+        self._axis.halt()
 
     def locate(self) -> dict[str, float | None]:
         """Return where it is and where a plan last sent it, as bluesky's Location.
@@ -145,21 +162,15 @@ class AxisShape:
 
     @property
     def _source(self) -> str:
-        return f"{self._manager.controller.name}:{self._name}"
+        return f"{self._axis.controller}:{self._now.name}"
 
 
+@checked_class
 class AxisMovable(AxisShape):
     """An axis for bluesky's RunEngine, whose documents forbid the dot in a name: "left_x"."""
 
-    def __init__(
-        self,
-        name: str,
-        manager: ManagerPort,
-        halt: Callable[[], None],
-        begin: Callable[[Number], Movement],
-    ) -> None:
-        self._name, self._manager = name, manager
-        self._halt, self._begin = halt, begin
+    def __init__(self, axis: PlanAxis) -> None:
+        self._moved = axis
 
     @override
     def __repr__(self) -> str:
@@ -169,4 +180,13 @@ class AxisMovable(AxisShape):
     @override
     def name(self) -> str:
         """Name of the axis without the dot, such as "left_x"."""
-        return plain_name(self._name)
+        return plain_name(self._now.name)
+
+    @property
+    @override
+    def _axis(self) -> PlanAxis:
+        return self._moved
+
+    def check(self, position: Number, *, consent: bool = False) -> MoveVerdict:
+        """Return the gate's answer to a move to `position`, without moving."""
+        return self._moved.check(position, consent=consent)

@@ -1,8 +1,11 @@
 """Several axes that move together."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from threading import Lock
-from typing import Self
+from typing import Any, ClassVar, Self
+
+from typing_extensions import override
 
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.errors import MoveCancelled
@@ -11,6 +14,14 @@ from cosmic.mico.core.motion.group_start import GroupStart
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.orders import Motion, Order
 from cosmic.mico.core.ports import ManagerPort
+
+
+@dataclass(frozen=True, slots=True)
+class GroupEnd:
+    """How several axes that moved together have ended well, as it is told to another process."""
+
+    positions: dict[str, float | None]
+    start_skew_ms: float | None
 
 
 @checked_class
@@ -23,17 +34,22 @@ class GroupMovement(Operation[dict[str, float | None]]):
     Attributes
     ----------
     movements : dict of str to Movement
-        The movement of each axis.
+        The movement of each axis; empty of a group that moves at another station.
     """
 
-    def __init__(self, movements: Mapping[str, Movement], start: GroupStart | None = None) -> None:
-        super().__init__(f"the movement of {', '.join(movements) or 'nothing'}")
+    sent_kind: ClassVar[Any] = GroupEnd
+
+    def __init__(
+        self, movements: Mapping[str, Movement], start: GroupStart | None = None, *, title: str = ""
+    ) -> None:
+        super().__init__(title or f"the movement of {', '.join(movements) or 'nothing'}")
         self.movements = dict(movements)
         self._start = start
+        self._skew_ms: float | None = None if title else 0.0
         self._counting = Lock()
         self._left = len(self.movements)
         self.on_cancel(self._stop_all)
-        if not self.movements:
+        if not (self.movements or title):
             self.finish({})
         for movement in self.movements.values():
             movement.add_callback(self._on_end)
@@ -44,15 +60,27 @@ class GroupMovement(Operation[dict[str, float | None]]):
         start = next((order.start for order in orders.values()), None)
         return cls({name: order.movement for name, order in orders.items()}, start)
 
+    @classmethod
+    @override
+    def followed(cls, title: str) -> Self:
+        return cls({}, title=title or "the movement of axes elsewhere")
+
+    @override
+    def sent_result(self) -> GroupEnd:
+        return GroupEnd(self.result, self.start_skew_ms)
+
+    @override
+    def finish_as_sent(self, sent: GroupEnd) -> bool:
+        self._skew_ms = sent.start_skew_ms
+        return self.finish(sent.positions)
+
     @property
     def start_skew_ms(self) -> float | None:
         """From the start of the first axis to that of the last, in milliseconds of wall time.
 
         Measured at the calls of the library; None before they were made, 0 where one goes alone.
         """
-        if self._start is None:
-            return 0.0
-        return self._start.skew_ms
+        return self._skew_ms if self._start is None else self._start.skew_ms
 
     def _stop_all(self) -> None:
         for movement in self.movements.values():

@@ -1,55 +1,551 @@
-"""The MiCo part of the scripted API: ``rig.mico``."""
+"""The one interface of MiCo: ``rig.mico``, its windows, plans and stations use nothing else."""
 
-from collections.abc import Callable, Mapping
-from typing import Literal, overload
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from threading import Lock
+from typing import Final, Literal, overload
 
+from PySide6.QtCore import Qt
 from typing_extensions import override
 
+from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.arguments import checked_class
-from cosmic.frame.errors import NotAvailable
-from cosmic.frame.operation import Progress, Task, wait_or_cancel
-from cosmic.frame.threads import forbid_waiting_here
+from cosmic.frame.clock import Clock
+from cosmic.frame.declaration import Companion, Declared, command, part, state, stream
+from cosmic.frame.errors import (
+    CosmicError,
+    MoveRefused,
+    NotAvailable,
+    UnknownAxisError,
+)
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.caller import current_call
+from cosmic.frame.network.lease import StationLease
+from cosmic.frame.network.transport import Rule
+from cosmic.frame.operation import Operation, Progress, Task, wait_or_cancel
+from cosmic.frame.threads import forbid_waiting_here, may_wait_here
+from cosmic.frame.verdict import MoveVerdict, Reason, refuse
+from cosmic.frame.weakly import weakly
+from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.api.application_base import WAY_BUDGET_S, MicoApplicationBase
-from cosmic.mico.api.axes_together import AxesTogether
+from cosmic.mico.api.axis import Axis
+from cosmic.mico.api.axis_group import AxisGroup
 from cosmic.mico.api.collision import Collision
-from cosmic.mico.api.entry import Number
+from cosmic.mico.api.entry import Number, as_number, finite, one_line, source_of
+from cosmic.mico.api.foresight import foreseen
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.initialisation import Confirm
 from cosmic.mico.api.links import check_linkable, check_links_may_change
+from cosmic.mico.api.news import (
+    AxisPositions,
+    MovementNews,
+    SentMotion,
+    follow_movements,
+    follow_positions,
+)
 from cosmic.mico.api.poses import Poses
 from cosmic.mico.api.trajectories import Trajectories
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
+from cosmic.mico.core.collision.collision_manager import CollisionManager
+from cosmic.mico.core.collision.model import SceneModel
+from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.motion.links import Link
+from cosmic.mico.core.motion.orders import Motion, MoveBy, MoveTo
+from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.mico.core.motion.undo import UndoEntry, undo_text
+from cosmic.mico.core.ports import DevicePort, ManagerPort
+from cosmic.mico.core.poses import Pose
+from cosmic.mico.core.sequence.report import SequenceReport
+from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
+
+SCENE_LIMIT_S: Final = 10.0
+"""How long the shapes of all bodies may take on the way."""
+LONGEST_SEARCH_S: Final = 60.0
+"""For how long a path may be looked for on a line; other long operations wait for it."""
+NOTHING_KNOWN: Final = MicoSettings(positioner=())
+"""Stands for settings while a station was never reached."""
+NOT_YET: Final = "MiCo of the station has not told anything yet"
 
 
 @checked_class
-class Mico(AxesTogether):
-    """The axes of the platform, by name; any thread.
+class Mico(Declared):
+    """The axes of the platform by name, and what they do together; any thread.
 
     Parameters
     ----------
-    application : MicoApplicationBase
+    application : MicoApplication
         Where the hardware is.
     source : str
         Who commands through this object, for the log: "script", "window", "key".
     """
 
-    def __init__(self, application: MicoApplicationBase, source: str = "script") -> None:
-        super().__init__(application.manager, source)
-        self._application = application
+    def __init__(self, application: MicoApplication, source: str = "script") -> None:
+        self._application: MicoApplicationBase = application
+        self._home: MicoApplication = application
+        self._manager: ManagerPort = application.manager
+        self._begin_here(source)
+        direct = Qt.ConnectionType.DirectConnection
+        manager, changed = application.manager, weakly(self.note_change)
+        manager.links_changed.connect(changed, direct)
+        application.undo.changed.connect(changed, direct)
+        application.status_changed.connect(changed, direct)
+        application.initialisation_changed.connect(changed, direct)
+        manager.latch.subscribe(lambda _state: changed())
+        if manager.exemptions is not None:
+            manager.exemptions.subscribe(changed)
+        self.belong_to(application)
+
+    def _begin_here(self, source: str) -> None:
+        self._source = source
+        self._commanders: dict[int, DeviceCommander] = {}
+        self._axes: dict[str, Axis] = {}
+        self._joined: dict[int, DevicePort] = {}
+        self._joining = Lock()
+
+    @override
+    def take_lease_of(self, lease: StationLease) -> None:
+        self._manager.lease.join(lease)
+
+    # Where the axes are at another station
+
+    @override
+    def prepare(self, key: str, policy: FailurePolicy) -> None:
+        self._begin_here("script")
+        self._policy = policy
+        self._told_away = ""
+
+    @override
+    def made_companion(self) -> Companion:
+        """Follow positions, and stop there what was begun here when something here fails."""
+        return _MicoCompanion(self, self._policy)
+
+    def belong_to(self, application: MicoApplicationBase, source: str = "") -> None:
+        """Work for an application; for whoever makes one of this."""
+        self._application, self._manager = application, application.manager
+        self._source = source or self._source
+        self._connect()
+        # Direct, because a script has no event loop that a queued call could arrive in.
+        direct = Qt.ConnectionType.DirectConnection
+        application.manager.changed.connect(weakly(self._connect), direct)
+
+    @override
+    def note_change(self) -> None:
+        super().note_change()
+        if self.elsewhere and self.away != self._told_away:
+            self._told_away = self.away
+            for axis in self.axes.values():
+                axis.note_change()
+
+    # Each axis
+
+    def _connect(self) -> None:
+        """Join the commanders to the devices there are now."""
+        token = self._manager.lease.local_token
+        with self._joining:
+            for index, device in self._manager.devices.items():
+                commander = self._commanders.get(index)
+                if commander is None:
+                    commander = self._commanders[index] = DeviceCommander(token, self._source)
+                if self._joined.get(index) is not device:
+                    self._joined[index] = device
+                    self._manager.connect_device_commander(index, commander)
 
     @property
     def application(self) -> MicoApplicationBase:
         """The application behind it."""
         return self._application
 
+    @property
+    @override
+    def clock(self) -> Clock:
+        """The platform's."""
+        return self._manager.clock
+
     @override
     def __repr__(self) -> str:
         return f"<Mico: {', '.join(self.names)}>"
+
+    @property
+    @part
+    def axes(self) -> Mapping[str, Axis]:
+        """Each axis by its name, in the order of the configuration."""
+        return {name: self[name] for name in self._manager.names()}
+
+    def __getitem__(self, name: str) -> Axis:
+        """Return an axis; raises `UnknownAxisError`, a `CosmicError` and `KeyError`."""
+        if self.elsewhere:
+            return self._axis_elsewhere(name)
+        address = self._manager.address(name)
+        axis = self._axes.get(name)
+        if axis is None:
+            if address.device not in self._commanders:
+                self._connect()  # it was told of just now, and `changed` is on its way
+            axis = Axis(name, self._manager, self._commanders[address.device])
+            self._axes[name] = axis
+        return axis
+
+    def _axis_elsewhere(self, name: str) -> Axis:
+        axis = self.axes.get(name) if isinstance(name, str) else None
+        if axis is None:
+            raise UnknownAxisError(name, self.names)
+        if name not in self._axes:
+            device = self._manager.address(name).device
+            if device not in self._commanders:
+                self._connect()
+            axis.commander = self._commanders[device]
+            if axis.far is not None:
+                axis.far.platform = lambda: self.settings
+                axis.far.foresee = self._foreseen
+            self._axes[name] = axis
+        return axis
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    def __iter__(self) -> Iterator[Axis]:
+        return (self[name] for name in self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    # What is known
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all axes, in the order of the configuration."""
+        return list(self.axes) if self.elsewhere else self._manager.names()
+
+    @property
+    @state(fixed=True, unknown=NOTHING_KNOWN)
+    def settings(self) -> MicoSettings:
+        """What the platform file says."""
+        return self._manager.settings
+
+    @property
+    @state(fixed=True)
+    def platform(self) -> str:
+        """Name of the platform."""
+        return self._home.trajectories.platform
+
+    @property
+    @state(fixed=True)
+    def controller(self) -> str:
+        """Name of the library that drives the axes."""
+        return self._manager.controller.name
+
+    @property
+    @state(fixed=True)
+    def simulated(self) -> bool:
+        """True when no hardware moves."""
+        return self._manager.controller.simulated
+
+    @property
+    @state(fixed=True)
+    def checks_collisions(self) -> bool:
+        """Whether there is a collision model."""
+        return self._home.collision is not None
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """What was configured and is not there, a line each."""
+        return (self.away, *self._missing) if self.away else self._missing
+
+    @property
+    @state
+    def _missing(self) -> tuple[str, ...]:
+        return self._manager.missing
+
+    @property
+    def ready(self) -> bool:
+        """True while axes can be moved."""
+        return not self.away and self._ready
+
+    @property
+    @state
+    def _ready(self) -> bool:
+        return self._manager.ready
+
+    @property
+    def failure(self) -> str:
+        """Why MiCo cannot work; empty when it can."""
+        return self.away or self._failure
+
+    @property
+    @state(unknown=NOT_YET)
+    def _failure(self) -> str:
+        return self._home.failure
+
+    @property
+    @state(unknown=StopState(None, 0))
+    def stop_state(self) -> StopState:
+        """Whether motion is stopped, and why."""
+        return self._manager.latch.state
+
+    @property
+    @state
+    def links(self) -> tuple[Link, ...]:
+        """The links in force, each with `first`, `second` and `ratio`."""
+        return self._manager.links.links
+
+    @property
+    @state
+    def undo_entries(self) -> tuple[UndoEntry, ...]:
+        """What can be taken back, the newest first; ten of each assembly."""
+        return self._home.undo.entries
+
+    @property
+    @state(unknown=SequenceReport(()))
+    def initialisation(self) -> SequenceReport:
+        """How far the initialisation sequence is, or was."""
+        return self._home.initialisation
+
+    @property
+    @state
+    def kept_poses(self) -> tuple[Pose, ...]:
+        """All named poses."""
+        return tuple(self._home.trajectories.poses.poses.values())
+
+    @property
+    def taken_out(self) -> tuple[str, ...]:
+        """Axes taken out of collision detection."""
+        if not self.checks_collisions:
+            return ()
+        return tuple(name for name, axis in self.axes.items() if not axis.collision_detection)
+
+    @property
+    @state
+    def allowed_contacts(self) -> tuple[str, ...]:
+        """Contacts of the scene that are allowed now."""
+        model = self._manager.exemptions
+        return () if model is None else tuple(sorted(model.allowed_contacts))
+
+    @stream(Rule.LATEST, topic="positions")
+    def follow_positions(self, receiver: Callable[[AxisPositions], object]) -> Callable[[], None]:
+        """Call `receiver` with where the axes are while one moves, at most 30 times a second."""
+        return follow_positions(self._home.manager, receiver)
+
+    @stream(Rule.ALL, topic="movements")
+    def follow_movements(self, receiver: Callable[[MovementNews], object]) -> Callable[[], None]:
+        """Call `receiver` with each movement that begins, ends or is refused."""
+        return follow_movements(self._home.manager, receiver)
+
+    # Moving several axes
+
+    @overload
+    def move(
+        self,
+        targets: Mapping[str, Number],
+        *,
+        wait: Literal[True] = True,
+        consent: bool = False,
+        match_arrival: bool = False,
+    ) -> dict[str, float | None]: ...
+
+    @overload
+    def move(
+        self,
+        targets: Mapping[str, Number],
+        *,
+        wait: Literal[False],
+        consent: bool = False,
+        match_arrival: bool = False,
+    ) -> GroupMovement: ...
+
+    def move(
+        self,
+        targets: Mapping[str, Number],
+        *,
+        wait: bool = True,
+        consent: bool = False,
+        match_arrival: bool = False,
+    ) -> dict[str, float | None] | GroupMovement:
+        """Move several axes to positions together; returns the positions reached.
+
+        They are decided together and started back to back; each goes at its own speed, so the
+        path is not a straight line. The failure of one stops the others. Axes that are linked to
+        them, and not named, move with them.
+
+        Parameters
+        ----------
+        targets : mapping
+            Positions by axis name, in the unit of each axis, from the user's zero.
+        wait : bool
+            False returns the `GroupMovement` at once.
+        match_arrival : bool
+            Slow the axes down to the one that takes longest, so that all arrive together; their
+            own speeds come back afterwards.
+
+        Raises
+        ------
+        MoveRefused
+            The gate refused; nothing moved.
+        UnknownAxisError
+            One axis does not exist; nothing moved.
+        DeviceError, MoveCancelled
+            One of them failed or was stopped.
+        """
+        motions = self._targets(targets)
+        return self._together(motions, wait=wait, consent=consent, match_arrival=match_arrival)
+
+    @overload
+    def move_by(
+        self,
+        distances: Mapping[str, Number],
+        *,
+        wait: Literal[True] = True,
+        consent: bool = False,
+        match_arrival: bool = False,
+    ) -> dict[str, float | None]: ...
+
+    @overload
+    def move_by(
+        self,
+        distances: Mapping[str, Number],
+        *,
+        wait: Literal[False],
+        consent: bool = False,
+        match_arrival: bool = False,
+    ) -> GroupMovement: ...
+
+    def move_by(
+        self,
+        distances: Mapping[str, Number],
+        *,
+        wait: bool = True,
+        consent: bool = False,
+        match_arrival: bool = False,
+    ) -> dict[str, float | None] | GroupMovement:
+        """Move several axes by distances together; otherwise as `move`."""
+        motions: dict[str, SentMotion] = {}
+        for name, value in distances.items():
+            unit = self[name].unit
+            motions[name] = MoveBy(as_number(value, unit, name), unit)
+        return self._together(motions, wait=wait, consent=consent, match_arrival=match_arrival)
+
+    def _targets(self, targets: Mapping[str, Number]) -> dict[str, SentMotion]:
+        motions: dict[str, SentMotion] = {}
+        for name, value in targets.items():
+            motions[name] = MoveTo(self._in_gate(name, value), self[name].unit)
+        return motions
+
+    def _together(
+        self, motions: Mapping[str, SentMotion], *, wait: bool, consent: bool, match_arrival: bool
+    ) -> dict[str, float | None] | GroupMovement:
+        group = self.begin_together(
+            dict(motions), consent=consent, match_arrival=match_arrival, source=self._source
+        )
+        return wait_or_cancel(group) if wait else group
+
+    @command(moves=True)
+    def begin_together(
+        self,
+        motions: dict[str, SentMotion],
+        *,
+        consent: bool = False,
+        linked: bool = True,
+        match_arrival: bool = False,
+        source: str = "script",
+    ) -> GroupMovement:
+        """Decide motions in gate coordinates together and start them, or none of them.
+
+        Parameters
+        ----------
+        linked : bool
+            Axes linked to those named move with them; False moves those named only.
+
+        Raises
+        ------
+        MoveRefused, UnknownAxisError
+            As `move`.
+        """
+        orders = self._manager.order_together(
+            motions,
+            source=source_of(source),
+            consent=consent,
+            linked=linked,
+            match_arrival=match_arrival,
+        )
+        group, call = GroupMovement.of(orders), current_call()
+        if call is not None and any(call.overtaken(("axes", name)) for name in orders):
+            group.cancel()
+        return group
+
+    def group(self, *names: str, name: str = "") -> AxisGroup:
+        """Return axes that a bluesky plan moves as one; raises `UnknownAxisError`."""
+        axes = {each: self[each].movable for each in names}
+        return AxisGroup(axes, lambda to: self.move(to, wait=False), self.check, name)
+
+    def check(self, targets: Mapping[str, Number]) -> MoveVerdict:
+        """Return the gate's answer to absolute targets together, without moving.
+
+        Raises
+        ------
+        UnknownAxisError
+            One axis does not exist.
+        """
+        try:
+            motions = self._targets(targets)
+        except MoveRefused as exc:
+            return exc.verdict
+        return self.judge(motions)
+
+    def judge(self, motions: Mapping[str, SentMotion], *, consent: bool = False) -> MoveVerdict:
+        """Return the gate's answer to motions in gate coordinates, without moving.
+
+        Where the axes are at another station and this thread must not wait (a window), it is what
+        can be said without collisions; the gate there decides each movement in any case.
+        """
+        if self.elsewhere and not may_wait_here():
+            return self._foreseen(motions, consent)
+        try:
+            return self.check_motions(dict(motions), consent=consent)
+        except UnknownAxisError:
+            raise
+        except MoveRefused as exc:
+            return exc.verdict
+        except CosmicError as exc:
+            return refuse(Reason.NO_ANSWER, f"the station does not answer: {exc}")
+
+    @command
+    def check_motions(
+        self, motions: dict[str, SentMotion], *, consent: bool = False
+    ) -> MoveVerdict:
+        """Return the gate's answer to motions in gate coordinates, without moving."""
+        return self._manager.check(motions, consent=consent)
+
+    def _foreseen(self, motions: Mapping[str, Motion], consent: bool) -> MoveVerdict:
+        states = {axis.name: axis.details for axis in self}
+        reason = self.stop_state.reason
+        return foreseen(motions, states, self.settings, consent=consent, stop_reason=reason)
+
+    def _in_gate(self, name: str, value: Number) -> float:
+        axis = self[name]
+        return as_number(value, axis.unit, name) + axis.details.zero
+
+    # Stopping
+
+    @command(at_once=True)
+    def stop(self, reason: str = "stop from a script") -> None:
+        """Stop every axis now; nothing moves again before `reset_stop`. Anybody may.
+
+        Raises
+        ------
+        StationAway, StationTimeout
+            The axes are at a station that cannot be reached. What was begun here stops by itself.
+        """
+        call = current_call()
+        said = reason if call is None else f"{one_line(reason)} (from {call.caller.name})"
+        self._manager.stop(said)
+
+    @command(moves=True, aside=True)
+    def reset_stop(self) -> None:
+        """Allow motion again; what was stopped does not go on by itself."""
+        self._manager.reset_stop()
+
+    # What takes long
 
     def initialise(
         self,
@@ -96,6 +592,29 @@ class Mico(AxesTogether):
         """Look again for the hardware; the arguments are those of `initialise`."""
         return self._follow(self._application.rescan(), progress, wait=wait)
 
+    @command(moves=True)
+    def begin_initialisation(
+        self, *, skip_known: bool = False, may_hold: bool = False, asks: bool = False
+    ) -> Task:
+        """Begin the initialisation sequence where the axes are; see `initialise`.
+
+        Parameters
+        ----------
+        asks : bool
+            Somebody reads `initialisation.question` and gives the answer with `answer`.
+        """
+        return self._home.begin_initialisation(skip_known=skip_known, may_hold=may_hold, asks=asks)
+
+    @command(moves=True)
+    def answer(self, agreed: bool) -> None:
+        """Answer the question that the initialisation sequence asks."""
+        self._home.answer(agreed)
+
+    @command(moves=True)
+    def begin_rescan(self) -> Task:
+        """Begin to look again for the hardware."""
+        return self._home.rescan()
+
     @staticmethod
     def _follow(task: Task, progress: Callable[[Progress], None] | None, *, wait: bool) -> Task:
         if progress is not None:
@@ -130,6 +649,18 @@ class Mico(AxesTogether):
         forbid_waiting_here("looking for a way")
         places = {name: self._in_gate(name, value) for name, value in targets.items()}
         return self._application.find_way(places, budget_s)
+
+    @command
+    def begin_search(self, targets: dict[str, float], budget_s: float) -> Operation[Way]:
+        """Begin to look for a path to targets in gate coordinates, for at most a minute."""
+        if not 0.0 < budget_s <= LONGEST_SEARCH_S:
+            raise NotAvailable(f"a path is looked for during at most {LONGEST_SEARCH_S:g} s")
+        return self._home.begin_search(targets, budget_s)
+
+    @command(moves=True)
+    def begin_detour(self, way: Way, *, source: str = "script") -> Task:
+        """Begin to go a path that was found, where the axes are; see `follow`."""
+        return self._home.follow_way(way, source_of(source))
 
     def follow(
         self, way: Way, progress: Callable[[Progress], None] | None = None, *, wait: bool = True
@@ -172,11 +703,6 @@ class Mico(AxesTogether):
 
     # Links
 
-    @property
-    def links(self) -> tuple[Link, ...]:
-        """The links in force, each with `first`, `second` and `ratio`."""
-        return self._manager.links.links
-
     def link(self, first: str, second: str, ratio: float = 1.0) -> Link:
         """Link two axes: a movement of one to or by a position moves the other as well.
 
@@ -196,7 +722,14 @@ class Mico(AxesTogether):
             They are linked already, have no sensor, or are not of one kind, or one of them moves.
         """
         check_linkable(self._manager, first, second)
-        return self._manager.links.add(first, second, float(ratio))
+        self.add_link(first, second, float(ratio))
+        return Link(first, second, float(ratio))
+
+    @command(moves=True, aside=True)
+    def add_link(self, first: str, second: str, ratio: float) -> None:
+        """Link two axes; raises as `link`."""
+        check_linkable(self._manager, first, second)
+        self._manager.links.add(first, second, finite(ratio, "a ratio"))
 
     def unlink(self, axis: str) -> bool:
         """Take away every link of an axis; False when it had none.
@@ -208,15 +741,17 @@ class Mico(AxesTogether):
         NotAvailable
             One of the axes linked moves.
         """
-        check_links_may_change(self._manager, {self[axis].name})
-        return self._manager.links.remove(self[axis].name)
+        linked = bool(self[axis].linked_to)
+        self.remove_links(self[axis].name)
+        return linked
+
+    @command(moves=True, aside=True)
+    def remove_links(self, axis: str) -> None:
+        """Take away every link of an axis; raises as `unlink`."""
+        check_links_may_change(self._manager, {axis})
+        self._manager.links.remove(axis)
 
     # Taking back
-
-    @property
-    def undo_entries(self) -> tuple[UndoEntry, ...]:
-        """What can be taken back, the newest first; ten of each assembly."""
-        return self._application.undo.entries
 
     @overload
     def undo(
@@ -262,18 +797,26 @@ class Mico(AxesTogether):
                 f"going back would move {undo_text(entry, self._manager.states())}, but "
                 f"{'; '.join(doubts)}. Look where it goes, then undo with confirm=True"
             )
-        movement = GroupMovement.of(history.order(entry))
-
-        def forget(ended: GroupMovement) -> None:
-            if ended.success:
-                history.drop(entry)
-
-        movement.add_callback(forget)
+        movement = self.begin_undo(entry.number)
         if not wait:
             return movement
         reached = wait_or_cancel(movement)
-        history.drop(entry)
+        if not self.elsewhere:  # what ends a movement tells it after whoever waits
+            self._home.undo.drop(entry)
         return reached
+
+    @command(moves=True)
+    def begin_undo(self, number: int) -> GroupMovement:
+        """Begin to take back the movement of that number in the history; raises as `undo`."""
+        history = self._home.undo
+        entry = next((each for each in history.entries if each.number == number), None)
+        if entry is None:
+            raise NotAvailable("there is nothing to undo any more: something moved since")
+        if history.newest(entry.group).number != number:
+            raise NotAvailable(f"{entry.group} has moved since; look again what undo takes back")
+        movement = GroupMovement.of(history.order(entry))
+        movement.add_callback(lambda ended: history.drop(entry) if ended.success else None)
+        return movement
 
     def undo_doubts(self, entry: UndoEntry) -> tuple[str, ...]:
         """Return what speaks against taking `entry` back: felt since, or so now."""
@@ -300,3 +843,94 @@ class Mico(AxesTogether):
             There is no collision model, or the position of some axis is not known.
         """
         return self.collision.clearance()
+
+    @command(reads=True)
+    def nearest(self, positions: dict[str, float]) -> Approach | None:
+        """Return the nearest pair of bodies with the axes at `positions`."""
+        return self._model.nearest(positions)
+
+    @command(reads=True, timeout_s=SCENE_LIMIT_S)
+    def scene(self) -> SceneModel:
+        """Return what is watched for collisions, and what it looks like."""
+        return self._model.model
+
+    @command(moves=True, aside=True)
+    def set_contact(self, name: str, *, allowed: bool, source: str = "script") -> None:
+        """Let the bodies of an operation touch, or watch them again."""
+        change = self._model.allow_contact if allowed else self._model.forbid_contact
+        change(name, source=source_of(source))
+
+    @property
+    def _model(self) -> CollisionManager:
+        model = self._home.collision
+        if model is None:
+            raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the station's platform file")
+        return model
+
+    # What poses are kept
+
+    @command(aside=True)
+    def put_pose(self, name: str, positions: dict[str, float]) -> None:
+        """Keep a named pose, in gate coordinates."""
+        for axis, position in positions.items():
+            self._manager.address(axis)
+            finite(position, f"{axis}: a position")
+        self._home.trajectories.poses.put(Pose(name, dict(positions)))
+        self.note_change()
+
+    @command(aside=True)
+    def remove_pose(self, name: str) -> None:
+        """Forget a named pose."""
+        self._home.trajectories.poses.remove(name)
+        self.note_change()
+
+
+class _MicoCompanion(Companion):
+    """Follows the positions of axes at another station, and minds what was begun here."""
+
+    def __init__(self, mico: Mico, policy: FailurePolicy) -> None:
+        self._mico = mico
+        self._policy = policy
+        self._ends: list[Callable[[], object]] = []
+
+    @override
+    def on_opened(self) -> None:
+        self._ends.append(self._policy.on_safe_stop(self._on_safe_stop))
+        self._ends.append(self._mico.follow_positions(self._on_positions))
+
+    @override
+    def close(self) -> None:
+        while self._ends:
+            self._ends.pop()()
+
+    def _on_safe_stop(self, reason: str) -> None:
+        """Stop what was begun here, when something here has failed."""
+        if self._mico.moves_elsewhere and not self._mico.away:
+            self._mico.carry_out(partial(self._mico.stop, reason), self._on_stopped)
+
+    def _on_stopped(self, _result: None, error: CosmicError | None) -> None:
+        if error is not None:
+            self._policy.report(error, "stop was NOT carried out at the station")
+
+    def _on_positions(self, positions: AxisPositions) -> None:
+        axes = self._mico.axes
+        for name, (position, std, read_wall_s) in positions.of.items():
+            axis = axes.get(name)
+            if axis is not None and axis.far is not None:
+                axis.far.move(position, std, read_wall_s)
+                axis.far.changed.emit(axis.details)
+
+
+def mico_of(application: CosmicApplicationBase, source: str = "script") -> Mico:
+    """Return what an application offers, whether its axes are here or at another station.
+
+    Raises
+    ------
+    TypeError
+        It is no MiCo.
+    """
+    if isinstance(application, MicoApplication):
+        return Mico(application, source)
+    if isinstance(application, MicoApplicationBase):
+        return application.mico(source)
+    raise TypeError(f"{application!r} is no MiCo")

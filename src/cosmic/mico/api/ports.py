@@ -10,7 +10,6 @@ from PySide6.QtCore import SignalInstance
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.callback import CollisionCallbackBase
 from cosmic.mico.core.collision.model import BodyPair, SceneModel
-from cosmic.mico.core.motion.orders import Order
 from cosmic.mico.core.motion.undo import UndoEntry
 
 
@@ -83,11 +82,3 @@ class UndoPort(Protocol):
     @abstractmethod
     def newest(self, group: str | None = None) -> UndoEntry:
         """Return what is to be taken back first; raises `NotAvailable`."""
-
-    @abstractmethod
-    def order(self, entry: UndoEntry) -> dict[str, Order]:
-        """Begin to move back; raises `MoveRefused`, and the entry stays."""
-
-    @abstractmethod
-    def drop(self, entry: UndoEntry) -> None:
-        """Forget an entry that was taken back; harmless the second time."""

@@ -1,7 +1,6 @@
 """What of the states of axes is news to those who listen."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 from cosmic.mico.core.motion.messages import PositionChanged
 from cosmic.mico.core.motion.positioner import PositionerState
@@ -28,7 +27,7 @@ class StateNews:
     def tell(self, state: PositionerState) -> None:
         """Tell a state, unless all but the time of its reading was told already."""
         before = self._told.get(state.name)
-        if before is not None and replace(before, read_wall_s=state.read_wall_s) == state:
+        if before == state:  # whenever it was read
             return
         self._told[state.name] = state
         self._on_state(state)

@@ -10,7 +10,7 @@ from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.gui.theme import State
 from cosmic.frame.operation import Task
 from cosmic.mico.api.application_base import MicoApplicationBase
-from cosmic.mico.api.mico import Mico
+from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.mico.core.motion.group_start import GroupStarted
 from cosmic.mico.core.settings import GroupSettings, MicoSettings, PositionerSettings
 from cosmic.mico.gui.arrangement import arranged_groups
@@ -237,11 +237,7 @@ class MicoWidget(QWidget):
         for each in self._settings.positioner:
             if each.name == name:
                 return each
-        container = self._manager.device(name).container
-        positioner = container.positioner(self._manager.address(name).channel)
-        if positioner is None:
-            raise NotAvailable(f"{name}: it went away just now; rescan")
-        return positioner.settings
+        return self._mico[name].settings
 
     def _jog_keys(self) -> dict[str, JogKey]:
         keys: dict[str, JogKey] = {}
@@ -334,4 +330,4 @@ def make_mico_gui(application: CosmicApplicationBase) -> MicoWidget:
     """Return the GUI component of a `MicoApplicationBase`; its `gui_factory`."""
     if not isinstance(application, MicoApplicationBase):
         raise TypeError(f"{application!r} is no MicoApplication")
-    return MicoWidget(Mico(application, "window"))
+    return MicoWidget(mico_of(application, "window"))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from queue import Empty, SimpleQueue
+from typing import Any
 
 from cosmic.frame.network.delivery import Backlog, Inbox
 from cosmic.frame.network.errors import StationAway, StationTimeout
@@ -34,6 +35,18 @@ class MemoryOutlet:
         pass
 
 
+class MemoryInlet(Backlog[bytes]):
+    def __init__(self, rule: Rule, inlets: list[Backlog[bytes]]) -> None:
+        super().__init__(rule)
+        self._inlets = inlets
+        inlets.append(self)
+
+    def close(self) -> None:
+        super().close()
+        if self in self._inlets:
+            self._inlets.remove(self)
+
+
 class MemorySign:
     def __init__(self, take_away: Callable[[], None]) -> None:
         self.close = take_away
@@ -64,7 +77,7 @@ class MemoryWire:
 
     def __init__(self, hub: MemoryHub) -> None:
         self._hub = hub
-        self._inboxes: list[Backlog[object]] = []
+        self._inboxes: list[Backlog[Any]] = []
 
     def ask(self, key: str, message: bytes, *, timeout_s: float) -> bytes:
         question = MemoryQuestion(key, message)
@@ -89,8 +102,8 @@ class MemoryWire:
         return MemoryOutlet(self._hub.inlets.setdefault(key, []))
 
     def inlet(self, key: str, rule: Rule) -> Inbox[bytes]:
-        made: Backlog[bytes] = self._inbox(rule)
-        self._hub.inlets.setdefault(key, []).append(made)
+        made = MemoryInlet(rule, self._hub.inlets.setdefault(key, []))
+        self._inboxes.append(made)
         return made
 
     def sign(self, key: str) -> MemorySign:

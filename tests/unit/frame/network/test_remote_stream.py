@@ -9,7 +9,7 @@ from typing_extensions import override
 
 from cosmic.frame.declaration import Declared, declaration_of, stream
 from cosmic.frame.errors import ProtocolError
-from cosmic.frame.network.link import RemoteStream
+from cosmic.frame.network.remote_stream import RemoteStream
 from cosmic.frame.network.transport import (
     PresenceListener,
     Receiver,
@@ -163,7 +163,7 @@ def test_it_comes_only_while_somebody_wants_it(
     end()
     pieces.tidy()
     assert not transport.subscriptions[0].closed, "somebody may want it again soon"
-    monkeypatch.setattr("cosmic.frame.network.link.LINGER_S", 0.0)
+    monkeypatch.setattr("cosmic.frame.network.remote_stream.LINGER_S", 0.0)
     pieces.tidy()
     assert transport.subscriptions[0].closed
     pieces.subscribe(lambda _: None)
@@ -175,7 +175,7 @@ def test_it_comes_only_while_somebody_wants_it(
 def test_one_that_is_kept_comes_all_the_time(
     transport: ByHand, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cosmic.frame.network.link.LINGER_S", 0.0)
+    monkeypatch.setattr("cosmic.frame.network.remote_stream.LINGER_S", 0.0)
     pieces = RemoteStream(
         declaration_of(Source).streams["pieces"], "pieces", transport, lambda: None
     )

@@ -179,7 +179,7 @@ class DeviceCommander(QObject):
 
     def jog(self, channel: int, direction: int, speed: float, *, consent: bool = False) -> Order:
         """Begin to move continuously; call `renew_jog` several times within the dead-man time."""
-        return self._issue(channel, Jog(direction, speed), consent=consent)
+        return self.order(channel, Jog(direction, speed), consent=consent)
 
     def renew_jog(self, order: Order) -> None:
         """Keep the jog begun by `order` alive."""
@@ -189,7 +189,7 @@ class DeviceCommander(QObject):
     def steer(self, channel: int, velocity: float, *, dead_man_s: float) -> Order:
         """Begin to move at a signed speed that `steer_on` changes; it ends when that stays away."""
         direction = 1 if velocity > 0.0 else -1
-        return self._issue(channel, Steer(direction, abs(velocity), dead_man_s), consent=False)
+        return self.order(channel, Steer(direction, abs(velocity), dead_man_s), consent=False)
 
     def steer_on(self, order: Order, velocity: float) -> None:
         """Keep the movement begun by `steer` alive at `velocity`; only the newest counts."""
@@ -210,11 +210,12 @@ class DeviceCommander(QObject):
         follows: Movement | None = None,
     ) -> Movement:
         """Send any motion; with `follows`, only if that is still the newest on its channel."""
-        return self._issue(channel, motion, consent=consent, follows=follows).movement
+        return self.order(channel, motion, consent=consent, follows=follows).movement
 
-    def _issue(
+    def order(
         self, channel: int, motion: Motion, *, consent: bool, follows: Movement | None = None
     ) -> Order:
+        """Send any motion, and return the order that it is."""
         device = self._device
         if device is None:
             raise NotConnectedError("this commander is connected to no device, or only listens")

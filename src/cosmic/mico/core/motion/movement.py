@@ -1,5 +1,9 @@
 """A movement under way, as seen by whoever asked for it."""
 
+from typing import Any, ClassVar, Self
+
+from typing_extensions import override
+
 from cosmic.frame.operation import Operation
 
 
@@ -11,8 +15,15 @@ class Movement(Operation[float | None]):
     `DeviceError` where it failed at the hardware.
     """
 
+    sent_kind: ClassVar[Any] = float | None
+
     def __init__(self) -> None:
         super().__init__("the movement")
+
+    @classmethod
+    @override
+    def followed(cls, title: str) -> Self:
+        return cls()
 
     @property
     def cancelled(self) -> bool:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, ClassVar, Final, Self
 
@@ -64,7 +64,7 @@ class PositionerState:
     position : float or None
         In gate coordinates and `unit`; None before the first reading. Never NaN.
     read_wall_s : float
-        Wall time of that reading.
+        Wall time of that reading; two states that differ in nothing else are the same.
     zero : float
         The user's zero: positions are shown as `position - zero`.
     limits : tuple of float or None
@@ -91,7 +91,7 @@ class PositionerState:
     positioner: PositionerType | None = None
     limits: tuple[float, float] | None = None
     position: float | None = None
-    read_wall_s: float = 0.0
+    read_wall_s: float = field(default=0.0, compare=False)
     confidence: Confidence = Confidence.UNKNOWN
     activity: Activity = Activity.STOPPED
     zero: float = 0.0

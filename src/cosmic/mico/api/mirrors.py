@@ -1,35 +1,34 @@
-"""What this process is told of the MiCo of a station, where commands go there instead."""
+"""What core sees of the MiCo of a station: as it was told last; commands go there."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
 
-from cosmic.frame.errors import NotAvailable, ProtocolError
+from cosmic.frame.errors import NotAvailable
 from cosmic.frame.network.errors import CallRefused
-from cosmic.mico.api.remote_line import CommandLine
+from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.callback import CollisionCallbackBase
 from cosmic.mico.core.collision.exemptions import Exemptions
 from cosmic.mico.core.collision.model import BodyPair, SceneModel, pair_of
 from cosmic.mico.core.motion.links import Link, LinkTable
-from cosmic.mico.core.motion.orders import Order
 from cosmic.mico.core.motion.stop_latch import StopLatch, StopState
 from cosmic.mico.core.motion.undo import UndoEntry
 from cosmic.mico.core.poses import Pose, PoseBook
 
 
 @dataclass(frozen=True, slots=True)
-class RemoteController:
+class ControllerElsewhere:
     """What is known of the controller at a station."""
 
     name: str = "a controller of another station"
     simulated: bool = False
 
 
-class RemoteLatch(StopLatch):
+class LatchElsewhere(StopLatch):
     """The stop of a station, as it was last told."""
 
     def show(self, state: StopState) -> None:
@@ -40,22 +39,22 @@ class RemoteLatch(StopLatch):
             self.announce()
 
 
-class RemoteLinks(LinkTable):
+class LinksElsewhere(LinkTable):
     """The links of a station."""
 
-    def __init__(self, line: CommandLine) -> None:
+    def __init__(self, mico: Mico) -> None:
         super().__init__()
-        self._line = line
+        self._mico = mico
 
     @override
     def add(self, first: str, second: str, ratio: float = 1.0) -> Link:
-        self._line.do("link", {"first": first, "second": second, "ratio": ratio})
+        self._mico.add_link(first, second, ratio)
         return Link(first, second, ratio)
 
     @override
     def remove(self, axis: str) -> bool:
         linked = bool(self.companions(axis))
-        self._line.do("unlink", {"axis": axis})
+        self._mico.remove_links(axis)
         return linked
 
     def show(self, links: tuple[Link, ...]) -> None:
@@ -67,12 +66,12 @@ class RemoteLinks(LinkTable):
         self._changed.emit()
 
 
-class RemoteCollision(Exemptions):
+class CollisionElsewhere(Exemptions):
     """The collision model of a station: what is left out of it, and how close things are."""
 
-    def __init__(self, line: CommandLine) -> None:
+    def __init__(self, mico: Mico) -> None:
         super().__init__((), ())
-        self._line = line
+        self._mico = mico
         self._refused = ""
         self.model: SceneModel | None = None
 
@@ -99,44 +98,38 @@ class RemoteCollision(Exemptions):
 
     @override
     def take_out(self, axis: str, *, source: str = "script") -> None:
-        self._line.do("watch_axis", {"axis": axis, "watched": False})
+        self._mico[axis].watch(False, source=source)
 
     @override
     def take_in(self, axis: str, *, source: str = "script") -> None:
-        self._line.do("watch_axis", {"axis": axis, "watched": True})
+        self._mico[axis].watch(True, source=source)
 
     @contextmanager
     @override
     def contact(self, name: str, *, source: str = "script") -> Iterator[None]:
-        self._allow(name, allowed=True)
+        self._mico.set_contact(name, allowed=True, source=source)
         try:
             yield
         finally:
-            self._allow(name, allowed=False)
+            self._mico.set_contact(name, allowed=False, source=source)
 
     @override
     def allow_contact(self, name: str, *, source: str = "script") -> None:
-        self._allow(name, allowed=True)
+        self._mico.set_contact(name, allowed=True, source=source)
 
     @override
     def forbid_contact(self, name: str, *, source: str = "script") -> None:
-        self._allow(name, allowed=False)
-
-    def _allow(self, name: str, *, allowed: bool) -> None:
-        self._line.do("set_contact", {"name": name, "allowed": allowed})
+        self._mico.set_contact(name, allowed=False, source=source)
 
     def nearest(self, positions: Mapping[str, float]) -> Approach | None:
         """Return the nearest pair; raises `CosmicError` without an answer."""
         if self._refused:  # a program that may only look; asking again and again changes nothing
             raise CallRefused(self._refused)
         try:
-            found = self._line.call("nearest", {"positions": dict(positions)})
+            return self._mico.nearest(dict(positions))
         except CallRefused as exc:
             self._refused = str(exc)
             raise
-        if not (found is None or isinstance(found, Approach)):
-            raise ProtocolError(f"the station does not say what is nearest: {found!r:.80}")
-        return found
 
     def set_callback(
         self,
@@ -159,21 +152,20 @@ class RemoteCollision(Exemptions):
             self._changed.emit()
 
 
-class RemotePoses(PoseBook):
+class PosesElsewhere(PoseBook):
     """The named poses of a station."""
 
-    def __init__(self, line: CommandLine) -> None:
+    def __init__(self, mico: Mico) -> None:
         super().__init__()
-        self._line = line
+        self._mico = mico
 
     @override
     def put(self, pose: Pose) -> None:
-        arguments = {"name": pose.name, "positions": dict(pose.positions)}
-        self._line.do("put_pose", arguments)
+        self._mico.put_pose(pose.name, dict(pose.positions))
 
     @override
     def remove(self, name: str) -> None:
-        self._line.do("remove_pose", {"name": name})
+        self._mico.remove_pose(name)
 
     def show(self, poses: Iterable[Pose]) -> None:
         """Take what was told."""
@@ -181,7 +173,7 @@ class RemotePoses(PoseBook):
             self._poses = {pose.name: pose for pose in poses}
 
 
-class RemoteUndo(QObject):
+class UndoElsewhere(QObject):
     """What can be taken back at a station.
 
     Signals
@@ -192,9 +184,8 @@ class RemoteUndo(QObject):
 
     changed = Signal()
 
-    def __init__(self, order: Callable[[UndoEntry], dict[str, Order]]) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._order = order
         self._entries: tuple[UndoEntry, ...] = ()
 
     @property
@@ -208,13 +199,6 @@ class RemoteUndo(QObject):
             if group in (None, entry.group):
                 return entry
         raise NotAvailable(f"there is nothing to undo{f' of {group}' if group else ''}")
-
-    def order(self, entry: UndoEntry) -> dict[str, Order]:
-        """Begin to move back; raises `MoveRefused`, and the entry stays."""
-        return self._order(entry)
-
-    def drop(self, entry: UndoEntry) -> None:
-        """Do nothing: the station forgets it by itself."""
 
     def show(self, entries: tuple[UndoEntry, ...]) -> None:
         """Take what was told."""

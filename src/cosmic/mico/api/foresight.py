@@ -1,35 +1,39 @@
-"""What can be said of a movement here, before the station decides it."""
+"""What can be said of a movement without asking the gate of the station that would make it."""
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.verdict import MoveVerdict
 from cosmic.mico.core.collision.checker import NoCollisionModel
 from cosmic.mico.core.motion.checks import Limits, PlatformSnapshot, Request, check_move
 from cosmic.mico.core.motion.orders import Motion
-
-if TYPE_CHECKING:
-    from cosmic.mico.api.remote_manager import RemoteManager
+from cosmic.mico.core.motion.positioner import PositionerState
+from cosmic.mico.core.settings import MicoSettings
 
 _HERE: Final = "here"
 _TEXT: Final = "nothing known here is in the way; the gate of the station decides"
 
 
 def foreseen(
-    motions: Mapping[str, Motion], manager: "RemoteManager", *, consent: bool
+    motions: Mapping[str, Motion],
+    states: Mapping[str, PositionerState],
+    settings: MicoSettings,
+    *,
+    consent: bool,
+    stop_reason: str | None = None,
 ) -> MoveVerdict:
     """Judge `motions` by all but collisions and the lease, with what the station told last."""
-    picture = PlatformSnapshot(
-        stop_reason=manager.latch.state.reason,
+    snapshot = PlatformSnapshot(
+        stop_reason=stop_reason,
         token=_HERE,
-        states=manager.states(),
+        states=states,
         held={},
         targets={},
         now_wall_s=WALL.now_s(),
-        rules=Limits.of(manager.settings),
+        rules=Limits.of(settings),
     )
     requests = [Request(name, motion, _HERE, consent) for name, motion in motions.items()]
-    verdict = check_move(requests, picture, NoCollisionModel(), advice=False).verdict
+    verdict = check_move(requests, snapshot, NoCollisionModel(), advice=False).verdict
     return replace(verdict, text=_TEXT) if verdict.allowed else verdict

@@ -1,0 +1,244 @@
+"""MiCo of another process or computer, in the place of one that runs here."""
+
+from collections.abc import Callable, Mapping
+from threading import Event
+from typing import Final
+
+from PySide6.QtCore import QObject, Qt
+from typing_extensions import override
+
+from cosmic.frame.application import GuiFactory
+from cosmic.frame.errands import Errands
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.link import ApplicationLink
+from cosmic.frame.network.proxy import proxy_of
+from cosmic.frame.network.transport import Transport
+from cosmic.frame.operation import Operation, Progress, Task
+from cosmic.frame.threads import may_wait_here
+from cosmic.mico.api.application_base import MicoApplicationBase
+from cosmic.mico.api.initialisation import POLL_S, Confirm
+from cosmic.mico.api.manager_elsewhere import ManagerElsewhere
+from cosmic.mico.api.mico import Mico
+from cosmic.mico.api.mirrors import CollisionElsewhere
+from cosmic.mico.api.trajectory_site import TrajectorySite
+from cosmic.mico.api.ways import Way
+from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
+from cosmic.mico.core.collision.model import SceneModel
+from cosmic.mico.core.motion.undo import Cautions
+from cosmic.mico.core.sequence.report import SequenceReport
+from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
+
+FIRST_WORD_S: Final = 10.0
+"""How long `initialize` waits for the station, where it may wait."""
+_CLOSED: Final = "MiCo is closed here"
+
+
+class MicoElsewhere(MicoApplicationBase):
+    """Shows and commands the axes of a station as if they were here.
+
+    Everything goes through `Mico`, as the station declares it. Initialisation and detours run at
+    the station, trajectories and teleoperation in this process, each movement by the station; what
+    moves there stops when this process ends, freezes or loses the lease.
+
+    Parameters
+    ----------
+    transport : Transport
+        The station, which hosts a `Mico` under the name "mico". Who made it closes it.
+    """
+
+    manager: ManagerElsewhere
+    collision: CollisionElsewhere
+    clearance_watch: ClearanceWatch
+
+    def __init__(
+        self,
+        transport: Transport,
+        policy: FailurePolicy,
+        *,
+        gui_factory: GuiFactory | None = None,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__("MiCo", policy, gui_factory, parent)
+        self._link = ApplicationLink(Mico, transport, "mico", policy)
+        self._errands = Errands("mico learns", policy)
+        self._known = Event()
+        self._asked = self._dressed = self._closed = False
+        self._report = SequenceReport(())
+        self._micos: dict[str, Mico] = {}
+        self._end_movements: Callable[[], None] = lambda: None
+        self.api: Mico = proxy_of(Mico, self._link)
+        self.manager = ManagerElsewhere(self.api, policy)
+        self.api.belong_to(self)
+        self.collision = self.manager.collision
+        self.clearance_watch = ClearanceWatch(self.collision, self.manager.positions, policy)
+        self.undo = self.manager.undo
+        self.cautions = Cautions()  # what the station felt stands in the entries it tells
+        self.teleoperation = Teleoperation(self.manager, policy)
+        self.trajectories = TrajectorySite(self, policy)
+        self.trajectories.poses = self.manager.poses
+        self.manager.changed.connect(self.status_changed, Qt.ConnectionType.DirectConnection)
+        self.api.on_change(self._on_change)
+
+    @override
+    def mico(self, source: str) -> Mico:
+        found = self._micos.get(source)
+        if found is None:
+            found = self._micos[source] = proxy_of(Mico, self._link)
+            found.belong_to(self, source)
+        return found
+
+    @property
+    @override
+    def failure(self) -> str:
+        return _CLOSED if self._closed else self.api.failure
+
+    @property
+    @override
+    def initialisation(self) -> SequenceReport:
+        return self.api.initialisation
+
+    # Beginning and ending
+
+    @override
+    def initialize(self) -> None:
+        """Hear of the station from now on, and wait for its first word where that is possible.
+
+        With a station that is away it stays open with `failure` set, and goes on by itself once
+        the station is there.
+        """
+        self.start()
+        self._link.open()
+        self._end_movements = self.api.follow_movements(self.manager.take_news)
+        if may_wait_here():
+            self._known.wait(FIRST_WORD_S)
+
+    @override
+    def initialize_later(self) -> Task:
+        """Do what `initialize` does without waiting, for windows."""
+        self.start()
+        self._link.open()
+        self._end_movements = self.api.follow_movements(self.manager.take_news)
+        task = Task("Looking for the station")
+        task.finish()
+        return task
+
+    def _on_change(self) -> None:
+        """Take note of a new state, in the thread that hears of it."""
+        self.manager.take_state()
+        report = self.api.initialisation
+        if report != self._report:
+            self._report = report
+            self.initialisation_changed.emit(report)
+        if not self.api.away and not self._asked:
+            self._asked = True
+            self._errands.do(self._read_scene, self._learn)
+
+    def _read_scene(self) -> SceneModel | None:
+        return self.api.scene() if self.api.checks_collisions else None
+
+    def _learn(self, scene: SceneModel | None, error: CosmicError | None) -> None:
+        """Take note of what the station has for as long as it runs."""
+        if error is not None:
+            self._asked = False  # the next word of the station asks again
+            return
+        self.collision.learn(scene)
+        self.trajectories.platform = self.api.platform
+        if not self._dressed:
+            self._dressed = True
+            self.teleoperation.close()
+            self.teleoperation = Teleoperation(self.manager, self._policy)
+            if self.collision.available:
+                self.clearance_watch.start()
+        self._known.set()
+        self.rescanned.emit()
+        self.status_changed.emit()
+
+    @override
+    def shut_down(self) -> None:
+        """Stop hearing and commanding; any state. What was begun here stops at the station."""
+        if self._closed:
+            return
+        self._closed = True
+        self.request_end()
+        self.teleoperation.close()
+        self.trajectories.close()
+        self.clearance_watch.request_end()
+        self.clearance_watch.join()
+        self._end_movements()
+        self._link.close()
+        self.join()
+        self._errands.request_end()
+        self._errands.join()
+        self.manager.close()
+
+    # What takes long, at the station
+
+    @override
+    def rescan(self) -> Task:
+        return self._begin_there("Looking for devices", self.api.begin_rescan)
+
+    @override
+    def find_way(self, targets: Mapping[str, float], budget_s: float) -> Way:
+        return self.api.begin_search(dict(targets), float(budget_s)).wait()
+
+    @override
+    def follow_way(self, way: Way, source: str) -> Task:
+        return self._begin_there("Going round", lambda: self.api.begin_detour(way, source=source))
+
+    @override
+    def initialise_platform(
+        self,
+        *,
+        skip_known: bool = False,
+        confirm: Confirm | None = None,
+        may_hold: bool = False,
+    ) -> Task:
+        asks = confirm is not None
+        return self._begin_there(
+            "Initialisation",
+            lambda: self.api.begin_initialisation(
+                skip_known=skip_known, may_hold=may_hold, asks=asks
+            ),
+            confirm,
+        )
+
+    def _begin_there(
+        self, title: str, begin: Callable[[], Operation[None]], confirm: Confirm | None = None
+    ) -> Task:
+        """Begin something at the station and follow it in this application's thread."""
+
+        def job(task: Task) -> None:
+            try:
+                begun = begin()
+                _accompany(begun, task)
+                self._answer(begun, confirm)
+                begun.wait()
+                self.rescanned.emit()
+                task.finish()
+            except CosmicError as exc:
+                task.fail(exc)
+
+        return self.begin(title, job)
+
+    def _answer(self, begun: Operation[None], confirm: Confirm | None) -> None:
+        """Answer the questions of the sequence until it has ended."""
+        over = Event()
+        begun.add_callback(lambda _ended: over.set())
+        answered = ""
+        while confirm is not None and not over.wait(POLL_S):
+            question = self.api.initialisation.question
+            if question and question != answered:
+                self.api.answer(confirm(question))
+            answered = question
+
+
+def _accompany(begun: Operation[None], task: Task) -> None:
+    """Have `task` tell how far something at the station is; cancelling it ends that."""
+
+    def on_progress(progress: Progress) -> None:
+        if not progress.done:
+            task.report(progress.fraction, progress.text)
+
+    begun.subscribe(on_progress)
+    task.on_cancel(begun.cancel)

@@ -1,0 +1,214 @@
+"""What MiCo tells of movements and positions, as frozen data, and who collects it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from threading import Lock
+from typing import Final
+
+from PySide6.QtCore import QMetaObject, QObject, Qt
+
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.network.travelling_errors import from_plain, to_plain
+from cosmic.frame.units import AxisUnit
+from cosmic.frame.verdict import MoveVerdict
+from cosmic.mico.core.motion.group_start import GroupStarted
+from cosmic.mico.core.motion.manager import DeviceManager
+from cosmic.mico.core.motion.messages import MovementBegun, MovementEnded, PositionChanged
+from cosmic.mico.core.motion.orders import (
+    Calibrate,
+    Jog,
+    MoveBy,
+    MoveTo,
+    Reference,
+    Steer,
+    Step,
+    ToEndStop,
+)
+
+PERIOD_S: Final = 1 / 30
+"""The least time between two tellings of positions."""
+
+SentMotion = MoveTo | MoveBy | Step | Calibrate | Reference | ToEndStop
+"""What another station may ask of an axis, beside a jog."""
+
+
+@dataclass(frozen=True, slots=True)
+class AxisPositions:
+    """Where the axes are.
+
+    Attributes
+    ----------
+    of : mapping of tuple
+        By axis: position in gate coordinates, standard deviation, and the wall time of the reading
+        where the axes are.
+    """
+
+    of: Mapping[str, tuple[float, float, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class AxisRefused:
+    """The gate refused a movement, of one axis or (`together`) of several."""
+
+    verdict: MoveVerdict
+    together: bool
+
+
+@dataclass(frozen=True, slots=True)
+class AxisBegun:
+    """A movement was sent to the controller; as `MovementBegun`."""
+
+    name: str
+    motion: SentMotion | Steer | Jog
+    from_position: float | None
+    target: float | None
+    unit: AxisUnit
+    time_s: float
+    source: str
+
+    def heard(self) -> MovementBegun:
+        """Return it as devices tell it."""
+        return MovementBegun(
+            name=self.name,
+            motion=self.motion,
+            from_position=self.from_position,
+            target=self.target,
+            unit=self.unit,
+            time_s=self.time_s,
+            source=self.source,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class AxisEnded:
+    """A movement ended; as `MovementEnded`, with the exception as plain values."""
+
+    name: str
+    position: float | None
+    error: list[object] | None
+
+    def heard(self) -> MovementEnded:
+        """Return it as devices tell it."""
+        error = None if self.error is None else from_plain(self.error)
+        return MovementEnded(self.name, self.position, error)
+
+
+@dataclass(frozen=True, slots=True)
+class AxesStarted:
+    """Several axes were started back to back; as `GroupStarted`."""
+
+    names: tuple[str, ...]
+    skew_ms: float
+
+
+MovementNews = AxisRefused | AxisBegun | AxisEnded | AxesStarted
+_DIRECT: Final = Qt.ConnectionType.DirectConnection
+
+
+class DeviceFeed:
+    """Listens to signals of all devices there are, also of those that come later; any thread."""
+
+    def __init__(self, manager: DeviceManager, slots: Mapping[str, Callable[..., object]]) -> None:
+        self._manager = manager
+        self._slots = slots
+        self._lock = Lock()
+        self._joined: dict[int, object] = {}
+        self._connections: list[QMetaObject.Connection] = []
+        self.join(manager, "changed", self._join_devices)
+        self._join_devices()
+
+    def join(self, sender: QObject, signal: str, slot: Callable[..., object]) -> None:
+        """Listen to a signal of something else as well."""
+        with self._lock:
+            self._connections.append(getattr(sender, signal).connect(slot, _DIRECT))
+
+    def _join_devices(self) -> None:
+        for index, device in self._manager.devices.items():
+            with self._lock:
+                new = self._joined.get(index) is not device
+                self._joined[index] = device
+            for signal, slot in self._slots.items() if new else ():
+                self.join(device, signal, slot)
+
+    def close(self) -> None:
+        """Listen no more."""
+        with self._lock:
+            connections, self._connections = self._connections, []
+            self._joined.clear()
+        for each in connections:
+            QObject.disconnect(each)
+
+
+def follow_movements(
+    manager: DeviceManager, receiver: Callable[[MovementNews], object]
+) -> Callable[[], None]:
+    """Tell of every movement; returns the function that ends it. In the threads of the devices."""
+
+    def on_begun(event: MovementBegun) -> None:
+        receiver(
+            AxisBegun(
+                event.name,
+                event.motion,
+                event.from_position,
+                event.target,
+                event.unit,
+                event.time_s,
+                event.source,
+            )
+        )
+
+    def on_ended(event: MovementEnded) -> None:
+        error = to_plain(event.error) if isinstance(event.error, CosmicError) else None
+        receiver(AxisEnded(event.name, event.position, error))
+
+    def on_refused(verdict: MoveVerdict) -> None:
+        receiver(AxisRefused(verdict, together=False))
+
+    def on_group_refused(verdict: MoveVerdict) -> None:
+        receiver(AxisRefused(verdict, together=True))
+
+    def on_group_started(started: GroupStarted) -> None:
+        receiver(AxesStarted(started.names, started.skew_ms))
+
+    feed = DeviceFeed(
+        manager,
+        {
+            "movement_begun": on_begun,
+            "movement_ended": on_ended,
+            "movement_refused": on_refused,
+        },
+    )
+    feed.join(manager, "group_refused", on_group_refused)
+    feed.join(manager, "group_started", on_group_started)
+    return feed.close
+
+
+def follow_positions(
+    manager: DeviceManager, receiver: Callable[[AxisPositions], object]
+) -> Callable[[], None]:
+    """Tell where the axes are while one moves, at most 30 times a second; returns what ends it.
+
+    In the threads of the devices. The last position of a movement is told by the state of the axis.
+    """
+    lock, told_s = Lock(), -PERIOD_S
+
+    def on_position(_event: PositionChanged) -> None:
+        nonlocal told_s
+        now_s = WALL.now_s()
+        with lock:
+            due = now_s - told_s >= PERIOD_S
+            told_s = now_s if due else told_s
+        if due:
+            states = manager.states().values()
+            receiver(
+                AxisPositions(
+                    {
+                        each.name: (each.position, each.std, each.read_wall_s)
+                        for each in states
+                        if each.position is not None
+                    }
+                )
+            )
+
+    return DeviceFeed(manager, {"position_changed": on_position}).close
