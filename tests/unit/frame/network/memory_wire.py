@@ -68,7 +68,9 @@ class MemoryHub:
     def find(self, key: str) -> Backlog[MemoryQuestion] | None:
         if key in self.asked:
             return self.asked[key]
-        wild = [each for each in self.asked if each.endswith("/**") and key.startswith(each[:-2])]
+        wild = [
+            each for each in list(self.asked) if each.endswith("/**") and key.startswith(each[:-2])
+        ]
         return self.asked[wild[0]] if wild else None
 
 
