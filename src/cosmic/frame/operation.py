@@ -83,9 +83,9 @@ class Operation(Generic[T]):
     """What is told of its result to another process; None: what its annotation names."""
 
     @classmethod
-    def followed(cls, title: str) -> Self:
+    def followed(cls, title: str) -> "Operation[Any]":
         """Return one that stands for another of its kind, which goes on elsewhere."""
-        return cls(title)
+        return Operation(title)
 
     def sent_result(self) -> object:
         """Return what is told of its result to another process; raises as `result`."""
@@ -334,6 +334,11 @@ class Operation(Generic[T]):
 
 class Task(Operation[None]):
     """A long operation that has no result."""
+
+    @classmethod
+    @override
+    def followed(cls, title: str) -> Self:
+        return cls(title)
 
     @override
     def finish(self, result: None = None) -> bool:

@@ -453,8 +453,10 @@ class ApplicationLink:
                 self._end(known, command, how)
             elif isinstance(how, Ended):
                 self._ends.do(self._fetch, lambda *_: self._end(known, command, how))
-            else:
-                known.fail(ended.failure or ProtocolError(f"{command.name} ended in no known way"))
+            elif ended.failure is not None:
+                known.fail(ended.failure)
+            else:  # of a command that changes nothing
+                known.finish(ended.result)
 
         _go_on_as(begun, known)
         begun.add_callback(on_end)

@@ -244,6 +244,8 @@ class Axis(AxisShape, Declared):
 
     @override
     def prepare(self, key: str, policy: FailurePolicy) -> None:
+        if not isinstance(policy, FailurePolicy):
+            raise TypeError(f"policy must be a FailurePolicy, not {str(policy)[:60]}")
         self._name = key
         self._far = AxisElsewhere(key)
         self._movable = AxisMovable(self)
@@ -886,6 +888,7 @@ class Axis(AxisShape, Declared):
     def limit_frequency(self, frequency_hz: int) -> None:
         """Limit the speed of movements to a position; raises as `set_closed_loop_frequency`."""
         low, high = self.details.frequency_range_hz
+        frequency_hz = as_whole(frequency_hz, "Hz", self._name)
         if not low <= frequency_hz <= high:
             text = f"{self._name}: frequency {frequency_hz} Hz is outside {low} to {high} Hz"
             limit = float(high if frequency_hz > high else low)

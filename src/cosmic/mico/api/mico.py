@@ -113,6 +113,8 @@ class Mico(Declared):
 
     @override
     def prepare(self, key: str, policy: FailurePolicy) -> None:
+        if not isinstance(policy, FailurePolicy):
+            raise TypeError(f"policy must be a FailurePolicy, not {str(policy)[:60]}")
         self._begin_here("script")
         self._policy = policy
         self._told_away = ""
@@ -124,6 +126,8 @@ class Mico(Declared):
 
     def belong_to(self, application: MicoApplicationBase, source: str = "") -> None:
         """Work for an application; for whoever makes one of this."""
+        if not isinstance(application, MicoApplicationBase):
+            raise TypeError(f"application must be a MiCo, not {str(application)[:60]}")
         self._application, self._manager = application, application.manager
         self._source = source or self._source
         self._connect()

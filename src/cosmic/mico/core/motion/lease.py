@@ -72,6 +72,8 @@ class Lease:
 
     def join(self, station: StationLease) -> None:
         """Let the lease of a station decide whether this process may move."""
+        if not isinstance(station, StationLease):
+            raise TypeError(f"lease must be that of a station, not {str(station)[:60]}")
         self._station = station
 
     @property
