@@ -8,7 +8,7 @@ from PySide6.QtCore import QObject, Qt
 from typing_extensions import override
 
 from cosmic.frame.application import GuiFactory
-from cosmic.frame.errands import Errands
+from cosmic.frame.background import BackgroundJobs
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.link import ApplicationLink
@@ -61,7 +61,7 @@ class MicoElsewhere(MicoApplicationBase):
     ) -> None:
         super().__init__("MiCo", policy, gui_factory, parent)
         self._link = ApplicationLink(Mico, transport, "mico", policy)
-        self._errands = Errands("mico learns", policy)
+        self._background = BackgroundJobs("mico learns", policy)
         self._known = Event()
         self._asked = self._dressed = self._closed = False
         self._report = SequenceReport(())
@@ -132,7 +132,7 @@ class MicoElsewhere(MicoApplicationBase):
             self.initialisation_changed.emit(report)
         if not self.api.away and not self._asked:
             self._asked = True
-            self._errands.do(self._read_scene, self._learn)
+            self._background.do(self._read_scene, self._learn)
 
     def _read_scene(self) -> SceneModel | None:
         return self.api.scene() if self.api.checks_collisions else None
@@ -168,8 +168,8 @@ class MicoElsewhere(MicoApplicationBase):
         self._end_movements()
         self._link.close()
         self.join()
-        self._errands.request_end()
-        self._errands.join()
+        self._background.request_end()
+        self._background.join()
         self.manager.close()
 
     # What takes long, at the station

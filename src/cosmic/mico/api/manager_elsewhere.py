@@ -7,8 +7,8 @@ from weakref import WeakKeyDictionary
 
 from PySide6.QtCore import QObject, Signal, SignalInstance
 
+from cosmic.frame.background import BackgroundJobs
 from cosmic.frame.clock import Clock
-from cosmic.frame.errands import Errands
 from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable, UnknownAxisError, refusal
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Operation
@@ -58,8 +58,8 @@ class Queues:
     """
 
     def __init__(self, policy: FailurePolicy) -> None:
-        self.orders = Errands("mico orders", policy)
-        self._stops = Errands("mico halts", policy)
+        self.orders = BackgroundJobs("mico orders", policy)
+        self._stops = BackgroundJobs("mico halts", policy)
         self._policy = policy
         self.keys: WeakKeyDictionary[Movement, str] = WeakKeyDictionary()
 
