@@ -2,14 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Generic, TypeVar
+from typing import Final, Generic, Protocol, TypeVar
 
 from cosmic.mico.hw import smaractctl_ctypes as sa
 from cosmic.mico.hw.sim_smaractctl_channel import NOTHING_MOVES, Channel
 from cosmic.mico.hw.sim_smaractctl_types import TYPE_NAMES, WRITABLE_TYPES, Refused
-
-if TYPE_CHECKING:
-    from cosmic.mico.hw.sim_smaractctl_device import Device
+from cosmic.twin.settings import ControllerSettings
 
 I32: Final = sa.SA_CTL_DTYPE_INT32
 I64: Final = sa.SA_CTL_DTYPE_INT64
@@ -131,6 +129,21 @@ def _of_type(what: str) -> Callable[[Channel, float], int]:
     return read
 
 
+class PropertyHolder(Protocol):
+    """A controller whose properties are read and written; in its lock."""
+
+    serial: str
+    name: str
+    settings: ControllerSettings
+    values: dict[int, int]
+    channels: list[Channel]
+    modules: int
+
+    def channel(self, index: int) -> Channel:
+        """Return a channel; raises `Refused` where there is none."""
+        ...
+
+
 _VELOCITY: Final = _kept(sa.SA_CTL_PKEY_MOVE_VELOCITY, I64, 0, 0, 10**11)
 _POWER: Final = _kept(sa.SA_CTL_PKEY_SENSOR_POWER_MODE, I32, 1, 0, 2)
 _OFFSET: Final = sa.SA_CTL_PKEY_LOGICAL_SCALE_OFFSET
@@ -208,45 +221,45 @@ CHANNEL: Final[dict[int, Property[Channel]]] = {
 }
 
 _MODULE: Final = {
-    sa.SA_CTL_PKEY_MODULE_STATE: Property["Device"](
+    sa.SA_CTL_PKEY_MODULE_STATE: Property[PropertyHolder](
         I32, lambda *_: sa.SA_CTL_MOD_STATE_BIT_SM_PRESENT
     ),
-    sa.SA_CTL_PKEY_POWER_SUPPLY_ENABLED: Property["Device"](I32, lambda *_: 1),
-    sa.SA_CTL_PKEY_NUMBER_OF_BUS_MODULE_CHANNELS: Property["Device"](I32, lambda *_: 3),
-    sa.SA_CTL_PKEY_BUS_MODULE_TYPE: Property["Device"](I32, lambda *_: 1),
-    sa.SA_CTL_PKEY_BUS_MODULE_TEMPERATURE: Property["Device"](
+    sa.SA_CTL_PKEY_POWER_SUPPLY_ENABLED: Property[PropertyHolder](I32, lambda *_: 1),
+    sa.SA_CTL_PKEY_NUMBER_OF_BUS_MODULE_CHANNELS: Property[PropertyHolder](I32, lambda *_: 3),
+    sa.SA_CTL_PKEY_BUS_MODULE_TYPE: Property[PropertyHolder](I32, lambda *_: 1),
+    sa.SA_CTL_PKEY_BUS_MODULE_TEMPERATURE: Property[PropertyHolder](
         I32, lambda device, _now_s: device.settings.temperature_deg_c
     ),
 }
 
 
-def _rename(device: "Device", value: Value, _now_s: float) -> None:
+def _rename(device: PropertyHolder, value: Value, _now_s: float) -> None:
     device.name = str(value)[: sa.SA_CTL_STRING_MAX_LENGTH]
 
 
-def _stored(key: int, default: int, high: int) -> "Property[Device]":
-    def read(device: "Device", _now_s: float) -> int:
+def _stored(key: int, default: int, high: int) -> Property[PropertyHolder]:
+    def read(device: PropertyHolder, _now_s: float) -> int:
         return device.values.get(key, default)
 
-    def write(device: "Device", value: Value, _now_s: float) -> None:
+    def write(device: PropertyHolder, value: Value, _now_s: float) -> None:
         device.values[key] = int(value)
 
     return Property(I32, read, write, default, 0, high)
 
 
 _DEVICE: Final = {
-    sa.SA_CTL_PKEY_NUMBER_OF_CHANNELS: Property["Device"](
+    sa.SA_CTL_PKEY_NUMBER_OF_CHANNELS: Property[PropertyHolder](
         I32, lambda device, _now_s: len(device.channels)
     ),
-    sa.SA_CTL_PKEY_NUMBER_OF_BUS_MODULES: Property["Device"](
+    sa.SA_CTL_PKEY_NUMBER_OF_BUS_MODULES: Property[PropertyHolder](
         I32, lambda device, _now_s: device.modules
     ),
-    sa.SA_CTL_PKEY_INTERFACE_TYPE: Property["Device"](I32, lambda *_: 1),
-    sa.SA_CTL_PKEY_DEVICE_STATE: Property["Device"](I32, lambda *_: 0),
-    sa.SA_CTL_PKEY_DEVICE_SERIAL_NUMBER: Property["Device"](
+    sa.SA_CTL_PKEY_INTERFACE_TYPE: Property[PropertyHolder](I32, lambda *_: 1),
+    sa.SA_CTL_PKEY_DEVICE_STATE: Property[PropertyHolder](I32, lambda *_: 0),
+    sa.SA_CTL_PKEY_DEVICE_SERIAL_NUMBER: Property[PropertyHolder](
         TEXT, lambda device, _now_s: device.serial
     ),
-    sa.SA_CTL_PKEY_DEVICE_NAME: Property["Device"](
+    sa.SA_CTL_PKEY_DEVICE_NAME: Property[PropertyHolder](
         TEXT, lambda device, _now_s: device.name, _rename
     ),
     sa.SA_CTL_PKEY_EMERGENCY_STOP_MODE: _stored(sa.SA_CTL_PKEY_EMERGENCY_STOP_MODE, 0, 2),
@@ -271,7 +284,7 @@ def power_up(channel: Channel) -> None:
             channel.values.setdefault(key, each.default)
 
 
-def read(device: "Device", index: int, key: int, now_s: float) -> tuple[int, Value]:
+def read(device: PropertyHolder, index: int, key: int, now_s: float) -> tuple[int, Value]:
     """Return type and value of a property; raises `Refused`."""
     if key in CHANNEL:
         prop = CHANNEL[key]
@@ -280,7 +293,7 @@ def read(device: "Device", index: int, key: int, now_s: float) -> tuple[int, Val
     return of_device.dtype, of_device.read(device, now_s)
 
 
-def write(device: "Device", index: int, key: int, value: Value, now_s: float) -> None:
+def write(device: PropertyHolder, index: int, key: int, value: Value, now_s: float) -> None:
     """Write a property; raises `Refused`."""
     if key in CHANNEL:
         CHANNEL[key].set(device.channel(index), value, now_s)
@@ -288,7 +301,7 @@ def write(device: "Device", index: int, key: int, value: Value, now_s: float) ->
         _device_property(device, index, key).set(device, value, now_s)
 
 
-def _device_property(device: "Device", index: int, key: int) -> "Property[Device]":
+def _device_property(device: PropertyHolder, index: int, key: int) -> Property[PropertyHolder]:
     if key in _MODULE:
         if not 0 <= index < device.modules:
             raise Refused(sa.SA_CTL_ERROR_INVALID_MODULE_INDEX)
