@@ -3,11 +3,14 @@
 from collections.abc import Callable
 from typing import Final
 
-from PySide6.QtCore import QSignalBlocker, Qt, QTimer, Signal
+from PySide6.QtCore import QObject, QSignalBlocker, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import (
+    QApplication,
     QComboBox,
     QHBoxLayout,
+    QLabel,
+    QLineEdit,
     QVBoxLayout,
     QWidget,
 )
@@ -15,19 +18,121 @@ from PySide6.QtWidgets import (
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named, push_button
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.key_hold import HoldKeys
 from cosmic.frame.gui.late_panel import is_seen
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.overrides import override
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.teleoperation.settings import TeleoperationProfileSettings
 from cosmic.mico.core.teleoperation.state import TeleoperationPhase, TeleoperationState
-from cosmic.mico.gui.fine_row import FineRow
 from cosmic.mico.gui.input_bars import ForceBar, InputBars
 from cosmic.mico.gui.mapping_table import MappingTable
 from cosmic.mico.gui.phase_indicator import PhaseIndicator
 from cosmic.mico.gui.qt_application import qt_application
-from cosmic.mico.gui.steering_keys import SteeringKeys
 from cosmic.mico.hw.input_device import InputKind
+from cosmic.mico.hw.keyboard_input import FINE_KEY, KEYS, KeyboardInput
+
+
+class FineRow(QWidget):
+    """Shows the pace of a profile and takes another.
+
+    Signals
+    -------
+    edited(object, str)
+        The operator has changed something: the share, text where it is no number, and the button.
+    """
+
+    edited = Signal(object, str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.share = named(QLineEdit(), "fineShare")
+        self.button = named(QLineEdit(), "fineButton")
+        self.pace = QLabel("coarse")
+        self._shown = ("", "")
+        tips = (
+            (self.share, "fine share", "Part of the speed that fine leaves, 0 to 1"),
+            (self.button, "fine button", "Button that changes between fine and coarse"),
+        )
+        for edit, name, tip in tips:
+            edit.setAccessibleName(name)
+            edit.setToolTip(tip)
+            edit.editingFinished.connect(self._on_edited)
+        self.share.setFixedWidth(7 * STEP_PX)
+        self.button.setFixedWidth(17 * STEP_PX)
+        self.pace.setFixedWidth(self.pace.fontMetrics().horizontalAdvance("coarse") + STEP_PX)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(STEP_PX // 2)
+        for widget in (self.pace, QLabel("fine:"), self.share, QLabel("by"), self.button):
+            row.addWidget(widget)
+
+    def show_profile(self, profile: TeleoperationProfileSettings) -> None:
+        """Show what a profile says."""
+        self._shown = (f"{profile.fine_share:g}", profile.fine_button)
+        self.share.setText(self._shown[0])
+        self.button.setText(self._shown[1])
+
+    def show_pace(self, *, fine: bool) -> None:
+        """Show how it is steered now."""
+        self.pace.setText("fine" if fine else "coarse")
+
+    def _on_edited(self) -> None:
+        said = (self.share.text().strip(), self.button.text().strip())
+        if said != self._shown:
+            self.edited.emit(_number(said[0]), said[1])
+
+
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+BEAT_MS: Final = 20
+
+
+class SteeringKeys(QObject):
+    """Tells a `KeyboardInput` which keys are held, and by a timer that the window is alive.
+
+    A window that hangs beats no more, so that the input counts as frozen.
+    """
+
+    def __init__(self, app: QApplication, keyboard: KeyboardInput, parent: QObject) -> None:
+        super().__init__(parent)
+        self._keyboard = keyboard
+        keys = [key for pair in KEYS.values() for key in pair]
+        self._hold = HoldKeys(app, [*keys, FINE_KEY], self)
+        self._hold.set_enabled(False)
+        self._hold.hold_started.connect(self._on_changed)
+        self._hold.hold_ended.connect(self._on_changed)
+        self._timer = QTimer(self, interval=BEAT_MS)
+        self._timer.timeout.connect(keyboard.beat)
+        self._enabled = False
+        keyboard.plug(plugged=True)
+
+    def set_enabled(self, enabled: bool) -> None:
+        """Let the keys steer, or leave them to others."""
+        if enabled != self._enabled:
+            self._enabled = enabled
+            self._hold.set_enabled(enabled)
+            self._keyboard.hold(())
+
+    def unplug(self) -> None:
+        """Listen no more."""
+        self.set_enabled(False)
+        self._timer.stop()
+        self._keyboard.plug(plugged=False)
+
+    def _on_changed(self, _key: str) -> None:
+        held = self._hold.held
+        self._keyboard.hold(held)
+        if held:
+            self._timer.start()
+        else:
+            self._timer.stop()
+
 
 REFRESH_MS: Final = 40
 LOOK_MS: Final = 1000
