@@ -88,7 +88,7 @@ def test_a_step_size_has_no_sign_and_says_so(panel: MicoWidget, qtbot: QtBot, te
     enter(qtbot, entry, text)
     for name in ("MiCoCL_6", "MiCoCL_7"):
         click(qtbot, card, name)
-        assert "the button says the direction" in entry.reason
+        assert "the button gives the direction" in entry.reason
     assert not card.axis.details.in_motion
     assert position(card) == 0.0
 
