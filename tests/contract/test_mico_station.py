@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PySide6.QtWidgets import QPushButton
+from pytestqt.qtbot import QtBot
 
 from contract.mico_rig import (
     HostedMico,
@@ -18,6 +20,7 @@ from contract.mico_rig import (
 )
 from contract.station_rig import connected_in_memory
 from cosmic.frame.clock import WALL
+from cosmic.frame.declaration import command
 from cosmic.frame.errors import (
     LimitError,
     MoveCancelled,
@@ -30,8 +33,11 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.caller import Access, Caller
 from cosmic.frame.network.client_side_connection import ClientSideConnection
 from cosmic.frame.network.errors import CallRefused, StationAway
+from cosmic.frame.network.host import Host
+from cosmic.frame.network.station import Station
 from cosmic.frame.network.transport import Receiver, Rule, Subscription
 from cosmic.frame.operation import Progress
+from cosmic.frame.threads import declare_gui_thread
 from cosmic.frame.verdict import Reason
 from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.elsewhere import MicoElsewhere
@@ -292,6 +298,49 @@ def test_a_long_move_is_made_in_parts(mico: Mico) -> None:
     assert series.planned == 3
     series.movement.wait(10.0)
     assert mico["left.x"].position_um == pytest.approx(80.0, abs=1.0)
+
+
+# --- a command is added in one place ----------------------------------------------------------
+
+
+class MicoWithBell(Mico):
+    """MiCo with one command more: this is all that it takes."""
+
+    @command(moves=True)
+    def ring(self, axis: str, times: int = 1) -> str:
+        return f"{axis}: {'ding ' * times}{self[axis].unit}"
+
+
+def test_a_new_command_of_mico_is_called_by_script_window_and_station(
+    hosted: HostedMico, qtbot: QtBot
+) -> None:
+    home = MicoWithBell(hosted.application)
+    assert home.ring("left.x", 2) == "left.x: ding ding um"
+    station = Station("bells", FailurePolicy())
+    host = Host("mico", home)
+    with ExitStack() as stack:
+        stack.callback(lambda: hosted.application.manager.lease.join(hosted.station.lease))
+        stack.callback(host.close)
+        station.host("mico", host)
+        client = stack.enter_context(connected_in_memory(station))
+        application = MicoElsewhere(client, FailurePolicy(), kind=MicoWithBell)
+        stack.callback(application.shut_down)
+        application.initialize()
+        mico = mico_of(application, "window")
+        assert isinstance(mico, MicoWithBell)
+        with pytest.raises(MoveRefused):
+            mico.ring("left.x")
+        client.take_lease()
+        assert mico.ring("left.x") == "left.x: ding um"
+        button, answers = QPushButton("Ring"), []
+        qtbot.addWidget(button)
+        button.clicked.connect(
+            lambda: mico.carry_out(lambda: mico.ring("left.x"), lambda *how: answers.append(how))
+        )
+        stack.callback(declare_gui_thread())
+        button.click()
+        wait_for(lambda: answers)
+        assert answers == [("left.x: ding um", None)]
 
 
 # --- who may move ------------------------------------------------------------------------------

@@ -45,6 +45,8 @@ class MicoElsewhere(MicoApplicationBase):
     ----------
     transport : Transport
         The station, which hosts a `Mico` under the name "mico". Who made it closes it.
+    kind : type
+        What is declared there.
     """
 
     manager: ManagerElsewhere
@@ -56,18 +58,20 @@ class MicoElsewhere(MicoApplicationBase):
         transport: Transport,
         policy: FailurePolicy,
         *,
+        kind: type[Mico] = Mico,
         gui_factory: GuiFactory | None = None,
         parent: QObject | None = None,
     ) -> None:
         super().__init__("MiCo", policy, gui_factory, parent)
-        self._link = ApplicationLink(Mico, transport, "mico", policy)
+        self._link = ApplicationLink(kind, transport, "mico", policy)
+        self._kind = kind
         self._background = BackgroundJobs("mico learns", policy)
         self._known = Event()
         self._asked = self._dressed = self._closed = False
         self._report = SequenceReport(())
         self._micos: dict[str, Mico] = {}
         self._end_movements: Callable[[], None] = lambda: None
-        self.api: Mico = proxy_of(Mico, self._link)
+        self.api: Mico = proxy_of(kind, self._link)
         self.manager = ManagerElsewhere(self.api, policy)
         self.api.belong_to(self)
         self.collision = self.manager.collision
@@ -84,7 +88,7 @@ class MicoElsewhere(MicoApplicationBase):
     def mico(self, source: str) -> Mico:
         found = self._micos.get(source)
         if found is None:
-            found = self._micos[source] = proxy_of(Mico, self._link)
+            found = self._micos[source] = proxy_of(self._kind, self._link)
             found.belong_to(self, source)
         return found
 
