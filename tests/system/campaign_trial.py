@@ -28,10 +28,13 @@ class Way:
         Calibrations to be made anew.
     provoke : callable
         Makes go wrong, before the campaign begins, what the operation comes after.
+    more : str
+        Of the recipe: what the operation needs in it.
     """
 
     forget: tuple[str, ...] = ()
     provoke: Provoke = lambda bench, campaign: None
+    more: str = ""
 
 
 class Trial:
@@ -43,7 +46,7 @@ class Trial:
         self.bench = bench
         self.operation = operation
         self.way = way or Way()
-        self.recipe = bench.recipe(procedure, good=2)
+        self.recipe = bench.recipe(procedure, good=2, more=self.way.more)
         self.folder = self.recipe.stem
 
     @property

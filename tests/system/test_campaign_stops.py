@@ -4,20 +4,22 @@ The operations are those of the procedures' own trees; one that comes only after
 wrong has a row in `PROVOKED`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Final
 
 import pytest
 
 from cosmic.autonomy.calibrating.calibrated import Calibrated
 from cosmic.autonomy.calibrating.heights import HEIGHTS
+from cosmic.autonomy.calibrating.touching import TOUCH, TouchJaw
 from cosmic.autonomy.campaign.campaign import Campaign
 from cosmic.autonomy.handling.prepare import PLATE
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.operation import UnitOperation
 from cosmic.autonomy.procedures.procedure import Part
 from cosmic.autonomy.shipped.registry import PROCEDURES
-from system.campaign_bench import Bench, bench
+from cosmic.vico.hw.peripherals import LensAxis
+from system.campaign_bench import Bench, bench, wait_for
 from system.campaign_trial import Provoke, Trial, Way
 
 RATE: Final = 10.0
@@ -44,6 +46,8 @@ PROVOKED: Final = {
     "give it up": Way(provoke=fault("drop")),
 }
 
+TOUCHED: Final = Way((TOUCH,), more="[parameters.calibration]\ntouch = true\n")
+
 
 def operations_of(part: Part) -> Iterator[UnitOperation]:
     if isinstance(part, UnitOperation):
@@ -62,6 +66,7 @@ def all_operations() -> dict[str, tuple[str, Way]]:
         for each in operations_of(shipped.build(HandlingSettings()).root):
             way = Way((each.key,)) if isinstance(each, Calibrated) else Way()
             found.setdefault(each.name, (procedure, PROVOKED.get(each.name, way)))
+    found[TouchJaw.name] = ("bend test", TOUCHED)
     return found
 
 
@@ -93,3 +98,57 @@ def test_stop_and_abort_in_every_operation_end_it_safely_and_nothing_is_lost(
     trial.abort(moving=True)
     trial.stop(moving=True)
     trial.finish()
+
+
+def stopped_when(bench: Bench, campaign: Campaign, moment: Callable[[], bool]) -> None:
+    """Let a campaign run until then, and press STOP."""
+    campaign.start()
+    wait_for(lambda: moment() or campaign.over, "the moment to stop")
+    assert not campaign.over, campaign.end_reason
+    bench.rig.stop("a hand on the button")
+    wait_for(lambda: campaign.over, "the end after STOP")
+    campaign.join()
+    bench.rig.reset_stop()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("plate", [0], indirect=True)
+def test_a_campaign_stopped_while_lens_and_axes_are_homed_goes_on(plate: Bench) -> None:
+    recipe, lens = plate.recipe(), plate.rig.vico.lens
+    assert lens is not None
+
+    def homed() -> bool:
+        zoom = lens.state(LensAxis.ZOOM)
+        return zoom is not None and zoom.homed
+
+    def beyond() -> bool:
+        axis = plate.rig.mico["left.z"]
+        return axis.limits is not None and (axis.position_um or 0.0) > axis.limits[1]
+
+    campaign = plate.campaign(recipe, "homed")
+    distrust(plate, campaign)
+    stopped_when(plate, campaign, beyond)
+    assert beyond()
+    campaign = plate.campaign(recipe, "homed")
+    campaign.run_here()
+    assert campaign.end_reason == "1 good fibres"
+    assert homed()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("plate", [0], indirect=True)
+def test_a_campaign_stopped_with_the_probe_at_a_jaw_goes_on(plate: Bench) -> None:
+    recipe = plate.recipe(more=TOUCHED.more)
+    campaign = plate.campaign(recipe, "touched", forget=TOUCHED.forget)
+    felt = plate.rig.daqco
+
+    def touches() -> bool:
+        here = campaign.operation == TouchJaw.name
+        return here and abs(felt.latest().get("force", 0.0)) > 2.0
+
+    stopped_when(plate, campaign, touches)
+    campaign = plate.campaign(recipe, "touched", forget=TOUCHED.forget)
+    campaign.run_here()
+    assert campaign.end_reason == "1 good fibres"

@@ -135,9 +135,14 @@ def test_a_jog_that_ends_in_front_of_something_shows_why(
     wait_for_position(qtbot, card, start)
     assert not shown.refused_text
     part(mico(window), "initialise", QPushButton).setFocus()
-    qtbot.keyPress(mico(window).focusWidget(), Qt.Key.Key_F)
-    qtbot.waitUntil(lambda: "plate" in shown.refused_text, timeout=8000)
-    qtbot.keyRelease(mico(window).focusWidget(), Qt.Key.Key_F)
+    for _ in range(10):  # where the window gets no core for a while, the axis stops as it should
+        qtbot.keyPress(mico(window).focusWidget(), Qt.Key.Key_F)
+        qtbot.waitUntil(lambda: card.axis.details.in_motion or "plate" in shown.refused_text)
+        qtbot.waitUntil(lambda: not card.axis.details.in_motion or "plate" in shown.refused_text)
+        qtbot.keyRelease(mico(window).focusWidget(), Qt.Key.Key_F)
+        if "plate" in shown.refused_text:
+            break
+    assert "plate" in shown.refused_text
     qtbot.waitUntil(lambda: not card.axis.details.in_motion)
     qtbot.wait(120)
     assert shown.refused_text  # its own end does not count as the next movement

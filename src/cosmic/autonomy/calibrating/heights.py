@@ -184,7 +184,7 @@ def _gripper(
 ) -> Generator[Yielded, object, Seen]:
     settings = work.settings.calibration
     tool = work.gripper
-    yield work.go_up(max(height_um, work.height_now()))
+    yield work.rise(height_um)
     yield work.go(work.at(tool, settings.focus_x_um, settings.focus_y_um))
     yield work.go_up(height_um)
     return (yield from _seen(work, tool, zoom, plate_counts))

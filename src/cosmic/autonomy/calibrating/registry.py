@@ -162,6 +162,8 @@ class CalibrationRegistry:
     session : str
         Names this start of the program: where stages are referenced anew, what was made before is
         looked at before it is trusted.
+    focus_before : int or None
+        Where the lens was focused before it was homed, counts, until it is focused there again.
 
     Raises
     ------
@@ -174,6 +176,7 @@ class CalibrationRegistry:
     clock: Clock | None = None
     now: Callable[[], datetime] = lambda: datetime.now(UTC)
     session: str = field(default_factory=lambda: uuid4().hex[:12])
+    focus_before: int | None = None
     _known: dict[tuple[str, str], CalibrationEntry] = field(default_factory=dict)
     _lock: Lock = field(default_factory=Lock)
     _changed: Event[[]] = field(default_factory=Event)

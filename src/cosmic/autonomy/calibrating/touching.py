@@ -61,7 +61,7 @@ class TouchJaw(Calibrated):
         side = -1.0 if work.probe.forward[1] > 0.0 else 1.0
         yield from retract_probe(work)
         below = work.hold_tip_um + positions.hold_above_tip_um - settings.touch_below_um
-        yield work.go_up(max(below, work.height_now(), positions.travel_um))
+        yield work.rise(max(below, positions.travel_um))
         yield work.go(
             work.at(work.gripper, positions.hold_x_um * work.jaws.forward, positions.hold_y_um)
         )

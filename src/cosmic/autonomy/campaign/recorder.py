@@ -27,6 +27,7 @@ from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Reach
+from cosmic.autonomy.handling.prepare import is_known
 from cosmic.autonomy.handling.put_away import ToBin
 from cosmic.autonomy.procedures.times import OperationTimes
 from cosmic.autonomy.procedures.tree import ENDS, OPERATION, NodeEvent, NodeState
@@ -458,9 +459,10 @@ def _date(when: datetime) -> str:
 def skip_known(work: HandlingContext, plan: ResumePlan) -> None:
     """Have the fibres that were treated before left alone where they are found again.
 
-    After an end without warning no position is believed: the platform is initialised first.
+    After an end without warning no position is believed: the platform is initialised first. So it
+    is where a stop left an axis without a known position.
     """
-    work.shared.needs_initialisation = plan.cut_off
+    work.shared.needs_initialisation = plan.cut_off or not is_known(work)
     work.shared.skipped += [_as_candidate(each) for each in plan.known]
     work.shared.dropped += [_as_dropped(each) for each in plan.fallen]
 

@@ -1,5 +1,6 @@
 """`HandlingContext`: what the operations of one gripper share, and what grippers share."""
 
+import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -315,6 +316,21 @@ class HandlingContext:
         """Begin to move the gripper to a height; to be yielded."""
         tool = self.gripper
         return self.go({tool.z_axis: z_um - tool.tip_um[2] - self.up_um(tool)})
+
+    def rise(self, z_um: float) -> RetryingMove:
+        """Begin to move the gripper up to a height, or leave it where it is higher; to be yielded.
+
+        Where a run to an end stop has left it beyond its limit, it goes back to that.
+        """
+        tool = self.gripper
+        stage_um = max(z_um, self.height_now()) - tool.tip_um[2] - self.up_um(tool)
+        return self.go({tool.z_axis: min(stage_um, self.highest_um)})
+
+    @property
+    def highest_um(self) -> float:
+        """How far up the stage of the gripper may go."""
+        limits = self.mico[self.gripper.z_axis].limits
+        return math.inf if limits is None else limits[1]
 
     def tip_now(self, tool: ToolSettings) -> tuple[float, float]:
         """Return where a tool's tip is, as its stages say."""

@@ -80,7 +80,7 @@ class DrawBack(FibreOperation):
     @override
     def steps(self, work: HandlingContext) -> Steps:
         with work.mico.collision.contact("grasp"):
-            yield work.go_up(max(work.settings.places.travel_um, work.height_now()))
+            yield work.rise(work.settings.places.travel_um)
         _, y = work.tip_now(work.gripper)
         yield work.go(work.at(work.gripper, behind_um(work), y))
         yield SAFE_POINT
@@ -142,7 +142,7 @@ class WipeInTurn(Wipe):
 
     @override
     def steps(self, work: HandlingContext) -> Steps:
-        yield work.go_up(max(work.settings.places.travel_um, work.height_now()))
+        yield work.rise(work.settings.places.travel_um)
         yield work.go(bin_position(work))
         try:
             # Without leave to touch: the gate knows what stands there.

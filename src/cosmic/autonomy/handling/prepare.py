@@ -2,16 +2,17 @@
 
 import logging
 import math
-from collections.abc import Generator
+from collections.abc import Collection, Generator
 from dataclasses import replace
 from typing import Final
 
 from typing_extensions import override
 
 from cosmic.autonomy.calibrating.calibrated import Calibrated, Holds
-from cosmic.autonomy.calibrating.registry import CalibrationEntry
+from cosmic.autonomy.calibrating.registry import CalibrationEntry, CalibrationRegistry
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.jaws import in_step, zero_jaws
+from cosmic.autonomy.handling.retrying_move import RetryingMove
 from cosmic.autonomy.handling.tips import TIMES_STD, TipOff, shift_maps, tip_off
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps, Yielded
 from cosmic.frame.errors import DeviceError, MoveRefused, NotAvailable
@@ -31,20 +32,27 @@ APART_S: Final = 8.0
 class InitialiseAgain(FibreOperation):
     """The sequence of the platform file, and meanwhile the lens is homed.
 
-    Only where the run before ended without warning. Whoever goes on with a campaign has consented
-    to it.
+    The sequence only where a campaign is resumed whose run before ended without warning, or in the
+    middle of this; the lens also where it was not homed. Whoever goes on with a campaign has
+    consented to it.
     """
 
     name = "initialise again"
 
     @override
     def steps(self, work: HandlingContext) -> Steps:
-        if not work.shared.needs_initialisation:
-            return
+        wanted = work.shared.needs_initialisation
         lens = work.vico.lens
-        homing = None if lens is None or lens.problem else _Homing(lens)
+        if lens is None or lens.problem or not (wanted or _unhomed(work, lens)):
+            lens = None
+        if not wanted and lens is None:
+            return
+        if is_known(work):
+            yield from retract_probe(work)  # while a jaw is beside it, no gripper can be lifted
+        homing = None if lens is None else _Homing(lens, work.calibration.registry)
         try:
-            yield from _initialise(work)
+            if wanted:
+                yield from _initialise(work)
             if homing is not None:
                 yield from homing.steps(work)
         finally:
@@ -54,21 +62,54 @@ class InitialiseAgain(FibreOperation):
         yield SAFE_POINT
 
 
-class _Homing:
-    """The lens runs to where counting begins, and then focuses as before, or on what lies there."""
+def is_known(work: HandlingContext) -> bool:
+    """Return whether the positions of all that a run moves are known, or estimated."""
+    axes = [work.table, *(axis for tool in tools_of(work) for axis in stages_of(tool))]
+    return all(work.mico[axis].details.confidence is not Confidence.UNKNOWN for axis in axes)
 
-    def __init__(self, lens: LensHandle) -> None:
+
+def tools_of(work: HandlingContext) -> list[ToolSettings]:
+    """Return the tools that a run moves."""
+    names = [work.settings.gripper, work.settings.probe, work.settings.other]
+    return [work.tool(name) for name in names if name]
+
+
+def stages_of(tool: ToolSettings) -> tuple[str, ...]:
+    """Return the axes that carry a tool."""
+    return (tool.x_axis, tool.y_axis, *filter(None, [tool.z_axis]))
+
+
+def _unhomed(work: HandlingContext, lens: LensHandle) -> bool:
+    states = [lens.state(axis) for axis in LensAxis]
+    lost = any(state is not None and not state.homed for state in states)
+    return lost or work.calibration.registry.focus_before is not None
+
+
+class _Homing:
+    """The lens runs to where counting begins, and then focuses as before, or on what lies there.
+
+    Where it was focused is kept until it is so again: whoever goes on after a stop needs it.
+    """
+
+    def __init__(self, lens: LensHandle, registry: CalibrationRegistry) -> None:
         focus = lens.state(LensAxis.FOCUS)
         self._lens = lens
-        self._before = focus.position_counts if focus is not None and focus.homed else None
+        self._registry = registry
+        if registry.focus_before is None and focus is not None and focus.homed:
+            registry.focus_before = focus.position_counts
         self._task = lens.home()
 
     def steps(self, work: HandlingContext) -> Steps:
-        lens = self._lens
         yield self._task
-        if self._before is not None:
-            yield lens.seek_focus(self._before)
-            return
+        before = self._registry.focus_before
+        if before is None:
+            yield from self._find(work)
+        else:
+            yield self._lens.seek_focus(before)
+        self._registry.focus_before = None
+
+    def _find(self, work: HandlingContext) -> Steps:
+        lens = self._lens
         focus = lens.state(LensAxis.FOCUS)
         yield lens.zoom_to(work.settings.zoom)
         if focus is None:
@@ -105,6 +146,8 @@ TABLE = "rotation centre"
 PROBE = "probe against gripper"
 CONTACT = "touch"
 """What the scene file calls it: only while it lasts may probe and jaws touch."""
+BEYOND_UM: Final = 100.0
+"""How far beyond where a jaw can be the probe goes from it, before the way on is checked again."""
 
 
 class MakeReady(FibreOperation):
@@ -114,8 +157,8 @@ class MakeReady(FibreOperation):
 
     @override
     def precondition(self, work: HandlingContext) -> None:
-        for tool in self._tools(work):
-            for name in (tool.x_axis, tool.y_axis, *filter(None, [tool.z_axis])):
+        for tool in tools_of(work):
+            for name in stages_of(tool):
                 details = work.mico[name].details
                 if details.confidence is not Confidence.KNOWN:
                     # What took the position away comes before what brings it back.
@@ -129,14 +172,15 @@ class MakeReady(FibreOperation):
         if work.ready:
             return
         settings, positions = work.settings, work.settings.places
-        for tool in self._tools(work):
-            for name in (tool.x_axis, tool.y_axis, *filter(None, [tool.z_axis])):
+        for tool in tools_of(work):
+            for name in stages_of(tool):
                 work.mico[name].set_closed_loop_frequency(settings.frequency_hz)
+        # After a stop the probe may stand at a jaw: back first, then the grippers can be lifted.
+        yield from retract_probe(work)
         lifted = {work.gripper.z_axis: self._high(work)}
         if settings.other:
             lifted[work.tool(settings.other).z_axis] = OTHER_UP_UM
         yield work.go(lifted)
-        yield from retract_probe(work)
         if settings.other:
             other = work.tool(settings.other)
             yield work.go({other.x_axis: OTHER_BACK_UM * (-1.0 if other.forward[0] > 0.0 else 1.0)})
@@ -155,27 +199,49 @@ class MakeReady(FibreOperation):
     @staticmethod
     def _high(work: HandlingContext) -> float:
         tool, travel = work.gripper, work.settings.places.travel_um
-        return max(travel - tool.tip_um[2], work.mico[tool.z_axis].position_um or 0.0)
-
-    @staticmethod
-    def _tools(work: HandlingContext) -> list[ToolSettings]:
-        names = [work.settings.gripper, work.settings.probe, work.settings.other]
-        return [work.tool(name) for name in names if name]
+        here = min(work.mico[tool.z_axis].position_um or 0.0, work.highest_um)
+        return max(travel - tool.tip_um[2], here)
 
 
 def retract_probe(work: HandlingContext) -> Steps:
-    """Take the probe away from where fibres are held and lie."""
-    x, y = work.tip_now(work.probe)
+    """Take the probe straight back from where fibres are held and lie.
+
+    Nothing but its way back is ordered: from inside a jaw's margin the gate allows what leads away
+    from it, and an axis that moves along, if only to where it is, may overshoot. Where it touches a
+    jaw, or may, it goes clear of that as in a touch, and the rest of the way as always.
+    """
+    _, y = work.tip_now(work.probe)
     away = work.settings.places.probe_away_y_um
     if not y < away - 1.0:
         return
     if not work.calibration.touching:
-        yield work.go(work.at(work.probe, x, away))
-        return
-    # It was on its way to a jaw, and may stand at one.
+        try:
+            yield _probe_to(work, away)
+        except MoveRefused as refusal:
+            if not _touches(work, refusal.verdict.bodies):
+                raise
+            logger.warning("the probe may touch a jaw, and goes back from it: %s", refusal)
+        else:
+            return
+    clear = y + work.settings.grasp.full_um / 2.0 + BEYOND_UM
     with work.mico.collision.contact(CONTACT):
-        yield work.go(work.at(work.probe, x, away))
+        yield _probe_to(work, min(clear, away))
+    yield _probe_to(work, away)
     work.calibration.touching = False
+
+
+def _probe_to(work: HandlingContext, y_um: float) -> RetryingMove:
+    return work.go({work.probe.y_axis: y_um - work.probe.tip_um[1]})
+
+
+def _touches(work: HandlingContext, bodies: Collection[str]) -> bool:
+    """Return whether one of the bodies is a jaw of a gripper that the probe stands in front of."""
+    scene, (_, y) = work.mico.collision.scene, work.tip_now(work.probe)
+    before = {
+        each.gap_axis for each in tools_of(work) if each.gap_axis and work.tip_now(each)[1] < y
+    }
+    driven = {drive.joint for drive in scene.drives if drive.axis in before}
+    return any(joint.child in bodies for joint in scene.joints if joint.name in driven)
 
 
 class CalibratePlate(Calibrated):
@@ -244,7 +310,7 @@ def still_at(
 
 def to_position(work: HandlingContext, x_um: float, y_um: float) -> Steps:
     """Take the gripper over a position, its jaws as far open as is counted."""
-    yield work.go_up(max(work.settings.places.travel_um, work.height_now()))
+    yield work.rise(work.settings.places.travel_um)
     yield work.go(work.at(work.gripper, x_um * work.jaws.forward, y_um))
     if not in_step(work):
         yield from zero_jaws(work)
@@ -271,7 +337,7 @@ def calibrate_at(
 def clear_image(work: HandlingContext) -> Steps:
     """Take gripper and probe out of the image."""
     positions = work.settings.places
-    yield work.go_up(max(positions.travel_um, work.height_now()))
+    yield work.rise(positions.travel_um)
     yield from retract_probe(work)
     x, y = positions.away_x_um * work.jaws.forward, positions.bin_y_um
     yield work.go(
@@ -344,7 +410,7 @@ def beside_jaws(work: HandlingContext) -> Steps:
     """Hold the jaws where fibres are pushed, and the probe beside them: both in one image."""
     positions, settings = work.settings.places, work.settings.calibration
     hold_x = positions.hold_x_um * work.jaws.forward
-    yield work.go_up(max(positions.travel_um, work.height_now()))
+    yield work.rise(positions.travel_um)
     yield work.go(work.at(work.gripper, hold_x, positions.hold_y_um))
     yield work.go_up(work.hold_tip_um)
     beside = hold_x + settings.compare_beside_um * work.jaws.forward
@@ -363,7 +429,7 @@ class TurnOn(FibreOperation):
     def steps(self, work: HandlingContext) -> Steps:
         positions = work.settings.places
         yield from retract_probe(work)
-        yield work.go_up(max(positions.travel_um, work.height_now()))
+        yield work.rise(positions.travel_um)
         largest = work.settings.grasp.largest_turn_deg
         angle = work.table_deg + TURN_ON_DEG
         yield work.go({work.table: angle if angle <= largest else angle - 2.0 * largest})
@@ -387,4 +453,4 @@ def make_safe(work: HandlingContext) -> Steps:
     yield from retract_probe((touching or [work])[0])
     with work.mico.collision.contact("grasp"):
         for arm in work.arms:
-            yield arm.go_up(max(arm.settings.places.travel_um, arm.height_now()))
+            yield arm.rise(arm.settings.places.travel_um)

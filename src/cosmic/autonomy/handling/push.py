@@ -429,7 +429,4 @@ class Retract(FibreOperation):
 
     @override
     def steps(self, work: HandlingContext) -> Steps:
-        x, y = work.tip_now(work.probe)
-        away = work.settings.places.probe_away_y_um
-        if y < away - 1.0:
-            yield work.go(work.at(work.probe, x, away))
+        yield from retract_probe(work)

@@ -32,7 +32,7 @@ class ToBin(FibreOperation):
         positions = work.settings.places
         if not work.beside_another:  # who may have the probe just then
             yield from retract_probe(work)
-        yield work.go_up(max(positions.travel_um, work.height_now()))
+        yield work.rise(positions.travel_um)
         if work.held_fibre().bending is not None:
             yield from self._look_on_the_way(work)
         yield work.go(bin_position(work))
@@ -111,7 +111,7 @@ class Wipe(FibreOperation):
     @override
     def steps(self, work: HandlingContext) -> Steps:
         positions = work.settings.places
-        yield work.go_up(max(positions.travel_um, work.height_now()))
+        yield work.rise(positions.travel_um)
         yield work.go(bin_position(work))
         with work.mico.collision.contact("grasp"):
             yield work.go_up(work.grasp_um)

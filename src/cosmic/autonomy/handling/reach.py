@@ -36,7 +36,7 @@ class Turn(FibreOperation):
     def steps(self, work: HandlingContext) -> Steps:
         fibre = work.held_fibre()
         (x, y), angle = fibre.reach.tip_um, fibre.reach.angle_deg
-        yield work.go_up(max(work.settings.places.travel_um, work.height_now()))
+        yield work.rise(work.settings.places.travel_um)
         behind = work.at(work.gripper, x - STAND_BACK_UM * work.jaws.forward, y)
         yield work.go({work.table: angle} | behind)
         yield SAFE_POINT

@@ -4,6 +4,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import replace
 from threading import Lock
+from typing import Final
 
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.events import Unsubscribe
@@ -87,6 +88,9 @@ class LiveView:
 
 CircumstancesOf = Callable[[CameraConfig, Frame, CameraSettings], Circumstances]
 
+VISION_JOIN_WALL_S: Final = 60.0
+"""An analysis cannot be broken off, and the first one on a busy computer takes many seconds."""
+
 
 class CameraUnit:
     """A camera's thread, the chain of machine vision on its images, and its recordings.
@@ -166,7 +170,7 @@ class CameraUnit:
         self.thread.join()
         self.jobs.join()
         self.live.join()
-        self.vision.join()
+        self.vision.join(VISION_JOIN_WALL_S)
 
     def _collect(self, image: CameraImage) -> None:
         """Give the background what it waits for; in the camera's thread."""

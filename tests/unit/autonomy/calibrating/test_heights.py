@@ -71,7 +71,7 @@ class Bench(HandlingContext):
         self.random = np.random.default_rng(7)
 
     def __getitem__(self, name: str) -> Any:
-        return SimpleNamespace(position_um=self.at_um.get(name, 0.0))
+        return SimpleNamespace(position_um=self.at_um.get(name, 0.0), limits=None)
 
     @override
     def tool(self, name: str) -> ToolSettings:

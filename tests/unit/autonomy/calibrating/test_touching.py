@@ -28,6 +28,8 @@ SENSOR_UN_UM = 800.0
 class Axis:
     """One of the bench's axes; steps of the probe are small and not alike."""
 
+    limits = None
+
     def __init__(self, bench: "Bench", name: str) -> None:
         self.bench, self.name = bench, name
 

@@ -15,7 +15,9 @@ from cosmic.autonomy.campaign.resume import FELL, DroppedFibre, resume
 from cosmic.autonomy.campaign.store import CampaignStore
 from cosmic.autonomy.handling.context import SharedWorkspace
 from cosmic.autonomy.handling.plate import Candidate
+from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.handling.survey import MEASURED, leave_dropped
+from cosmic.mico.core.motion.positioner import Confidence
 from unit.autonomy.campaign.sample_records import INFO, failed, good
 
 LEFT_THERE = Pose(1000.0, -500.0, 20.0)
@@ -121,13 +123,35 @@ def test_a_run_that_ended_without_a_word_is_told_from_one_that_said_why(tmp_path
         assert not resume(after_end).cut_off
 
 
+def workplace(confidence: Confidence) -> Any:
+    """Return as much of the work as resuming needs, with axes that are known so well."""
+    tool = SimpleNamespace(x_axis="x", y_axis="y", z_axis="")
+    axis = SimpleNamespace(details=SimpleNamespace(confidence=confidence))
+    return SimpleNamespace(
+        shared=SharedWorkspace(),
+        settings=HandlingSettings(),
+        table="table",
+        tool=lambda _name: tool,
+        mico=dict.fromkeys(("x", "y", "table"), axis),
+    )
+
+
+@pytest.mark.parametrize("confidence", [Confidence.KNOWN, Confidence.UNKNOWN])
+def test_what_a_stop_left_without_a_position_is_initialised_first(
+    confidence: Confidence, store: CampaignStore
+) -> None:
+    work, plan = workplace(confidence), replace(resume(store), cut_off=False)
+    skip_known(work, plan)
+    assert work.shared.needs_initialisation is (confidence is Confidence.UNKNOWN)
+
+
 def test_what_looks_like_one_that_fell_is_not_taken_after_the_restart(
     store: CampaignStore,
 ) -> None:
     number = store.begin_fibre(LEFT_THERE, time_s=0.0)
     store.note("carry to the bin", FELL, LOOKS, time_s=9.0, fibre=number)
     store.finish_fibre(good(number))
-    work: Any = SimpleNamespace(shared=SharedWorkspace())
+    work = workplace(Confidence.KNOWN)
     skip_known(work, resume(store))
     line = np.array([[0.0, 0.0], [1511.0, 0.0]])
     alike, other = (Candidate(line, length, 31.2, 0.013, 60.0) for length in (1511.0, 1200.0))

@@ -1,6 +1,7 @@
 """No fibre is taken, and no limit armed, before the force can be measured."""
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
@@ -53,17 +54,14 @@ class Work:
 
         return mean
 
-    probe = None
+    probe = SimpleNamespace(y_axis="probe.y", tip_um=(0.0, 0.0, 0.0))
 
     def tip_now(self, _tool: object) -> tuple[float, float]:
         return 0.0, self.probe_y_um
 
-    def at(self, _tool: object, _x_um: float, y_um: float) -> float:
-        return y_um
-
-    def go(self, y_um: float) -> Callable[[], None]:
+    def go(self, targets: dict[str, float]) -> Callable[[], None]:
         def gone() -> None:
-            self.probe_y_um = y_um
+            self.probe_y_um = targets["probe.y"]
 
         return gone
 
