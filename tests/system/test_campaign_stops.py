@@ -127,7 +127,7 @@ def test_a_campaign_stopped_while_lens_and_axes_are_homed_goes_on(plate: Bench) 
         return axis.limits is not None and (axis.position_um or 0.0) > axis.limits[1]
 
     campaign = plate.campaign(recipe, "homed")
-    distrust(plate, campaign)
+    mark_unreliable(plate, campaign)
     stopped_when(plate, campaign, beyond)
     assert beyond()
     campaign = plate.campaign(recipe, "homed")
