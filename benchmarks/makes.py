@@ -1,0 +1,95 @@
+"""Completion, start of two axes and stop: the simulated MCS2 beside the simulated SCU."""
+
+import math
+import statistics
+import time
+from collections.abc import Callable
+
+from benchmarks.figures import Figure, main
+from cosmic.frame.clock import RatedClock
+from cosmic.mico.hw.interface import Channel, Completed, Controller, MatchedMove
+from cosmic.mico.hw.scu3d import Scu3dController
+from cosmic.mico.hw.sim_scu3d import load_simulated_library as load_scu3d
+from cosmic.mico.hw.sim_smaractctl import load_simulated_library as load_smaractctl
+from cosmic.mico.hw.smaractctl import SmaractCtlController
+from cosmic.twin.stage import Stage
+
+NAME = "makes"
+FIRST, SECOND = Channel(0, 0), Channel(0, 1)
+
+
+def median_ms(count: int, call: Callable[[int], float]) -> float:
+    """Return the median of what `call` takes in seconds, in ms."""
+    return 1e3 * statistics.median(call(number) for number in range(count))
+
+
+def completion_s(controller: Controller, stage: Stage, clock: RatedClock, target: float) -> float:
+    """Return the time from the end of a stage's path to the event that tells it."""
+    controller.move_to(FIRST, target, "um", hold_s=math.inf)
+    end_s = stage.path.end_s
+    while not isinstance(controller.receive(0, 0.2), Completed):
+        pass
+    return clock.now_s() - end_s
+
+
+def spent_s(call: Callable[[], None]) -> float:
+    """Return how long a call takes."""
+    before_s = time.perf_counter()
+    call()
+    return time.perf_counter() - before_s
+
+
+def start_two(controller: Controller, way_um: float) -> None:
+    """Send two axes off: as one command group where there is one, else back to back."""
+    if controller.capabilities.group_start:
+        moves = [
+            MatchedMove(at, way_um, "um", math.inf, 1000.0, 50_000.0, 100.0)
+            for at in (FIRST, SECOND)
+        ]
+        controller.move_together(moves)
+        return
+    for at in (FIRST, SECOND):
+        controller.move_to(at, way_um, "um", hold_s=math.inf)
+
+
+def figures_of(make: str, count: int) -> list[Figure]:
+    """Return the figures of one make."""
+    clock = RatedClock(1.0)
+    library = load_scu3d(clock=clock) if make == "SCU" else load_smaractctl(clock=clock)
+    kind = Scu3dController if make == "SCU" else SmaractCtlController
+    controller: Controller = kind(library, simulated=True)
+    controller.open()
+    controller.report_completion(FIRST)
+    stage = library.scene.stages["0.0"]
+
+    def complete(number: int) -> float:
+        return completion_s(controller, stage, clock, 10.0 * (number % 2 + 1))
+
+    def start(number: int) -> float:
+        return spent_s(lambda: start_two(controller, 200.0 * (number % 2)))
+
+    def stop(number: int) -> float:
+        controller.move_to(FIRST, 500.0 * (number % 2), "um", hold_s=math.inf)
+        return spent_s(lambda: controller.stop(FIRST))
+
+    measured = {
+        "completion after the end": complete,
+        "start of two axes": start,
+        "stop of one axis": stop,
+    }
+    figures = [
+        Figure(NAME, f"{make}: {name}", median_ms(count, call), "ms")
+        for name, call in measured.items()
+    ]
+    controller.close()
+    return figures
+
+
+def measure(quick: bool = False) -> list[Figure]:
+    """Return the figures of one run."""
+    count = 3 if quick else 200
+    return [figure for make in ("SCU", "MCS2") for figure in figures_of(make, count)]
+
+
+if __name__ == "__main__":
+    main(__doc__, measure)
