@@ -171,6 +171,6 @@ def test_steps_that_are_too_long_to_be_safe_are_noticed_before_anything_is_touch
 def test_without_an_image_of_both_nothing_is_touched() -> None:
     bench = Bench()
     del bench.calibration.made[PROBE]
-    with pytest.raises(OperationFailed, match="see probe and gripper"):
+    with pytest.raises(OperationFailed, match="probe and gripper must be in one image"):
         carried_out(bench)
     assert bench.allowed == []
