@@ -10,9 +10,8 @@ from typing_extensions import override
 
 from contract.cameras import CameraRig, Can
 from contract.cameras.mjpeg_server import MjpegServer
-from cosmic.vico.hw.interface import Roi
+from cosmic.vico.hw.interface import Roi, VideoSource
 from cosmic.vico.hw.opencv import OpenCvLibrary
-from cosmic.vico.hw.opencv_source import VideoSource
 
 WIDTH, HEIGHT = 160, 120
 

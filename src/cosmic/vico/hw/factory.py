@@ -17,7 +17,7 @@ from cosmic.vico.hw.serial_port import SerialPort, open_serial_port
 
 if TYPE_CHECKING:
     from cosmic.twin.scene import Scene
-    from cosmic.vico.hw.opencv_source import VideoSource
+    from cosmic.vico.hw.interface import VideoSource
     from cosmic.vico.hw.sim_line import SimLine
     from cosmic.vico.hw.sim_peripherals import SimPeripherals
 

@@ -1,11 +1,12 @@
 """What ViCo asks of a camera, whatever bus it sits on (thesis 3.3.2, 5.2)."""
 
+import re
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,6 @@ from cosmic.frame.plugins import Backend
 
 if TYPE_CHECKING:
     from cosmic.twin.scene import Scene
-    from cosmic.vico.hw.opencv_source import VideoSource
 
 Pixels = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
@@ -82,6 +82,70 @@ class CameraInfo:
     serial: str
     simulated: bool = False
     sensor_px: tuple[int, int] = (0, 0)
+
+
+_DEVICE: Final = re.compile(r"(?:/dev/)?video(\d+)")
+
+
+class Kind(StrEnum):
+    """What a source is."""
+
+    DEVICE = "USB camera"
+    FILM = "video file"
+    IMAGES = "folder of images"
+    ADDRESS = "network address"
+
+
+@dataclass(frozen=True, slots=True)
+class VideoSource:
+    """One source of images.
+
+    Attributes
+    ----------
+    address : str
+        ``video0`` for a device by its number, the path of a video file, of a folder of images
+        (in the order of their names), or an address such as ``http://192.168.0.7/video.mjpg``.
+    rate_hz : float
+        At which films and images are played; 0 is the film's own, or 15 for images.
+    loop : bool
+        Begin anew at the end; otherwise the last image is the last.
+    paced : bool
+        False: a film gives its images as fast as they are asked for.
+    size_px : (int, int) or None
+        What a USB camera is asked to send; None is what it sends by itself.
+    """
+
+    address: str
+    rate_hz: float = 0.0
+    loop: bool = False
+    paced: bool = True
+    size_px: tuple[int, int] | None = None
+
+    @property
+    def kind(self) -> Kind:
+        """What the address names."""
+        if "://" in self.address:
+            return Kind.ADDRESS
+        if _DEVICE.fullmatch(self.address):
+            return Kind.DEVICE
+        return Kind.IMAGES if Path(self.address).is_dir() else Kind.FILM
+
+    @property
+    def device(self) -> int:
+        """Number of the device."""
+        found = _DEVICE.fullmatch(self.address)
+        return int(found[1]) if found else -1
+
+    @property
+    def is_there(self) -> bool:
+        """False when its file is not; a device or an address is asked only when opened."""
+        return self.kind in (Kind.DEVICE, Kind.ADDRESS) or Path(self.address).exists()
+
+    @property
+    def info(self) -> CameraInfo:
+        """The camera that it looks like."""
+        name = self.address if self.kind is Kind.ADDRESS else Path(self.address).name
+        return CameraInfo(key=self.address, vendor="OpenCV", model=str(self.kind), serial=name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,7 +378,7 @@ class CameraContext:
 
     clock: Clock
     scene: "Scene | None" = None
-    sources: "Sequence[VideoSource | str | Path]" = ()
+    sources: Sequence[VideoSource | str | Path] = ()
     producers: Sequence[Path | str] = ()
     packet_bytes: int = 0
     seed: int = 0

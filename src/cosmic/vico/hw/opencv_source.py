@@ -3,11 +3,8 @@
 USB cameras and network addresses are captures; video files and folders of images are films.
 """
 
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,79 +14,17 @@ import numpy.typing as npt
 from typing_extensions import override
 
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
-from cosmic.vico.hw.interface import CameraInfo, PixelFormat, Pixels, Roi
+from cosmic.vico.hw.interface import CameraInfo, Kind, PixelFormat, Pixels, Roi, VideoSource
 
 SYSFS: Final = Path("/sys/class/video4linux")
 SILENCE_S: Final = 1.5
 """After so long without an image a camera counts as gone."""
 
-_DEVICE: Final = re.compile(r"(?:/dev/)?video(\d+)")
 _IMAGES_HZ: Final = 15.0
 _ENDINGS: Final = (".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm")
 
 Raw = Pixels
 MakeCapture = Callable[..., Any]
-
-
-class Kind(StrEnum):
-    """What a source is."""
-
-    DEVICE = "USB camera"
-    FILM = "video file"
-    IMAGES = "folder of images"
-    ADDRESS = "network address"
-
-
-@dataclass(frozen=True, slots=True)
-class VideoSource:
-    """One source of images.
-
-    Attributes
-    ----------
-    address : str
-        ``video0`` for a device by its number, the path of a video file, of a folder of images
-        (in the order of their names), or an address such as ``http://192.168.0.7/video.mjpg``.
-    rate_hz : float
-        At which films and images are played; 0 is the film's own, or 15 for images.
-    loop : bool
-        Begin anew at the end; otherwise the last image is the last.
-    paced : bool
-        False: a film gives its images as fast as they are asked for.
-    size_px : (int, int) or None
-        What a USB camera is asked to send; None is what it sends by itself.
-    """
-
-    address: str
-    rate_hz: float = 0.0
-    loop: bool = False
-    paced: bool = True
-    size_px: tuple[int, int] | None = None
-
-    @property
-    def kind(self) -> Kind:
-        """What the address names."""
-        if "://" in self.address:
-            return Kind.ADDRESS
-        if _DEVICE.fullmatch(self.address):
-            return Kind.DEVICE
-        return Kind.IMAGES if Path(self.address).is_dir() else Kind.FILM
-
-    @property
-    def device(self) -> int:
-        """Number of the device."""
-        found = _DEVICE.fullmatch(self.address)
-        return int(found[1]) if found else -1
-
-    @property
-    def is_there(self) -> bool:
-        """False when its file is not; a device or an address is asked only when opened."""
-        return self.kind in (Kind.DEVICE, Kind.ADDRESS) or Path(self.address).exists()
-
-    @property
-    def info(self) -> CameraInfo:
-        """The camera that it looks like."""
-        name = self.address if self.kind is Kind.ADDRESS else Path(self.address).name
-        return CameraInfo(key=self.address, vendor="OpenCV", model=str(self.kind), serial=name)
 
 
 def attached_devices(sysfs: Path = SYSFS) -> tuple[CameraInfo, ...]:

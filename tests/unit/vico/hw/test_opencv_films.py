@@ -11,9 +11,8 @@ from contract.cameras.mjpeg_server import MjpegServer
 from contract.cameras.opencv import HEIGHT, WIDTH, pattern, write_film, write_images
 from cosmic.frame.clock import ManualClock, RatedClock
 from cosmic.frame.errors import DeviceError, NotConnectedError
-from cosmic.vico.hw.interface import Frame, PixelFormat, Roi
+from cosmic.vico.hw.interface import Frame, PixelFormat, Roi, VideoSource
 from cosmic.vico.hw.opencv import OpenCvCamera, OpenCvLibrary
-from cosmic.vico.hw.opencv_source import VideoSource
 
 
 def opened(source: VideoSource, clock: ManualClock | None = None) -> OpenCvCamera:

@@ -10,9 +10,8 @@ import pytest
 
 from cosmic.frame.clock import RatedClock
 from cosmic.frame.errors import ConfigError, DeviceError, NotConnectedError
-from cosmic.vico.hw.interface import Camera, PixelFormat
+from cosmic.vico.hw.interface import Camera, PixelFormat, VideoSource
 from cosmic.vico.hw.opencv import OpenCvLibrary
-from cosmic.vico.hw.opencv_source import VideoSource
 from unit.vico.hw.fake_capture import FakeDevice
 
 
