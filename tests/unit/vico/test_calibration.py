@@ -130,7 +130,7 @@ def test_moves_that_tell_too_little_are_refused(places: np.ndarray, reason: str)
 
 def test_a_thing_that_did_not_move_with_the_stage_is_refused() -> None:
     still = [replace(each, image_px=(800.0, 600.0)) for each in look(grid())]
-    with pytest.raises(CalibrationRefused, match="what is tracked moves with the stage"):
+    with pytest.raises(CalibrationRefused, match="tracked object moves with the stage"):
         fit_map(still)
 
 
@@ -261,7 +261,7 @@ def test_the_rotation_centre_is_found_with_its_sense(sense: int) -> None:
         (ANGLES[:4], 600.0, 0.3, "4 angles, at least 5"),
         ([0.0, 0.1, 0.2, 0.3, 60.0], 600.0, 0.3, "2 angles"),
         ([0.0, 2.0, 4.0, 6.0, 8.0], 600.0, 0.3, "a turn of 8 degrees"),
-        (ANGLES, 0.0, 0.3, "see that it turns along"),
+        (ANGLES, 0.0, 0.3, "check that it turns with the table"),
         (ANGLES, 600.0, 8.0, "residual of"),
         ([0.0, 8.0, 16.0, 24.0, 32.0], 600.0, 2.5, "known to"),
         ([0.0, 30.0, 60.0, 90.0, math.nan], 600.0, 0.3, "not a number"),

@@ -199,5 +199,5 @@ def test_black_frames_make_no_background_and_the_old_one_stays() -> None:
 
 @pytest.mark.parametrize("frames", [0, -1, 1001])
 def test_a_number_of_frames_that_makes_no_sense_is_refused(frames: int) -> None:
-    with pytest.raises(ConfigError, match="from 1 to 1000"):
+    with pytest.raises(ConfigError, match="give 1 to 1000"):
         Background().collect(frames)

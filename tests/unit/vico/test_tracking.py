@@ -83,7 +83,7 @@ def test_the_drift_of_a_whole_image_is_found() -> None:
     [
         (Roi(380, 0, 40, 40), "within the image of 400 x 300"),
         (Roi(10, 10, 4, 40), "12 px or more"),
-        (Roi(0, 0, 40, 40), "of one grey"),
+        (Roi(0, 0, 40, 40), "no contrast"),
     ],
 )
 def test_a_region_that_cannot_be_followed_is_refused(region: Roi, reason: str) -> None:

@@ -82,7 +82,7 @@ def test_a_camera_that_answers_is_there(peer: Peer, watch: GvcpWatch) -> None:
 def test_a_camera_that_nobody_controls_was_started_anew(peer: Peer, watch: GvcpWatch) -> None:
     watch.poll(1.0)
     peer.answer(0)
-    assert "started anew" in polled(watch, 1.1)
+    assert "restarted" in polled(watch, 1.1)
     assert watch.controlled is False
 
 
