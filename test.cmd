@@ -14,6 +14,7 @@ call :check "mypy" "%bin%\python.exe" -m mypy
 call :check "mypy linux" "%bin%\python.exe" -m mypy --platform linux --cache-dir .mypy_cache/linux
 call :check "mypy darwin" "%bin%\python.exe" -m mypy --platform darwin --cache-dir .mypy_cache/darwin
 call :check "lint-imports" "%bin%\lint-imports.exe"
+call :check "platforms" "%bin%\python.exe" tools/resolve_platforms.py --core --within 12 windows:3.14 aarch64-manylinux_2_39:3.14
 if defined failed echo == failed so far: !failed:~2!
 if "%~1"=="" goto all
 if "%~1"=="--all" goto all
@@ -25,6 +26,7 @@ call :tests "not slow" "pytest"
 rem Alone, for it measures.
 call :check "guard" "%bin%\python.exe" -m benchmarks.guard
 if "%~1"=="--all" call :tests "slow" "slow tests"
+if "%~1"=="--all" call :check "all platforms" "%bin%\python.exe" tools/resolve_platforms.py
 
 :end
 if defined failed echo == FAILED: !failed:~2!
