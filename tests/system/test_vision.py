@@ -213,8 +213,8 @@ def test_a_calibration_is_found_again_at_the_next_start(lab: Lab, config: Path) 
     assert (config.parent / "measured" / "microscope-right.toml").exists()
     again = build_platform(config).vico
     assert again is not None
-    assert again.places is not None
-    assert again.places.calibrated == lab.rig.vico.calibrated
+    assert again.transform is not None
+    assert again.transform.calibrated == lab.rig.vico.calibrated
 
 
 def test_a_tool_that_is_not_on_the_image_calibrates_nothing_and_stands_where_it_was(
@@ -255,7 +255,7 @@ def test_a_cancelled_calibration_ends_at_once_and_keeps_what_was_known(lab: Lab)
     task = lab.rig.vico.calibrate_stage("right")
     with pytest.raises(cosmic.NotAvailable, match="is running"):
         lab.rig.vico.camera().click_to_move((900.0, 600.0), "right")
-    wait_until(lambda: "place" in task.progress.text)
+    wait_until(lambda: "point" in task.progress.text or "position" in task.progress.text)
     task.cancel()
     with pytest.raises(MoveCancelled):
         task.wait(10.0)
