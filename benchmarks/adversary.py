@@ -141,6 +141,8 @@ def attack(
         for thread in threads:
             thread.join()
         told = remote.end() if remote is not None else (0, [])
+        if remote is not None and not told[0]:
+            raise RuntimeError(f"no command went through the station: {told[1][:3]}")
         watch.may_move()
         watch.end()
         return Result(watch.found, attacks, told)

@@ -13,11 +13,19 @@ from benchmarks.adversary_attacks import AxisAttack
 from cosmic.frame.errors import CosmicError
 
 
+def connected(endpoint: str) -> cosmic.Rig:
+    """Connect to a station that may be too busy to answer at once."""
+    for _ in range(20):
+        with suppress(CosmicError):
+            return cosmic.connect(stations={"fiberstation": endpoint})
+    return cosmic.connect(stations={"fiberstation": endpoint})
+
+
 def main(endpoint: str, seed: str) -> None:
     """Attack until standard input is closed."""
     ended = threading.Event()
     threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
-    with cosmic.connect(stations={"fiberstation": endpoint}) as rig:
+    with connected(endpoint) as rig:
         attack = AxisAttack(rig, int(seed) + 1, "station")
         told_s = 0.0
         while not ended.is_set():

@@ -102,7 +102,6 @@ def collect(bench: FullStand, seconds: float, tell: Callable[[Look], None]) -> l
                 bench.recording.unlink(missing_ok=True)
                 with suppress(CosmicError):
                     bench.rig.daqco.start_recording(bench.recording)
-                gc.collect()
                 looks.append(
                     Look(
                         (time.perf_counter() - began_s) / 60.0,

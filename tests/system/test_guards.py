@@ -175,7 +175,7 @@ def test_acquisition_that_is_stopped_says_that_the_limit_is_not_watched(
     assert "force: its limit is no longer watched: nothing is acquired" in caplog.text
     (limit,) = guarded.rig.daqco.limits
     assert not limit.settings.armed
-    assert "armed again when acquisition starts" in limit.reason
+    assert "armed again when it starts" in limit.reason
     with pytest.raises(NotAvailable, match="isarm the limit first"):
         guarded.rig.daqco.apply(guarded.change(name="push"))
 

@@ -95,6 +95,7 @@ class Garbage:
         self._frozen = 0  # counting them takes milliseconds, so it is done after a freeze only
         self._moved_s = 0.0
         self._collected_s = 0.0
+        self._left_behind = False
 
     @property
     def in_force(self) -> bool:
@@ -139,7 +140,11 @@ class Garbage:
         with self._lock:
             if self._by_hand.pop(number, None) is not None and not self._by_hand:
                 gc.enable()
-            if self._users.pop(number, None) is None or self._users:
+            if self._users.pop(number, None) is None:
+                return
+            # A platform is freed by a whole collection only: much of it was frozen with the rest.
+            self._left_behind = bool(self._users)
+            if self._users:
                 return
             if gc.get_threshold() == (*self._before[:2], NEVER):  # else somebody else's wish
                 gc.set_threshold(*self._before)
@@ -159,7 +164,8 @@ class Garbage:
                 self._moved_s = now_s
             rest_s = now_s - self._moved_s
             frozen = self._frozen - self._loaded
-            if frozen >= MOST_FROZEN or (frozen >= MANY_FROZEN and rest_s >= LONG_REST_S):
+            many = frozen >= MANY_FROZEN or self._left_behind
+            if frozen >= MOST_FROZEN or (many and rest_s >= LONG_REST_S):
                 return self._collect(at_rest=rest_s >= LONG_REST_S, whole=True)
             passes = gc.get_count()[2]  # of young objects, since old ones were looked through
             grown = len(gc.get_objects(generation=2)) if passes else 0
@@ -194,7 +200,7 @@ class Garbage:
         self._collected_s = self._now_s()
         self._frozen = left = gc.get_freeze_count()
         if whole:
-            self._loaded = left
+            self._loaded, self._left_behind = left, False
         objects = found + (left if whole else left - before)
         done = Collection(objects, found, self._collected_s - began_s, at_rest, whole)
         level = logging.INFO if not at_rest and done.took_s > 0.02 else logging.DEBUG

@@ -62,6 +62,18 @@ def test_old_garbage_is_collected_at_a_rest(bench: Bench) -> None:
     assert done.found >= WORTHWHILE
 
 
+def test_what_a_closed_platform_leaves_is_freed_at_the_next_long_rest(bench: Bench) -> None:
+    kept, found = old_ring(10)
+    end = bench.garbage.begin(lambda: False)  # freezes the ring with the rest
+    kept.clear()
+    end()
+    assert bench.after(LONG_REST_S / 2.0) is None
+    done = bench.after(LONG_REST_S)
+    assert done is not None and done.whole and done.at_rest
+    assert found() is None
+    assert bench.after(LONG_REST_S) is None
+
+
 def test_nothing_old_is_looked_through_while_something_moves(bench: Bench) -> None:
     kept, found = old_ring(WORTHWHILE)
     kept.clear()
