@@ -116,3 +116,11 @@ def test_subscriptions_from_many_threads_are_all_kept(event: Event[int]) -> None
         thread.join(20.0)
     event.emit(5)
     assert heard == [5] * 800
+
+
+@pytest.mark.parametrize("odd", [None, 5, "abc"])
+def test_what_cannot_be_called_is_refused_at_once(odd: object) -> None:
+    heard: Event[[]] = Event()
+    with pytest.raises(TypeError, match="subscriber must be callable"):
+        heard.subscribe(odd)  # type: ignore[arg-type]
+    assert len(heard) == 0

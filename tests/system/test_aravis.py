@@ -130,7 +130,7 @@ def test_a_camera_that_starts_anew_is_not_taken_for_the_one_that_was_open(
     process.kill()
     process.start()
     began_s = WALL.now_s()
-    with pytest.raises(DeviceError, match="started anew"):
+    with pytest.raises(DeviceError, match="restarted"):
         received(camera, 5.0)
     assert WALL.now_s() - began_s < 2.0
 

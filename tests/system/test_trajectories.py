@@ -426,7 +426,7 @@ def test_one_that_is_cancelled_before_its_turn_has_ended(mico: Mico) -> None:
     assert busy.wait(20.0)
     player = mico.trajectories.run(written("wait 500 s\n"), wait=False)
     player.cancel()
-    with pytest.raises(MoveCancelled, match="before it began"):
+    with pytest.raises(MoveCancelled, match="before it started"):
         player.wait(5.0)
     assert player.state is PlayState.CANCELLED
     go_on.set()

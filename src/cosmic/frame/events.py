@@ -49,7 +49,14 @@ class Event(Generic[P]):
 
         Each subscription is one of its own, also where the same callable is subscribed twice. An
         emission under way in another thread may still reach a subscriber that has just ended.
+
+        Raises
+        ------
+        TypeError
+            It cannot be called.
         """
+        if not callable(subscriber):
+            raise TypeError(f"subscriber must be callable, not {repr(subscriber):.60}")
         with self._changing:
             self._subscribers = (*self._subscribers, subscriber)
         ended = False

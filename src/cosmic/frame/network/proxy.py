@@ -70,6 +70,7 @@ class Proxied(Declared):
         return self._link.moves
 
     @override
+    @checked
     def wall_s_here(self, wall_s: float) -> float:
         return self._link.wall_s_here(wall_s)
 
@@ -145,6 +146,7 @@ def _state(name: str) -> property:
 
 
 def _stream(name: str) -> object:
+    @checked
     def subscribe(
         self: Proxied,
         receiver: Callable[[Any], object],
