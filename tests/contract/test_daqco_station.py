@@ -119,7 +119,7 @@ def test_crossings_and_failures_are_published_one_by_one(rig: DaqcoRig) -> None:
 def test_all_samples_are_sent_only_while_somebody_wants_them(
     rig: DaqcoRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cosmic.frame.network.link.LINGER_S", 0.0)
+    monkeypatch.setattr("cosmic.frame.network.remote_stream.LINGER_S", 0.0)
     assert rig.station is not None
     bus = rig.station.bus
     firsts, _lengths, end = gather(rig.daqco)

@@ -56,7 +56,7 @@ class Event(Generic[P]):
             It cannot be called.
         """
         if not callable(subscriber):
-            raise TypeError(f"subscriber must be callable, not {repr(subscriber):.60}")
+            raise TypeError(f"subscriber must be callable, not {subscriber!r:.60}")
         with self._changing:
             self._subscribers = (*self._subscribers, subscriber)
         ended = False
