@@ -42,6 +42,11 @@ class Rig:
         stage.follow(route, held_until_s=1e9)
         return route.end_s
 
+    def touch(self) -> None:
+        """Bring the probe to the fibre: what is solved once for a grasp is a figure of its own."""
+        self.now_s = self.go("probe.y", -4986.0, 2000.0) + 0.01
+        self.force_side.moment(self.now_s)
+
     def cost(self, duration_s: float, *reads: Read) -> float:
         """Return CPU seconds for a second of platform time while `reads` are asked."""
         times = self.now_s + np.arange(round(duration_s * RATE_HZ)) / RATE_HZ
@@ -86,6 +91,7 @@ def measure(quick: bool = False) -> list[Figure]:
         rig.force_side.moment(rig.now_s)
     plain_s = plain_filter_s(duration_s)
     still_s = rig.cost(duration_s, *reads)
+    rig.touch()
     rig.go("probe.y", -5030.0, 50.0 / (2.0 * duration_s))
     pushing_s = rig.cost(duration_s, *reads)
     rig.now_s += duration_s + 0.01
