@@ -43,7 +43,7 @@ name = "{sample}"
 [stop]
 {stop}
 [output]
-images = false
+pictures = false
 html = false
 pdf = false
 """

@@ -36,7 +36,7 @@ count = 3
 good = 2
 time_s = 900.0
 [output]
-images = false
+pictures = false
 html = false
 pdf = false
 table = false

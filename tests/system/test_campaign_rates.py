@@ -15,7 +15,7 @@ name = "three-dry"
 [stop]
 count = 1
 [output]
-images = false
+pictures = false
 html = false
 pdf = false
 table = false
