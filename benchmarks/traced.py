@@ -33,6 +33,11 @@ class TracedLibrary:
         self.lets_go = False
 
     @property
+    def keeps_interpreter(self) -> bool:
+        """No call lets another thread of Python in."""
+        return not self.lets_go
+
+    @property
     def cpu_s(self) -> float:
         """CPU seconds spent in the functions so far."""
         return sum(self._cpu_s.copy().values())

@@ -3,6 +3,7 @@
 import gc
 import math
 import random
+import threading
 import weakref
 from contextlib import suppress
 
@@ -131,6 +132,34 @@ def test_stop_passes_a_device_thread_that_hangs_in_the_library():
                 movement.wait(5)
         WALL.sleep(0.05)
         assert scene.truth()["left.x"] < 90.0, "the blocked call must have been stopped again"
+
+
+def test_a_stop_that_hangs_in_one_device_does_not_keep_the_others_moving(monkeypatch):
+    with platform(rate=1.0) as (mico, _, scene):
+        controller = mico.application.manager.controller
+        stop, stopping = controller.stop, threading.get_ident()
+
+        def hangs_here(channel):
+            if channel.device == 0 and threading.get_ident() == stopping:
+                WALL.sleep(0.5)
+            stop(channel)
+
+        monkeypatch.setattr(controller, "stop", hangs_here)
+        running = mico["right.y"].move_to(5000.0, wait=False)
+        wait_until(lambda: mico["right.y"].position_um > 20.0)
+        stood = {}
+
+        def look():
+            WALL.sleep(0.2)
+            stood["at"] = scene.truth()["right.y"]
+
+        watcher = threading.Thread(target=look)
+        watcher.start()
+        mico.application.manager.stop("test")
+        watcher.join()
+        assert scene.truth()["right.y"] == pytest.approx(stood["at"], abs=0.5)
+        with pytest.raises(cosmic.StoppedError):
+            running.wait(5)
 
 
 def test_nothing_is_left_moving_by_a_jog_that_is_forgotten():

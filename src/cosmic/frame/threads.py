@@ -20,6 +20,9 @@ SWITCH_S: Final = 0.001
 """So long may one thread of Python keep the others waiting for the interpreter."""
 URGENT_SWITCH_S: Final = 0.0001
 """The same while something is urgent."""
+_PYTHONS_SWITCH_S: Final = 0.005
+KEPT_SWITCH_S: Final = 0.004
+"""The same while who has the interpreter is to keep it: ten times as long as a stop takes."""
 
 
 class WorkerThread(QThread):
@@ -123,18 +126,19 @@ def share_interpreter() -> None:
 
 
 @contextmanager
-def urgent() -> Generator[None]:
+def urgent(*, kept: bool = False) -> Generator[None]:
     """Let who needs the interpreter have it at once meanwhile; any thread, takes no lock.
 
-    For a few calls into a library in C, each of which has to win the interpreter back.
+    For a few calls into a library in C, each of which has to win the interpreter back. With
+    `kept`, for calls that never give it up: then the others wait.
     """
     before_s = sys.getswitchinterval()
-    sys.setswitchinterval(min(before_s, URGENT_SWITCH_S))
+    sys.setswitchinterval(KEPT_SWITCH_S if kept else min(before_s, URGENT_SWITCH_S))
     try:
         yield
     finally:
-        # Of two that overlap neither leaves it short for ever.
-        sys.setswitchinterval(max(before_s, SWITCH_S))
+        # Of two that overlap neither leaves it short, or long, for ever.
+        sys.setswitchinterval(min(max(before_s, SWITCH_S), _PYTHONS_SWITCH_S))
 
 
 def declare_gui_thread() -> Callable[[], None]:

@@ -237,3 +237,16 @@ def test_what_is_urgent_waits_for_the_interpreter_a_tenth_of_a_millisecond_each_
         assert sys.getswitchinterval() == pytest.approx(0.005)
     finally:
         sys.setswitchinterval(before_s)
+
+
+def test_what_keeps_the_interpreter_is_not_asked_for_it_meanwhile() -> None:
+    before_s = sys.getswitchinterval()
+    try:
+        sys.setswitchinterval(0.001)
+        with urgent(kept=True):
+            assert sys.getswitchinterval() >= 0.002
+            with urgent(kept=True):
+                pass
+        assert sys.getswitchinterval() <= 0.005
+    finally:
+        sys.setswitchinterval(before_s)

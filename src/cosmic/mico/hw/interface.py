@@ -118,6 +118,9 @@ class Capabilities:
         The fewest and the most steps a second, in open and in closed loop.
     amplitude_v : tuple of float
         The lowest and the highest amplitude of a step.
+    keeps_interpreter : bool
+        Its calls are Python that never waits, as a simulated library's are, so that a stop of all
+        channels goes through in one piece if the interpreter is not taken away meanwhile.
     """
 
     group_start: bool
@@ -127,6 +130,7 @@ class Capabilities:
     most_steps: int = 29_999
     frequency_hz: tuple[int, int] = (1, 18_500)
     amplitude_v: tuple[float, float] = (15.0, 100.0)
+    keeps_interpreter: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,6 +78,7 @@ class JoinedController(Controller):
                 max(each.amplitude_v[0] for each in every),
                 min(each.amplitude_v[1] for each in every),
             ),
+            keeps_interpreter=all(each.keeps_interpreter for each in every),
         )
 
     @override

@@ -83,7 +83,12 @@ class Scu3dController(Controller):
     @property
     @override
     def capabilities(self) -> Capabilities:
-        return Capabilities(group_start=False, velocity=False, position_known=self._position_known)
+        return Capabilities(
+            group_start=False,
+            velocity=False,
+            position_known=self._position_known,
+            keeps_interpreter=self._library.keeps_interpreter,
+        )
 
     @override
     def find_devices(self) -> tuple[Serial, ...]:

@@ -244,6 +244,12 @@ class Scu3dLibrary:
         self._library = library
         self._bound: dict[str, Callable[..., int] | None] = {}
 
+    @property
+    def keeps_interpreter(self) -> bool:
+        """A call never lets another thread of Python in."""
+        in_python = getattr(self._library, "in_python", False)
+        return bool(getattr(self._library, "keeps_interpreter", in_python))
+
     def has(self, name: str) -> bool:
         """Return whether the library has the function `name`."""
         return self._function(name) is not None

@@ -117,8 +117,7 @@ class SmaractCtlController(Controller):
     def device_capabilities(self, device: int) -> Capabilities:
         return self._able(self._device(device).channels)
 
-    @staticmethod
-    def _able(channels: int) -> Capabilities:
+    def _able(self, channels: int) -> Capabilities:
         return Capabilities(
             group_start=True,
             velocity=True,
@@ -127,6 +126,7 @@ class SmaractCtlController(Controller):
             most_steps=convert.MOST_STEPS,
             frequency_hz=convert.FREQUENCY_HZ,
             amplitude_v=convert.AMPLITUDE_V,
+            keeps_interpreter=self._library.keeps_interpreter,
         )
 
     # Opening and closing

@@ -17,6 +17,7 @@ from cosmic.frame.errors import (
     DeviceFault,
     MoveCancelled,
     NotConnectedError,
+    refusal,
 )
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.inbox import Inbox
@@ -93,6 +94,7 @@ class Device(WorkerThread):
         self._intake = Lock()
         self._open = False
         self._nudged = False
+        self._stops_seen = 0
         self._newest: dict[int, int] = {}
         self._void: dict[int, int] = {}
         self._queries = GateQueue(
@@ -255,6 +257,7 @@ class Device(WorkerThread):
             self._guarded(self._discovery.begin)
             while not self.end_requested:
                 self._take_waiting()
+                self._guarded(self._look_at_latch)
                 self._guarded(self._poll)
         except BaseException as exc:
             self._on_lost(DeviceError(f"its thread failed: {exc!r}"))
@@ -319,7 +322,14 @@ class Device(WorkerThread):
             case _:
                 self._on_event(message)
 
+    def _look_at_latch(self) -> None:
+        """Stop although nobody woke this thread: who stopped may hang in a foreign device."""
+        stop = self._context.gate.stop_state
+        if stop.latched and stop.epoch != self._stops_seen:
+            self._stop_all(refusal(refuse(Reason.STOPPED, f"stopped: {stop.reason}")))
+
     def _stop_all(self, error: CosmicError) -> None:
+        self._stops_seen = self._context.gate.stop_state.epoch
         for order in self._queries.orders:
             if order.epoch != self._context.gate.stop_state.epoch:
                 self._drop(order, error)

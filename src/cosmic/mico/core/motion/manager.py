@@ -610,17 +610,18 @@ class DeviceManager(QObject):
         """Stop every channel now and stay stopped until `reset_stop`; any thread.
 
         It overtakes every queue and takes no lock that a hardware call can hold. The device
-        threads repeat it after the call they may be in.
+        threads repeat it after the call they may be in; they are woken last, so that they don't
+        compete for the interpreter, and look at the latch themselves should a call here hang.
         """
         self.latch.set(reason)
         error = refusal(refuse(Reason.STOPPED, f"stopped: {reason}"))
         devices = list(self._devices.values())
-        for device in devices:
-            device.stop_later(error)
-        with urgent():
+        with urgent(kept=self.controller.capabilities.keeps_interpreter):
             for device in devices:
                 if device.isRunning():
                     self._threads.stop_channels(device)
+        for device in devices:
+            device.stop_later(error)
         logger.warning("stop: %s", reason)
         self.latch.announce()
 
