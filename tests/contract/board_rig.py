@@ -6,8 +6,10 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import override
 
+from contract.fake_ljm import FakeLjm
 from contract.fake_nidaqmx import FakeNidaqmx
 from cosmic.daqco.hw.interface import Board, BoardChunk, BoardLibrary, InputMode, InputSettings
+from cosmic.daqco.hw.labjack_library import LabjackLibrary
 from cosmic.daqco.hw.nidaqmx_library import NidaqmxLibrary
 from cosmic.daqco.hw.sim_library import SimulatedLibrary
 from cosmic.frame.clock import ManualClock
@@ -15,24 +17,36 @@ from cosmic.frame.errors import DeviceError
 
 
 class BoardRig(ABC):
-    """Two PCI-6229, Dev1 and Dev2, whose input aiK carries about K * 0.1 V.
+    """Two boards, PCI-6229 `Dev1` and `Dev2` by default, whose input aiK carries about K * 0.1 V.
 
     Time stands still unless a test calls `go_on`.
     """
 
     library: BoardLibrary
+    one, other, product = "Dev1", "Dev2", "PCI-6229"
+    count, sum_hz = 32, 250_000.0
+    ranges_v: tuple[tuple[float, float], ...] = (
+        (-10.0, 10.0),
+        (-5.0, 5.0),
+        (-1.0, 1.0),
+        (-0.2, 0.2),
+    )
+    single_modes: tuple[InputMode, ...] = (InputMode.RSE, InputMode.NRSE)
+    pair, other_pair = ("ai0", "ai8"), ("ai16", "ai24")
+    first_after = 0
+    """So many periods after the start the first sample is taken."""
 
     def __init__(self) -> None:
         self.clock = ManualClock()
         self._opened: list[Board] = []
 
-    def open(self, name: str = "Dev1") -> Board:
-        board = self.library.open(name)
+    def open(self, name: str = "") -> Board:
+        board = self.library.open(name or self.one)
         self._opened.append(board)
         return board
 
     def running(
-        self, name: str = "Dev1", *, inputs: int = 4, rate_hz: float = 1000.0, chunk: int = 10
+        self, name: str = "", *, inputs: int = 4, rate_hz: float = 1000.0, chunk: int = 10
     ) -> Board:
         board = self.open(name)
         board.configure(some_inputs(inputs), rate_hz, chunk)
@@ -138,6 +152,46 @@ class NidaqmxRig(BoardRig):
     @override
     def uninstall(self) -> None:
         self.driver.installed = False
+
+
+class LabjackRig(BoardRig):
+    one, other, product = "T7_470010001", "T7_470010002", "T7"
+    count, sum_hz = 14, 100_000.0
+    ranges_v = ((-10.0, 10.0), (-1.0, 1.0), (-0.1, 0.1), (-0.01, 0.01))
+    single_modes = (InputMode.RSE,)
+    pair, other_pair = ("ai0", "ai1"), ("ai4", "ai5")
+    first_after = 1
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.ljm = FakeLjm()
+        self.library = LabjackLibrary(self.clock, api=self.ljm)
+
+    @override
+    def close(self) -> None:
+        super().close()
+        assert not self.ljm.handles, "a handle was left open"
+
+    @override
+    def go_on(self, samples: int, *, rate_hz: float = 1000.0) -> None:
+        self.clock.advance(samples / rate_hz)
+        self.ljm.take(samples)
+
+    @override
+    def unplug(self, name: str) -> None:
+        self.ljm.device(name).unplug()
+
+    @override
+    def plug_in(self, name: str) -> None:
+        self.ljm.device(name).plugged = True
+
+    @override
+    def take_away(self, name: str, *, taken: bool) -> None:
+        self.ljm.device(name).taken = taken
+
+    @override
+    def uninstall(self) -> None:
+        self.library = LabjackLibrary(self.clock)
 
 
 def some_inputs(count: int, *, mode: InputMode = InputMode.RSE) -> list[InputSettings]:

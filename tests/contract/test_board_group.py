@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from contract.board_rig import BoardRig, NidaqmxRig, SimulatedRig, one_input
+from contract.board_rig import BoardRig, LabjackRig, NidaqmxRig, SimulatedRig, one_input
 from cosmic.daqco.hw.board_group import BoardGroup
 from cosmic.daqco.hw.interface import BoardChunk, OverrunError
 from cosmic.frame.errors import DeviceError, LimitError
@@ -139,3 +139,65 @@ class Late:
 
     def receive(self, timeout_s):
         return None if self.late else self._board.receive(timeout_s)
+
+
+# --- boards of different makes ----------------------------------------------------------------
+
+
+@pytest.fixture
+def makes() -> Iterator[tuple[NidaqmxRig, LabjackRig]]:
+    ours = NidaqmxRig(), LabjackRig()
+    yield ours
+    for each in ours:
+        each.close()
+
+
+def both(makes: tuple[NidaqmxRig, LabjackRig], rate_hz: float = 1000.0) -> BoardGroup:
+    group = BoardGroup([each.open() for each in makes], clock_ppm=50.0)
+    inputs = [one_input("ai3"), one_input("ai1")]
+    group.configure({each.one: inputs for each in makes}, rate_hz, 10)
+    return group
+
+
+def test_a_board_of_ni_and_one_of_labjack_acquire_together(
+    makes: tuple[NidaqmxRig, LabjackRig],
+) -> None:
+    group = both(makes)
+    group.start()
+    for each in makes:
+        each.go_on(20)
+    chunks = [received(group), received(group)]
+    assert [each.first_sample for each in chunks] == [0, 10]
+    assert chunks[0].volts.mean(axis=1) == pytest.approx([0.3, 0.1, 0.3, 0.1], abs=5e-3)
+
+
+def test_how_well_the_clocks_of_two_makes_agree_is_told(
+    makes: tuple[NidaqmxRig, LabjackRig],
+) -> None:
+    group = both(makes)
+    assert group.agreement == ()
+    group.start()
+    for each in makes:
+        each.go_on(10)
+    received(group)
+    (agreement,) = group.agreement
+    assert (agreement.board, agreement.first) == ("T7_470010001", "Dev1")
+    assert agreement.offset_s == pytest.approx(0.001), "the first scan comes a period later"
+    assert agreement.parted_s(3600.0) == pytest.approx(0.001 + 0.36)
+    assert "1.0 ms after those of Dev1" in agreement.text and "360 ms an hour" in agreement.text
+
+
+def test_two_makes_that_make_different_rates_of_one_are_refused(
+    makes: tuple[NidaqmxRig, LabjackRig],
+) -> None:
+    with pytest.raises(DeviceError, match="different rates"):
+        both(makes, rate_hz=7013.0)
+
+
+def test_boards_with_one_clock_need_no_statement(rig: BoardRig) -> None:
+    group = BoardGroup([rig.open("Dev1"), rig.open("Dev2")], clocked=["Dev2"], clock_ppm=50.0)
+    group.configure(INPUTS, 1000.0, 10)
+    group.start()
+    rig.go_on(10)
+    received(group)
+    assert group.agreement == ()

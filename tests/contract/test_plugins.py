@@ -83,7 +83,7 @@ def test_what_is_shipped_loads_and_refuses_options_that_it_has_not(plugin: Plugi
 
 
 def test_the_shipped_boards_are_there() -> None:
-    assert {"nidaqmx", "simulated"} <= set(names(Kind.BOARD))
+    assert {"labjack", "nidaqmx", "simulated"} <= set(names(Kind.BOARD))
 
 
 def test_the_shipped_cameras_are_there() -> None:

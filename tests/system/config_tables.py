@@ -12,6 +12,7 @@ from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.daqco.core.settings import (
     ChannelSettings,
     DaqcoSettings,
+    DriverSettings,
     LimitSettings,
     ScaleSettings,
 )
@@ -83,6 +84,7 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[[mico.link]]": LinkSettings,
     "[[mico.positioner]]": PositionerSettings,
     "[daqco]": DaqcoSettings,
+    "[[daqco.driver]]": DriverSettings,
     "[[daqco.scale]]": ScaleSettings,
     "[[daqco.channel]]": ChannelSettings,
     "[[daqco.limit]]": LimitSettings,

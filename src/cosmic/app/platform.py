@@ -244,7 +244,8 @@ def _check_simulation(file: PlatformFile, path: Path, *, rate: float, only_simul
             f"{path}: mico.backend: only the simulated platform has a rate, --cold, --sample or "
             "--truth"
         )
-    if rate != 1.0 and file.daqco is not None and file.daqco.backend != "simulated":
+    boards = {each.backend for each in file.daqco.drivers} if file.daqco is not None else set()
+    if rate != 1.0 and not boards <= {"simulated"}:
         raise ConfigError(f"{path}: daqco.backend: real boards have no rate; leave --rate out")
 
 

@@ -73,7 +73,7 @@ def _network_mistakes(file: PlatformFile, path: Path) -> list[str]:
 def _backend_mistakes(file: PlatformFile, path: Path) -> list[str]:
     named: list[tuple[str, Kind, str, Mapping[str, object]]] = []
     if file.daqco is not None:
-        named.append(("daqco", Kind.BOARD, file.daqco.backend, file.daqco.options))
+        named += [("daqco", Kind.BOARD, each.backend, each.options) for each in file.daqco.drivers]
     if file.vico is not None:
         options = file.vico.options
         used = dict.fromkeys([*(each.backend for each in file.vico.camera), *options])

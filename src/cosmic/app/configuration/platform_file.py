@@ -43,7 +43,7 @@ class PlatformFile(StrictModel):
         """Whether no part of the platform is real; what is left out counts as simulated."""
         backends: set[str] = {self.mico.backend}
         if self.daqco is not None:
-            backends.add(self.daqco.backend)
+            backends |= {each.backend for each in self.daqco.drivers}
         if self.vico is not None:
             backends |= {each.backend for each in self.vico.camera}
             backends |= {self.vico.lens.backend, self.vico.light.backend} - {"none"}

@@ -22,11 +22,13 @@ PORTS = "Ports"
 def hardware(file: PlatformFile) -> list[Finding]:
     """Look for every library and its devices; what the platform file names is needed."""
     cameras = {each.backend for each in file.vico.camera} if file.vico else set()
-    boards = file.daqco is not None and file.daqco.backend == "nidaqmx"
+    boards = {each.backend for each in file.daqco.drivers} if file.daqco is not None else set()
     found = carry_out(
         LIBRARIES, "scu3d", lambda: _controllers(file), needed=file.mico.backend == "scu3d"
     )
-    found += carry_out(LIBRARIES, "nidaqmx", _boards, needed=boards)
+    for backend in names(Kind.BOARD):
+        if backend != "simulated":
+            found += _boards(backend, needed=backend in boards)
     for backend in names(Kind.CAMERA):
         if backend != "simulated":
             found += _cameras(backend, needed=backend in cameras)
@@ -44,10 +46,14 @@ def _controllers(file: PlatformFile) -> Iterator[Finding]:
     yield Finding(LIBRARIES, "scu3d", state, found, advice)
 
 
-def _boards() -> Iterator[Finding]:
-    library = make_library("nidaqmx")
-    names = ", ".join(each.name for each in library.list_boards())
-    yield Finding(LIBRARIES, "nidaqmx", State.GOOD, f"{library.name}; boards: {names or 'none'}")
+def _boards(backend: str, *, needed: bool) -> list[Finding]:
+    def look() -> Iterator[Finding]:
+        library = make_library(backend)
+        there = ", ".join(each.name for each in library.list_boards())
+        found = f"{library.name}; boards: {there or 'none'}"
+        yield Finding(LIBRARIES, backend, State.GOOD, found)
+
+    return carry_out(LIBRARIES, backend, look, needed=needed)
 
 
 def _cameras(backend: str, *, needed: bool) -> list[Finding]:

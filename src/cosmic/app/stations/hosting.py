@@ -14,6 +14,7 @@ from cosmic.app.simulation import SimulationFaults
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.core.left_behind import Closing, OpenRecordings, Outcome
 from cosmic.daqco.core.settings import DaqcoSettings
+from cosmic.daqco.hw.factory import join as join_boards
 from cosmic.daqco.hw.factory import make_library
 from cosmic.daqco.hw.interface import Source
 from cosmic.frame.application import GuiFactory
@@ -128,18 +129,22 @@ def _build_mico(
 def _build_daqco(
     site: Site, faults: SimulationFaults, settings: DaqcoSettings, gui_factory: GuiFactory | None
 ) -> DaqcoApplication:
-    library = make_library(
-        settings.backend,
-        clock=site.clock,
-        scene_sources=_sources(site.scene),
-        clock_sources=settings.clock_sources,
-        options=settings.options,
-        seed=site.seed,
-    )
-    faults.join_simulated("board", library)
+    libraries = [
+        make_library(
+            each.backend,
+            clock=site.clock,
+            scene_sources=_sources(site.scene),
+            clock_sources=settings.clock_sources,
+            options=each.options,
+            seed=site.seed,
+        )
+        for each in settings.drivers
+    ]
+    for each in reversed(libraries):  # what is injected reaches the boards of the first
+        faults.join_simulated("board", each)
     notes = open_recordings()
     application = DaqcoApplication(
-        library,
+        join_boards(libraries),
         settings,
         clock=site.clock,
         policy=site.policy,

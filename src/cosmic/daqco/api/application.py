@@ -20,6 +20,7 @@ from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings, ScaleSettings
 from cosmic.daqco.core.udaq_buffer import UDaqBuffer
 from cosmic.daqco.core.udaq_core import UDaqCore
+from cosmic.daqco.hw.board_group import ClockAgreement
 from cosmic.daqco.hw.interface import Board, BoardInfo, BoardLibrary, OverrunError
 from cosmic.frame.application import GuiFactory
 from cosmic.frame.background import BackgroundJobs, OnResult, do_and_report
@@ -164,6 +165,12 @@ class DaqcoApplication(TaskApplication):
         core = self._core
         return core.rate_hz if core is not None else self._settings.rate_hz
 
+    @property
+    def clock_agreement(self) -> tuple[ClockAgreement, ...]:
+        """How well the sample clocks of the boards agree that have clocks of their own."""
+        core = self._core
+        return core.agreement if core is not None else ()
+
     def scales(self) -> dict[str, Scale]:
         """Return the scale in force of every channel, by its name."""
         known = self._settings.scales()
@@ -262,6 +269,7 @@ class DaqcoApplication(TaskApplication):
                 self._take,
                 self._policy,
                 clocked=tuple(settings.clock_sources),
+                clock_ppm=settings.clock_ppm,
             )
             core.failed.connect(self._on_core_failed, Qt.ConnectionType.DirectConnection)
             self.buffer.clear()

@@ -29,6 +29,7 @@ from cosmic.daqco.core.limits import LOWEST_RATE_HZ, Crossing, Limit, LimitGuard
 from cosmic.daqco.core.plan import highest_rate_hz
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, LimitSettings
+from cosmic.daqco.hw.board_group import ClockAgreement
 from cosmic.daqco.hw.interface import BoardInfo
 from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.arguments import checked_class
@@ -183,6 +184,12 @@ class Daqco(Declared):
     def _boards(self) -> tuple[BoardInfo, ...]:
         return tuple(self._application.infos.values())
 
+    @property
+    @state(quiet=True)
+    def clock_agreement(self) -> tuple[ClockAgreement, ...]:
+        """How well the sample clocks of boards agree that have clocks of their own."""
+        return self._application.clock_agreement
+
     def highest_rate_hz(self, channels: Sequence[ChannelSettings] | None = None) -> float:
         """Return the highest rate for the active ones of `channels`, or of those in force."""
         infos = {each.name: each for each in self._boards}
@@ -296,7 +303,7 @@ class Daqco(Declared):
         present = self._application.settings
         if settings.directory != present.directory:
             self._folders.folder(settings.directory)
-        fixed = [(each.backend, each.options, each.clock_sources) for each in (settings, present)]
+        fixed = [(each.drivers, each.clock_sources) for each in (settings, present)]
         if fixed[0] != fixed[1]:
             raise ConfigError("driver and clocks of the boards are set in the platform file only")
 

@@ -21,6 +21,7 @@ from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.daqco.core.udaq_buffer import UDaqBuffer
 from cosmic.daqco.core.unclosed_file import is_unclosed
+from cosmic.daqco.hw.board_group import ClockAgreement
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.events import Event
@@ -87,6 +88,11 @@ class Acquisition(Protocol):
     @abstractmethod
     def rate_hz(self) -> float:
         """The rate of each channel."""
+
+    @property
+    @abstractmethod
+    def clock_agreement(self) -> tuple[ClockAgreement, ...]:
+        """How well the sample clocks of the boards agree that have clocks of their own."""
 
     @abstractmethod
     def scales(self) -> dict[str, Scale]:
@@ -178,6 +184,8 @@ class Recorder:
             self._note = None if self._notes is None else self._notes.note(writer.path)
             writer.start()
             self._unsubscribe = self._application.buffer.subscribe(self._write)
+            for each in self._application.clock_agreement:
+                self.note("clocks", each.text)
         logger.info("recording to %s", writer.path)
         self._changed.emit()
 

@@ -9,6 +9,7 @@ from cosmic.daqco.core.settings import (
     ChannelSettings,
     DaqcoSettings,
 )
+from cosmic.daqco.hw.board_checks import negative_input
 from cosmic.daqco.hw.interface import BoardInfo, InputMode, InputSettings
 from cosmic.frame.errors import LimitError, NotConnectedError
 from cosmic.frame.verdict import Reason, refuse
@@ -108,33 +109,36 @@ def _check_board(board: BoardInfo, channels: Sequence[ChannelSettings], rate_hz:
             value=rate_hz,
             limit=highest,
         )
-    half = len(board.inputs) // 2
     used: dict[str, str] = {}
     for each in channels:
-        for taken in _taken(each, board, half):
+        for taken in _taken(each, board):
             if taken in used:
                 raise _limit(f"{each.name} and {used[taken]} both use {board.name}/{taken}")
             used[taken] = each.name
 
 
-def _taken(channel: ChannelSettings, board: BoardInfo, half: int) -> tuple[str, ...]:
+def _taken(channel: ChannelSettings, board: BoardInfo) -> tuple[str, ...]:
     """Return the inputs that a channel occupies, its partner as well where differential."""
     if channel.input not in board.inputs:
         raise _limit(
             f"{channel.name}: {board.name} has no input {channel.input}; it has "
             f"{board.inputs[0]} to {board.inputs[-1]}"
         )
-    if channel.input_mode is not InputMode.DIFFERENTIAL:
+    if channel.input_mode not in board.modes:
+        raise _limit(
+            f"{channel.name}: {board.name}/{channel.input} cannot be wired {channel.mode}; a "
+            f"{board.product} can: {', '.join(board.modes)}"
+        )
+    if channel.input_mode is not InputMode.DIFFERENTIAL or board.pairs == ():
         return (channel.input,)
-    number = board.inputs.index(channel.input)
-    # NI pairs ai0 with ai8, ai16 with ai24: within each block of sixteen.
-    block, offset = divmod(number, 16)
-    if offset >= 8 or number >= 2 * half:
+    negative = negative_input(board, channel.input)
+    if negative is None:
+        partner = [each for each in board.inputs if negative_input(board, each) == channel.input]
         raise _limit(
             f"{channel.name}: {channel.input} is the second half of a pair; give its partner "
-            f"{board.inputs[block * 16 + offset - 8]}"
+            f"{', '.join(partner) or 'there is none'}"
         )
-    return channel.input, board.inputs[number + 8]
+    return channel.input, negative
 
 
 def _limit(text: str, *, value: float | None = None, limit: float | None = None) -> LimitError:

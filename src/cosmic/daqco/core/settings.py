@@ -72,6 +72,13 @@ class LimitSettings(StrictModel):
         return self
 
 
+class DriverSettings(StrictModel):
+    """One more driver, whose boards acquire beside those of the first."""
+
+    backend: str = Field(min_length=1)
+    options: dict[str, object] = Field(default_factory=dict)
+
+
 class DaqcoSettings(StrictModel):
     """Section ``[daqco]`` of platform.toml."""
 
@@ -83,9 +90,16 @@ class DaqcoSettings(StrictModel):
     silence_s: float = Field(default=0.1, ge=0.02, le=1.0)
     directory: str = ""
     clock_sources: dict[str, str] = Field(default_factory=dict)
+    clock_ppm: float = Field(default=50.0, ge=0.0, le=1000.0)
+    driver: Annotated[tuple[DriverSettings, ...], Field(strict=False)] = ()
     scale: Annotated[tuple[ScaleSettings, ...], Field(strict=False)] = ()
     channel: Annotated[tuple[ChannelSettings, ...], Field(strict=False, min_length=1)]
     limit: Annotated[tuple[LimitSettings, ...], Field(strict=False)] = ()
+
+    @property
+    def drivers(self) -> tuple[DriverSettings, ...]:
+        """All drivers, that of ``backend`` first."""
+        return DriverSettings(backend=self.backend, options=self.options), *self.driver
 
     def scales(self) -> dict[str, Scale]:
         """Return all scales by name; raises `ConfigError`."""

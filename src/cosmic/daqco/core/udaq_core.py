@@ -1,5 +1,6 @@
 """`UDaqCore`: acquires from all boards in a thread of its own (thesis 6.2.1, Fig. 6.12)."""
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
@@ -10,11 +11,13 @@ from typing_extensions import override
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.plan import AcquisitionPlan
 from cosmic.daqco.core.scale import Scale
-from cosmic.daqco.hw.board_group import BoardGroup
+from cosmic.daqco.hw.board_group import BoardGroup, ClockAgreement
 from cosmic.daqco.hw.interface import Board, BoardChunk
 from cosmic.frame.errors import DeviceError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.threads import WorkerThread
+
+logger = logging.getLogger(__name__)
 
 LOOK_S: Final = 0.05
 
@@ -28,6 +31,8 @@ class UDaqCore(WorkerThread):
     ----------
     clocked : sequence of str
         Boards that take their sample clock from another; they are started first.
+    clock_ppm : float
+        How far off the clock of any real board may be, in parts of a million.
 
     Signals
     -------
@@ -48,17 +53,25 @@ class UDaqCore(WorkerThread):
         policy: FailurePolicy,
         *,
         clocked: Sequence[str] = (),
+        clock_ppm: float = 0.0,
         parent: QObject | None = None,
     ) -> None:
         super().__init__("acquisition", policy, parent)
         self.plan = plan
-        self._boards = BoardGroup([boards[name] for name in plan.boards], clocked)
+        self._boards = BoardGroup(
+            [boards[name] for name in plan.boards], clocked, clock_ppm=clock_ppm
+        )
         self._put = put
         self._scales = tuple(scales[each.name] for each in plan.channels)
         self._names = tuple(each.name for each in plan.channels)
         in_order = plan.rows == tuple(range(len(plan.rows)))
         self._rows = None if in_order else np.array(plan.rows)
         self.rate_hz = plan.rate_hz
+
+    @property
+    def agreement(self) -> tuple[ClockAgreement, ...]:
+        """How well the sample clocks agree that are not one clock; known with the first chunk."""
+        return self._boards.agreement
 
     def set_scales(self, scales: Mapping[str, Scale]) -> None:
         """Apply other scales from the next chunk on; any thread."""
@@ -85,8 +98,12 @@ class UDaqCore(WorkerThread):
         try:
             while not self.end_requested:
                 chunk = self._boards.receive(LOOK_S)
-                if chunk is not None:
-                    self._put(self._scaled(chunk))
+                if chunk is None:
+                    continue
+                if not chunk.first_sample:
+                    for each in self.agreement:
+                        logger.warning("%s", each.text)
+                self._put(self._scaled(chunk))
         except DeviceError as exc:
             self.failed.emit(exc)
         finally:

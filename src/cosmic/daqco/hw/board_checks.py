@@ -17,6 +17,8 @@ def negative_input(info: BoardInfo, positive: str) -> str | None:
 
     None when `positive` cannot be the first half of a pair.
     """
+    if info.pairs is not None:
+        return dict(info.pairs).get(positive)
     block = min(_BLOCK, len(info.inputs))
     number = info.inputs.index(positive)
     partner = number + block // 2
@@ -58,12 +60,13 @@ def range_in_force(info: BoardInfo, each: InputSettings) -> tuple[float, float]:
 
 
 def check_inputs(info: BoardInfo, inputs: Sequence[InputSettings], *, paired: bool = True) -> None:
-    """Refuse inputs that are not there, used twice, not pairable or out of every range.
+    """Refuse inputs that are not there, used twice, not to be wired so or out of every range.
 
     Parameters
     ----------
     paired : bool
-        A differential channel takes two inputs; False where each input has two wires of its own.
+        A differential channel takes two inputs; False where each input has two wires of its own,
+        which `info` may say as well.
 
     Raises
     ------
@@ -80,8 +83,10 @@ def check_inputs(info: BoardInfo, inputs: Sequence[InputSettings], *, paired: bo
             limit=float(len(info.inputs)),
             unit="",
         )
+    paired = paired and info.pairs != ()
     used: dict[str, str] = {}
     for each in inputs:
+        _check_mode(info, each)
         for wire in _wires(info, each, paired=paired):
             if wire in used:
                 raise DeviceError(
@@ -117,6 +122,15 @@ def check_chunk(info: BoardInfo, chunk_samples: int) -> None:
     if not chunk_samples >= 1:
         raise DeviceError(
             f"{info.name}: chunks of {chunk_samples} samples asked; give at least 1",
+            fault=DeviceFault.PARAMETER,
+        )
+
+
+def _check_mode(info: BoardInfo, each: InputSettings) -> None:
+    if each.mode not in info.modes:
+        raise DeviceError(
+            f"{info.name}: {each.input} cannot be wired {each.mode}; a {info.product} can: "
+            f"{', '.join(info.modes)}",
             fault=DeviceFault.PARAMETER,
         )
 

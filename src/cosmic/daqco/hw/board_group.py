@@ -1,6 +1,7 @@
 """`BoardGroup`: the boards of one acquisition, received from by one call."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,13 +10,45 @@ from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceError, DeviceFault
 
 
+@dataclass(frozen=True, slots=True)
+class ClockAgreement:
+    """How well the sample clock of a board agrees with that of the first board of a group.
+
+    Attributes
+    ----------
+    offset_s : float
+        By how much its sample 0 was taken later, as far as the two drivers can tell.
+    drift_ppm : float
+        How far the two may part, in parts of a million of the time that has passed.
+    """
+
+    board: str
+    first: str
+    offset_s: float
+    drift_ppm: float
+
+    def parted_s(self, after_s: float) -> float:
+        """Return how far apart samples of one number may lie so long after the start, s."""
+        return abs(self.offset_s) + 1e-6 * self.drift_ppm * after_s
+
+    @property
+    def text(self) -> str:
+        """The same for the operator."""
+        offset_ms, hour_ms = 1e3 * self.offset_s, 3600.0 * 1e-3 * self.drift_ppm
+        return (
+            f"{self.board} has a sample clock of its own: its samples lie {offset_ms:.1f} ms after "
+            f"those of {self.first} at the start, and may part from them by {self.drift_ppm:g} ppm,"
+            f" {hour_ms:.0f} ms an hour, until acquisition starts again"
+        )
+
+
 class BoardGroup:
     """Boards that acquire together; of any maker, real or simulated.
 
     Order of calls as of `Board`: `configure`, `start`, `receive` again and again, `stop`. One
     thread receives; any thread may stop. The boards stay with whoever opened them. Chunks are
     joined by the numbers of their samples; boards that are to stay in step over hours need a
-    common sample clock.
+    common sample clock, and `agreement` says how far the others may part.
 
     Parameters
     ----------
@@ -23,14 +56,25 @@ class BoardGroup:
         Their inputs follow each other in this order in every chunk.
     clocked : sequence of str
         Boards that take their sample clock from another; they are started first.
+    clock_ppm : float
+        How far off the clock of any real board may be, in parts of a million.
     """
 
-    def __init__(self, boards: Sequence[Board], clocked: Sequence[str] = ()) -> None:
+    def __init__(
+        self, boards: Sequence[Board], clocked: Sequence[str] = (), *, clock_ppm: float = 0.0
+    ) -> None:
         if not boards:
             raise ValueError("a group has at least one board")
         self._boards = tuple(boards)
         self._clocked = frozenset(clocked)
         self._pieces: dict[int, BoardChunk] = {}
+        self._drift_ppm = 2.0 * clock_ppm
+        self._agreement: tuple[ClockAgreement, ...] = ()
+
+    @property
+    def agreement(self) -> tuple[ClockAgreement, ...]:
+        """How well the clocks agree that are not one clock; known with the first chunk."""
+        return self._agreement
 
     def configure(
         self, inputs: Mapping[str, Sequence[InputSettings]], rate_hz: float, chunk_samples: int
@@ -49,21 +93,22 @@ class BoardGroup:
         DeviceError
             A board is gone or taken, or they make different rates of this one.
         """
-        rates = {
+        rates = [
             board.configure(inputs[board.info.name], rate_hz, chunk_samples)
             for board in self._boards
-        }
-        if len(rates) > 1:
-            given = ", ".join(f"{rate:g} Hz" for rate in sorted(rates))
+        ]
+        if max(rates) - min(rates) > 1e-6 * self._drift_ppm * min(rates):
+            given = ", ".join(f"{rate:g} Hz" for rate in sorted(set(rates)))
             raise DeviceError(
-                f"the boards make different rates of this one: {given}",
+                f"the boards make different rates of this one: {given}; choose one that all make, "
+                f"such as 1000 Hz",
                 fault=DeviceFault.PARAMETER,
             )
-        return rates.pop()
+        return rates[0]
 
     def start(self) -> None:
         """Begin to acquire on all boards; raises `DeviceError`, and none acquires then."""
-        self._pieces = {}
+        self._pieces, self._agreement = {}, ()
         # Who waits for another's sample clock must listen before that clock begins.
         in_order = sorted(self._boards, key=lambda board: board.info.name not in self._clocked)
         try:
@@ -117,5 +162,16 @@ class BoardGroup:
                     f"sample {piece.first_sample} arrived with sample {first.first_sample}; "
                     f"start again"
                 )
+        if not first.first_sample:
+            self._agreement = tuple(self._compared(pieces))
         volts = np.concatenate([piece.volts for piece in pieces])
         return BoardChunk(first.first_sample, first.time_s, volts)
+
+    def _compared(self, pieces: list[BoardChunk]) -> Iterator[ClockAgreement]:
+        first = self._boards[0].info
+        for board, piece in zip(self._boards[1:], pieces[1:], strict=True):
+            info = board.info
+            one_clock = info.name in self._clocked or first.name in self._clocked
+            if not one_clock and not (info.simulated and info.product == first.product):
+                offset_s = piece.time_s - pieces[0].time_s
+                yield ClockAgreement(info.name, first.name, offset_s, self._drift_ppm)

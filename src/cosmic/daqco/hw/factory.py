@@ -1,8 +1,9 @@
 """Makes the acquisition boards that the configuration names."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from cosmic.daqco.hw.interface import BoardContext, BoardLibrary, Source
+from cosmic.daqco.hw.joined_boards import JoinedLibrary
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.plugins import Kind, make
 
@@ -21,8 +22,9 @@ def make_library(
     Parameters
     ----------
     backend : str
-        "simulated", "nidaqmx" for boards of National Instruments, or what another package brings
-        (`cosmic.frame.plugins`). None ever stands in for another, and only this one is loaded.
+        "simulated", "nidaqmx" for boards of National Instruments, "labjack" for those of LabJack,
+        or what another package brings (`cosmic.frame.plugins`). None ever stands in for another,
+        and only this one is loaded.
     clock : Clock or None
         The platform's, which paces simulated boards and stamps real ones; None is the wall's.
     scene_sources : mapping of (str, str) to Source, or None
@@ -41,3 +43,8 @@ def make_library(
     context = BoardContext(clock or WALL, clock_sources or {}, scene_sources, seed)
     library: BoardLibrary = make(Kind.BOARD, backend, context, options or {})
     return library
+
+
+def join(libraries: Sequence[BoardLibrary]) -> BoardLibrary:
+    """Return the boards of several makes as one library; one alone stays as it is."""
+    return libraries[0] if len(libraries) == 1 else JoinedLibrary(libraries)

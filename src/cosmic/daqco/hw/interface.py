@@ -49,12 +49,17 @@ class BoardInfo:
     product : str
         Such as "PCI-6229".
     inputs : tuple of str
-        Single-ended inputs in order, "ai0" and so on. Within each block of sixteen, the first
-        eight can be wired differentially, ai0 with ai8 and so on.
+        Single-ended inputs in order, "ai0" and so on. On boards of National Instruments the first
+        eight of each block of sixteen can be wired differentially, ai0 with ai8 and so on.
     max_single_rate_hz, max_multi_rate_hz : float
         Highest rate of one input alone, and the sum of the rates of several.
     ranges_v : tuple of (float, float)
         Input ranges, the widest first.
+    modes : tuple of InputMode
+        How inputs can be wired at all; a board may refuse one for some of its inputs.
+    pairs : tuple of (str, str), or None
+        Positive and negative input of each differential pair; None is that of National
+        Instruments, as above. Empty: a differential input has two terminals of its own.
     """
 
     name: str
@@ -65,6 +70,8 @@ class BoardInfo:
     max_single_rate_hz: float
     max_multi_rate_hz: float
     ranges_v: tuple[tuple[float, float], ...]
+    modes: tuple[InputMode, ...] = tuple(InputMode)
+    pairs: tuple[tuple[str, str], ...] | None = None
 
     def highest_rate_hz(self, active: int) -> float:
         """Return the highest sampling rate a channel with `active` channels at once."""

@@ -40,6 +40,9 @@ MakeSignal = Callable[[Sequence[InputSettings], int], Signal]
 class _Setup:
     inputs: tuple[InputSettings, ...]
     rate_hz: float
+    """As the board tells it."""
+    true_hz: float
+    """As its clock really runs."""
     chunk_samples: int
     signal: Signal
     offsets_s: npt.NDArray[np.float64]
@@ -56,6 +59,11 @@ class _Run:
     next_sample: int = 0
 
     def time_s(self, sample: int) -> float:
+        """Return when a sample is truly taken."""
+        return self.start_s + sample / self.setup.true_hz
+
+    def told_s(self, sample: int) -> float:
+        """Return when it is, as far as the board's clock knows."""
         return self.start_s + sample / self.setup.rate_hz
 
 
@@ -68,6 +76,8 @@ class SimulatedBoard(Board):
         Makes what the inputs carry, from their settings and the length of a chunk.
     timebase_hz : float
         The rate is this over a whole number, as on the real board; 0 allows any rate.
+    clock_ppm : float
+        How much faster than it says its sample clock runs, in parts of a million.
     paced : bool
         False: chunks are due at once, however many are asked for.
     owners : dict of str to SimulatedBoard
@@ -88,6 +98,7 @@ class SimulatedBoard(Board):
         receiver: Worker,
         timebase_hz: float = TIMEBASE_HZ,
         paced: bool = True,
+        clock_ppm: float = 0.0,
     ) -> None:
         self._info = info
         self._clock = clock
@@ -96,6 +107,7 @@ class SimulatedBoard(Board):
         self._owners = owners
         self._timebase_hz = timebase_hz
         self._paced = paced
+        self._fast = 1.0 + 1e-6 * clock_ppm
         self._setup: _Setup | None = None
         self._run: _Run | None = None
         self._closed = False
@@ -122,8 +134,9 @@ class SimulatedBoard(Board):
                 raise self._taken("configure")
         real_hz = self._nearest_rate_hz(rate_hz)
         signal = self._make_signal(inputs, chunk_samples)
-        offsets_s = np.arange(chunk_samples) / real_hz
-        self._setup = _Setup(tuple(inputs), real_hz, chunk_samples, signal, offsets_s)
+        true_hz = real_hz * self._fast
+        offsets_s = np.arange(chunk_samples) / true_hz
+        self._setup = _Setup(tuple(inputs), real_hz, true_hz, chunk_samples, signal, offsets_s)
         logger.debug("%s: %d inputs at %g Hz", self._info.name, len(inputs), real_hz)
         return real_hz
 
@@ -151,7 +164,7 @@ class SimulatedBoard(Board):
         run.next_sample = first + setup.chunk_samples
         if self._run is not run:
             return None
-        return BoardChunk(first, float(times_s[0]), volts)
+        return BoardChunk(first, run.told_s(first), volts)
 
     @override
     def stop(self) -> None:
@@ -225,7 +238,7 @@ class SimulatedBoard(Board):
             raise self._overrun(run, setup.chunk_samples)
         if not self._paced or self._faults.hit("stalled", self._info.name):
             return
-        taken = int((self._clock.now_s() - run.start_s) * setup.rate_hz)
+        taken = int((self._clock.now_s() - run.start_s) * setup.true_hz)
         # The receiver is late by the wall: on a fast clock the buffer holds as much longer.
         room_s = BUFFER_S * max(1.0, self._clock.rate)
         room = int(room_s * setup.rate_hz) + FIFO_SAMPLES // len(setup.inputs)

@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, Literal
 
+from pydantic import Field
 from typing_extensions import override
 
 from cosmic.daqco.hw.board_checks import range_in_force
@@ -12,6 +13,7 @@ from cosmic.daqco.hw.interface import (
     BoardContext,
     BoardInfo,
     BoardLibrary,
+    InputMode,
     InputSettings,
     Source,
 )
@@ -19,8 +21,8 @@ from cosmic.daqco.hw.sim_board import SimulatedBoard
 from cosmic.daqco.hw.sim_faults import BoardFaults
 from cosmic.daqco.hw.sim_signal import BoardSignal, Signal
 from cosmic.frame.clock import Clock
+from cosmic.frame.config import StrictModel
 from cosmic.frame.errors import ConfigError, DeviceFault, NotConnectedError
-from cosmic.frame.plugins import NoOptions
 
 PCI_6229: Final = BoardInfo(
     name="Dev",
@@ -32,6 +34,36 @@ PCI_6229: Final = BoardInfo(
     max_multi_rate_hz=250_000.0,
     ranges_v=((-10.0, 10.0), (-5.0, 5.0), (-1.0, 1.0), (-0.2, 0.2)),
 )
+_T7_INPUTS: Final = tuple(f"ai{number}" for number in range(14))
+T7: Final = BoardInfo(
+    name="Dev",
+    product="T7",
+    simulated=True,
+    serial=470_010_000,
+    inputs=_T7_INPUTS,
+    max_single_rate_hz=100_000.0,
+    max_multi_rate_hz=100_000.0,
+    ranges_v=((-10.0, 10.0), (-1.0, 1.0), (-0.1, 0.1), (-0.01, 0.01)),
+    modes=(InputMode.RSE, InputMode.DIFFERENTIAL),
+    pairs=tuple(zip(_T7_INPUTS[::2], _T7_INPUTS[1::2], strict=True)),
+)
+
+
+class SimulatedOptions(StrictModel):
+    """What the configuration may say under ``options``.
+
+    Attributes
+    ----------
+    name : str
+        What the boards are called, before their number.
+    clock_ppm : float
+        How much faster than it says the sample clock of these boards runs, in parts of a million.
+    """
+
+    product: Literal["PCI-6229", "T7"] = "PCI-6229"
+    boards: int = Field(default=2, ge=1, le=16)
+    name: str = Field(default=PCI_6229.name, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
+    clock_ppm: float = Field(default=0.0, ge=-1000.0, le=1000.0)
 
 
 class SimulatedLibrary(BoardLibrary):
@@ -48,6 +80,8 @@ class SimulatedLibrary(BoardLibrary):
         How many there are.
     info : BoardInfo
         What each is; names and serials are numbered from it.
+    clock_ppm : float
+        How much faster than they say their sample clock runs, in parts of a million.
 
     Attributes
     ----------
@@ -68,14 +102,16 @@ class SimulatedLibrary(BoardLibrary):
         boards: int = 2,
         seed: int = 0,
         info: BoardInfo = PCI_6229,
+        clock_ppm: float = 0.0,
     ) -> None:
         self._clock = clock
+        self._clock_ppm = clock_ppm
         self._sources = dict(sources or {})
         self._seed = seed
         self._infos = {
             each.name: each
             for each in (
-                replace(info, name=f"Dev{number}", serial=info.serial + number)
+                replace(info, name=f"{info.name}{number}", serial=info.serial + number)
                 for number in range(1, boards + 1)
             )
         }
@@ -132,11 +168,24 @@ class SimulatedLibrary(BoardLibrary):
             make_signal,
             owners=self._owners,
             receiver=self._receiver,
+            clock_ppm=self._clock_ppm,
         )
 
 
-def _make(_options: NoOptions, context: BoardContext) -> BoardLibrary:
-    return SimulatedLibrary(context.clock, context.scene_sources, seed=context.seed)
+def _make(options: SimulatedOptions, context: BoardContext) -> BoardLibrary:
+    info = replace(T7 if options.product == "T7" else PCI_6229, name=options.name)
+    sources = dict(context.scene_sources or {})
+    if options.name != PCI_6229.name:
+        # A second make beside those that the twin's sensors are wired to.
+        sources = {key: each for key, each in sources.items() if key[0].startswith(options.name)}
+    return SimulatedLibrary(
+        context.clock,
+        sources,
+        boards=options.boards,
+        seed=context.seed,
+        info=info,
+        clock_ppm=options.clock_ppm,
+    )
 
 
-BACKEND: Final = BoardBackend(_make, simulated=True)
+BACKEND: Final = BoardBackend(_make, options=SimulatedOptions, simulated=True)
