@@ -173,6 +173,7 @@ class Keeps:
     """A group start of somebody who means to start the axis again and again."""
 
     skew_ms = None
+    line = None
 
     def __init__(self):
         self.axes = []

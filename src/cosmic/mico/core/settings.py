@@ -41,6 +41,27 @@ class MotionDefaults(StrictModel):
     acceleration_deg_s2: float = Field(default=1_000.0, gt=0)
     approach_um: float = Field(default=20.0, ge=0)
     approach_deg: float = Field(default=0.2, ge=0)
+    following_error_um: float = Field(default=20.0, gt=0)
+    following_error_deg: float = Field(default=0.02, gt=0)
+    line_speed_um_s: float = Field(default=500.0, gt=0)
+    line_speed_deg_s: float = Field(default=0.5, gt=0)
+    stop_spread_s: float = Field(default=0.05, gt=0, le=1.0)
+
+    def acceleration(self, unit: AxisUnit) -> float:
+        """Return how fast an axis picks up speed, in `unit` per second squared."""
+        return self.acceleration_deg_s2 if unit == "deg" else self.acceleration_um_s2
+
+    def following_error(self, unit: AxisUnit) -> float:
+        """Return how far an axis may lag behind its setpoint, in `unit`."""
+        return self.following_error_deg if unit == "deg" else self.following_error_um
+
+    def line_speed(self, unit: AxisUnit) -> float:
+        """Return the most speed along a line whose box is not clear, in `unit` per second."""
+        return self.line_speed_deg_s if unit == "deg" else self.line_speed_um_s
+
+    def nominal_step(self, unit: AxisUnit) -> float:
+        """Return what a step at 100 V goes, in `unit`."""
+        return self.nominal_step_deg if unit == "deg" else self.nominal_step_um
 
     @property
     def hold(self) -> float:

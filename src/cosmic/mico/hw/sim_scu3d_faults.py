@@ -16,6 +16,7 @@ NAMES: Final = (
     "sensor_lost",
     "slow_answer",
     "blocked_call",
+    "lagging",
 )
 _WITH_DELAY: Final = ("slow_answer", "blocked_call")
 
@@ -62,6 +63,7 @@ class Faults:
     - `sensor_lost`: no sensor (130); its position is unknown afterwards.
     - `slow_answer`: packets come, and synchronous calls return, `delay_s` later.
     - `blocked_call`: the next movement call blocks `delay_s`; once; never a stop.
+    - `lagging`: where a speed is commanded (MCS2), the stage goes half as fast.
 
     Parameters
     ----------

@@ -176,7 +176,9 @@ class Channel:
     def step_speed(self, direction: int) -> float:
         """Return the speed at the closed-loop frequency limit."""
         hertz = self.value(sa.SA_CTL_PKEY_MAX_CL_FREQUENCY)
-        return hertz * self.stage.step_size(100.0, direction)
+        speed = hertz * self.stage.step_size(100.0, direction)
+        worn = self.velocity > 0.0 and self.fault("lagging")
+        return min(speed, self.velocity / 2.0) if worn else speed
 
     @property
     def velocity(self) -> float:

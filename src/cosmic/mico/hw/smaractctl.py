@@ -65,6 +65,8 @@ class _Device:
     seeks_end: set[int] = field(default_factory=set)
     speeds: dict[int, tuple[int, int]] = field(default_factory=dict)
     lag_limits: dict[int, int] = field(default_factory=dict)
+    frequencies: dict[int, int] = field(default_factory=dict)
+    paced: set[int] = field(default_factory=set)
 
 
 class SmaractCtlController(Controller):
@@ -341,6 +343,7 @@ class SmaractCtlController(Controller):
     def set_closed_loop_frequency(self, channel: Channel, frequency_hz: int) -> None:
         hertz = convert.frequency(frequency_hz, channel)
         self._write(channel, [(sa.SA_CTL_PKEY_MAX_CL_FREQUENCY, hertz)])
+        self._at(channel, "set_closed_loop_frequency").frequencies[channel.channel] = hertz
 
     @override
     def step(self, channel: Channel, steps: int, *, amplitude_v: float, frequency_hz: int) -> None:
@@ -373,6 +376,7 @@ class SmaractCtlController(Controller):
         """Start movements of one device as one command group; all or none."""
         at = self._of_one_device(moves)
         for move in moves:
+            at.paced.add(move.channel.channel)
             self._write(move.channel, self._matched(at, move))
             limit = convert.counts(move.following_error, move.unit, move.channel)
             at.lag_limits[move.channel.channel] = limit
@@ -463,15 +467,22 @@ class SmaractCtlController(Controller):
         self._move(channel, writes, counts, seeks_end=seeks_end)
 
     def _speed(self, channel: Channel) -> list[tuple[int, int]]:
-        """Return what sets the speed of the next movement, where one was given."""
-        at = self._at(channel, "moving")
-        if channel.channel not in at.speeds:
+        """Return what sets the speed of the next movement, or takes that of a line back."""
+        at, index = self._at(channel, "moving"), channel.channel
+        paced = index in at.paced
+        if index not in at.speeds and not paced:
             return []
-        velocity, acceleration = at.speeds[channel.channel]
-        return [
+        if paced and index in at.begun_s:
+            self.stop(channel)  # a channel under way keeps the speed that it has
+        at.paced.discard(index)
+        velocity, acceleration = at.speeds.get(index, (0, 0))
+        writes = [
             (sa.SA_CTL_PKEY_MOVE_VELOCITY, velocity),
             (sa.SA_CTL_PKEY_MOVE_ACCELERATION, acceleration),
         ]
+        if paced and index in at.frequencies:
+            writes.append((sa.SA_CTL_PKEY_MAX_CL_FREQUENCY, at.frequencies[index]))
+        return writes
 
     def _move(
         self, channel: Channel, writes: Writes, value: int, *, seeks_end: bool = False

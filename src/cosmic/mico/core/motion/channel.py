@@ -70,6 +70,23 @@ class StartingChannel(StartingAxis):
             self._stop()
         return True
 
+    @override
+    def prepare(self) -> bool:
+        if self._void:
+            return False
+        motion, reservation = self._active.order.motion, self._active.reservation
+        refused = self._context.gate.claim(reservation, self.name, motion, straight=True)
+        if refused is not None:
+            logger.warning("refused: %s", refused)
+            self._error = refusal(refused)
+        return refused is None
+
+    @override
+    def conclude(self, error: CosmicError | None) -> None:
+        self._error = self._error or error
+        if self._void:
+            self._stop()
+
     def _stop(self) -> None:
         try:
             self._context.controller.stop(self._positioner.state.address)
@@ -129,6 +146,10 @@ class ChannelController:
         if reservation is not None and gate.superseded(reservation):
             # The axis was sent elsewhere since this was decided: the volume is another one now.
             gate.withdraw(reservation)
+            if order.start is not None and order.start.line is not None:
+                over = MoveCancelled(f"{self.name}: sent elsewhere; the line was not begun")
+                order.movement.fail(over)
+                return
             reservation = None
         if reservation is not None:
             self._go(order, reservation)

@@ -32,6 +32,7 @@ from cosmic.mico.core.motion.positioner import (
     class_for,
     counted_travels,
 )
+from cosmic.mico.core.motion.straight import StraightLine, check_line
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.hw.interface import Direction, PositionerKind, ReferenceKind
 
@@ -400,12 +401,19 @@ class PlatformSnapshot:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """The gate's answer with what it would reserve."""
+    """The gate's answer with what it would reserve.
+
+    Attributes
+    ----------
+    straight : bool
+        It is allowed along a straight line only.
+    """
 
     verdict: MoveVerdict
     intervals: Mapping[str, Interval]
     targets: Mapping[str, float]
     headings: Mapping[str, int]
+    straight: bool = False
 
 
 def check_move(
@@ -414,13 +422,27 @@ def check_move(
     checker: CollisionChecker,
     *,
     advice: bool = True,
+    line: StraightLine | None = None,
 ) -> Decision:
-    """Decide several movements together; pure: state in, answer out, nothing else touched."""
+    """Decide several movements together; pure: state in, answer out, nothing else touched.
+
+    Parameters
+    ----------
+    line : StraightLine or None
+        Where it is not clear for the axes in any order, they can keep to this line.
+    """
     planned = _planned(requests, snapshot)
     if not planned.verdict.allowed:
         return planned
-    verdict = _clear_of_everything(planned, snapshot, partial(checker.check, advice=advice))
-    return replace(planned, verdict=verdict, intervals=planned.intervals if verdict.allowed else {})
+    check = partial(checker.check, advice=advice and line is None)
+    verdict = _clear_of_everything(planned, snapshot, check)
+    straight = False
+    if line is not None and verdict.reason is Reason.COLLISION:
+        along = partial(check_line, line, check=partial(checker.check, advice=False))
+        verdict = _clear_of_everything(planned, snapshot, along)
+        straight = verdict.allowed
+    intervals = planned.intervals if verdict.allowed else {}
+    return replace(planned, verdict=verdict, intervals=intervals, straight=straight)
 
 
 def check_move_promptly(

@@ -27,6 +27,7 @@ from cosmic.mico.core.motion.lease import Lease, LeaseHolder
 from cosmic.mico.core.motion.orders import Interval, Motion, Reservation
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.core.motion.stop_latch import StopLatch, StopState
+from cosmic.mico.core.motion.straight import StraightLine
 
 SOON_S: Final = 0.05
 """An answer that took no longer is as new as the positions, which are asked for so often."""
@@ -123,16 +124,21 @@ class Gate:
         return check_move(requests, self._snapshot(holder), self._checker, advice=advice).verdict
 
     def decide(
-        self, requests: Sequence[Request], query: GateQuery | None = None
+        self,
+        requests: Sequence[Request],
+        query: GateQuery | None = None,
+        *,
+        line: StraightLine | None = None,
     ) -> tuple[MoveVerdict, dict[str, Reservation]]:
         """Decide `requests` together; when allowed, hold their intervals and reserve each axis.
 
-        Nothing is held, or reserved, for a `query` that was withdrawn meanwhile.
+        Nothing is held, or reserved, for a `query` that was withdrawn meanwhile. With a `line`
+        that the axes can keep to, the reservations may be `straight`; others see the whole box.
         """
         for _ in range(MOST_TRIES):
             holder = self._lease.holder  # first, for it may emit that it has lapsed
             before = holder.token, self._revision
-            verdict, reservations = self._decide(requests, holder, query)
+            verdict, reservations = self._decide(requests, holder, query, line)
             # Looked at when the intervals are held: who changes it later finds them.
             if before == (self._lease.holder.token, self._revision):
                 return verdict, reservations
@@ -172,11 +178,15 @@ class Gate:
         return getattr(self._checker, "revision", None)
 
     def _decide(
-        self, requests: Sequence[Request], holder: LeaseHolder, query: GateQuery | None
+        self,
+        requests: Sequence[Request],
+        holder: LeaseHolder,
+        query: GateQuery | None,
+        line: StraightLine | None,
     ) -> tuple[MoveVerdict, dict[str, Reservation]]:
         with self._deciding:
             epoch = self._latch.state.epoch
-            snapshot, decision = self._check(requests, holder)
+            snapshot, decision = self._check(requests, holder, line)
             with self._lock:
                 if query is not None and query.withdrawn:
                     return decision.verdict, {}
@@ -197,7 +207,8 @@ class Gate:
         asked = {request.axis: request.motion for request in requests}
         for axis, interval in decision.intervals.items():
             target = decision.targets.get(axis)
-            reservation = Reservation(axis, next(self._numbers), epoch, target)
+            straight = decision.straight
+            reservation = Reservation(axis, next(self._numbers), epoch, target, straight)
             state = snapshot.states[axis]
             if state.confidence is Confidence.UNKNOWN:
                 self._regions[axis] = interval  # wherever that ends, it is somewhere there
@@ -210,7 +221,7 @@ class Gate:
         return reservations
 
     def _check(
-        self, requests: Sequence[Request], holder: LeaseHolder
+        self, requests: Sequence[Request], holder: LeaseHolder, line: StraightLine | None
     ) -> tuple[PlatformSnapshot, Decision]:
         """Check `requests` by the platform as it still is when the answer comes.
 
@@ -218,7 +229,7 @@ class Gate:
         """
         snapshot = self._snapshot(holder)
         for _ in range(MOST_TRIES):
-            decision = check_move(requests, snapshot, self._checker)
+            decision = check_move(requests, snapshot, self._checker, line=line)
             soon = WALL.now_s() - snapshot.now_wall_s <= SOON_S
             if soon or not decision.verdict.allowed:
                 return snapshot, decision
@@ -261,11 +272,17 @@ class Gate:
         text = f"{axis}: its reservation {why}; nothing was sent. Give the order anew"
         return refuse(Reason.NO_LEASE, text, axis=axis)
 
-    def claim(self, reservation: Reservation, axis: str, motion: Motion) -> MoveVerdict | None:
+    def claim(
+        self, reservation: Reservation, axis: str, motion: Motion, *, straight: bool = False
+    ) -> MoveVerdict | None:
         """Use `reservation` up at the moment at which `motion` is sent to `axis`; takes no lock.
 
-        Returns why it must not be sent, or None, which it does once for each reservation.
+        Returns why it must not be sent, or None, which it does once for each reservation. Whoever
+        sends it along a line with the others says `straight`.
         """
+        if reservation.straight and not straight:
+            text = f"{axis}: it may go along a line with the others only; nothing was sent"
+            return refuse(Reason.NO_LEASE, text, axis=axis)
         refused = self.objection(reservation, axis, motion)
         if refused is None and self._unused.pop(id(reservation), None) is None:
             refused = self.objection(reservation, axis, motion)  # another thread came first

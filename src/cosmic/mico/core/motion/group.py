@@ -4,20 +4,23 @@ import logging
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
+from cosmic.frame.clock import Clock
 from cosmic.frame.errors import refusal
 from cosmic.frame.verdict import MoveVerdict
-from cosmic.mico.core.motion.checks import Request
+from cosmic.mico.core.motion.checks import Request, planned_target
+from cosmic.mico.core.motion.data_container import DeviceDataContainer
 from cosmic.mico.core.motion.gate import Gate
-from cosmic.mico.core.motion.group_start import GroupStart, GroupStarted
+from cosmic.mico.core.motion.group_start import GroupStart, GroupStarted, LineStart
 from cosmic.mico.core.motion.lease import Lease
 from cosmic.mico.core.motion.links import LinkTable
 from cosmic.mico.core.motion.movement import Movement
 from cosmic.mico.core.motion.orders import FREQUENCY_HZ, Motion, Order, Reservation
-from cosmic.mico.core.motion.positioner import PositionerState, class_for
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState, class_for
+from cosmic.mico.core.motion.straight import StraightLine, Way
 from cosmic.mico.core.settings import MicoSettings, MotionDefaults
-from cosmic.mico.hw.interface import Channel
+from cosmic.mico.hw.interface import Capabilities, Channel, Controller, MatchedMove
 
 logger = logging.getLogger(__name__)
 
@@ -65,7 +68,78 @@ def matched_frequencies(legs: Mapping[str, Leg]) -> dict[str, int]:
     }
 
 
+NO_WAY: Final = 1e-3
+"""A shorter way, in um or degrees, is none."""
+
+
+def straight_line(
+    targets: Mapping[str, float],
+    states: Mapping[str, PositionerState],
+    speeds: Mapping[str, float],
+    hold_s: Mapping[str, float],
+    defaults: MotionDefaults,
+    spread_s: float,
+) -> StraightLine | None:
+    """Return the line from where axes stand to `targets`, as fast as the slowest allows.
+
+    Parameters
+    ----------
+    targets, speeds, hold_s : mapping of float
+        By axis: where it goes, how fast it can, per second, and how long it holds there.
+    spread_s : float
+        How much later than the first axis the last may stop, in platform time.
+
+    Returns
+    -------
+    StraightLine or None
+        None where fewer than two axes have a way to go.
+    """
+    lengths = {name: target - (states[name].position or 0.0) for name, target in targets.items()}
+    going = {name: abs(way) for name, way in lengths.items() if abs(way) >= NO_WAY}
+    if len(going) < 2:
+        return None
+    duration_s = max(way / speeds[name] for name, way in going.items())
+    rate = min(defaults.acceleration(states[name].unit) / way for name, way in going.items())
+    errors = {name: defaults.following_error(states[name].unit) for name in going}
+    ways: dict[str, Way] = {}
+    for name, way in going.items():
+        state, speed = states[name], way / duration_s
+        others = [other for other in going if other != name]
+        beside = min(others, key=lambda other: errors[other] / going[other])
+        lag = errors[name] + way * errors[beside] / going[beside] + speed * spread_s
+        move = MatchedMove(
+            channel=state.address,
+            target=targets[name],
+            unit=state.unit,
+            hold_s=hold_s[name],
+            speed=speed,
+            acceleration=rate * way,
+            following_error=errors[name],
+        )
+        start = targets[name] - lengths[name]
+        wide = lag + speed * spread_s
+        ways[name] = Way(start, targets[name], move, beside=beside, lag=lag, wide=wide)
+    return StraightLine(ways)
+
+
+def runs_straight(state: PositionerState, can: Capabilities) -> bool:
+    """Return whether an axis, as it is now, can keep to a line with others of its device."""
+    return (
+        can.group_start
+        and can.velocity
+        and state.present
+        and state.position is not None
+        and state.confidence is Confidence.KNOWN
+        and state.activity.at_rest
+        and not state.in_motion
+    )
+
+
 class _Device(Protocol):
+    @property
+    def container(self) -> DeviceDataContainer:
+        """What is known of the device."""
+
     def submit(self, order: Order) -> None:
         """Queue an order."""
 
@@ -88,6 +162,14 @@ class Axes(Protocol):
 
     def device(self, name: str) -> _Device:
         """Return the device that drives an axis."""
+
+    @property
+    def controller(self) -> Controller:
+        """The library behind all devices."""
+
+    @property
+    def clock(self) -> Clock:
+        """The platform's time."""
 
 
 class GroupOrders:
@@ -144,10 +226,12 @@ class GroupOrders:
             match_arrival = match_arrival or len(motions) > named
         requests = self._requests(motions, consent=consent, alone=not linked)
         self._check_ready()
-        reservations = self._reserved(requests, source)
-        speeds = self._matched_speeds(reservations) if match_arrival else {}
+        in_line = match_arrival and not (slow_hz or follows)
+        lines = self._lines(motions) if in_line else None
+        reservations = self._reserved(requests, source, None if lines is None else lines[1])
+        speeds = self._matched_speeds(reservations) if match_arrival and lines is None else {}
         speeds |= {name: hertz for name, hertz in (slow_hz or {}).items() if name in motions}
-        start = GroupStart(len(motions), self._on_started) if len(motions) > 1 else None
+        start = self._start(reservations, lines) if len(motions) > 1 else None
         token, guard = self._lease.local_token, self._lease.guard()
         orders = {
             name: Order(
@@ -164,8 +248,64 @@ class GroupOrders:
             )
             for name, motion in motions.items()
         }
+        if start is not None and start.line is not None:
+            start.line.follow([order.movement for order in orders.values()])
         self._submit(orders)
         return orders
+
+    def _start(
+        self, reservations: Mapping[str, Reservation], lines: tuple[StraightLine, ...] | None
+    ) -> GroupStart:
+        """Return what starts the axes: by one command where they keep to a line."""
+        if lines is None:
+            return GroupStart(len(reservations), self._on_started)
+        narrow = any(each.straight for each in reservations.values())
+        line = LineStart(lines[1 if narrow else 0], self._axes.controller.move_together)
+        return GroupStart(len(reservations), self._on_started, line)
+
+    def _lines(self, motions: Mapping[str, Motion]) -> tuple[StraightLine, StraightLine] | None:
+        """Return how `motions` run along a line, usually and where only the line is clear.
+
+        None where they cannot: not all on one device, moving, not known, or not so commanded.
+        """
+        states, going = self._axes.states(), self._gate.held()
+        targets: dict[str, float] = {}
+        devices: set[int] = set()
+        hold_s: dict[str, float] = {}
+        for name, motion in motions.items():
+            state, container = states.get(name), self._axes.device(name).container
+            axis = container.positioner(self._axes.address(name).channel)
+            if state is None or axis is None or name in going:
+                return None
+            target = planned_target(motion, state, None)
+            if target is None or not runs_straight(state, container.capabilities):
+                return None
+            targets[name], hold_s[name] = target, axis.hold_s
+            devices.add(state.address.device)
+        return self._paced_lines(targets, states, hold_s) if len(devices) == 1 else None
+
+    def _paced_lines(
+        self,
+        targets: Mapping[str, float],
+        states: Mapping[str, PositionerState],
+        hold_s: Mapping[str, float],
+    ) -> tuple[StraightLine, StraightLine] | None:
+        axes, defaults = self._axes, self._axes.settings.defaults
+        usual = {
+            name: axes.usual_frequency_hz(name) * defaults.nominal_step(states[name].unit)
+            for name in targets
+        }
+        slow = {
+            name: min(speed, defaults.line_speed(states[name].unit))
+            for name, speed in usual.items()
+        }
+        spread_s = defaults.stop_spread_s * max(axes.clock.rate, 1.0)
+        lines = [
+            straight_line(targets, states, speeds, hold_s, defaults, spread_s)
+            for speeds in (usual, slow)
+        ]
+        free, narrow = lines
+        return None if free is None or narrow is None else (free, narrow)
 
     def _check_names(self, motions: Mapping[str, Motion]) -> None:
         """Raise `UnknownAxisError` where one of the axes does not exist."""
@@ -194,8 +334,10 @@ class GroupOrders:
             for name, motion in motions.items()
         ]
 
-    def _reserved(self, requests: list[Request], source: str) -> dict[str, Reservation]:
-        verdict, reservations = self._gate.decide(requests)
+    def _reserved(
+        self, requests: list[Request], source: str, line: StraightLine | None
+    ) -> dict[str, Reservation]:
+        verdict, reservations = self._gate.decide(requests, line=line)
         if not verdict.allowed:
             logger.warning("refused (%s): %s", source, verdict)
             self._on_refused(verdict)

@@ -89,6 +89,12 @@ class ActiveMove:
         """True when the channel has another closed-loop speed than the usual one meanwhile."""
         return isinstance(self.order.motion, Jog) or self.order.frequency_hz is not None
 
+    def leave_line(self, name: str) -> None:
+        """Stop the axes that keep to a line with this one, if there are any."""
+        start = self.order.start
+        if start is not None and start.line is not None:
+            start.line.leave(name)
+
     @property
     def found_reference(self) -> bool:
         """True of a reference run without error: the word of libraries that have none."""
@@ -306,6 +312,7 @@ class MotionMonitor:
         replaced, self.active = self.active, active
         if replaced is not None:
             replaced.replaced = True
+            replaced.leave_line(self._name)
             self._withdraw_query(replaced)
         self._next_poll_s = self._context.clock.wall_s() + self._context.poll_s
         return replaced
@@ -353,6 +360,7 @@ class MotionMonitor:
             self.active.awaiting = False
         self._stop()
         if self.active is not None:
+            self.active.leave_line(self._name)
             self.active.progress_s = self._context.clock.now_s()
             self.ask_activity()
 
@@ -361,6 +369,7 @@ class MotionMonitor:
         active, self.active = self.active, None
         if active is not None:
             self._withdraw_query(active)
+            active.leave_line(self._name)
             active.error = active.error or error
             self._context.gate.abandon(active.reservation)
             self._count(active)
@@ -425,6 +434,7 @@ class MotionMonitor:
 
     def _report_failed(self, active: ActiveMove, error: CosmicError) -> None:
         """Fail the movement now, and follow the axis until it is stationary somewhere known."""
+        active.leave_line(self._name)
         active.reported = True
         active.error = active.error or error
         if not active.at_rest:
@@ -497,9 +507,20 @@ class MotionMonitor:
         active = self.active
         if active is None:
             return
-        active.note_position(self._positioner.state.position, self._context.clock.now_s())
+        position = self._positioner.state.position
+        active.note_position(position, self._context.clock.now_s())
+        self._keep_to_line(active, position)
         if active.at_rest and number == -active.order.number and not active.known_pending:
             self._land()
+
+    def _keep_to_line(self, active: ActiveMove, position: float | None) -> None:
+        """Stop everything when an axis falls behind those it keeps to a line with."""
+        line = None if active.order.start is None else active.order.start.line
+        if line is None or position is None or active.awaiting or active.error is not None:
+            return
+        behind = line.lags(self._name, position)
+        if behind is not None:
+            self.fail(DeviceError(behind))
 
     def _on_known(self, event: PositionKnownRead) -> None:
         known = Confidence.KNOWN if event.known else Confidence.UNKNOWN
@@ -574,6 +595,8 @@ class MotionMonitor:
         active, self.active = self.active, None
         if active is None:
             return
+        if error is not None:
+            active.leave_line(self._name)
         if active.has_own_speed:
             self._speed.restore()
         in_motion = not active.at_rest

@@ -111,13 +111,15 @@ class Reservation:
     """The gate's leave to make one movement once, void after the next stop.
 
     It holds the interval that the movement may sweep until it is released (`Gate.release`).
-    Only the object that the gate gave is worth anything; it is used up with `Gate.claim`.
+    Only the object that the gate gave is worth anything; it is used up with `Gate.claim`. One that
+    is `straight` is for a start with others that keeps to a line, and for nothing else.
     """
 
     axis: str
     number: int
     epoch: int
     target: float | None
+    straight: bool = False
 
 
 class _OrderFields(NamedTuple):
