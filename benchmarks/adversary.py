@@ -140,12 +140,12 @@ def attack(
         ended.set()
         for thread in threads:
             thread.join()
-        told = remote.end() if remote is not None else (0, [])
-        if remote is not None and not told[0]:
-            raise RuntimeError(f"no command went through the station: {told[1][:3]}")
+        remote_ended = remote.end() if remote is not None else (0, [])
+        if remote is not None and not remote_ended[0]:
+            raise RuntimeError(f"no command went through the station: {remote_ended[1][:3]}")
         watch.may_move()
         watch.end()
-        return Result(watch.found, attacks, told)
+        return Result(watch.found, attacks, remote_ended)
 
 
 class _Client:

@@ -27,14 +27,14 @@ def main(endpoint: str, seed: str) -> None:
     threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
     with connected(endpoint) as rig:
         attack = AxisAttack(rig, int(seed) + 1, "station")
-        told_s = 0.0
+        sent_s = 0.0
         while not ended.is_set():
             if attack.calls % 20 == 0:
                 with suppress(CosmicError):
                     rig.take_control()
             attack.act()
-            if time.monotonic() - told_s > 0.1:
-                told_s = time.monotonic()
+            if time.monotonic() - sent_s > 0.1:
+                sent_s = time.monotonic()
                 print(f"calls {attack.calls}", flush=True)
             if attack.chance.random() < 0.02:
                 with suppress(CosmicError):

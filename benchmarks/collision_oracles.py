@@ -18,9 +18,9 @@ SCENE = Path(__file__).resolve().parents[1] / "config" / "scenes" / "fiberstatio
 
 
 def _figures(
-    what: str, found: Counter[str], told: tuple[str, ...], limits: dict[str, float]
+    what: str, found: Counter[str], names: tuple[str, ...], limits: dict[str, float]
 ) -> list[Figure]:
-    counts = [Figure(NAME, f"{what}: {name}", float(found[name]), "") for name in told]
+    counts = [Figure(NAME, f"{what}: {name}", float(found[name]), "") for name in names]
     return counts + [
         Figure(NAME, f"{what}: {name}", float(found[name]), "", limit)
         for name, limit in limits.items()

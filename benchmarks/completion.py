@@ -111,7 +111,7 @@ def follow(count: int, *, repaint: bool) -> list[Watched]:
 
 def times_s(done: list[Watched]) -> tuple[list[float], list[float]]:
     """Return how long after COMPLETED the position and the end were told, in s."""
-    told: list[float] = []
+    moved: list[float] = []
     ended: list[float] = []
     for watched in done:
         if watched.completed_s is None or watched.ended_s is None:
@@ -122,21 +122,21 @@ def times_s(done: list[Watched]) -> tuple[list[float], list[float]]:
             for when_s, where in watched.positions
             if when_s > watched.completed_s and where == watched.where
         ]
-        told += last[:1]
-    return told, ended
+        moved += last[:1]
+    return moved, ended
 
 
 def measure(quick: bool = False) -> list[Figure]:
     """Return the figures of one run."""
     found: list[Figure] = []
     for repaint, window in ((True, "panel painted at 30 Hz"), (False, "only changes painted")):
-        told, ended = times_s(follow(2 if quick else 200, repaint=repaint))
+        moved, ended = times_s(follow(2 if quick else 200, repaint=repaint))
         limit = 20 if repaint else None
         found += [
             Figure(NAME, f"{window}: movements", len(ended), ""),
-            Figure(NAME, f"{window}: position_changed, p50", 1e3 * percentile(told, 50), "ms"),
+            Figure(NAME, f"{window}: position_changed, p50", 1e3 * percentile(moved, 50), "ms"),
             Figure(
-                NAME, f"{window}: position_changed, p99", 1e3 * percentile(told, 99), "ms", limit
+                NAME, f"{window}: position_changed, p99", 1e3 * percentile(moved, 99), "ms", limit
             ),
             Figure(NAME, f"{window}: movement_ended, p99", 1e3 * percentile(ended, 99), "ms"),
         ]

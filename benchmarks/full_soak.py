@@ -80,7 +80,7 @@ def log_kb(folder: Path) -> float:
     return sum(file.stat().st_size for file in folder.glob("*.log*")) / 1024
 
 
-def collect(bench: FullStand, seconds: float, tell: Callable[[Look], None]) -> list[Look]:
+def collect(bench: FullStand, seconds: float, publish: Callable[[Look], None]) -> list[Look]:
     """Move, stop and record at random; look `PARTS` times."""
     chance = random.Random(1)
     axes, folder = list(bench.mico), bench.recording.parent
@@ -114,7 +114,7 @@ def collect(bench: FullStand, seconds: float, tell: Callable[[Look], None]) -> l
                         campaigns.done,
                     )
                 )
-                tell(looks[-1])
+                publish(looks[-1])
         finally:
             campaigns.end()
     if campaigns.failure:
@@ -147,10 +147,10 @@ def figures(looks: list[Look]) -> list[Figure]:
     ]
 
 
-def run(seconds: float, tell: Callable[[Look], None]) -> list[Figure]:
+def run(seconds: float, publish: Callable[[Look], None]) -> list[Figure]:
     """Return the figures of one soak."""
     with full_platform(campaign=False) as bench:
-        return figures(bench.beside(lambda: collect(bench, seconds, tell)))
+        return figures(bench.beside(lambda: collect(bench, seconds, publish)))
 
 
 def measure(quick: bool = False) -> list[Figure]:
@@ -164,10 +164,10 @@ def _from_command_line() -> None:
     minutes = parser.parse_args().minutes
     print(" ".join(field.name for field in fields(Look)))
 
-    def tell(seen: Look) -> None:
+    def publish(seen: Look) -> None:
         print(" ".join(f"{value:.5g}" for value in astuple(seen)), flush=True)
 
-    print(table(run(60.0 * minutes, tell)))
+    print(table(run(60.0 * minutes, publish)))
 
 
 if __name__ == "__main__":

@@ -138,8 +138,8 @@ def probed(names: Sequence[str]) -> Ratios:
         if done.returncode:
             sys.stderr.write(done.stderr)
             continue  # its ratios are missing, which fails by their names
-        told: Ratios = json.loads(done.stdout.splitlines()[-1])
-        found |= {f"{name}: {key}": value for key, value in told.items()}
+        found_ratios: Ratios = json.loads(done.stdout.splitlines()[-1])
+        found |= {f"{name}: {key}": value for key, value in found_ratios.items()}
     return found
 
 

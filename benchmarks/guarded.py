@@ -174,7 +174,7 @@ def _completion(bench: Any, count: int) -> float:
         if args[2]._obj.packetType == sa.SA_COMPLETED_PACKET_TYPE:
             handed_s[0] = time.process_time()
 
-    def told() -> float:
+    def published() -> float:
         ended: SimpleQueue[float] = SimpleQueue()
         movement = axis.move_by(20.0 if axis.position_um < 1000.0 else -20.0, wait=False)
         movement.add_callback(lambda _: ended.put(time.process_time()))
@@ -183,7 +183,7 @@ def _completion(bench: Any, count: int) -> float:
         return found
 
     bench.library.left[RECEIVE] = on_packet
-    found = to_reference(told, count)
+    found = to_reference(published, count)
     del bench.library.left[RECEIVE]
     return found
 

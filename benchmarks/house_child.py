@@ -174,8 +174,8 @@ def main() -> int:
         "of those, until the library is called": sorted({file for file, _ in way_there}),
         "functions that do not run at rest as well": sorted(f"{f}: {name}" for f, name in own),
     }
-    told = [{"name": name, "names": names} for name, names in figures.items()]
-    kept.write_text(json.dumps(told), encoding="utf-8")
+    table = [{"name": name, "names": names} for name, names in figures.items()]
+    kept.write_text(json.dumps(table), encoding="utf-8")
     return code
 
 

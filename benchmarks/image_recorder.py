@@ -201,7 +201,7 @@ def overload(folder: Path, parts: list[np.ndarray], seconds: float) -> list[Figu
     recorder.join(120.0)
     stats = recorder.stats
     with open_image_recording(recorder.path) as found:
-        told = sum(row.status == "dropped" for row in found.rows)
+        listed = sum(row.status == "dropped" for row in found.rows)
         wrong = sum(
             not np.array_equal(p.data, parts[p.row.frame_id % SEEDS]) for p in found if p.row
         )
@@ -211,7 +211,7 @@ def overload(folder: Path, parts: list[np.ndarray], seconds: float) -> list[Figu
         Figure(
             NAME,
             "overload: images neither written nor told as dropped",
-            abs(count - stats.written - stats.dropped) + abs(stats.dropped - told),
+            abs(count - stats.written - stats.dropped) + abs(stats.dropped - listed),
             "",
             0.0,
         ),

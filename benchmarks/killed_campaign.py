@@ -54,7 +54,7 @@ class Tally:
     changed: int = 0
     doubled: int = 0
     unreadable: int = 0
-    untold: int = 0
+    unannounced: int = 0
     spoilt: int = 0
     orphans: int = 0
     trusted: int = 0
@@ -91,17 +91,17 @@ class Victim:
         command = [sys.executable, "-m", "cosmic", "campaign", str(self._recipe)]
         command += ["--out", str(self._out), "--config", str(config), "--truth", str(truth)]
         command += ["--rate", str(RATE), "--seed", str(self._seed * 100 + self._life)]
-        with (self._home / f"told-{self._life}.txt").open("w+", encoding="utf-8") as told:
+        with (self._home / f"output-{self._life}.txt").open("w+", encoding="utf-8") as output:
             program = subprocess.Popen(
-                command + (["--cold"] if cold else []), stdout=told, stderr=told
+                command + (["--cold"] if cold else []), stdout=output, stderr=output
             )
             began = time.perf_counter()
             killed = self._strike(program, began, kind, chance)
             children = _children(program.pid) if killed else []
             program.kill()
             program.wait()
-            told.seek(0)
-            self._look(told.read())
+            output.seek(0)
+            self._look(output.read())
         self._tally.orphans += _left(children)
         self._true(truth)
         if killed:
@@ -158,7 +158,7 @@ class Victim:
 
     # ------------------------------------------------------------------ what is found
 
-    def _look(self, told: str) -> None:
+    def _look(self, output: str) -> None:
         """Compare the folder with what was in it before, and with what the program told."""
         if not (self._out / DATABASE).exists():
             self._tally.lost += len(self._before)
@@ -174,7 +174,7 @@ class Victim:
         changed = [n for n, digest in self._before.items() if found.get(n, digest) != digest]
         tally.lost += len(lost)
         tally.changed += len(changed)
-        tally.untold += max(0, _told(told) - len(found))
+        tally.unannounced += max(0, _announced(output) - len(found))
         tally.finished += len(set(found) - set(self._before))
         self._before = found
         self._times()
@@ -226,9 +226,9 @@ def _digests(folder: Path) -> dict[int, str]:
     reader = CampaignReader(folder)
     reader.check()
     with closing(sqlite3.connect(folder / DATABASE)) as line:
-        ((told,),) = line.execute("PRAGMA integrity_check").fetchall()
-    if told != "ok":
-        raise CosmicError(f"{folder}: {told}")
+        ((answer,),) = line.execute("PRAGMA integrity_check").fetchall()
+    if answer != "ok":
+        raise CosmicError(f"{folder}: {answer}")
     found = {}
     for record in reader.finished():
         whole = reader.fibre(record.number)
@@ -251,7 +251,7 @@ def _rows(folder: Path, query: str) -> list[tuple[Any, ...]]:
         return []
 
 
-def _told(text: str) -> int:
+def _announced(text: str) -> int:
     """Return how many fibres the program said were done."""
     counts = [
         int(part.split(" ")[0])

@@ -100,12 +100,12 @@ def _running(node: ast.AST) -> Iterator[ast.AST]:
         if name in ("annotation", "returns", "decorator_list", "type_params"):
             continue
         for child in value if isinstance(value, list) else [value]:
-            if isinstance(child, ast.AST) and not _only_tells(child):
+            if isinstance(child, ast.AST) and not _only_describes(child):
                 yield child
                 yield from _running(child)
 
 
-def _only_tells(node: ast.AST) -> bool:
+def _only_describes(node: ast.AST) -> bool:
     if isinstance(node, (ast.JoinedStr, ast.Import, ast.ImportFrom, ast.Assert)):
         return True
     if isinstance(node, ast.FunctionDef):

@@ -59,28 +59,28 @@ def _stands_at(bench: Stand, name: str, target_um: float) -> bool:
 
 def collect(bench: Stand, count: int) -> tuple[list[float], list[float], list[float]]:
     """Return both skews of groups and that of bare calls, made by turns: load hits them alike."""
-    seen, told, bare = [], [], []
+    seen, by_event, bare = [], [], []
     home_um = {name: bench.mico[name].details.position or 0.0 for name in AXES}
     away_um = {name: where_um - WAY_UM for name, where_um in home_um.items()}
     for _ in range(count):
         by_library, by_program = through_the_gate(bench, away_um)
         seen.append(by_library)
-        told.append(by_program)
+        by_event.append(by_program)
         bare.append(natively(bench, home_um))
-    return seen, told, bare
+    return seen, by_event, bare
 
 
 def measure(quick: bool = False) -> list[Figure]:
     """Return the figures of one run."""
     with stand() as bench:
-        seen, told, bare = bench.beside(lambda: collect(bench, 4 if quick else 300))
+        seen, by_event, bare = bench.beside(lambda: collect(bench, 4 if quick else 300))
     p50, p99, bare_p50, bare_p99 = (
         1e3 * percentile(values, percent) for values in (seen, bare) for percent in (50, 99)
     )
     return [
         Figure(NAME, "6 axes on 3 devices, p50", p50, "ms"),
         Figure(NAME, "6 axes on 3 devices, p99", p99, "ms"),
-        Figure(NAME, "as told by start_skew_ms, p99", 1e3 * percentile(told, 99), "ms"),
+        Figure(NAME, "as told by start_skew_ms, p99", 1e3 * percentile(by_event, 99), "ms"),
         Figure(NAME, "native calls, p50", bare_p50, "ms"),
         Figure(NAME, "native calls, p99", bare_p99, "ms", 1),
         Figure(NAME, "p99 beyond that of native calls", p99 - bare_p99, "ms", 2),

@@ -106,7 +106,7 @@ def look(bench: Stand, moves: int) -> Look:
 
 
 def collect(
-    bench: Stand, seconds: float, tell: Callable[[Look], None], *, parts: int
+    bench: Stand, seconds: float, publish: Callable[[Look], None], *, parts: int
 ) -> list[Look]:
     """Move at random and look `parts` times."""
     rng = random.Random(1)
@@ -125,7 +125,7 @@ def collect(
             moves += 1
             time.sleep(rng.uniform(0.01, 0.09))
         looks.append(look(bench, moves))
-        tell(looks[-1])
+        publish(looks[-1])
     tracemalloc.stop()
     return looks
 
@@ -146,10 +146,10 @@ def figures(looks: list[Look]) -> list[Figure]:
     ]
 
 
-def run(seconds: float, tell: Callable[[Look], None], *, parts: int = 12) -> list[Figure]:
+def run(seconds: float, publish: Callable[[Look], None], *, parts: int = 12) -> list[Figure]:
     """Return the figures of one soak."""
     with stand(repaint=False, traced=False) as bench:
-        return figures(bench.beside(lambda: collect(bench, seconds, tell, parts=parts)))
+        return figures(bench.beside(lambda: collect(bench, seconds, publish, parts=parts)))
 
 
 def measure(quick: bool = False) -> list[Figure]:
@@ -163,11 +163,11 @@ def _from_command_line() -> None:
     minutes = parser.parse_args().minutes
     print(" ".join(field.name for field in fields(Look)))
 
-    def tell(seen: Look) -> None:
+    def publish(seen: Look) -> None:
         values = (getattr(seen, field.name) for field in fields(Look))
         print(" ".join(f"{value:.0f}" for value in values), flush=True)
 
-    print(table(run(60.0 * minutes, tell)))
+    print(table(run(60.0 * minutes, publish)))
 
 
 if __name__ == "__main__":

@@ -65,13 +65,15 @@ def measure(quick: bool = False) -> list[Figure]:
     share = LINES / len(text.splitlines())
     with cosmic.connect(applications=("mico",)) as rig:
         mico = rig.mico
-        api, told = mico.trajectories, []
+        api, times_s = mico.trajectories, []
         began_s = time.thread_time()
         read_s, read_cpu_s = took_s(
-            lambda: parse(text, progress=lambda _part: told.append(time.thread_time()))
+            lambda: parse(text, progress=lambda _part: times_s.append(time.thread_time()))
         )
         trajectory = parse(text)
-        gaps_s = [later - before for before, later in zip([began_s, *told], told, strict=False)]
+        gaps_s = [
+            later - before for before, later in zip([began_s, *times_s], times_s, strict=False)
+        ]
         check_s, check_cpu_s = took_s(lambda: api.check(trajectory))
         rehearsal = api.rehearse(trajectory)  # the first one builds the pure gate as well
         _, cpu_s = took_s(lambda: api.rehearse(trajectory))

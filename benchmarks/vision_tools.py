@@ -106,7 +106,7 @@ def calibration(magnification: float, checks: int) -> list[Figure]:
 
 def rotation() -> list[Figure]:
     """Find a rotation centre from five angles, with 1 um of noise in the places."""
-    errors, told = [], []
+    errors, stds_um = [], []
     angles = [-60.0, -30.0, 0.0, 30.0, 60.0]
     turn = np.radians(angles)
     for seed in range(50):
@@ -114,10 +114,10 @@ def rotation() -> list[Figure]:
         places = 700.0 * np.column_stack([np.cos(turn), np.sin(turn)]) + noise
         fit = fit_rotation(angles, [(x, y) for x, y in places.tolist()])
         errors.append(math.hypot(*fit.centre_um))
-        told.append(fit.std_um)
+        stds_um.append(fit.std_um)
     return [
         Figure(NAME, "rotation centre, places to 1 um: p95", percentile(errors, 95), "um", 2.0),
-        Figure(NAME, "rotation centre: uncertainty told", float(np.median(told)), "um"),
+        Figure(NAME, "rotation centre: uncertainty told", float(np.median(stds_um)), "um"),
     ]
 
 

@@ -58,7 +58,7 @@ def read_back(path: Path) -> pd.DataFrame:
     return pd.DataFrame([each["doc"]["data"] for each in documents if each["name"] == "event"])
 
 
-def tell(table: pd.DataFrame) -> None:
+def show(table: pd.DataFrame) -> None:
     """Print the table, the stiffness where the probe touches, and how many images are there."""
     columns = {"probe_y": "y_um", "force": "force_un", "force_std": "std_un"}
     print(table[list(columns)].rename(columns=columns).round(1).to_string(index=False))
@@ -87,7 +87,7 @@ def main() -> None:
         rehearse("push", push(rig))
         rehearse("into the probe", into_the_probe(rig))
         path = run(rig, engine, Path(folder))
-        tell(read_back(path))
+        show(read_back(path))
         be_refused(rig, engine)
 
 

@@ -120,7 +120,7 @@ def scan() -> Procedure[Work]:
     return Procedure("stiffness along a fibre", all_positions, make_safe=draw_back)
 
 
-def tell(event: NodeEvent) -> None:
+def show(event: NodeEvent) -> None:
     """Print what each operation came to."""
     if event.kind == "operation" and event.ended_s is not None:
         print(f"{event.name}: {event.cause or event.state}")
@@ -131,7 +131,7 @@ def main() -> None:
     with cosmic.connect(applications=("mico", "daqco"), rate=10.0) as rig:
         work = Work(rig, positions_um=[3600.0, 3500.0, 3400.0])
         run = rig.procedure(scan(), work)
-        run.subscribe(tell)
+        run.subscribe(show)
         run.run_here()
         for place_um, stiffness_un_um in work.stiffness_un_um.items():
             print(f"at {place_um:.0f} um: {stiffness_un_um:.2f} uN/um")

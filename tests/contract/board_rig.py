@@ -139,7 +139,7 @@ class NidaqmxRig(BoardRig):
         self.driver.unplug(name)
 
     def unplug_silently(self, name: str) -> None:
-        self.driver.unplug(name, told=False)
+        self.driver.unplug(name, announced=False)
 
     @override
     def plug_in(self, name: str) -> None:

@@ -122,18 +122,18 @@ class FakeNidaqmx:
             if task.running and board in (None, task.board) and not task.device.broken:
                 self.in_driver(lambda task=task: task.take(samples, events))
 
-    def break_down(self, board: str, code: int, *, told: bool = True) -> None:
-        """Fail with `code` while acquiring; `told` by a Done event, or silently."""
+    def break_down(self, board: str, code: int, *, announced: bool = True) -> None:
+        """Fail with `code` while acquiring; `announced` by a Done event, or silently."""
         device = self.device(board)
         device.broken = code
         for task in list(self.tasks):
-            if told and task.running and task.device is device and task.on_done is not None:
+            if announced and task.running and task.device is device and task.on_done is not None:
                 done = task.on_done
                 self.in_driver(lambda done=done: self.answers.append(done(None, code, None)))
 
-    def unplug(self, board: str, *, told: bool = True) -> None:
+    def unplug(self, board: str, *, announced: bool = True) -> None:
         self.device(board).plugged = False
-        self.break_down(board, LOST, told=told)
+        self.break_down(board, LOST, announced=announced)
 
     def plug_in(self, board: str) -> None:
         self.device(board).plugged, self.device(board).broken = True, 0
@@ -167,7 +167,7 @@ class FakeTask:
         self.rate_hz, self.source, self.buffer = 0.0, "", 0
         self.every, self.on_samples, self.on_done = 0, None, None
         self.running = self.committed = self.closed = False
-        self.taken = self.read = self.told = 0
+        self.taken = self.read = self.announced_samples = 0
         self.short: list[int] = []
         self.ai_channels = FakeChannels(self)
         self.timing = FakeTiming(self)
@@ -222,7 +222,7 @@ class FakeTask:
         if self.device.broken:
             fail(self.device.broken)
         assert not self.running
-        self.taken = self.read = self.told = 0
+        self.taken = self.read = self.announced_samples = 0
         self.running = True
         self.driver.starts += 1
 
@@ -250,10 +250,10 @@ class FakeTask:
         """On the driver's thread: take samples and tell of each `every`."""
         end = self.taken + samples
         while self.running and self.taken < end:
-            self.taken = min(end, self.told + self.every) if events else end
-            while self.running and self.taken - self.told >= self.every:
-                self.told += self.every
-                if events or self.taken - self.told < self.every:
+            self.taken = min(end, self.announced_samples + self.every) if events else end
+            while self.running and self.taken - self.announced_samples >= self.every:
+                self.announced_samples += self.every
+                if events or self.taken - self.announced_samples < self.every:
                     assert self.on_samples is not None
                     self.driver.answers.append(self.on_samples(None, 1, self.every, None))
 

@@ -342,13 +342,13 @@ def test_what_is_refused_raises_the_same_and_changes_nothing(rig: Rig) -> None:
 
 
 def test_every_change_is_told_where_it_happened(rig: Rig) -> None:
-    told: list[str] = []
-    end = rig.far.on_change(lambda: told.append("cabinet"))
-    rig.far.lamp.on_change(lambda: told.append("lamp"))
+    received: list[str] = []
+    end = rig.far.on_change(lambda: received.append("cabinet"))
+    rig.far.lamp.on_change(lambda: received.append("lamp"))
     rig.home.lamp.shine(Colour.GREEN)
-    assert wait_until(lambda: "lamp" in told)
+    assert wait_until(lambda: "lamp" in received)
     rig.home.apply(LampSettings(name="other"))
-    assert wait_until(lambda: "cabinet" in told and rig.far.name == "other")
+    assert wait_until(lambda: "cabinet" in received and rig.far.name == "other")
     end()
 
 

@@ -277,10 +277,10 @@ def test_a_trajectory_is_rehearsed_against_the_scene(mico: Mico) -> None:
 
 
 def test_the_initialisation_tells_how_far_it_is(mico: Mico) -> None:
-    told: list[Progress] = []
-    mico.initialise(told.append, skip_known=True)
-    assert told[-1].done
-    assert not told[-1].error
+    progress: list[Progress] = []
+    mico.initialise(progress.append, skip_known=True)
+    assert progress[-1].done
+    assert not progress[-1].error
 
 
 def test_a_trajectory_runs_pauses_and_goes_on(mico: Mico, tmp_path: Path) -> None:
@@ -647,8 +647,8 @@ def test_who_commands_is_told_and_positions_are_told_seldom(hosted: HostedMico, 
         wait_for(lambda: commands)
         heard.close()
         seen.close()
-    told = [str(each) for each in commands]
-    assert any("vision: left.x begin" in each and "MoveTo" in each for each in told), told
+    texts = [str(each) for each in commands]
+    assert any("vision: left.x begin" in each and "MoveTo" in each for each in texts), texts
     assert 1 <= len(positions) <= 31 * took_s + 2
 
 

@@ -124,11 +124,11 @@ def test_settings_are_in_force_when_their_task_has_ended(rig: VicoRig) -> None:
 
 
 def test_stopping_and_starting_is_told(rig: VicoRig) -> None:
-    camera, told = rig.vico.camera(), Event()
-    forget = rig.vico.on_change(told.set)
+    camera, noticed = rig.vico.camera(), Event()
+    forget = rig.vico.on_change(noticed.set)
     camera.stop().wait(LIMIT_S)
     assert not camera.running
-    assert told.wait(LIMIT_S)
+    assert noticed.wait(LIMIT_S)
     forget()
     camera.start().wait(LIMIT_S)
     assert camera.running
@@ -340,9 +340,9 @@ def test_a_state_that_was_overtaken_is_passed_over(away: VicoRig) -> None:
     assert away.remote is not None
     assert away.client is not None
     known: Any = away.client.call("vico", "state")
-    told: list[tuple[str, ...]] = []
+    notified: list[tuple[str, ...]] = []
     got = Event()
-    forget = away.vico.on_change(lambda: told.append(tuple(away.vico.cameras)))
+    forget = away.vico.on_change(lambda: notified.append(tuple(away.vico.cameras)))
     assert away.client is not None
     fence = away.client.subscribe(STATE, Rule.LATEST, lambda _: got.set())
     away.station.publish(
@@ -351,8 +351,8 @@ def test_a_state_that_was_overtaken_is_passed_over(away: VicoRig) -> None:
     )
     assert got.wait(LIMIT_S)
     away.vico.camera().switch("focus", on=True)  # a newer one follows
-    assert soon(lambda: told)
-    assert set(told) == {("top",)}
+    assert soon(lambda: notified)
+    assert set(notified) == {("top",)}
     forget()
     fence.close()
 

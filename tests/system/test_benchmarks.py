@@ -71,8 +71,8 @@ def test_each_section_of_figures_names_commands_that_exist_and_when_it_was_measu
 
 
 def test_every_benchmark_has_its_place_among_the_figures(repository):
-    told = "".join(sections(repository).values())
-    missing = [name for name in ALL if f"benchmarks.{name}" not in told]
+    all_pages = "".join(sections(repository).values())
+    missing = [name for name in ALL if f"benchmarks.{name}" not in all_pages]
     assert missing == []
 
 

@@ -191,7 +191,7 @@ def test_without_a_limit_a_campaign_outlives_an_overrun(
         campaign.abort("that was enough")
 
     assert run(tmp_path, monkeypatch, strike, armed=False) == 3
-    told = capsys.readouterr().err
-    assert "acquisition restarted after an overrun: " in told
-    assert "that was enough" in told
+    output = capsys.readouterr().err
+    assert "acquisition restarted after an overrun: " in output
+    assert "that was enough" in output
     check_marked_once(tmp_path / "all.h5")

@@ -107,7 +107,7 @@ def make(tmp_path: Path) -> Iterator[Make]:
 
 
 @pytest.mark.parametrize(
-    ("sample", "told"),
+    ("sample", "message"),
     [
         ("empty", "the plate is empty: put a sample there"),
         ("crossings", r"none on the plate can be grasped \(.*\d+ crossing.*\): spread them"),
@@ -115,7 +115,7 @@ def make(tmp_path: Path) -> Iterator[Make]:
     ],
 )
 def test_where_nothing_can_be_taken_up_the_campaign_ends_and_says_why(
-    make: Make, tmp_path: Path, sample: str, told: str
+    make: Make, tmp_path: Path, sample: str, message: str
 ) -> None:
     config = tmp_path / "config"
     shutil.copytree(CONFIG, config)
@@ -125,7 +125,7 @@ def test_where_nothing_can_be_taken_up_the_campaign_ends_and_says_why(
     campaign = bench.campaign(sample)
     campaign.run_here()
     assert campaign.phase is CampaignPhase.STOPPED
-    with pytest.raises(AssertionError, match=f"no fibre: {told}"):
+    with pytest.raises(AssertionError, match=f"no fibre: {message}"):
         raise AssertionError(campaign.end_reason)
     assert bench.fibres == ()
     assert bench.truth.of("grasped") == ()
@@ -312,7 +312,7 @@ def soon(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("soon")
 @pytest.mark.parametrize(
-    ("fault", "where", "operation", "told", "cause"),
+    ("fault", "where", "operation", "message", "cause"),
     [
         (
             "controller unplugged",
@@ -336,7 +336,7 @@ def soon(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_what_fails_in_mid_lift_leads_to_a_safe_end_that_names_it(
-    make: Make, fault: str, where: dict[str, int], operation: str, told: str, cause: str
+    make: Make, fault: str, where: dict[str, int], operation: str, message: str, cause: str
 ) -> None:
     bench = make()
     campaign = bench.campaign(count=3)
@@ -347,7 +347,7 @@ def test_what_fails_in_mid_lift_leads_to_a_safe_end_that_names_it(
     assert strike.struck.is_set(), campaign.end_reason
     bench.check_stands()
     said = [campaign.end_reason, *(each.text for each in bench.fibres)]
-    assert any(told in each for each in said), said
+    assert any(message in each for each in said), said
     assert cause in campaign.end_reason
     assert not [each for each in bench.fibres if each.outcome in (Outcome.RUNNING, Outcome.GOOD)]
     bench.check_nothing_ran_into_anything()
@@ -355,7 +355,7 @@ def test_what_fails_in_mid_lift_leads_to_a_safe_end_that_names_it(
 
 @pytest.mark.usefixtures("soon")
 @pytest.mark.parametrize(
-    ("fault", "told", "phase"),
+    ("fault", "message", "phase"),
     [
         # The limit of the probe, which is armed, stops everything before the campaign looks.
         ("board unplugged", "force", CampaignPhase.STOPPED),
@@ -365,14 +365,14 @@ def test_what_fails_in_mid_lift_leads_to_a_safe_end_that_names_it(
     ],
 )
 def test_an_instrument_that_is_dead_from_the_start_is_found_before_a_fibre_is_touched(
-    make: Make, fault: str, told: str, phase: CampaignPhase
+    make: Make, fault: str, message: str, phase: CampaignPhase
 ) -> None:
     bench = make()
     bench.rig.faults.inject(fault)
     campaign = bench.campaign(count=3)
     campaign.run_here()
     assert campaign.phase is phase
-    assert told in campaign.end_reason
+    assert message in campaign.end_reason
     assert bench.truth.of("grasped") == ()
     assert bench.fibres == ()
     bench.check_stands()

@@ -110,6 +110,6 @@ def test_a_gate_that_becomes_slow_fails_by_its_name(
     assert guard.main(["--only", "gate"]) == 0
     monkeypatch.setattr(Sweep, "check", slow)
     assert guard.main(["--only", "gate"]) == 1
-    told = capsys.readouterr().out
-    assert "guard: gate: check of the gate: " in told
-    assert "1 worse" in told
+    output = capsys.readouterr().out
+    assert "guard: gate: check of the gate: " in output
+    assert "1 worse" in output

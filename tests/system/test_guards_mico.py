@@ -193,20 +193,23 @@ def test_links_change_only_while_their_axes_stand(rig: cosmic.Rig) -> None:
 def test_a_speed_set_in_a_jog_counts_from_the_next_movement(rig: cosmic.Rig) -> None:
     axis = rig.mico["left.x"]
     controller = application(rig).manager.controller
-    told: list[int] = []
+    frequencies_hz: list[int] = []
     real = controller.set_closed_loop_frequency
-    controller.set_closed_loop_frequency = lambda channel, hz: (told.append(hz), real(channel, hz))
+    controller.set_closed_loop_frequency = lambda channel, hz: (
+        frequencies_hz.append(hz),
+        real(channel, hz),
+    )
     try:
         with axis.jog(1, speed=50.0) as jog:
             wait_until(lambda: axis.details.in_motion)
-            told.clear()
+            frequencies_hz.clear()
             axis.set_closed_loop_frequency(18500)
             for _ in range(10):
                 jog.renew()
                 WALL.sleep(0.02)
-            assert 18500 not in told
+            assert 18500 not in frequencies_hz
         jog.movement.exception(2.0)
-        wait_until(lambda: told[-1:] == [18500])
+        wait_until(lambda: frequencies_hz[-1:] == [18500])
     finally:
         controller.set_closed_loop_frequency = real
         axis.set_closed_loop_frequency(5000)

@@ -163,7 +163,7 @@ def taken(
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "told"),
+    ("name", "value", "message"),
     [
         ("number", "5", "must be a number"),
         ("number", b"5", "must be a number"),
@@ -178,9 +178,9 @@ def taken(
         ("file", 5, "must be a path"),
     ],
 )
-def test_what_is_of_a_wrong_kind_is_refused_by_name(name: str, value: object, told: str) -> None:
+def test_what_is_of_a_wrong_kind_is_refused_by_name(name: str, value: object, message: str) -> None:
     take: Any = taken
-    with pytest.raises(TypeError, match=rf"^taken: {name} .*{told}.*not "):
+    with pytest.raises(TypeError, match=rf"^taken: {name} .*{message}.*not "):
         take(**{name: value})
 
 

@@ -86,8 +86,8 @@ def started(rig: cosmic.Rig, part: Part[cosmic.Rig], event: str) -> ProcedureRun
     """Start a run and wait for the begin of an operation."""
     begun = threading.Event()
 
-    def note(told: NodeEvent) -> None:
-        if told.name == event:
+    def note(heard: NodeEvent) -> None:
+        if heard.name == event:
             begun.set()
 
     run = rig.procedure(Procedure("trial", part), rig)

@@ -170,8 +170,8 @@ def test_the_force_channel_is_not_renamed_under_the_hand_and_its_lack_is_told(ca
             daqco.apply(renamed)
         teleoperation.stop()
         daqco.apply(renamed)
-        told = [each.getMessage() for each in caplog.records if each.levelname == "WARNING"]
-        assert any("force feedback needs the channel force" in each for each in told)
+        warnings = [each.getMessage() for each in caplog.records if each.levelname == "WARNING"]
+        assert any("force feedback needs the channel force" in each for each in warnings)
         with pytest.raises(cosmic.NotAvailable, match="force feedback needs the channel force"):
             teleoperation.start(pad.key, "left assembly")
         daqco.apply(before)

@@ -187,20 +187,20 @@ def test_a_recording_goes_on_over_a_rescan_and_ends_with_the_platform(tmp_path: 
 
 
 def test_lines_are_told_with_progress_and_time_left(mico: Mico) -> None:
-    told: list[PlayProgress] = []
+    reports: list[PlayProgress] = []
     player = mico.trajectories.run(
-        written("left.x to 500 um\nwait 1 s\nleft.x by -100 um\n"), told.append
+        written("left.x to 500 um\nwait 1 s\nleft.x by -100 um\n"), reports.append
     )
     assert player.state is PlayState.ENDED
     assert where(mico, "left.x") == pytest.approx([400.0], abs=1.0)
-    lines = [each.line for each in told]
+    lines = [each.line for each in reports]
     assert lines == sorted(lines)
     assert set(lines) >= {3, 4, 5}
-    left = [each.left_s for each in told if each.left_s is not None]
+    left = [each.left_s for each in reports if each.left_s is not None]
     assert left == sorted(left, reverse=True)
     assert left[0] > 1.0
     assert left[-1] == 0.0
-    assert told[-1].fraction == 1.0
+    assert reports[-1].fraction == 1.0
 
 
 def test_away_from_the_start_it_refuses_or_goes_there(mico: Mico) -> None:
@@ -262,12 +262,12 @@ def test_a_wait_is_interrupted_by_a_pause_and_goes_on_where_it_was(mico: Mico) -
 
 
 def test_it_loops_where_it_ends_where_it_begins(mico: Mico) -> None:
-    told: list[PlayProgress] = []
+    reports: list[PlayProgress] = []
     player = mico.trajectories.run(
-        written("left.x by 200 um\nleft.x by -200 um\n"), told.append, loops=3
+        written("left.x by 200 um\nleft.x by -200 um\n"), reports.append, loops=3
     )
     assert player.state is PlayState.ENDED
-    assert {each.loop for each in told} == {1, 2, 3}
+    assert {each.loop for each in reports} == {1, 2, 3}
     assert where(mico, "left.x") == pytest.approx([0.0], abs=1.0)
     with pytest.raises(AwayFromStartError, match="does not end where it begins"):
         mico.trajectories.run(written("left.x by 200 um\n"), loops=2)

@@ -68,10 +68,10 @@ def _work(mico: Mico, scene: Scene, *, watched: bool) -> None:
 
 def test_the_fate_of_fibres_is_the_same_at_rate_1_and_at_rate_20() -> None:
     slow, fast = handled(1.0, watched=False), handled(20.0, watched=True)
-    told = [(name, facts.get("how")) for name, facts in slow]
-    assert told == [(name, facts.get("how")) for name, facts in fast]
-    assert {"grasped", "released"} <= {name for name, _ in told}
-    assert {"missed", "slipped", "came off"} <= {name for name, _ in told}
+    outcomes = [(name, facts.get("how")) for name, facts in slow]
+    assert outcomes == [(name, facts.get("how")) for name, facts in fast]
+    assert {"grasped", "released"} <= {name for name, _ in outcomes}
+    assert {"missed", "slipped", "came off"} <= {name for name, _ in outcomes}
     for (name, one), (_, two) in zip(slow, fast, strict=True):
         for key in ("at_um", "x_um", "y_um") if name != "sample" else ():
             if key in one:

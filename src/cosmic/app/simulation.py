@@ -160,7 +160,7 @@ def make_scene(
     """
     twin = load_twin(file, path)
     twin = twin if sample is None else put_on(twin, sample, seed)
-    told = NO_TRUTH if truth is None else TruthFile(Path(truth))
+    truth_log = NO_TRUTH if truth is None else TruthFile(Path(truth))
     try:
         return Scene.from_settings(
             twin,
@@ -169,9 +169,9 @@ def make_scene(
             cold=cold,
             folder=path.parent,
             sample=sample or "",
-            truth=told,
+            truth=truth_log,
             apart=True,
         )
     except BaseException:
-        told.close()
+        truth_log.close()
         raise

@@ -52,7 +52,7 @@ class TouchWatch:
 
     def __init__(self, mico: MicoApplicationBase) -> None:
         self._mico = mico
-        self._told_s: dict[str, float] = {}
+        self._published_s: dict[str, float] = {}
         self._recent: deque[tuple[Values, int]] = deque()
         self._last: DataChunk | None = None
         self._means: Values = np.empty(0)
@@ -75,8 +75,8 @@ class TouchWatch:
             # Not a number is no touch: the doubt tells it for as long as it lasts.
             if samples < TOUCH_S * chunk.rate_hz or np.isnan(force_un):
                 continue
-            if chunk.time_s >= self._told_s.get(name, -math.inf) + TOUCH_AGAIN_S:
-                self._told_s[name] = chunk.time_s
+            if chunk.time_s >= self._published_s.get(name, -math.inf) + TOUCH_AGAIN_S:
+                self._published_s[name] = chunk.time_s
                 self._mico.cautions.touched(f"{name} felt more than {least_un:g} uN")
         self._felt = "; ".join(sorted(felt))
 

@@ -12,29 +12,29 @@ OnResult = Callable[[T | None, CosmicError | None], object]
 """Takes the result of something, or why there is none."""
 
 
-def do_and_report(action: Callable[[], T], told: OnResult[T]) -> None:
+def do_and_report(action: Callable[[], T], on_result: OnResult[T]) -> None:
     """Do `action` now and tell its result, or the `CosmicError` that it raised."""
     try:
         result = action()
     except CosmicError as exc:
-        told(None, exc)
+        on_result(None, exc)
     else:
-        told(result, None)
+        on_result(result, None)
 
 
 class BackgroundJobs(JobQueue):
     """Does one after the other what a window must not wait for."""
 
-    def do(self, action: Callable[[], T], told: OnResult[T]) -> None:
-        """Have `action` done and `told` how it ended; returns at once, any thread."""
+    def do(self, action: Callable[[], T], on_result: OnResult[T]) -> None:
+        """Have `action` done and `on_result` how it ended; returns at once, any thread."""
 
-        def tell(ended: Operation[T]) -> None:
+        def report(ended: Operation[T]) -> None:
             error = ended.failure
             if error is None:
-                told(ended.result, None)
+                on_result(ended.result, None)
             elif isinstance(error, CosmicError):
-                told(None, error)
+                on_result(None, error)
             else:
-                told(None, CosmicError(f"{type(error).__name__}: {error}"))
+                on_result(None, CosmicError(f"{type(error).__name__}: {error}"))
 
-        self.submit(action, "an errand").add_callback(tell)
+        self.submit(action, "an errand").add_callback(report)

@@ -120,7 +120,7 @@ def _reason(kind: str, message: str) -> str:
 def _given(item: ErrorDetails) -> str:
     """Say what the file has there, where that is a plain value."""
     value = item["input"]
-    told = item["type"] in ("missing", "extra_forbidden", "value_error")
-    if told or not isinstance(value, (str, int, float, bool)):
+    explained = item["type"] in ("missing", "extra_forbidden", "value_error")
+    if explained or not isinstance(value, (str, int, float, bool)):
         return ""
     return f"; the file has {value!r}"

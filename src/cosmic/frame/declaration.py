@@ -235,7 +235,7 @@ class Declared:
     Here it is used directly. The attributes below are the same wherever it is.
     """
 
-    _told: "Event[[]] | None" = None
+    _change_event: "Event[[]] | None" = None
 
     @property
     def clock(self) -> Clock:
@@ -274,24 +274,26 @@ class Declared:
     def on_change(self, listener: Callable[[], object]) -> Unsubscribe:
         """Call `listener()`, in any thread, when anything but streams changed."""
         with _lock:
-            if self._told is None:
-                self._told = Event()
-            told = self._told
-        return told.subscribe(listener)
+            if self._change_event is None:
+                self._change_event = Event()
+            event = self._change_event
+        return event.subscribe(listener)
 
     def note_change(self) -> None:
         """Tell everybody that something changed; for whoever changes it."""
-        if self._told is not None:
-            self._told.emit()
+        if self._change_event is not None:
+            self._change_event.emit()
 
-    def carry_out(self, action: Callable[[], T], told: OnResult[T], *, slow: bool = False) -> None:
+    def carry_out(
+        self, action: Callable[[], T], on_result: OnResult[T], *, slow: bool = False
+    ) -> None:
         """Do what may have to wait for a line, without waiting in a window's thread.
 
-        `told` takes the result, or the `CosmicError` that was raised; here it is called at once,
-        unless it is `slow` and there is a thread for that.
+        `on_result` takes the result, or the `CosmicError` that was raised; here it is called at
+        once, unless it is `slow` and there is a thread for that.
         """
         del slow
-        do_and_report(action, told)
+        do_and_report(action, on_result)
 
     def prepare(self, key: str, policy: FailurePolicy) -> None:
         """Prepare what a proxy of this class keeps on this side; `key` is that of the part."""

@@ -41,7 +41,7 @@ class _Entered(local):
     """What this thread is doing now, so that a failure of it does not start it again."""
 
     stopping = False
-    telling = False
+    publishing = False
 
 
 class FailurePolicy:
@@ -74,7 +74,7 @@ class FailurePolicy:
         if defect or thread_died:
             self._stop_everything(f"{where}: {text}")
         logger.error("%s: %s", where, text, exc_info=error if defect else None)
-        self._tell(failure)
+        self._publish(failure)
         return failure
 
     def _stop_everything(self, reason: str) -> None:
@@ -84,12 +84,12 @@ class FailurePolicy:
         self._safe_stop.emit(reason)
         self._entered.stopping = False
 
-    def _tell(self, failure: Failure) -> None:
-        if self._entered.telling:
+    def _publish(self, failure: Failure) -> None:
+        if self._entered.publishing:
             return
-        self._entered.telling = True
+        self._entered.publishing = True
         self._failed.emit(failure)
-        self._entered.telling = False
+        self._entered.publishing = False
 
     def guarded(self, where: str, function: Callable[P, R], fallback: R) -> Callable[P, R]:
         """Wrap a driver callback, out of which no exception may escape into C code."""

@@ -86,20 +86,20 @@ class FoldingHandler(logging.Handler):
     @override
     def emit(self, record: logging.LogRecord) -> None:
         try:
-            told, passes = self._decided(record)
-            for each in (*told, record) if passes else told:
+            lines, passes = self._decided(record)
+            for each in (*lines, record) if passes else lines:
                 self._hand_on(each)
         except Exception:  # noqa: BLE001 - logging's contract: a handler never raises
             self.handleError(record)
 
-    def tell_due(self) -> None:
+    def flush_due(self) -> None:
         """Tell what was folded in windows that are over; returns at once where there is none."""
         now_s = self._clock.now_s()
         if now_s < self._next_due_s:
             return
         with self._guard:
-            told = self._due(now_s)
-        for each in told:
+            lines = self._due(now_s)
+        for each in lines:
             self._hand_on(each)
 
     @override
@@ -107,10 +107,10 @@ class FoldingHandler(logging.Handler):
         """Tell what was folded so far and forget it; the targets stay open."""
         with self._guard:
             now_s = self._clock.now_s()
-            told = [line for each in self._sources.values() if (line := _line(each, now_s))]
+            lines = [line for each in self._sources.values() if (line := _line(each, now_s))]
             self._sources.clear()
             self._next_due_s = float("inf")
-        for each in told:
+        for each in lines:
             self._hand_on(each)
         with _all_lock:
             _all.discard(self)
@@ -127,24 +127,24 @@ class FoldingHandler(logging.Handler):
             return [], True
         now_s = self._clock.now_s()
         with self._guard:
-            told = self._due(now_s)
+            lines = self._due(now_s)
             if record.levelno < logging.ERROR:
                 allowance = _INFO if record.levelno < logging.WARNING else _WARNING
-                return told, self._counted(told, _key(record), record, allowance)
+                return lines, self._counted(lines, _key(record), record, allowance)
             text = f"{record.msg!s}\0{_text(record)}"
-            passes = self._counted(told, _key(record, text), record, _WARNING)
+            passes = self._counted(lines, _key(record, text), record, _WARNING)
             # Texts that never repeat would be a flood as well.
             distinct = _Allowance(_DISTINCT_ERRORS, _DISTINCT_ERRORS)
-            return told, passes and self._counted(told, _key(record), record, distinct)
+            return lines, passes and self._counted(lines, _key(record), record, distinct)
 
     def _counted(
         self,
-        told: list[logging.LogRecord],
+        lines: list[logging.LogRecord],
         key: _Key,
         record: logging.LogRecord,
         allowance: _Allowance,
     ) -> bool:
-        """Return whether `record` passes; add to `told` what a forgotten source had folded."""
+        """Return whether `record` passes; add to `lines` what a forgotten source had folded."""
         now_s = self._clock.now_s()
         source = self._sources.get(key)
         if source is None:
@@ -152,7 +152,7 @@ class FoldingHandler(logging.Handler):
             self._next_due_s = min(self._next_due_s, now_s + WINDOW_S)
             if len(self._sources) > SOURCES_LIMIT:
                 _, oldest = self._sources.popitem(last=False)
-                told += [line for line in [_line(oldest, now_s)] if line is not None]
+                lines += [line for line in [_line(oldest, now_s)] if line is not None]
         self._sources.move_to_end(key)
         if source.passed < source.allowed:
             source.passed += 1
@@ -165,7 +165,7 @@ class FoldingHandler(logging.Handler):
         """Return what is to be told of the windows that are over, and begin the next ones."""
         if now_s < self._next_due_s:
             return []
-        told = []
+        lines = []
         for key, source in list(self._sources.items()):
             if now_s - source.began_s < WINDOW_S:
                 continue
@@ -173,12 +173,12 @@ class FoldingHandler(logging.Handler):
             if line is None:
                 del self._sources[key]
             else:
-                told.append(line)
+                lines.append(line)
                 source.began_s, source.passed, source.folded, source.example = now_s, 0, 0, None
         self._next_due_s = min(
             (each.began_s + WINDOW_S for each in self._sources.values()), default=float("inf")
         )
-        return told
+        return lines
 
 
 def _key(record: logging.LogRecord, text: str | None = None) -> _Key:
@@ -213,9 +213,9 @@ _all: Final["weakref.WeakSet[FoldingHandler]"] = weakref.WeakSet()
 _all_lock: Final = Lock()
 
 
-def tell_folded() -> None:
+def flush_folded() -> None:
     """Tell what was folded and is due, where nothing else is logged; returns at once."""
     with _all_lock:
         found = list(_all)
     for each in found:
-        each.tell_due()
+        each.flush_due()

@@ -49,7 +49,7 @@ class Progress:
     error: str
 
 
-class _Told:
+class _Listeners:
     """Who hears how far an operation is, in order."""
 
     def __init__(self) -> None:
@@ -77,7 +77,7 @@ class Operation(Generic[T]):
     _cancel_requested = False
     _on_cancel: tuple[Callable[[], object], ...] = ()
     _done = False
-    _told: "_Told | None" = None
+    _listeners: "_Listeners | None" = None
     _future: Future[T] | None = None
     sent_kind: ClassVar[Any] = None
     """What is told of its result to another process; None: what its annotation names."""
@@ -230,10 +230,10 @@ class Operation(Generic[T]):
         It is called at once with what has been reported so far, and last when all is over.
         """
         with self._lock:
-            told = self._told = self._told or _Told()
-        with told.order:
+            listeners = self._listeners = self._listeners or _Listeners()
+        with listeners.order:
             notify(subscriber, self.progress)
-            return told.progressed.subscribe(subscriber)
+            return listeners.progressed.subscribe(subscriber)
 
     @property
     def progress(self) -> Progress:
@@ -265,14 +265,14 @@ class Operation(Generic[T]):
     def report(self, fraction: float, text: str) -> None:
         """Say how far it is."""
         self._fraction, self._text = min(max(fraction, 0.0), 1.0), text
-        self._tell()
+        self._publish()
 
     def finish(self, result: T) -> bool:
         """End it well; False where it had ended before."""
         if not self._may_end():
             return False
         self._end.set_result(result)
-        self._tell()
+        self._publish()
         return True
 
     def fail(self, error: Exception) -> bool:
@@ -280,7 +280,7 @@ class Operation(Generic[T]):
         if not self._may_end():
             return False
         self._end.set_exception(error)
-        self._tell()
+        self._publish()
         return True
 
     @property
@@ -297,11 +297,11 @@ class Operation(Generic[T]):
             first, self._done = not self._done, True
         return first
 
-    def _tell(self) -> None:
-        told = self._told
-        if told is not None:
-            with told.order:
-                told.progressed.emit(self.progress)
+    def _publish(self) -> None:
+        listeners = self._listeners
+        if listeners is not None:
+            with listeners.order:
+                listeners.progressed.emit(self.progress)
 
     def _await_end(self, timeout_s: float | None) -> None:
         """Wait for the end; raises `DeviceTimeout`."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from cosmic.twin.centre_line import turned
 from cosmic.twin.fibre import Carried, Fibre
-from cosmic.twin.surroundings import Tell
+from cosmic.twin.surroundings import Record
 from cosmic.twin.tools import Tool
 
 
@@ -19,10 +19,10 @@ class Bonds:
         Pull that takes a lying fibre off the plate: a stronger bond drags the partner along.
     """
 
-    def __init__(self, fibres: list[Fibre], partner_un: float, tell: Tell) -> None:
+    def __init__(self, fibres: list[Fibre], partner_un: float, record: Record) -> None:
         self._fibres = fibres
         self._partner_un = partner_un
-        self._tell = tell
+        self._record = record
         self._bonds = [
             (each.settings.bonded_to, number, each.settings.bond_un)
             for number, each in enumerate(fibres)
@@ -44,7 +44,7 @@ class Bonds:
                 self._hang(partner, fibre, tool)
             elif partner.lies or partner.holds:
                 self._bonds.remove(bond)
-                self._tell("parted", fibre=fibre.number, partner=partner.number)
+                self._record("parted", fibre=fibre.number, partner=partner.number)
 
     def _hang(self, partner: Fibre, fibre: Fibre, tool: Tool) -> None:
         # As it lay to the fibre before that was taken and turned into line.
@@ -57,7 +57,7 @@ class Bonds:
         relative = np.column_stack([line, np.zeros(len(line))])
         partner.carried = Carried(f"{tool.name}.hold", relative, angle + turn, "hanging")
         partner.on_plate = False
-        self._tell("dragged", fibre=partner.number, by=fibre.number)
+        self._record("dragged", fibre=partner.number, by=fibre.number)
 
     def part(self, fibre: Fibre) -> None:
         """Undo the bonds of a fibre that one gripper takes while another holds its partner."""
@@ -65,4 +65,4 @@ class Bonds:
             partner = self._fibres[bond[0] if fibre.number == bond[1] else bond[1]]
             if partner.holds:
                 self._bonds.remove(bond)
-                self._tell("parted", fibre=fibre.number, partner=partner.number)
+                self._record("parted", fibre=fibre.number, partner=partner.number)

@@ -16,7 +16,7 @@ from cosmic.twin.kinematics import Floats, Skeleton, Slide
 from cosmic.twin.offsets import ToolOffsets
 from cosmic.twin.optics.solids import read_solids
 from cosmic.twin.settings import TwinSettings
-from cosmic.twin.surroundings import Tell
+from cosmic.twin.surroundings import Record
 
 PLATE_HALF_UM: Final = 12_000.0
 
@@ -35,7 +35,7 @@ class Contacts:
 
     Parameters
     ----------
-    tell : callable
+    record : callable
         Told "contact" when two bodies meet and "contact over" when they have parted, with the
         names of both, the greatest depth, and whether it was meant: jaws land on the plate, and
         the probe feels for a jaw.
@@ -47,11 +47,11 @@ class Contacts:
     """
 
     def __init__(
-        self, settings: TwinSettings, folder: Path, skeleton: Skeleton, tell: Tell
+        self, settings: TwinSettings, folder: Path, skeleton: Skeleton, record: Record
     ) -> None:
         self._settings = settings
         self._skeleton = skeleton
-        self._tell = tell
+        self._record = record
         self._plate = settings.geometry.plate
         self._stage_names = tuple(settings.stages)
         self._jaws = {jaw for each in settings.geometry.grippers.values() for jaw in each.jaws}
@@ -108,7 +108,7 @@ class Contacts:
             if pair in self._by_design:
                 continue
             if pair not in self._now:
-                self._tell("contact", bodies=pair, depth_um=round(depth, 3))
+                self._record("contact", bodies=pair, depth_um=round(depth, 3))
             self._now[pair] = max(self._now.get(pair, 0.0), depth)
         for pair in [each for each in self._now if each not in depths]:
             self._over(pair)
@@ -125,7 +125,7 @@ class Contacts:
         landed = jaw and self._plate in pair and depth <= handling.landing_um
         felt = jaw and self._settings.geometry.probe in pair and depth <= handling.touch_um
         meant = landed or felt
-        self._tell("contact over", bodies=pair, depth_um=depth, meant=meant)
+        self._record("contact over", bodies=pair, depth_um=depth, meant=meant)
 
     # ------------------------------------------------------------------ bodies
 

@@ -10,7 +10,7 @@ from cosmic.twin.bonds import Bonds
 from cosmic.twin.centre_line import turned
 from cosmic.twin.fibre import Fibre
 from cosmic.twin.handling_settings import HandlingSettings
-from cosmic.twin.surroundings import Surroundings, Tell
+from cosmic.twin.surroundings import Record, Surroundings
 from cosmic.twin.tools import Tool
 
 PLATE_HALF_UM: Final = 12_000.0
@@ -27,11 +27,11 @@ class Falls:
     """
 
     def __init__(
-        self, handling: HandlingSettings, bonds: Bonds, tell: Tell, *, scatter: bool
+        self, handling: HandlingSettings, bonds: Bonds, record: Record, *, scatter: bool
     ) -> None:
         self._handling = handling
         self._bonds = bonds
-        self._tell = tell
+        self._record = record
         self._scatters = scatter
 
     def fall(
@@ -51,7 +51,7 @@ class Falls:
         fibre.lay(pose)
         middle = fibre.line_um.placed(*pose).mean(axis=0)
         fibre.gone = bool(np.abs(middle).max() > PLATE_HALF_UM)
-        self._tell(
+        self._record(
             "gone" if fibre.gone else "landed",
             fibre=fibre.number,
             x_um=round(float(middle[0]), 2),

@@ -17,7 +17,7 @@ from cosmic.twin.grip import make_hold
 from cosmic.twin.handling_settings import HandlingSettings
 from cosmic.twin.kinematics import Point
 from cosmic.twin.settings import TwinSettings
-from cosmic.twin.surroundings import Surroundings, Tell
+from cosmic.twin.surroundings import Record, Surroundings
 from cosmic.twin.tools import Tool
 from cosmic.twin.twin_faults import TwinFaults
 
@@ -126,7 +126,7 @@ class GripperContacts:
     ----------
     fibres : list of Fibre
         Shared with the workplace; pieces that break off are appended.
-    tell : callable
+    record : callable
         Told each event by name, with facts.
     faults : bool
         Whether anything goes wrong by chance.
@@ -144,17 +144,17 @@ class GripperContacts:
         seed: int,
         *,
         injected: TwinFaults,
-        tell: Tell,
+        record: Record,
         faults: bool,
     ) -> None:
         self._contact, self._handling = settings.contact, settings.handling
         self.fibres = fibres
         self._seed = seed
         self._injected = injected
-        self._tell = tell
+        self._record = record
         self._faults = faults
-        self._bonds = Bonds(fibres, settings.handling.partner_un, tell)
-        self._falls = Falls(settings.handling, self._bonds, tell, scatter=faults)
+        self._bonds = Bonds(fibres, settings.handling.partner_un, record)
+        self._falls = Falls(settings.handling, self._bonds, record, scatter=faults)
         self._in_hand: dict[str, Fibre] = {}
         self._clinging: dict[int, Clinging] = {}
         self._widest: dict[str, float] = {}
@@ -237,7 +237,7 @@ class GripperContacts:
         fibre.grasps += 1
         fate = self._fate(fibre, tool)
         if fate.missed:
-            self._tell("missed", fibre=fibre.number, tool=tool.name)
+            self._record("missed", fibre=fibre.number, tool=tool.name)
             return
         self._clinging.pop(fibre.number, None)
         fibre.on_plate = fibre.lies
@@ -245,7 +245,7 @@ class GripperContacts:
         self._in_hand[tool.name] = fibre
         self._came_um[fibre.number] = tool.hold, 0.0
         self._bonds.part(fibre)
-        self._tell(
+        self._record(
             "grasped",
             fibre=fibre.number,
             tool=tool.name,
@@ -269,7 +269,7 @@ class GripperContacts:
             height = max(fibre.height_um(tool), 0.0)
             if fibre.peeled_um(height) >= fibre.holds[tool.name].free.length_um:
                 fibre.on_plate = False
-                self._tell("lifted", fibre=fibre.number, tool=tool.name, height_um=height)
+                self._record("lifted", fibre=fibre.number, tool=tool.name, height_um=height)
                 self._bonds.drag(fibre, tool)
         if fate.slip_at_um < math.inf and fibre.height_um(tool) > fate.slip_at_um:
             self._lose(fibre, tool, around, "slipped")
@@ -285,7 +285,7 @@ class GripperContacts:
         name, hold = next(iter(fibre.holds.items()))
         hold.depth_um += hold.fate.loosen_um
         hold.fate = replace(hold.fate, loosen_strain=math.inf)
-        self._tell("grip loosened", fibre=fibre.number, tool=name, by_um=hold.fate.loosen_um)
+        self._record("grip loosened", fibre=fibre.number, tool=name, by_um=hold.fate.loosen_um)
 
     def snap(self, fibre: Fibre, around: Surroundings, strain: float) -> None:
         """Break a fibre where it leaves the jaws; the outer piece falls."""
@@ -297,7 +297,7 @@ class GripperContacts:
         piece = self._piece(fibre, *outer)
         piece.carried = Carried(f"{name}.hold", np.zeros((2, 3)), hold.angle_rad, "hanging")
         self.fibres.append(piece)
-        self._tell("broken", fibre=fibre.number, tool=name, piece=piece.number, strain=strain)
+        self._record("broken", fibre=fibre.number, tool=name, piece=piece.number, strain=strain)
         # The piece keeps the frame of the whole, so it is laid where that is.
         self._falls.fall(piece, hold.frame_um(fibre.line_um, tool.hold), tool, around)
         fibre.line_um = _part_of(fibre.line_um, low, high)
@@ -328,12 +328,12 @@ class GripperContacts:
         self._widest[name] = tool.gap_um
         if len(fibre.holds) > 1:
             del self._in_hand[name], fibre.holds[name]
-            self._tell("released", fibre=fibre.number, tool=name, sticks=False)
+            self._record("released", fibre=fibre.number, tool=name, sticks=False)
             (other,) = fibre.holds
             self._came_um[fibre.number] = around.tools[other].hold, 0.0
             return
         sticks = fibre.holds[name].fate.sticks
-        self._tell("released", fibre=fibre.number, tool=name, sticks=sticks)
+        self._record("released", fibre=fibre.number, tool=name, sticks=sticks)
         if not sticks:
             self._fall(fibre, tool, around)
             return
@@ -349,7 +349,7 @@ class GripperContacts:
         self._clinging[fibre.number] = Clinging(self._handling, key, around.anchor(anchor))
 
     def _lose(self, fibre: Fibre, tool: Tool, around: Surroundings, event: str) -> None:
-        self._tell(
+        self._record(
             event, fibre=fibre.number, tool=tool.name, height_um=max(fibre.height_um(tool), 0.0)
         )
         self._fall(fibre, tool, around)
@@ -365,7 +365,7 @@ class GripperContacts:
         if how:
             del self._clinging[number]
             tool = around.tools[carried.anchor.partition(".")[0]]
-            self._tell("came off", fibre=number, tool=tool.name, how=how)
+            self._record("came off", fibre=number, tool=tool.name, how=how)
             self._falls.come_down(fibre, tool, around)
 
     def _fall(self, fibre: Fibre, tool: Tool, around: Surroundings) -> None:

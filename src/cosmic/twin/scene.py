@@ -17,7 +17,7 @@ from cosmic.twin.light import TwinLight
 from cosmic.twin.optics.optics import Optics
 from cosmic.twin.settings import StageKind, TwinSettings
 from cosmic.twin.stage import Stage
-from cosmic.twin.truth import NO_TRUTH, Truth, tell_sample
+from cosmic.twin.truth import NO_TRUTH, Truth, record_sample
 from cosmic.twin.twin_faults import TwinFaults
 
 Wiring = tuple[tuple[str | None, ...], ...]
@@ -167,7 +167,7 @@ class Scene:
         files = folder or shipped_config_dir()
         lens, light = TwinLens(settings.lens, seed, cold=cold), TwinLight(settings.light)
         faults = TwinFaults()
-        tell_sample(truth, sample, seed, settings.fibres)
+        record_sample(truth, sample, seed, settings.fibres)
         force_side = ForceSide(settings, files, stages, seed, faults=faults, truth=truth)
         faults.begin = LastingFaults(clock, stages, force_side, lens, light)
         return cls(
@@ -248,7 +248,7 @@ class Scene:
         """End the truth; harmless the second time."""
         if self.force_side is not None:
             self.force_side.finish(self.clock.now_s())
-        self._truth.tell(self.clock.now_s(), "end")
+        self._truth.record(self.clock.now_s(), "end")
         self._truth.close()
 
     def keep_up(self) -> None:

@@ -8,7 +8,7 @@ from cosmic.twin.fibre import Floats
 from cosmic.twin.kinematics import Point
 from cosmic.twin.tools import Tool
 
-Tell = Callable[..., None]
+Record = Callable[..., None]
 
 
 class Surroundings(Protocol):

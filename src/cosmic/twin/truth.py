@@ -25,7 +25,7 @@ class Truth(Protocol):
     """Whoever is told what truly happens; any thread."""
 
     @abstractmethod
-    def tell(self, time_s: float, event: str, **facts: object) -> None:
+    def record(self, time_s: float, event: str, **facts: object) -> None:
         """Take note of an event."""
 
     @abstractmethod
@@ -37,7 +37,7 @@ class NoTruth(Truth):
     """Nobody listens."""
 
     @override
-    def tell(self, time_s: float, event: str, **facts: object) -> None:
+    def record(self, time_s: float, event: str, **facts: object) -> None:
         """Forget it."""
 
     @override
@@ -70,7 +70,7 @@ class TruthFile(Truth):
             raise ConfigError(f"{path}: cannot be written: {exc.strerror or exc}") from exc
 
     @override
-    def tell(self, time_s: float, event: str, **facts: object) -> None:
+    def record(self, time_s: float, event: str, **facts: object) -> None:
         line = json.dumps({"time_s": round(time_s, 6), "event": event, **facts}, default=_rounded)
         with self._lock:
             if self._file is not None:
@@ -147,14 +147,14 @@ class TruthRecord:
         )
 
 
-def tell_sample(truth: Truth, sample: str, seed: int, fibres: tuple[FibreSettings, ...]) -> None:
+def record_sample(truth: Truth, sample: str, seed: int, fibres: tuple[FibreSettings, ...]) -> None:
     """Tell what lies on the plate at the start."""
     names = TrueFibre.__slots__[1:]
     table = [
         {"number": number, **{name: getattr(each, name) for name in names}}
         for number, each in enumerate(fibres)
     ]
-    truth.tell(0.0, "sample", format=FORMAT, sample=sample, seed=seed, fibres=table)
+    truth.record(0.0, "sample", format=FORMAT, sample=sample, seed=seed, fibres=table)
 
 
 def read_truth(path: str | Path) -> TruthRecord:

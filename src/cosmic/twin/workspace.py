@@ -106,7 +106,7 @@ class Workspace:
             for number, fibre in enumerate(settings.fibres)
         ]
         self._gripper_contacts = GripperContacts(
-            settings, self.fibres, seed, injected=self.faults, tell=self._tell, faults=wander
+            settings, self.fibres, seed, injected=self.faults, record=self._record, faults=wander
         )
         self._touches: dict[int, Touch] = {}
         self._peaks_un: dict[int | str, float] = {}
@@ -116,7 +116,7 @@ class Workspace:
         self.gripper_stages = frozenset(each.stage for each in self._geometry.grippers.values())
         self._contacts: Contacts | None = None
         if folder is not None:
-            self._contacts = Contacts(settings, folder, skeleton, self._tell)
+            self._contacts = Contacts(settings, folder, skeleton, self._record)
 
     @property
     def stages(self) -> frozenset[str]:
@@ -194,8 +194,8 @@ class Workspace:
         if self._contacts is not None:
             self._contacts.finish()
 
-    def _tell(self, event: str, **facts: object) -> None:
-        self._truth.tell(self._time_s, event, **facts)
+    def _record(self, event: str, **facts: object) -> None:
+        self._truth.record(self._time_s, event, **facts)
 
     # ------------------------------------------------------------------ probe
 
@@ -251,10 +251,10 @@ class Workspace:
         for what, force in forces.items():
             if what not in self._peaks_un:
                 at = {"abscissa_um": along[what]} if isinstance(what, int) else {}
-                self._tell("touched", **_named(what), **at)
+                self._record("touched", **_named(what), **at)
             self._peaks_un[what] = max(self._peaks_un.get(what, 0.0), abs(force))
         for what in [each for each in self._peaks_un if each not in forces]:
-            self._tell("left", **_named(what), peak_un=self._peaks_un.pop(what))
+            self._record("left", **_named(what), peak_un=self._peaks_un.pop(what))
 
     def _jaw(self, name: str, tool: Tool, probe: Point) -> float:
         """Return the force of a jaw's outer face on the probe's tip."""

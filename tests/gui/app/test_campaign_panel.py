@@ -155,9 +155,9 @@ def test_a_finished_fibre_is_shown_and_can_be_replayed(panel, qtbot, tmp_path) -
     panel.board.fibre_chosen.emit(2)
     assert panel.tabs.currentWidget() is panel.card
     assert panel.card.card.number == 2
-    with qtbot.waitSignal(panel.replay_requested) as told:
+    with qtbot.waitSignal(panel.replay_requested) as signal:
         press(qtbot, panel.card.replay)
-    assert told.args[0].number == 2
+    assert signal.args[0].number == 2
 
 
 def test_the_report_is_written_where_the_campaign_is(panel, qtbot, tmp_path) -> None:
@@ -167,7 +167,7 @@ def test_the_report_is_written_where_the_campaign_is(panel, qtbot, tmp_path) -> 
     assert not panel.report.isEnabled(), "the press returned before the report was written"
     qtbot.waitUntil(panel.report.isEnabled, timeout=20_000)
     assert (tmp_path / "here" / "report.html").exists()
-    assert "report.html" in panel.told.toolTip() or "report.html" in panel.told.text()
+    assert "report.html" in panel.message.toolTip() or "report.html" in panel.message.text()
 
 
 def test_a_replay_goes_from_the_first_to_the_last_position_of_every_axis() -> None:

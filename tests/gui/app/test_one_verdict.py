@@ -145,12 +145,12 @@ def same(verdict: MoveVerdict, expected: MoveVerdict) -> None:
 
 def hold_down(window: OperatorWindow, qtbot: QtBot, guard: Guard) -> MoveVerdict:
     """Hold the key of the axis until it is stopped in front of the other body."""
-    told: list[MoveVerdict] = []
+    verdicts: list[MoveVerdict] = []
     card = panel(window).cards[AXIS]
-    panel(window).verdict_given.connect(told.append)
+    panel(window).verdict_given.connect(verdicts.append)
     part(panel(window), "initialise", QPushButton).setFocus()
     qtbot.keyPress(panel(window).focusWidget(), Qt.Key.Key_F)
-    qtbot.waitUntil(lambda: guard.look() and bool(told), timeout=8000)
+    qtbot.waitUntil(lambda: guard.look() and bool(verdicts), timeout=8000)
     qtbot.waitUntil(lambda: guard.look() and not card.axis.details.in_motion)
     qtbot.keyRelease(panel(window).focusWidget(), Qt.Key.Key_F)
-    return told[-1]
+    return verdicts[-1]

@@ -202,15 +202,15 @@ def test_many_changes_are_drawn_a_few_times(
     monkeypatch.setattr(tree, "show_view", lambda view: (next(drawn), real(view)))
     rounds = iter(range(2000))
     run = timed(Repeat(Op("a", steps=(0.0,)), lambda _work: next(rounds) == 1999), 1e5)
-    told, signalled = count(), count()
-    run.on_change(lambda: next(told))
+    received, signalled = count(), count()
+    run.on_change(lambda: next(received))
     panel._bridge.changed.connect(lambda: next(signalled))
     panel.follow(run)
     click(qtbot, panel.start)
     with qtbot.waitSignal(panel._redraw.timeout):
         pass
     qtbot.waitUntil(lambda: panel.state.text() == "done")
-    assert next(told) > 4000
+    assert next(received) > 4000
     assert next(drawn) < 200
     assert 0 < next(signalled) < 200
     assert panel.tree.row(())[STATE] == "done"
@@ -219,13 +219,13 @@ def test_many_changes_are_drawn_a_few_times(
 def test_what_changes_after_a_drawing_is_told_again(qtbot: QtBot) -> None:
     panel = shown(qtbot, ProcedureTreePanel())
     bridge = ChangeBridge(panel)
-    told = count()
-    bridge.changed.connect(lambda: next(told))
+    received = count()
+    bridge.changed.connect(lambda: next(received))
     for _ in range(3):
-        bridge.tell()
+        bridge.publish()
     bridge.take()
-    bridge.tell()
-    assert next(told) == 2
+    bridge.publish()
+    assert next(received) == 2
 
 
 def test_closing_the_panel_aborts_the_run_begun_there_and_no_other(qtbot: QtBot) -> None:

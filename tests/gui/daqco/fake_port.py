@@ -118,13 +118,13 @@ class FakePort:
     def rate_hz(self) -> float:
         return self.settings.rate_hz
 
-    def carry_out(self, action, told, *, slow=False) -> None:
+    def carry_out(self, action, on_result, *, slow=False) -> None:
         try:
             result = action()
         except CosmicError as exc:
-            told(None, exc)
+            on_result(None, exc)
         else:
-            told(result, None)
+            on_result(result, None)
 
     def folder_problem(self, directory: str) -> str:
         return directory_problem(directory)

@@ -184,11 +184,11 @@ def test_the_window_does_not_wait_for_a_slow_disk_to_close_the_file(qtbot, tmp_p
 
 @pytest.mark.defects
 def test_a_mistake_in_what_is_carried_out_aside_is_reported_and_told(qtbot, tmp_path):
-    told = []
+    results = []
     with at_home(settings(tmp_path)) as home:
-        home.application.carry_out(lambda: 1 / 0, lambda *how: told.append(how), slow=True)
-        qtbot.waitUntil(lambda: bool(told))
-        assert "ZeroDivisionError" in str(told[0][1])
+        home.application.carry_out(lambda: 1 / 0, lambda *how: results.append(how), slow=True)
+        qtbot.waitUntil(lambda: bool(results))
+        assert "ZeroDivisionError" in str(results[0][1])
         assert [each.defect for each in home.failures] == [True]
-    home.application.carry_out(lambda: 1, lambda *how: told.append(how), slow=True)
-    assert "closed" in str(told[1][1])
+    home.application.carry_out(lambda: 1, lambda *how: results.append(how), slow=True)
+    assert "closed" in str(results[1][1])

@@ -89,7 +89,7 @@ def test_a_file_that_could_not_be_closed_well_is_told(qtbot, widget, port):
     click(qtbot, widget.start)
     port.fail_close = "disk full: the last 0.5 s are missing"
     click(qtbot, widget.stop)
-    assert "disk full" in widget.told.text()
+    assert "disk full" in widget.message.text()
     assert widget.badge.state is State.ERROR
 
 
@@ -98,7 +98,7 @@ def test_a_start_that_is_refused_enables_start_again_and_says_why(qtbot, widget,
     click(qtbot, widget.start)
     assert widget.start.isEnabled()
     assert not widget.stop.isEnabled()
-    assert "the disk is full" in widget.told.text()
+    assert "the disk is full" in widget.message.text()
 
 
 def test_an_existing_file_is_overwritten_only_after_a_question(qtbot, widget, port):
@@ -173,19 +173,19 @@ def test_time_left_on_the_disk_is_told_for_the_channels_and_rate_in_force(qtbot,
 def test_a_writer_that_falls_behind_is_told(qtbot, widget, port):
     port.counters = Counted(backlog=2500)
     port.change(recording=Recorded(active=True, path=port.directory / "x.h5"))
-    qtbot.waitUntil(lambda: "2.5 s behind" in widget.told.text())
+    qtbot.waitUntil(lambda: "2.5 s behind" in widget.message.text())
 
 
 def test_length_and_size_of_the_recording_are_told(qtbot, widget, port):
     path = port.directory / "x.h5"
     recording = Recorded(active=True, path=path, duration_s=72.0, size_bytes=12_300_000)
     port.change(recording=recording)
-    qtbot.waitUntil(lambda: "1 min 12 s, 12.3 MB" in widget.told.text())
+    qtbot.waitUntil(lambda: "1 min 12 s, 12.3 MB" in widget.message.text())
 
 
 def test_a_recording_that_broke_off_by_itself_is_told(qtbot, widget, port):
     port.change(recording=Recorded(path=port.directory / "x.h5", failure="the disk is full"))
-    qtbot.waitUntil(lambda: "the disk is full" in widget.told.text())
+    qtbot.waitUntil(lambda: "the disk is full" in widget.message.text())
     assert widget.start.isEnabled()
 
 

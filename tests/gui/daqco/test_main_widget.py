@@ -258,7 +258,7 @@ def test_a_channel_opens_the_dialog_at_its_limit(qtbot, main):
 def test_a_recording_that_the_application_ends_is_told_by_the_widget(qtbot, main, port):
     failed = Recorded(path=port.directory / "x.h5", failure="the disk is full")
     port.change(recording=failed)
-    qtbot.waitUntil(lambda: "the disk is full" in main.files.told.text())
+    qtbot.waitUntil(lambda: "the disk is full" in main.files.message.text())
 
 
 def test_a_main_widget_that_goes_stops_listening(qtbot, tmp_path):

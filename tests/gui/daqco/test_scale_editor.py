@@ -88,15 +88,15 @@ def test_a_scale_without_coefficients_is_refused(qtbot, editor):
 
 
 @pytest.mark.parametrize(
-    ("name", "unit", "told"),
+    ("name", "unit", "refusal"),
     [("", "uN", "needs a name"), ("Bent", "uN", "already"), ("Volts", "V", "already"),
      ("Probe", "", "unit")],
 )  # fmt: skip
-def test_name_and_unit_are_needed_and_the_name_is_its_own(qtbot, editor, name, unit, told):
+def test_name_and_unit_are_needed_and_the_name_is_its_own(qtbot, editor, name, unit, refusal):
     editor.name.setText(name)
     editor.unit.setText(unit)
     ok(qtbot, editor)
-    assert told in editor.message.text()
+    assert refusal in editor.message.text()
     assert editor.accepted_scales == []
 
 

@@ -52,9 +52,9 @@ def bubble(field: QuantityField) -> ReasonBubble:
 def test_a_number_with_or_without_a_unit_is_taken(
     qtbot: QtBot, field: QuantityField, text: str, value: float
 ) -> None:
-    with qtbot.waitSignal(field.value_committed) as told:
+    with qtbot.waitSignal(field.value_committed) as signal:
         enter(qtbot, field, text)
-    assert told.args == [pytest.approx(value)]
+    assert signal.args == [pytest.approx(value)]
     assert field.value() == pytest.approx(value)
     assert field.reason == ""
     assert float(field.text()) == pytest.approx(value)
@@ -133,9 +133,9 @@ def test_an_unchanged_value_is_not_committed_but_entered(
     qtbot: QtBot, field: QuantityField
 ) -> None:
     enter(qtbot, field, "7")
-    with qtbot.assertNotEmitted(field.value_committed), qtbot.waitSignal(field.entered) as told:
+    with qtbot.assertNotEmitted(field.value_committed), qtbot.waitSignal(field.entered) as signal:
         enter(qtbot, field, "7.0 um")
-    assert told.args == [7.0]
+    assert signal.args == [7.0]
 
 
 def test_a_refusal_by_the_gate_undoes_what_was_committed(

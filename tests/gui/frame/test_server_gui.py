@@ -180,9 +180,9 @@ def test_a_failed_application_is_greyed_says_why_and_can_be_rescanned(
     texts = [label.text() for label in dock.findChildren(QLabel) if label.isVisible()]
     assert "device 1 is not there: plugged in and powered?" in texts
     rescan = next(b for b in dock.findChildren(QPushButton) if b.text() == "Rescan")
-    with qtbot.waitSignal(gui.rescan_requested) as told:
+    with qtbot.waitSignal(gui.rescan_requested) as signal:
         qtbot.mouseClick(rescan, LEFT)
-    assert told.args == ["MiCo"]
+    assert signal.args == ["MiCo"]
     gui.clear_failed("MiCo")
     assert dock.panel.isEnabled()
     assert not rescan.isVisible()
@@ -232,8 +232,8 @@ def test_the_theme_button_changes_all_windows(
 ) -> None:
     show(qtbot, gui)
     before = qapp.styleSheet()
-    with qtbot.waitSignal(gui.theme_changed) as told:
+    with qtbot.waitSignal(gui.theme_changed) as signal:
         gui.top_bar.theme_requested.emit()
-    assert told.args == ["light"]
+    assert signal.args == ["light"]
     assert qapp.styleSheet() != before
     assert action(gui, "Light").isChecked()

@@ -39,11 +39,11 @@ def test_an_amount_of_data_is_told_in_words(size_bytes, text):
 
 
 @pytest.mark.parametrize(
-    ("typed", "told"),
+    ("typed", "message"),
     [("", "type a number"), ("1,5", "point"), ("a", "not a number"), ("nan", "finite")],
 )
-def test_a_text_that_is_no_number_is_refused_with_what_to_do(typed, told):
-    with pytest.raises(QuantityError, match=told):
+def test_a_text_that_is_no_number_is_refused_with_what_to_do(typed, message):
+    with pytest.raises(QuantityError, match=message):
         read_number(typed)
 
 

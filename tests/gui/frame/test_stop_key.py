@@ -41,9 +41,9 @@ def key(qapp: QApplication, moves: list[bool]) -> Iterator[StopKeyFilter]:
 @pytest.fixture
 def stops(key: StopKeyFilter) -> list[str]:
     """What the stop key asked for, in order."""
-    told: list[str] = []
-    key.stop_requested.connect(told.append)
-    return told
+    received: list[str] = []
+    key.stop_requested.connect(received.append)
+    return received
 
 
 def show(qtbot: QtBot, window: QWidget) -> None:

@@ -158,9 +158,9 @@ def test_only_manual_mode_can_be_chosen_and_the_others_say_why(qtbot: QtBot, bar
         assert not buttons[name].isEnabled()
         assert "Not available" in buttons[name].toolTip()
     bar.set_mode_available("SCM")
-    with qtbot.waitSignal(bar.mode_requested) as told:
+    with qtbot.waitSignal(bar.mode_requested) as signal:
         qtbot.mouseClick(buttons["SCM"], LEFT)
-    assert told.args == ["SCM"]
+    assert signal.args == ["SCM"]
     assert buttons["MCM"].isChecked()  # the owner decides
     bar.set_mode("SCM")
     assert buttons["SCM"].isChecked()

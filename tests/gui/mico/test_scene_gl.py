@@ -25,8 +25,8 @@ def display():
         stderr=subprocess.DEVNULL,
     )
     os.close(write)
-    with os.fdopen(read) as told:
-        number = told.readline().strip()
+    with os.fdopen(read) as answer:
+        number = answer.readline().strip()
     if not number:
         server.wait(10)
         pytest.skip("Xvfb does not start here")

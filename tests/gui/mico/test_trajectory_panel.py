@@ -81,9 +81,9 @@ def test_a_rehearsal_tells_clearance_duration_and_end_and_gives_a_preview(
     panel: TrajectoryPanel, mico: Mico, qtbot: QtBot, tmp_path: Path
 ) -> None:
     opened(panel, qtbot, tmp_path, HEAD + "left.z to 300 um\nwait 2 s\nleft.z to 0 um\n")
-    with qtbot.waitSignal(panel.preview_changed) as told:
+    with qtbot.waitSignal(panel.preview_changed) as signal:
         click(qtbot, panel, "rehearse")
-    assert [round(pose["left.z"]) for pose in told.args[0]][1:] == [300, 0]
+    assert [round(pose["left.z"]) for pose in signal.args[0]][1:] == [300, 0]
     assert "smallest clearance" in panel.report.text()
     assert "in about 2." in panel.report.text()
     assert "left.z 0.0" in panel.report.text()
@@ -94,9 +94,9 @@ def test_a_rehearsal_that_is_refused_marks_the_line(
 ) -> None:
     text = HEAD + "left.z to 10 um\ntogether\nleft.x to 5400 um\nright.x to -5400 um\nend\n"
     opened(panel, qtbot, tmp_path, text)
-    with qtbot.waitSignal(panel.refused) as told:
+    with qtbot.waitSignal(panel.refused) as signal:
         panel.rehearse()
-    verdict: MoveVerdict = told.args[0]
+    verdict: MoveVerdict = signal.args[0]
     assert verdict.reason is Reason.COLLISION
     assert list(panel.lines.lines.problems) == [4]
 
@@ -174,7 +174,7 @@ def test_poses_are_taught_gone_to_and_offered_to_recordings(
     qtbot.keyClicks(part(box, "poseName", QLineEdit), "over the fibre")
     box.group.setCurrentText("Left assembly")
     click(qtbot, box, "teachPose")
-    assert "3 axes" in box.told.text()
+    assert "3 axes" in box.message.text()
     assert part(box, "poses", QComboBox).currentText() == "over the fibre"
     offered = panel.record_bar.pose
     assert [offered.itemText(n) for n in range(offered.count())] == ["no pose", "over the fibre"]
@@ -182,7 +182,7 @@ def test_poses_are_taught_gone_to_and_offered_to_recordings(
     movement = mico["left.x"].move_to(before + 90.0, wait=False)
     qtbot.waitUntil(lambda: movement.done)
     click(qtbot, box, "goPose")
-    qtbot.waitUntil(lambda: box.told.text() == "there", timeout=5000)
+    qtbot.waitUntil(lambda: box.message.text() == "there", timeout=5000)
     assert at(panel, mico, "left.x") == pytest.approx(before, abs=1.0)
     click(qtbot, box, "removePose")
     assert mico.poses.names == []

@@ -183,7 +183,7 @@ class FakeCamera:
     def change(self, **changes: object) -> None:
         for name, value in changes.items():
             setattr(self, name, value)
-        self._port.tell()
+        self._port.publish()
 
     def _do(self, *call: object) -> None:
         if self.refuse:
@@ -204,7 +204,7 @@ class FakeCamera:
         else:
             self.settings = settings
             task.finish()
-            self._port.tell()
+            self._port.publish()
         return task
 
     def start(self) -> None:
@@ -379,6 +379,6 @@ class FakeVico:
     def listened(self) -> int:
         return len(self._listeners)
 
-    def tell(self) -> None:
+    def publish(self) -> None:
         for listener in list(self._listeners):
             listener()

@@ -32,18 +32,18 @@ def test_each_tool_calibrates_and_the_table_turns(button, camera):
 
 
 def test_while_one_is_under_way_it_can_only_be_cancelled(qtbot, button, camera):
-    told = []
-    button.told.connect(told.append)
+    messages = []
+    button.message.connect(messages.append)
     actions(button)["Move left gripper"].trigger()
     task = camera.task
     task.report(0.5, "place 5 of 9")
-    qtbot.waitUntil(lambda: "Calibrating: place 5 of 9" in told)
+    qtbot.waitUntil(lambda: "Calibrating: place 5 of 9" in messages)
     offered = actions(button)
     assert list(offered) == ["Cancel"]
     offered["Cancel"].trigger()
     assert task.cancel_requested
     task.fail(NotAvailable("it was cancelled"))
-    qtbot.waitUntil(lambda: "it was cancelled" in told[-1])
+    qtbot.waitUntil(lambda: "it was cancelled" in messages[-1])
     assert "Cancel" not in actions(button)
 
 
@@ -58,11 +58,11 @@ def test_what_is_calibrated_is_listed_with_its_age(button, camera):
 
 
 def test_a_refusal_is_told(button, camera):
-    told = []
-    button.told.connect(told.append)
+    messages = []
+    button.message.connect(messages.append)
     camera.refuse = "autofocus is running"
     actions(button)["Move left gripper"].trigger()
-    assert told[-1].endswith("autofocus is running")
+    assert messages[-1].endswith("autofocus is running")
 
 
 def test_without_tools_the_button_is_off_and_says_why(button, camera):

@@ -150,7 +150,7 @@ def test_a_camera_is_chosen_among_those_found_and_they_are_looked_for_again(
     port.task.finish()
     qtbot.waitUntil(lambda: box.count() == 1)  # the one in use
     camera.info = None
-    port.tell()
+    port.publish()
     qtbot.waitUntil(lambda: box.placeholderText() == "none found")
     assert INFO.key not in [box.itemData(n) for n in range(box.count())]
 

@@ -118,7 +118,7 @@ def test_light_is_set_in_percent(qtbot, panel, port):
 
 def test_without_lens_and_lamp_everything_says_why(qtbot, panel, port):
     port.lens = port.light = None
-    port.tell()
+    port.publish()
     qtbot.waitUntil(lambda: not panel.home.isEnabled())
     assert "no motorised lens" in panel.home.toolTip()
     assert "no lamp" in panel.light.field.toolTip()

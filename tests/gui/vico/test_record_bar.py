@@ -42,7 +42,7 @@ def test_a_snap_that_fails_is_told(qtbot, bar, camera):
     qtbot.waitUntil(lambda: "disk full" in bar.tasks.text.text())
     camera.refuse = "no such directory"
     click(qtbot, bar.snap)
-    assert "no such directory" in bar.told.text()
+    assert "no such directory" in bar.message.text()
 
 
 def test_a_recording_is_started_counted_and_stopped(qtbot, bar, camera):
@@ -62,8 +62,8 @@ def test_a_recording_is_started_counted_and_stopped(qtbot, bar, camera):
         size_bytes=123_400_000,
         left_s=3700.0,
     )
-    qtbot.waitUntil(lambda: bar.told.text().startswith("4711 written, 2 dropped, 5 waiting"))
-    assert "123.4 MB, disk lasts 1 h 01 min" in bar.told.text()
+    qtbot.waitUntil(lambda: bar.message.text().startswith("4711 written, 2 dropped, 5 waiting"))
+    assert "123.4 MB, disk lasts 1 h 01 min" in bar.message.text()
     assert [each.geometry() for each in (bar.snap, bar.record, bar.lapse, bar.more)] == places
     click(qtbot, bar.record)
     assert camera.calls[-1] == ("stop recording",)
@@ -73,12 +73,12 @@ def test_a_recording_is_started_counted_and_stopped(qtbot, bar, camera):
 def test_a_recording_that_ended_by_itself_says_why(qtbot, bar, camera):
     click(qtbot, bar.record)
     camera.change(recording=replace(camera.recording, active=False, failure="disk full"))
-    qtbot.waitUntil(lambda: bar.told.text() == "■ disk full")
+    qtbot.waitUntil(lambda: bar.message.text() == "■ disk full")
     assert not bar.record.isChecked()
 
 
 def test_before_a_recording_the_disk_is_said_to_last(bar):
-    assert bar.told.text() == "disk lasts 2 h 00 min"
+    assert bar.message.text() == "disk lasts 2 h 00 min"
 
 
 def test_a_format_that_cannot_be_used_disables_recording_and_says_why(qtbot, bar, camera):

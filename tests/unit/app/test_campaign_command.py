@@ -81,8 +81,8 @@ def test_the_exit_code_is_0_only_when_it_did_what_was_asked(
 ) -> None:
     platforms.phase = phase
     assert main(["campaign", str(recipe), "--out", str(tmp_path / "out")]) == code
-    told = capsys.readouterr()
-    assert "so it was" in (told.err if code else told.out)
+    printed = capsys.readouterr()
+    assert "so it was" in (printed.err if code else printed.out)
 
 
 def test_the_seed_given_is_the_one_recorded_reported_and_printed(
@@ -168,7 +168,7 @@ def test_a_flood_of_warnings_is_folded_by_every_command_without_a_window(
     monkeypatch.setattr(calibrate_command, "connect", flood)
     monkeypatch.setattr(repair_command, "close_left_open", flood)
     assert main([command, *([str(tmp_path / "push.h5")] if command == "repair" else [])]) == 1
-    told = capsys.readouterr().err
-    assert 1 <= told.count("is late") < 100
-    assert "repeated 950 times" in told
-    assert "and that was all" in told
+    printed = capsys.readouterr().err
+    assert 1 <= printed.count("is late") < 100
+    assert "repeated 950 times" in printed
+    assert "and that was all" in printed

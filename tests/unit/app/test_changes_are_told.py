@@ -32,16 +32,16 @@ def test_a_change_in_a_thread_is_told_there_and_nothing_waits_for_one_who_is_gon
 ) -> None:
     platform = build_platform(applications=(hosted,))
     application = getattr(platform, hosted)
-    told: list[str] = []
+    notified_in: list[str] = []
     rig = Rig(platform)
-    getattr(rig, hosted).on_change(lambda: told.append(threading.current_thread().name))
+    getattr(rig, hosted).on_change(lambda: notified_in.append(threading.current_thread().name))
     worker = Doing(application.status_changed.emit)
     worker.start()
     worker.join()
-    assert len(told) == 1
-    assert told != [threading.main_thread().name]
+    assert len(notified_in) == 1
+    assert notified_in != [threading.main_thread().name]
     rig.close()
     del rig
     gc.collect()
     QCoreApplication.sendPostedEvents()
-    assert len(told) == 1
+    assert len(notified_in) == 1

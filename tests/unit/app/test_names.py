@@ -139,11 +139,11 @@ def test_poses_and_kept_profiles_of_axes_that_are_gone_are_told_at_the_start(
         caplog.at_level(logging.WARNING, "cosmic"),
         cosmic.connect(folder, applications=("mico",)) as rig,
     ):
-        told = "\n".join(record.getMessage() for record in caplog.records)
+        messages = "\n".join(record.getMessage() for record in caplog.records)
         for file, key in (("poses.toml", "home.left.q"), ("profiles.toml", "'mine'")):
-            assert f"{folder / file}: " in told
-            assert key in told
-        assert "there is no positioner 'left.q'; there are left.x" in told
+            assert f"{folder / file}: " in messages
+            assert key in messages
+        assert "there is no positioner 'left.q'; there are left.x" in messages
         with pytest.raises(NotAvailable, match=r"pose home\.left\.q: there is no positioner"):
             rig.mico.poses.go("home")
 

@@ -109,9 +109,9 @@ def test_an_empty_recording_can_be_exported(tmp_path, to):
 def test_progress_rises_to_one(recorded, monkeypatch, to):
     path, _ = recorded
     monkeypatch.setattr(export, "READ_SAMPLES", 1000)
-    told = []
-    export_file(path, to, None, told.append)
-    assert told == [0.0, 0.2, 0.4, 0.6, 0.8, 1.0]
+    fractions = []
+    export_file(path, to, None, fractions.append)
+    assert fractions == [0.0, 0.2, 0.4, 0.6, 0.8, 1.0]
 
 
 @pytest.mark.parametrize("to", ["csv", "tdms"])

@@ -27,7 +27,7 @@ from unit.daqco.recording_helpers import FORCE, chunks, header, volts_of
 Usage = namedtuple("Usage", "total used free")
 
 
-class OnResult:
+class Heard:
     """What a writer said, and every failure, in the order of coming."""
 
     def __init__(self, policy):
@@ -50,17 +50,17 @@ def policy():
 
 
 @pytest.fixture
-def told(policy):
-    return OnResult(policy)
+def heard(policy):
+    return Heard(policy)
 
 
 @pytest.fixture
-def writers(policy, told):
+def writers(policy, heard):
     made = []
 
     def make(path, head=None, *, start=True, **how):
         writer = UDaqFileWriter(path, head or header(), policy, **how)
-        told.listen(writer)
+        heard.listen(writer)
         made.append(writer)
         if start:
             writer.start()
@@ -86,7 +86,7 @@ def wait_until(condition, timeout_s=10.0):
         WALL.sleep(0.005)
 
 
-def test_everything_put_before_the_end_is_in_the_file(tmp_path, writers, told):
+def test_everything_put_before_the_end_is_in_the_file(tmp_path, writers, heard):
     head = header()
     volts = volts_of(2, 5000)
     writer = writers(tmp_path / "run.h5", head)
@@ -96,10 +96,10 @@ def test_everything_put_before_the_end_is_in_the_file(tmp_path, writers, told):
     writer.add_positions([AxisPosition(101.0, "probe.x", 3.5)])
     end(writer)
     assert writer.error is None
-    assert told.closed == [tmp_path / "run.h5"]
-    assert told.failures == []
-    assert (told.stats[-1].samples, told.stats[-1].backlog) == (5000, 0)
-    assert told.stats[-1].duration_s == 5.0
+    assert heard.closed == [tmp_path / "run.h5"]
+    assert heard.failures == []
+    assert (heard.stats[-1].samples, heard.stats[-1].backlog) == (5000, 0)
+    assert heard.stats[-1].duration_s == 5.0
     with open_recording(tmp_path / "run.h5") as found:
         assert found.complete
         np.testing.assert_array_equal(found.volts("noise"), volts[1])
@@ -123,12 +123,12 @@ def test_samples_are_readable_within_half_a_second_without_an_end(tmp_path, writ
     assert WALL.now_s() - began_s < 2.0  # 0.25 s on a machine that has nothing else to do
 
 
-def test_it_says_how_the_recording_stands(tmp_path, writers, told):
+def test_it_says_how_the_recording_stands(tmp_path, writers, heard):
     head = header()
     writer = writers(tmp_path / "run.h5", head)
     writer.put(next(chunks(head, volts_of(2, 10))))
-    wait_until(lambda: told.stats and told.stats[-1].samples == 10)
-    stats = told.stats[-1]
+    wait_until(lambda: heard.stats and heard.stats[-1].samples == 10)
+    stats = heard.stats[-1]
     assert stats.path == tmp_path / "run.h5"
     assert stats.file_bytes > 0
     free = shutil.disk_usage(tmp_path).free
@@ -136,7 +136,7 @@ def test_it_says_how_the_recording_stands(tmp_path, writers, told):
 
 
 def test_putting_returns_at_once_while_the_disk_hangs_and_the_end_is_told(
-    tmp_path, writers, told, monkeypatch
+    tmp_path, writers, heard, monkeypatch
 ):
     head = header()
     volts = volts_of(2, 30_000)
@@ -148,7 +148,7 @@ def test_putting_returns_at_once_while_the_disk_hangs_and_the_end_is_told(
         writer.put(chunk)
         longest_s = max(longest_s, WALL.now_s() - began_s)
     assert longest_s < 0.5
-    assert "disk is too slow, 10.0 s of samples wait" in str(told.errors[0])
+    assert "disk is too slow, 10.0 s of samples wait" in str(heard.errors[0])
     assert writer.backlog == 10_000
     hang.set()
     assert writer.join()
@@ -158,7 +158,7 @@ def test_putting_returns_at_once_while_the_disk_hangs_and_the_end_is_told(
         assert found.events[-1].kind == "error"
         assert "disk is too slow" in found.events[-1].text
     assert h5py.File(tmp_path / "run.h5", "r").close() is None  # closed in order
-    assert told.stops == []
+    assert heard.stops == []
 
 
 def wait_for_release(monkeypatch):
@@ -174,7 +174,7 @@ def wait_for_release(monkeypatch):
     return released
 
 
-def test_the_backlog_is_bounded_in_bytes_too(tmp_path, writers, told, monkeypatch):
+def test_the_backlog_is_bounded_in_bytes_too(tmp_path, writers, heard, monkeypatch):
     head = header(tuple(f"c{number}" for number in range(32)), rate_hz=100_000.0)
     hang = wait_for_release(monkeypatch)
     writer = writers(tmp_path / "run.h5", head)
@@ -182,12 +182,12 @@ def test_the_backlog_is_bounded_in_bytes_too(tmp_path, writers, told, monkeypatc
     for number in range(40):
         writer.put(next(chunks(head, block, 10_000, first_sample=number * 10_000)))
     assert writer.backlog * 32 * 8 <= 64 * 1024 * 1024
-    assert len(told.errors) == 1
+    assert len(heard.errors) == 1
     hang.set()
     assert writer.join()
 
 
-def test_the_scale_may_change_while_recording_and_the_channels_may_not(tmp_path, writers, told):
+def test_the_scale_may_change_while_recording_and_the_channels_may_not(tmp_path, writers, heard):
     head = header()
     volts = volts_of(2, 100)
     other = Scale("edited", "uN", (1.0, 2.0))
@@ -199,8 +199,8 @@ def test_the_scale_may_change_while_recording_and_the_channels_may_not(tmp_path,
     three = header(("force", "noise", "more"))
     writer.put(next(chunks(three, volts_of(3, 10), first_sample=200)))
     assert writer.join()
-    assert "the channels and the rate of a recording cannot change" in str(told.errors[0])
-    assert told.stops == []
+    assert "the channels and the rate of a recording cannot change" in str(heard.errors[0])
+    assert heard.stops == []
     with open_recording(tmp_path / "run.h5") as found:
         assert not found.complete
         assert found.scales["force"] == (FORCE, other)
@@ -208,46 +208,46 @@ def test_the_scale_may_change_while_recording_and_the_channels_may_not(tmp_path,
         assert found.values("force").tolist() == wanted
 
 
-def test_another_rate_ends_the_recording_with_what_it_has(tmp_path, writers, told):
+def test_another_rate_ends_the_recording_with_what_it_has(tmp_path, writers, heard):
     head = header()
     chunk = next(chunks(head, volts_of(2, 10)))
     writer = writers(tmp_path / "run.h5", head)
     writer.put(chunk)
     writer.put(replace(chunk, rate_hz=2000.0))
     assert writer.join()
-    assert len(told.errors) == 1
+    assert len(heard.errors) == 1
     with open_recording(tmp_path / "run.h5") as found:
         assert found.samples == 10
 
 
-def test_it_ends_in_order_before_the_disk_is_full(tmp_path, writers, told, monkeypatch):
+def test_it_ends_in_order_before_the_disk_is_full(tmp_path, writers, heard, monkeypatch):
     head = header()
     free = [RESERVE_BYTES + 10_000_000]
     monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(10**12, 0, free[0]))
     writer = writers(tmp_path / "run.h5", head)
     writer.put(next(chunks(head, volts_of(2, 10))))
-    wait_until(lambda: told.stats)
-    assert told.stats[-1].left_s == pytest.approx(10_000_000 / 16_000.0)
+    wait_until(lambda: heard.stats)
+    assert heard.stats[-1].left_s == pytest.approx(10_000_000 / 16_000.0)
     free[0] = RESERVE_BYTES
     assert writer.join()
-    assert "the disk is full" in str(told.errors[0])
-    assert "make room" in str(told.errors[0])
+    assert "the disk is full" in str(heard.errors[0])
+    assert "make room" in str(heard.errors[0])
     writer.put(next(chunks(head, volts_of(2, 10), first_sample=10)))  # acquisition goes on
-    assert told.stops == []
+    assert heard.stops == []
     with open_recording(tmp_path / "run.h5") as found:
         assert (found.samples, found.complete) == (10, False)
         assert found.events[-1].kind == "error"
     h5py.File(tmp_path / "run.h5", "r").close()
 
 
-def test_a_file_taken_away_while_recording_is_told(tmp_path, writers, told):
+def test_a_file_taken_away_while_recording_is_told(tmp_path, writers, heard):
     if sys.platform == "win32":
         pytest.skip("Windows does not delete an open file")
     writer = writers(tmp_path / "run.h5")
     (tmp_path / "run.h5").unlink()
     assert writer.join()
-    assert "was taken away" in str(told.errors[0])
-    assert told.stops == []
+    assert "was taken away" in str(heard.errors[0])
+    assert heard.stops == []
 
 
 @pytest.mark.parametrize("path", ["none/run.h5", "file/run.h5", "con", "a:b.h5", "a*.h5", "x."])

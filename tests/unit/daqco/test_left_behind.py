@@ -139,10 +139,10 @@ def test_one_of_another_computer_is_left_alone_until_somebody_answers_for_it(
 ) -> None:
     monkeypatch.setattr("platform.node", lambda: "another")
     before = killed.read_bytes()
-    (told,) = OpenRecordings(tmp_path / "notes").close_left_open((tmp_path,))
-    assert told.outcome is Outcome.UNSURE
-    assert "cannot be seen from here" in told.text
-    assert f"cosmic repair --ended {killed}" in told.text
+    (closing,) = OpenRecordings(tmp_path / "notes").close_left_open((tmp_path,))
+    assert closing.outcome is Outcome.UNSURE
+    assert "cannot be seen from here" in closing.text
+    assert f"cosmic repair --ended {killed}" in closing.text
     assert main(["repair", str(killed)]) == 1
     assert "left alone" in capsys.readouterr().err
     assert killed.read_bytes() == before
@@ -232,7 +232,7 @@ def overwritten(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("harm", "told"),
+    ("harm", "message"),
     [
         (nothing, "No such file"),
         (text, "is no recording by CoSMic; nothing was changed"),
@@ -243,14 +243,14 @@ def overwritten(path: Path) -> None:
     ],
 )
 def test_what_cannot_be_closed_is_refused_and_stays_as_it_is(
-    killed: Path, capsys: pytest.CaptureFixture[str], harm, told: str
+    killed: Path, capsys: pytest.CaptureFixture[str], harm, message: str
 ) -> None:
     harm(killed)
     before = killed.read_bytes() if killed.exists() else None
     assert main(["repair", str(killed)]) == 1
     said = capsys.readouterr().err
     assert str(killed) in said
-    assert told in said
+    assert message in said
     assert (killed.read_bytes() if killed.exists() else None) == before
 
 

@@ -266,7 +266,7 @@ def test_samples_between_unknown_positions_are_left_out_of_a_curve(tmp_path):
 def test_the_error_of_a_slope_grows_where_neighbours_resemble_each_other(tmp_path):
     rng = np.random.default_rng(3)
     path = tmp_path / "run.h5"
-    found, told = [], []
+    found, std_errors = [], []
     for number in range(60):
         noise = np.convolve(rng.normal(0.0, 0.01, 1020), np.ones(20) / 20, "valid")[:1000]
         volts = np.linspace(0.0, 1.0, 1000) + noise
@@ -280,8 +280,8 @@ def test_the_error_of_a_slope_grows_where_neighbours_resemble_each_other(tmp_pat
         with open_recording(path) as recording:
             slope = recording.slope("v", "x")
         found.append(slope.value)
-        told.append(slope.standard_error)
-    assert np.std(found) < 2.0 * np.mean(told)
+        std_errors.append(slope.standard_error)
+    assert np.std(found) < 2.0 * np.mean(std_errors)
 
 
 @pytest.mark.parametrize(

@@ -344,8 +344,8 @@ def outcome_of_waiting(board: SimulatedBoard, meanwhile: Callable[[], None]) -> 
 def test_a_board_that_is_unplugged_while_somebody_waits_is_told_at_once() -> None:
     library = SimulatedLibrary(RatedClock(1.0))
     board = waiting_board(library)
-    told = outcome_of_waiting(board, lambda: library.faults.inject("unplugged"))
-    assert isinstance(told, NotConnectedError)
+    raised = outcome_of_waiting(board, lambda: library.faults.inject("unplugged"))
+    assert isinstance(raised, NotConnectedError)
 
 
 def test_a_stop_ends_a_wait_in_real_time_at_once() -> None:

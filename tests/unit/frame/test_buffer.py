@@ -174,8 +174,8 @@ def test_an_active_buffer_converts_and_notifies_by_itself(qapp: QObject) -> None
 
 
 def test_an_active_buffer_stores_and_tells_nothing_when_it_cannot_convert(qapp: QObject) -> None:
-    lengths, told = Lengths(), []
-    lengths.data_ready.connect(lambda: told.append(True))
+    lengths, received = Lengths(), []
+    lengths.data_ready.connect(lambda: received.append(True))
     with pytest.raises(TypeError):
         lengths.put(5)  # type: ignore[arg-type]
-    assert (told, lengths.buffer.latest()) == ([], None)
+    assert (received, lengths.buffer.latest()) == ([], None)

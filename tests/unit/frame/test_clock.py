@@ -68,17 +68,17 @@ def test_waiting_reaches_the_time_waited_for(clock: Clock) -> None:
 
 @pytest.mark.parametrize("clock", [RatedClock(), ManualClock()])
 def test_a_notification_ends_a_wait_early(clock: Clock) -> None:
-    condition, told = threading.Condition(), []
+    condition, notified = threading.Condition(), []
 
     def wait() -> None:
         with condition:
-            while not told:
+            while not notified:
                 clock.wait(condition, clock.now_s() + 1e6)
 
     with ThreadPoolExecutor() as pool:
         waiting = pool.submit(wait)
         with condition:
-            told.append(True)
+            notified.append(True)
             condition.notify_all()
         waiting.result(LONG_S)
 

@@ -58,14 +58,14 @@ def test_all_errors_are_told_at_once_with_file_key_and_reason(file: Path) -> Non
         load_model(file, Platform)
     lines = sorted(str(caught.value).splitlines())
     assert all(line.startswith(f"{file}: ") for line in lines)
-    told = [line.removeprefix(f"{file}: ") for line in lines]
-    assert told[0] == "axis[0].name: a name has no spaces"
-    assert told[1].startswith("axis[0].speed_um_s: Input should be a finite number")
-    assert told[2].startswith("axis[1].speed_um_s: Input should be greater than 0")
-    assert told[3].startswith("channels: Input should be a valid integer")
-    assert told[4] == "titel: unknown key; is it misspelt?"
-    assert told[5] == "title: key is missing"
-    assert len(told) == 6
+    reasons = [line.removeprefix(f"{file}: ") for line in lines]
+    assert reasons[0] == "axis[0].name: a name has no spaces"
+    assert reasons[1].startswith("axis[0].speed_um_s: Input should be a finite number")
+    assert reasons[2].startswith("axis[1].speed_um_s: Input should be greater than 0")
+    assert reasons[3].startswith("channels: Input should be a valid integer")
+    assert reasons[4] == "titel: unknown key; is it misspelt?"
+    assert reasons[5] == "title: key is missing"
+    assert len(reasons) == 6
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.log import RingBufferHandler, set_up_logging
-from cosmic.frame.log_folding import tell_folded
+from cosmic.frame.log_folding import flush_folded
 
 logger = logging.getLogger("cosmic.test")
 
@@ -160,13 +160,13 @@ def test_a_flood_that_has_ended_is_told_though_nothing_else_is_logged() -> None:
     undo = set_up_logging(ring, clock=clock)
     for _ in range(862):
         logger.warning("cable out")
-    tell_folded()
+    flush_folded()
     assert _texts(ring) == ["cable out"] * 50
     clock.advance(10.0)
-    tell_folded()
+    flush_folded()
     assert _texts(ring)[50:] == ["cable out ... repeated 812 times in 10 s"]
     clock.advance(10.0)
-    tell_folded()
+    flush_folded()
     logger.warning("cable out")
     assert _texts(ring)[51:] == ["cable out"], "afterwards it is new again"
     undo()

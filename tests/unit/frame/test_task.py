@@ -32,9 +32,9 @@ def test_the_time_left_is_told_only_once_something_can_be_said(task: Task) -> No
     assert 0.0 <= left_s < 60.0
 
 
-@pytest.mark.parametrize(("told", "shown"), [(-1.0, 0.0), (2.0, 1.0)])
-def test_progress_stays_between_nothing_and_all(task: Task, told: float, shown: float) -> None:
-    task.report(told, "x")
+@pytest.mark.parametrize(("reported", "shown"), [(-1.0, 0.0), (2.0, 1.0)])
+def test_progress_stays_between_nothing_and_all(task: Task, reported: float, shown: float) -> None:
+    task.report(reported, "x")
     assert task.progress.fraction == shown
 
 

@@ -100,7 +100,7 @@ def test_a_wrong_kind_is_an_error_of_that_axis_only():
 
 def test_a_device_lost_in_motion_fails_its_moves_and_stops_everything():
     with mico(("LL", "LL"), instant=False) as (rig, controller):
-        told = listen(rig.application.manager.device_lost)
+        lost = listen(rig.application.manager.device_lost)
         movement = rig["d0.c0"].move_to(5.0, wait=False)
         wait_until(lambda: bool(controller.of("move_to")))
         controller.broken = DeviceError("usb gone", fault=DeviceFault.COMMUNICATION)
@@ -108,7 +108,7 @@ def test_a_device_lost_in_motion_fails_its_moves_and_stops_everything():
             movement.wait(3)
         wait_until(lambda: rig.application.manager.latch.state.latched)
         assert rig["d0.c0"].state is Status.UNKNOWN
-        wait_until(lambda: bool(told))
+        wait_until(lambda: bool(lost))
         assert any("device 0" in line for line in rig.missing)
 
 

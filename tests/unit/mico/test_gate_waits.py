@@ -208,11 +208,11 @@ def test_positions_are_published_while_a_judgement_is_awaited():
         heard = listen(rig.application.manager.devices[0].position_changed)
         for number in range(1, 4):
             controller.position[Channel(0, 1)] = 10.0 * number
-            wait_until(lambda at=10.0 * number: ("d0.c1", at) in told(heard), timeout_s=2.0)
+            wait_until(lambda at=10.0 * number: ("d0.c1", at) in positions_in(heard), timeout_s=2.0)
         assert len(controller.of("move_to")) == 1
 
 
-def told(heard):
+def positions_in(heard):
     return [(each.name, each.position) for each in heard]
 
 

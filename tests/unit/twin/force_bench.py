@@ -50,7 +50,7 @@ class Heard(Truth):
         self.events: list[tuple[str, dict[str, Any]]] = []
 
     @override
-    def tell(self, time_s: float, event: str, **facts: object) -> None:
+    def record(self, time_s: float, event: str, **facts: object) -> None:
         self.events.append((event, dict(facts)))
 
     @override

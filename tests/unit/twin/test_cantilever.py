@@ -66,7 +66,7 @@ def test_a_curled_fibre_agrees_with_a_chain_of_least_energy(
     turn_deg: float, span_um: float
 ) -> None:
     line = arc(1300.0, turn_deg, 300)
-    told = curve(span_um, line=line, depth_um=20.0, radius_um=25.0)
+    curled = curve(span_um, line=line, depth_um=20.0, radius_um=25.0)
     travel = 0.12 * span_um
     chain = pushed(
         line,
@@ -77,7 +77,7 @@ def test_a_curled_fibre_agrees_with_a_chain_of_least_energy(
         depth_um=20.0,
         links=100,
     )
-    assert told.force_un(travel) == pytest.approx(chain, rel=5e-3)
+    assert curled.force_un(travel) == pytest.approx(chain, rel=5e-3)
 
 
 def test_stiffness_may_vary_along_the_fibre() -> None:
@@ -86,7 +86,7 @@ def test_stiffness_may_vary_along_the_fibre() -> None:
     def softer(along_um: np.ndarray) -> np.ndarray:
         return 1.0 - 0.4 * np.exp(-(((along_um - 120.0) / 60.0) ** 2))
 
-    told = Cantilever(*line.T, ei_un_um2=EI, depth_um=0.0, radius_um=25.0, stiffness=softer)
+    curled = Cantilever(*line.T, ei_un_um2=EI, depth_um=0.0, radius_um=25.0, stiffness=softer)
     chain = pushed(
         line,
         ei_un_um2=EI,
@@ -96,7 +96,7 @@ def test_stiffness_may_vary_along_the_fibre() -> None:
         ei_of=softer,
         links=130,
     )
-    force = told.curve(400.0, sensor_un_um=RIGID).force_un(20.0)
+    force = curled.curve(400.0, sensor_un_um=RIGID).force_un(20.0)
     assert force == pytest.approx(chain, rel=5e-3)
     assert force < 0.9 * curve(400.0, line=line, radius_um=25.0).force_un(20.0)
 
@@ -138,8 +138,8 @@ def test_curves_are_finite_and_rise() -> None:
     shapes = [None, arc(1200.0, 70.0, 300), arc(1200.0, -70.0, 300), arc(600.0, 100.0, 60)]
     for line in shapes:
         for span_um in (5.0, 30.0, 150.0, 399.9):
-            told = curve(span_um, line=line, depth_um=8.0, radius_um=25.0)
-            assert told.ways_um[0] == told.forces_un[0] == 0.0
-            assert np.isfinite(told.forces_un).all()
-            assert (np.diff(told.ways_um) > 0.0).all()
-            assert math.isfinite(told.force_un(1e6))
+            curled = curve(span_um, line=line, depth_um=8.0, radius_um=25.0)
+            assert curled.ways_um[0] == curled.forces_un[0] == 0.0
+            assert np.isfinite(curled.forces_un).all()
+            assert (np.diff(curled.ways_um) > 0.0).all()
+            assert math.isfinite(curled.force_un(1e6))

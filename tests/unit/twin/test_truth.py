@@ -27,9 +27,9 @@ def test_a_file_of_truth_begins_with_the_sample_and_ends_in_order(tmp_path: Path
     assert (before.sample, before.seed, before.complete) == ("three-dry", 3, False)
     put = put_on(shipped_settings(), "three-dry", 3).fibres
     assert len(before.fibres) == 7
-    for number, (told, fibre) in enumerate(zip(before.fibres, put, strict=True)):
-        assert (told.number, told.ei_n_m2, told.role) == (number, fibre.ei_n_m2, fibre.role)
-        assert (told.length_um, told.curl_deg) == (fibre.length_um, fibre.curl_deg)
+    for number, (record, fibre) in enumerate(zip(before.fibres, put, strict=True)):
+        assert (record.number, record.ei_n_m2, record.role) == (number, fibre.ei_n_m2, fibre.role)
+        assert (record.length_um, record.curl_deg) == (fibre.length_um, fibre.curl_deg)
     scene.close()
     scene.close()
     assert read_truth(file).complete

@@ -82,9 +82,9 @@ def test_the_uncertainty_told_is_the_error_made() -> None:
     truth_um = (points_px - AXIS_PX) @ np.linalg.inv(matrix()).T + AXIS_UM
     fits = [fit_map(look(grid(), noise_px=0.15, seed=seed)).map for seed in range(200)]
     errors = np.array([fit.to_um(points_px) - truth_um for fit in fits])
-    told = np.array([fit.std_um(points_px) for fit in fits]).mean(axis=0)
-    assert errors.std(axis=(0, 2)) == pytest.approx(told, rel=0.12)
-    assert told[1] > 3.0 * told[0]
+    stds_um = np.array([fit.std_um(points_px) for fit in fits]).mean(axis=0)
+    assert errors.std(axis=(0, 2)) == pytest.approx(stds_um, rel=0.12)
+    assert stds_um[1] > 3.0 * stds_um[0]
 
 
 def test_a_place_that_was_tracked_wrongly_is_left_out_and_named() -> None:

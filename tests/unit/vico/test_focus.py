@@ -125,7 +125,7 @@ def test_the_peak_is_found_between_the_positions_measured(at: float) -> None:
 
 def test_the_uncertainty_told_is_the_error_made() -> None:
     rng = np.random.default_rng(5)
-    errors, told = [], []
+    errors, stds = [], []
     for _ in range(150):
         at = float(rng.uniform(-60.0, 60.0))
         measure = peak(at, width=20.0)
@@ -133,8 +133,8 @@ def test_the_uncertainty_told_is_the_error_made() -> None:
         assert answer.position is not None
         assert answer.std is not None
         errors.append(answer.position - at)
-        told.append(answer.std)
-    assert np.std(errors) == pytest.approx(np.sqrt(np.mean(np.square(told))), rel=0.35)
+        stds.append(answer.std)
+    assert np.std(errors) == pytest.approx(np.sqrt(np.mean(np.square(stds))), rel=0.35)
 
 
 def test_every_sweep_goes_upwards_and_stays_within_the_range() -> None:

@@ -104,12 +104,12 @@ def test_a_seek_ends_when_the_motor_is_there_and_tells_how_far_it_is(make: Make)
 
 def test_movement_is_told_at_most_twenty_times_a_second(make: Make) -> None:
     bench = make(rate=5.0).start()
-    told: list[object] = []
-    bench.thread.state_changed.connect(told.append, Qt.ConnectionType.DirectConnection)
+    received: list[object] = []
+    bench.thread.state_changed.connect(received.append, Qt.ConnectionType.DirectConnection)
     task = bench.thread.seek(ZOOM, 12000)
     task.wait(5.0)
     elapsed_s = task.progress.elapsed_s or 0.0
-    assert 3 <= len(told) <= 20.0 * elapsed_s + 3
+    assert 3 <= len(received) <= 20.0 * elapsed_s + 3
 
 
 def test_a_lens_not_homed_says_so_and_can_be_homed(make: Make) -> None:
@@ -266,9 +266,9 @@ def test_the_past_can_be_looked_up_as_it_truly_was(make: Make) -> None:
     assert history.counts_at(ZOOM, -1.0) is None
     for part in range(1, 20):
         time_s = before_s + part * (after_s - before_s) / 20
-        told = history.counts_at(ZOOM, time_s)
+        reckoned = history.counts_at(ZOOM, time_s)
         true = bench.lens.position_counts("zoom", time_s)
-        assert told == pytest.approx(true, abs=400)  # 50 ms at 8000 counts/s
+        assert reckoned == pytest.approx(true, abs=400)  # 50 ms at 8000 counts/s
     assert history.light_at(after_s) == 50.0
 
 

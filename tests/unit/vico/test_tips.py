@@ -71,8 +71,8 @@ def test_the_uncertainty_told_is_about_the_error_made() -> None:
     images = [tool_image(seed, blur=2.0, noise=8.0) for seed in range(12)]
     found = [probe(image) for image in images]
     errors = np.array([np.array(f.tip_px) - p.hold for f, p in zip(found, images, strict=True)])
-    told = float(np.mean([each.std_px for each in found]))
-    assert 0.4 * told < errors.std() < 1.6 * told
+    mean_std_px = float(np.mean([each.std_px for each in found]))
+    assert 0.4 * mean_std_px < errors.std() < 1.6 * mean_std_px
 
 
 def test_a_fibre_between_the_jaws_shifts_nothing() -> None:

@@ -36,17 +36,17 @@ def scene(
 def test_a_shift_is_found_to_a_small_part_of_a_pixel_and_its_uncertainty_is_true() -> None:
     rng = np.random.default_rng(3)
     before = scene()
-    errors, told = [], []
+    errors, stds_px = [], []
     for number in range(25):
         shift = tuple(rng.uniform(-15.0, 15.0, 2).tolist())
         match = displacement(before, scene(shift, seed=number), Roi(140, 90, 100, 90), 20.0)
         assert match is not None
         assert match.score > 0.9
         errors.append(np.array(match.centre_px) - (189.5, 134.5) - shift)
-        told.append(match.std_px)
+        stds_px.append(match.std_px)
     assert np.abs(errors).max() < 0.08
-    assert np.std(errors) < 1.3 * np.mean(told)
-    assert np.mean(told) < 0.05
+    assert np.std(errors) < 1.3 * np.mean(stds_px)
+    assert np.mean(stds_px) < 0.05
 
 
 def test_brightness_contrast_and_sixteen_bits_change_nothing() -> None:

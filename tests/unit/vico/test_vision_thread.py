@@ -56,10 +56,10 @@ def test_images_are_analysed_as_they_come_after_a_look(bench: Bench) -> None:
 
 
 def test_images_are_analysed_while_a_listener_wants_them(bench: Bench) -> None:
-    told, heard = list[int](), Event()
+    received, heard = list[int](), Event()
 
     def listen(number: int) -> None:
-        told.append(number)
+        received.append(number)
         heard.set()
 
     wanted = [False]
@@ -68,4 +68,4 @@ def test_images_are_analysed_while_a_listener_wants_them(bench: Bench) -> None:
     wanted[0] = True
     bench.put(2)
     assert heard.wait(5.0)
-    assert (told, bench.analysed) == ([2], [2])
+    assert (received, bench.analysed) == ([2], [2])

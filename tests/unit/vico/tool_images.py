@@ -73,7 +73,7 @@ def tool_image(
     grain = rng if noise_seed is None else np.random.default_rng(noise_seed)
     image = image + grain.normal(0.0, noise, image.shape)
     turn = math.radians(rng.uniform(-2.0, 2.0))
-    told = np.array(
+    pointing = np.array(
         [
             forward[0] * math.cos(turn) - forward[1] * math.sin(turn),
             forward[0] * math.sin(turn) + forward[1] * math.cos(turn),
@@ -81,6 +81,6 @@ def tool_image(
     )
     away = rng.uniform(-off_px, off_px, 2)
     expected = ExpectedTool(
-        tuple((hold + away).tolist()), tuple(told.tolist()), width, gap, reach_px=40.0
+        tuple((hold + away).tolist()), tuple(pointing.tolist()), width, gap, reach_px=40.0
     )
     return ToolImage(np.clip(np.rint(image), 0, 255).astype(np.uint8), hold, forward, expected)

@@ -38,7 +38,7 @@ def run(chosen: argparse.Namespace) -> int:
         if chosen.connect:
             rig.take_control()
         run = rig.calibrate(anew=chosen.anew, zooms=chosen.zooms)
-        run.subscribe(_tell)
+        run.subscribe(_print_event)
         try:
             run.run_here()
         except CosmicError as exc:
@@ -56,6 +56,6 @@ def line_of(registry: CalibrationRegistry, entry: CalibrationEntry) -> str:
     return f"{entry.name} ({entry.tool}): {registry.standing(entry)}, {quality}"
 
 
-def _tell(event: NodeEvent) -> None:
+def _print_event(event: NodeEvent) -> None:
     if event.kind == OPERATION and event.state in _ENDS:
         sys.stderr.write(f"{event.name}: {event.state}\n")

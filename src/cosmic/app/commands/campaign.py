@@ -88,10 +88,10 @@ def _log_to(file: Path) -> Callable[[], None]:
 class Bar:
     """One line that says how a campaign stands; lines of their own where that is no terminal."""
 
-    def __init__(self, campaign: Campaign, recipe: Recipe, told: TextIO) -> None:
+    def __init__(self, campaign: Campaign, recipe: Recipe, terminal: TextIO) -> None:
         self._campaign = campaign
         self._name = recipe.name
-        self._told = told
+        self._terminal = terminal
         self._length = 0
         self._done = -1
         self._share = 0.0
@@ -102,19 +102,19 @@ class Bar:
             self._write()
             WALL.sleep(_EVERY_S)
         self._write()
-        if self._told.isatty():
-            self._told.write("\n")
+        if self._terminal.isatty():
+            self._terminal.write("\n")
 
     def _write(self) -> None:
         now = self._campaign.progress
-        if self._told.isatty():
+        if self._terminal.isatty():
             line = self._line()
-            self._told.write(f"\r{line.ljust(self._length)}")
+            self._terminal.write(f"\r{line.ljust(self._length)}")
             self._length = len(line)
         elif now.done != self._done:
-            self._told.write(f"{self._line()}\n")
+            self._terminal.write(f"{self._line()}\n")
         self._done = now.done
-        self._told.flush()
+        self._terminal.flush()
 
     def _line(self) -> str:
         now, left_s = self._campaign.progress, self._campaign.left_s

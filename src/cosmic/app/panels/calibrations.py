@@ -139,7 +139,7 @@ class CalibrationPanel(QWidget):
         item.setIcon(STANDING, self._icons[standing])
         item.setData(NAME, _KEY, entry.key)
         tip = "\n".join(
-            [*(f"{key}: {each:.4g}" for key, each in entry.values.items()), _told(entry)]
+            [*(f"{key}: {each:.4g}" for key, each in entry.values.items()), _made_text(entry)]
         )
         for column in range(len(HEADERS)):
             item.setToolTip(column, entry.problem or tip)
@@ -185,7 +185,7 @@ def texts(registry: CalibrationRegistry, entry: CalibrationEntry) -> Sequence[st
     )
 
 
-def _told(entry: CalibrationEntry) -> str:
+def _made_text(entry: CalibrationEntry) -> str:
     made = entry.made.astimezone().strftime("%Y-%m-%d %H:%M")
     seen = entry.checked.astimezone().strftime("; last confirmed %H:%M") if entry.checked else ""
     return f"made {made}{seen}; with {entry.made_with}; CoSMic {entry.version}"

@@ -99,9 +99,9 @@ class ChangeBridge(QObject):
         """Tell of the changes of `port`, and of no other."""
         self.end()
         self._due = False
-        self._ends.append(port.on_change(self.tell))
+        self._ends.append(port.on_change(self.publish))
 
-    def tell(self) -> None:
+    def publish(self) -> None:
         """Say that something changed; any thread."""
         if not self._due:
             self._due = True

@@ -206,7 +206,7 @@ class RemoteStation:
         if isinstance(state, LeaseState):
             with self._lock:
                 self._lease = state
-            self._tell()
+            self._publish()
 
     def _on_presence(self, presence: Presence) -> None:
         with self._lock:
@@ -214,12 +214,12 @@ class RemoteStation:
             self._lease = self._lease if presence.here else None
         if presence.here:
             self.later(self._ask_lease, _say_later)
-        self._tell()
+        self._publish()
 
     def _ask_lease(self) -> None:
         self._on_lease(self._connection.call(ITSELF, "lease"))
 
-    def _tell(self) -> None:
+    def _publish(self) -> None:
         self._control_changed.emit(self.control)
 
 

@@ -62,7 +62,7 @@ class StationControls(QObject):
         self._own_state: LeaseState | None = None
         indicator.action_requested.connect(self._on_action)
         self._say_later = Relay(self._say)
-        self._relay, self._own_relay = Relay(self._on_told), Relay(self._on_own_told)
+        self._relay, self._own_relay = Relay(self._on_control), Relay(self._on_own_state)
         for each in self._stations.values():
             self._relay.follow(each.on_control)
         if own is not None:
@@ -75,12 +75,12 @@ class StationControls(QObject):
 
     # What is told
 
-    def _on_told(self, control: StationControl) -> None:
+    def _on_control(self, control: StationControl) -> None:
         self._known[control.station] = control
         self._show()
         self.control_changed.emit(control)
 
-    def _on_own_told(self, state: LeaseState) -> None:
+    def _on_own_state(self, state: LeaseState) -> None:
         self._own_state = state
         self._show()
 

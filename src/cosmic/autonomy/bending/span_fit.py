@@ -177,7 +177,7 @@ def fit_span(span: Span, *, settings: FitSettings, place_um: float, length_um: f
         curved = span.shape.curve(depth_um=settings.offset_um, radius_um=settings.radius_um)
     model = _Model(points, settings, length_um, curved)
     found = model.fit()
-    fit = _told(span, points, model, found, place_um)
+    fit = _result(span, points, model, found, place_um)
     flags = _flags(span, fit, points, settings, found)
     if flags & {Quality.SLIPPED, Quality.BROKEN, Quality.HYSTERESIS}:
         # Only the way out still says something about the fibre.
@@ -216,7 +216,7 @@ def _without_contact(span: Span, place_um: float, peak_un: float) -> SpanFit:
     )
 
 
-def _told(span: Span, points: Points, model: _Model, found: _Found, place_um: float) -> SpanFit:
+def _result(span: Span, points: Points, model: _Model, found: _Found, place_um: float) -> SpanFit:
     values, both = found.values, len(model.branches) == 2
     logs = values[[0, 2]] if both else values[[0]]
     spread = found.covariance[np.ix_([0, 2], [0, 2])] if both else found.covariance[:1, :1]

@@ -311,8 +311,8 @@ class Campaign:
         finally:
             self.store.close()
         end = CampaignPhase.ENDED if self._reached else CampaignPhase.STOPPED
-        told = logger.error if failed else logger.info if self._reached else logger.warning
-        told("campaign %s: %s", self.recipe.name, self._end_reason)
+        log = logger.error if failed else logger.info if self._reached else logger.warning
+        log("campaign %s: %s", self.recipe.name, self._end_reason)
         self._operation = ""
         self._enter(CampaignPhase.FAILED if failed else end)
         self._publish()

@@ -28,9 +28,9 @@ def with_interval(value: float, std: float, digits: int = 0) -> str:
 
 def width_words(shape: Shape) -> str:
     """Return a width with its 95 % interval; one that was not resolved says so."""
-    told = with_interval(shape.width_um, shape.width_std_um, 1)
+    text = with_interval(shape.width_um, shape.width_std_um, 1)
     unknown = not math.isfinite(shape.width_std_um) or shape.width_resolved
-    return told if unknown else f"{told} (not resolved)"
+    return text if unknown else f"{text} (not resolved)"
 
 
 def stiffness(value_n_m2: float) -> str:

@@ -262,15 +262,15 @@ def _spread(spread_ln: float) -> str:
 
 
 def _shape(fibres: Sequence[FibreRecord]) -> str:
-    told = []
+    means = []
     for values, digits, unit in (
         ([each.shape.length_um for each in fibres], 0, " µm"),
         ([each.shape.width_um for each in fibres], 0, " µm"),
         ([each.shape.curl for each in fibres], 3, ""),
     ):
         known = [each for each in values if math.isfinite(each)]
-        told.append(f"{np.mean(known):.{digits}f}{unit}" if known else NONE)
-    return ", ".join(told)
+        means.append(f"{np.mean(known):.{digits}f}{unit}" if known else NONE)
+    return ", ".join(means)
 
 
 def _fibre_row(each: FibreRecord) -> tuple[str, ...]:

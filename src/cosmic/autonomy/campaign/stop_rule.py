@@ -79,8 +79,8 @@ class StopRule:
         if rules.precision_percent is not None:
             wanted = max(_needed(now, rules.precision_percent), rules.least)
             times.append(max(wanted - now.good, 0.0) * good_cycle)
-        told = [each for each in times if not math.isnan(each)]
-        return min(told) if told else math.nan
+        known_s = [each for each in times if not math.isnan(each)]
+        return min(known_s) if known_s else math.nan
 
 
 def _needed(now: CampaignProgress, precision_percent: float) -> float:

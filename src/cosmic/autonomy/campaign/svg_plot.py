@@ -168,14 +168,14 @@ def bars(title: str, rows: Sequence[tuple[str, float, str]], *, width: float = 4
     most = max((amount for _, amount, _ in rows), default=1.0) or 1.0
     begin = LETTER * max((len(name) for name, _, _ in rows), default=0) + 16.0
     parts = []
-    for number, (name, amount, told) in enumerate(rows):
+    for number, (name, amount, amount_text) in enumerate(rows):
         top = 24.0 * number + 6.0
         long = max(amount / most * (width - begin - 70.0), 1.0)
         parts.append(_text(begin - 8.0, top + 13.0, name, anchor="end"))
         parts.append(
             f'<rect x="{begin:.1f}" y="{top:.1f}" width="{long:.1f}" height="17" fill="{BLUE}"/>'
         )
-        parts.append(_text(begin + 6.0 + long, top + 13.0, told, anchor="start"))
+        parts.append(_text(begin + 6.0 + long, top + 13.0, amount_text, anchor="start"))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:g}" height="{height:g}" '
         f'viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{escape(title)}" '

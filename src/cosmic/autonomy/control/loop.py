@@ -176,8 +176,8 @@ class ControlLoop(WorkerThread):
         self.sink.close(error)
         self._end_requested.set()
         self._pacer.end()
-        told = logger.info if error is None else logger.warning
-        told("control loop: %s by %s ended: %s", self.source.name, self.sink.name, self.reason)
+        log = logger.info if error is None else logger.warning
+        log("control loop: %s by %s ended: %s", self.source.name, self.sink.name, self.reason)
 
     @property
     def reason(self) -> str:

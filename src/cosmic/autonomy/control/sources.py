@@ -140,19 +140,19 @@ class ChannelSource(Source):
         """Take a chunk; acquisition thread."""
         if self._channel not in chunk.channels:
             gone = f"there is no channel {self._channel} any more: renamed, or switched off"
-            self._tell(ConfigError(f"{gone}; start the loop again with an existing channel"))
+            self._report(ConfigError(f"{gone}; start the loop again with an existing channel"))
             return
         row = chunk.channels.index(self._channel)
         if chunk.scales[row].unit != self._unit:
-            self._tell(ConfigError(f"{self._channel} is no longer measured in {self._unit}"))
+            self._report(ConfigError(f"{self._channel} is no longer measured in {self._unit}"))
             return
         values = chunk.scales[row].apply(chunk.volts[row])
         self._newest = Sample(float(values[-1]), WALL.now_s())
         beyond = np.flatnonzero(~((values > self._low) & (values < self._high)))
         if beyond.size:
-            self._tell(self._crossed(float(values[beyond[0]])))
+            self._report(self._crossed(float(values[beyond[0]])))
 
-    def _tell(self, error: CosmicError) -> None:
+    def _report(self, error: CosmicError) -> None:
         if self._on_limit is not None:
             self._on_limit(error)
 

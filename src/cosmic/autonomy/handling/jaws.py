@@ -37,16 +37,16 @@ def zero_jaws(work: HandlingContext) -> Steps:
 
 def mark_gap_unknown(work: HandlingContext) -> None:
     """Have the gate take the jaws to be anywhere: before they are run against their stop."""
-    _tell_gate(work, work.mico[work.gripper.gap_axis].position_um or 0.0, None)
+    _set_estimate(work, work.mico[work.gripper.gap_axis].position_um or 0.0, None)
 
 
 def note_gap(work: HandlingContext, gap_um: float, std_um: float) -> None:
     """Take the opening that is known by an end stop or by sight; the gate counts from it."""
     work.gap_um = gap_um
-    _tell_gate(work, gap_um, std_um)
+    _set_estimate(work, gap_um, std_um)
 
 
-def _tell_gate(work: HandlingContext, gap_um: float, std_um: float | None) -> None:
+def _set_estimate(work: HandlingContext, gap_um: float, std_um: float | None) -> None:
     axis = work.mico[work.gripper.gap_axis]
     try:
         axis.set_estimate(gap_um, std_um=std_um)

@@ -65,10 +65,10 @@ def none_left(skip_reasons: Mapping[str, int]) -> str:
     skip_reasons : mapping of str to int
         Why fibres on the plate are not taken, and how many.
     """
-    told = ", ".join(f"{count} {why}" for why, count in sorted(skip_reasons.items()))
-    if not told:
+    reasons = ", ".join(f"{count} {why}" for why, count in sorted(skip_reasons.items()))
+    if not reasons:
         return "the plate is empty: put a sample there, or check light and focus"
-    return f"none on the plate can be grasped ({told}): spread them, or put another sample there"
+    return f"none on the plate can be grasped ({reasons}): spread them, or put another sample there"
 
 
 def look(work: HandlingContext, seen: list[SeenFibre]) -> None:

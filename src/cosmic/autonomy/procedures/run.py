@@ -311,8 +311,8 @@ class ProcedureRun(Generic[W]):
             logger.info("%s finished", self.name)
         else:
             meant = state is RunState.ABORTED or isinstance(failure, ProcedureStopped)
-            told = logger.warning if meant else logger.error
-            told("%s %s: %s", self.name, state, failure)
+            log = logger.warning if meant else logger.error
+            log("%s %s: %s", self.name, state, failure)
         with self._lock:
             self._state = state
             if failure is None:

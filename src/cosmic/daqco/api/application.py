@@ -439,12 +439,14 @@ class DaqcoApplication(TaskApplication):
         )
         self.apply(settings.model_copy(update={"scale": scales, "channel": channels}))
 
-    def carry_out(self, action: Callable[[], T], told: OnResult[T], *, slow: bool = False) -> None:
+    def carry_out(
+        self, action: Callable[[], T], on_result: OnResult[T], *, slow: bool = False
+    ) -> None:
         """Do `action` and tell how it ended: at once, or in another thread what is `slow`."""
         if slow:
-            self._background.do(action, told)
+            self._background.do(action, on_result)
         else:
-            do_and_report(action, told)
+            do_and_report(action, on_result)
 
     # The end
 

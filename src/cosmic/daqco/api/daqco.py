@@ -252,13 +252,15 @@ class Daqco(Declared):
         return self._application.buffer.subscribe(pieces.take)
 
     @override
-    def carry_out(self, action: Callable[[], T], told: OnResult[T], *, slow: bool = False) -> None:
+    def carry_out(
+        self, action: Callable[[], T], on_result: OnResult[T], *, slow: bool = False
+    ) -> None:
         """Do what may have to wait for a line or a disk, without waiting in a window's thread.
 
-        `told` takes the result, or the `CosmicError` that was raised. Where the boards are here it
-        is called at once, unless it is `slow`: then a thread waits for it.
+        `on_result` takes the result, or the `CosmicError` that was raised. Where the boards are
+        here it is called at once, unless it is `slow`: then a thread waits for it.
         """
-        self._application.carry_out(action, told, slow=slow)
+        self._application.carry_out(action, on_result, slow=slow)
 
     # Acquisition
 

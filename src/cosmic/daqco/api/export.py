@@ -138,15 +138,15 @@ def _export(
     kind: Callable[[Recording, Path], Target],
     progress: Progress | None,
 ) -> None:
-    def told(fraction: float) -> None:
+    def report(fraction: float) -> None:
         if progress is not None and progress(fraction) is False:
             raise ExportCancelled(f"{path}: the export was cancelled")
 
     with _replacing(path) as part, closing(kind(recording, part)) as target:
-        told(0.0)
+        report(0.0)
         for block, fraction in _blocks(recording):
             target.write(block)
-            told(fraction)
+            report(fraction)
         target.finish()
 
 

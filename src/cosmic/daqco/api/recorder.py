@@ -191,7 +191,7 @@ class Recorder:
 
     def stop(self) -> None:
         """Close the file and wait until it is closed; harmless when nothing is recorded."""
-        self._application.guard.wait_told()  # the crossing that ended a script's move belongs in it
+        self._application.guard.wait_published()  # the crossing that ended a move belongs in it
         self._close()
 
     def _close(self) -> None:

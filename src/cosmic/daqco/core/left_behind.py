@@ -175,12 +175,12 @@ def _close(path: Path, head: bytes, hold: FileHold) -> Closing:
             ) from exc
         file.truncate(end)
         os.fsync(file.fileno())
-    told = f"{path}: closed; {before.seconds:.2f} s of samples"
+    summary = f"{path}: closed; {before.seconds:.2f} s of samples"
     if lost:
-        told += f", of which {lost} blocks are lost with the end of the file"
+        summary += f", of which {lost} blocks are lost with the end of the file"
     if end < size:
-        told += f"; {(size - end) / 1e6:.1f} MB of disk space released"
-    return Closing(Outcome.CLOSED, path, told)
+        summary += f"; {(size - end) / 1e6:.1f} MB of disk space released"
+    return Closing(Outcome.CLOSED, path, summary)
 
 
 def _write_head(handle: int, head: bytes) -> None:
@@ -274,7 +274,7 @@ class OpenRecordings:
 
         Returns what was done, and what was left for a person to decide.
         """
-        told: list[Closing] = []
+        closings: list[Closing] = []
         seen: set[Path] = set()
         for note in self._notes():
             path = _noted(note)
@@ -287,12 +287,12 @@ class OpenRecordings:
             if found is None or found.outcome in (Outcome.CLOSED, Outcome.WHOLE):
                 self.forget(note)
             if found is not None:
-                told.append(found)
+                closings.append(found)
         for path in _recordings(folders):
             if path not in seen and _looks_unclosed(path):
                 found = _attempt(path)
-                told += [] if found is None else [found]
-        return [each for each in told if each.outcome is not Outcome.WHOLE]
+                closings += [] if found is None else [found]
+        return [each for each in closings if each.outcome is not Outcome.WHOLE]
 
     def _notes(self) -> list[Path]:
         """Return the notes, the newest first."""

@@ -20,7 +20,7 @@ logger = logging.getLogger(__name__)
 LOWEST_RATE_HZ: Final = 200.0
 SILENCE_S: Final = 0.1
 """How long data may stay away while a limit is armed, unless somebody says otherwise."""
-_TOLD_S: Final = 1.0
+_PUBLISHED_S: Final = 1.0
 LAXEST: Final = 10.0
 """A simulation that runs faster than the wall may be silent so much longer: nothing can break."""
 
@@ -108,7 +108,7 @@ class LimitGuard:
         self.trip = trip
         self.check: Callable[[Limit], None] = lambda _limit: None
         self._lock = Lock()
-        self._telling = RLock()
+        self._publishing = RLock()
         self._limits: dict[str, Limit] = {}
         self._crossed: Event[Crossing] = Event()
         self._noted: Event[str, str] = Event()
@@ -120,7 +120,7 @@ class LimitGuard:
     @property
     def limits(self) -> dict[str, Limit]:
         """The limits by channel; a crossing that stopped something is among them."""
-        self.wait_told()
+        self.wait_published()
         return dict(self._limits)
 
     @property
@@ -131,13 +131,13 @@ class LimitGuard:
     @property
     def crossings(self) -> tuple[Crossing, ...]:
         """What happened so far, oldest first; the last hundred."""
-        self.wait_told()
+        self.wait_published()
         return self._crossings
 
-    def wait_told(self) -> None:
+    def wait_published(self) -> None:
         """Wait until a crossing under way was told to everybody; it stops motion before that."""
-        if self._telling.acquire(timeout=_TOLD_S):
-            self._telling.release()
+        if self._publishing.acquire(timeout=_PUBLISHED_S):
+            self._publishing.release()
 
     def subscribe(self, listener: Callable[[Crossing], object]) -> Unsubscribe:
         """Call `listener(crossing)` after each trip, in the thread that saw it.
@@ -190,7 +190,7 @@ class LimitGuard:
                 why = (
                     "nothing is acquired" if rate_hz == 0.0 else f"it is sampled at {rate_hz:g} Hz"
                 )
-                self._tell_note(limit.channel, f"its limit is no longer watched: {why}")
+                self._publish_note(limit.channel, f"its limit is no longer watched: {why}")
             else:
                 self._arm_again(limit)
 
@@ -201,9 +201,9 @@ class LimitGuard:
         except (ConfigError, NotAvailable) as exc:
             with self._lock:
                 self._limits[limit.channel] = replace(limit, armed=False, suspended=False)
-            self._tell_note(limit.channel, f"its limit is disarmed: {exc}")
+            self._publish_note(limit.channel, f"its limit is disarmed: {exc}")
         else:
-            self._tell_note(limit.channel, f"its limit is armed: {limit.range_text}")
+            self._publish_note(limit.channel, f"its limit is armed: {limit.range_text}")
 
     def set_limit(self, limit: Limit) -> None:
         """Set the limit of a channel, armed or not.
@@ -227,9 +227,9 @@ class LimitGuard:
             before = self._limits.get(limit.channel)
             self._put(replace(limit, tripped=False, beyond=False))
         if limit.armed:
-            self._tell_note(limit.channel, f"its limit is armed: {limit.range_text}")
+            self._publish_note(limit.channel, f"its limit is armed: {limit.range_text}")
         elif before is not None and (before.armed or before.suspended):
-            self._tell_note(limit.channel, "its limit was disarmed")
+            self._publish_note(limit.channel, "its limit was disarmed")
 
     def set_suspended(self, limit: Limit) -> None:
         """Set a limit that is armed as soon as channels are sampled; raises as `set_limit`."""
@@ -276,7 +276,7 @@ class LimitGuard:
         with self._lock:
             limit = self._limits.pop(channel, None)
         if limit is not None:
-            self._tell_note(channel, f"its limit was removed{why and ': '}{why}")
+            self._publish_note(channel, f"its limit was removed{why and ': '}{why}")
 
     def rename(self, channel: str, name: str) -> None:
         """Have a limit follow its channel to another name."""
@@ -285,7 +285,7 @@ class LimitGuard:
             if limit is not None:
                 self._put(replace(limit, channel=name))
 
-    def _tell_note(self, channel: str, text: str) -> None:
+    def _publish_note(self, channel: str, text: str) -> None:
         logger.warning("%s: %s", channel, text)
         self._noted.emit(channel, text)
 
@@ -376,7 +376,7 @@ class LimitGuard:
                 self._limits[limit.channel] = replace(now, tripped=tripped, beyond=beyond)
 
     def _trip(self, crossing: Crossing, limit: Limit) -> None:
-        with self._telling:
+        with self._publishing:
             if self.trip is not None:
                 self.trip(crossing.text)
             reaction_s = self._clock.now_s() - crossing.time_s

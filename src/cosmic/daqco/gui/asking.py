@@ -19,8 +19,10 @@ class CarriesOut(Protocol):
     """What an application offers to its widgets, as far as it matters here."""
 
     @abstractmethod
-    def carry_out(self, action: Callable[[], T], told: OnResult[T], *, slow: bool = False) -> None:
-        """Do `action`; `told(result, error)` at its end, maybe in another thread."""
+    def carry_out(
+        self, action: Callable[[], T], on_result: OnResult[T], *, slow: bool = False
+    ) -> None:
+        """Do `action`; `on_result(result, error)` at its end, maybe in another thread."""
 
 
 class Asking(QObject):
@@ -29,18 +31,18 @@ class Asking(QObject):
     def __init__(self, daqco: CarriesOut, widget: QWidget) -> None:
         super().__init__(widget)
         self._daqco = daqco
-        self._relay = Relay(self._on_told)
+        self._relay = Relay(self._on_report)
 
-    def ask(self, action: Callable[[], T], told: OnResult[T], *, slow: bool = False) -> None:
-        """Have `action` done and call `told(result, error)`.
+    def ask(self, action: Callable[[], T], on_result: OnResult[T], *, slow: bool = False) -> None:
+        """Have `action` done and call `on_result(result, error)`.
 
         At home that is before this returns, unless it is `slow`: then a thread waits for it.
         """
 
-        def tell(result: T | None, error: CosmicError | None) -> None:
-            self._relay(partial(told, result, error))
+        def report(result: T | None, error: CosmicError | None) -> None:
+            self._relay(partial(on_result, result, error))
 
-        self._daqco.carry_out(action, tell, slow=slow)
+        self._daqco.carry_out(action, report, slow=slow)
 
-    def _on_told(self, tell: Callable[[], object]) -> None:
-        tell()
+    def _on_report(self, report: Callable[[], object]) -> None:
+        report()

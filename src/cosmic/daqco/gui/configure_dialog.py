@@ -249,7 +249,7 @@ class UDaqConfigureDialog(FieldDialog):
         """Put the draft in force; where it is refused, the dialog then says why."""
         self._apply(self._on_applied)
 
-    def _apply(self, told: Callable[[object, CosmicError | None], None]) -> None:
+    def _apply(self, on_result: Callable[[object, CosmicError | None], None]) -> None:
         self.message.set_text("")
         if not (self._take_form() and self._take_rates()):
             self.message.set_text("◆ REFUSED: see the field")
@@ -257,13 +257,13 @@ class UDaqConfigureDialog(FieldDialog):
         try:
             settings = self._draft.settings()
         except CosmicError as exc:
-            told(None, exc)
+            on_result(None, exc)
             return
         if settings == self._daqco.settings:
-            told(None, None)
+            on_result(None, None)
             return
         self.buttons.setEnabled(False)
-        self._asking.ask(lambda: self._daqco.apply(settings), told)
+        self._asking.ask(lambda: self._daqco.apply(settings), on_result)
 
     def _on_applied(self, _result: object, error: CosmicError | None) -> None:
         self.buttons.setEnabled(True)

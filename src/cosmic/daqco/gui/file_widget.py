@@ -124,7 +124,7 @@ class UDaqFileWidget(QWidget):
         self.browse = push_button("Browse…", _BROWSE)
         self.start = named(push_button("Start recording", ""), "startRecording")
         self.stop = named(push_button("Stop recording", ""), "stopRecording")
-        self.badge, self.told = StateBadge(State.UNKNOWN), ElidedLabel()
+        self.badge, self.message = StateBadge(State.UNKNOWN), ElidedLabel()
         self.room = ElidedLabel()
         self.room.setProperty("role", "dim")
         self.options = QButtonGroup(self)
@@ -145,8 +145,8 @@ class UDaqFileWidget(QWidget):
         self._below.addWidget(self.start)
         self._below.addWidget(self.stop)
         self._below.addWidget(self.badge)
-        self._below.addWidget(self.told, 1)
-        self.told.setFont(number_font())
+        self._below.addWidget(self.message, 1)
+        self.message.setFont(number_font())
         self.fields = push_button("File…", "Show the fields for name and directory")
         self.fields.setCheckable(True)
         self.fields.setChecked(True)
@@ -237,7 +237,7 @@ class UDaqFileWidget(QWidget):
             widget.setEnabled(not recording.active)
         self._show_browse()
         self._enable(wrong_name or wrong_folder)
-        self._tell()
+        self._show_message()
         self._show_room(wrong_folder)
 
     def _folder_problem(self) -> str:
@@ -299,14 +299,14 @@ class UDaqFileWidget(QWidget):
             "Stop recording and close the file" if recording.active else "Nothing is being recorded"
         )
 
-    def _tell(self) -> None:
+    def _show_message(self) -> None:
         recording = self._daqco.recording
         error = self._error or ("" if recording.active else recording.failure)
         state = State.ERROR if error else State.BUSY if recording.active else State.OK
         self.badge.set_state(state, error)
         self.badge.setVisible(bool(error) or recording.active or recording.path is not None)
         behind_s = self._daqco.counters.backlog / self._daqco.rate_hz
-        self.told.set_text(error or recording_text(recording, behind_s))
+        self.message.set_text(error or recording_text(recording, behind_s))
 
     def _show_room(self, wrong: str) -> None:
         if wrong:
@@ -339,11 +339,11 @@ class UDaqFileWidget(QWidget):
         self._ask(self._name_now, self._on_named, "The name is being completed")
 
     def _ask(
-        self, action: Callable[[], T], told: OnResult[T], what: str, *, slow: bool = False
+        self, action: Callable[[], T], on_result: OnResult[T], what: str, *, slow: bool = False
     ) -> None:
         self._error, self._waits = "", what
         self.refresh()
-        self._asking.ask(action, told, slow=slow)
+        self._asking.ask(action, on_result, slow=slow)
 
     def _answered(self, error: CosmicError | None) -> None:
         self._waits = ""

@@ -38,7 +38,7 @@ class ValueField(NumberEdit):
     def set_unit(self, unit: str) -> None:
         """Write another unit behind the number."""
         self._write_unit(display_unit(unit))
-        self._tell()
+        self._show_tip()
 
     def set_value(self, value: float | None) -> None:
         """Show `value`; an entry under way is lost."""
@@ -69,9 +69,9 @@ class ValueField(NumberEdit):
     @override
     def refuse(self, reason: str) -> None:
         super().refuse(reason)
-        self._tell()
+        self._show_tip()
 
-    def _tell(self) -> None:
+    def _show_tip(self) -> None:
         unit = f" in {self._unit}" if self._unit else ""
         self.setToolTip(
             f"REFUSED: {self.reason}\nEsc goes back" if self.reason else f"{self._name}{unit}"

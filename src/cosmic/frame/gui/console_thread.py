@@ -219,7 +219,7 @@ class ConsoleThread(WorkerThread):
 
     @override
     def run_body(self) -> None:
-        self._tell(PROMPT)
+        self._set_prompt(PROMPT)
         while not self.end_requested:
             self._obey(self._inbox.get())
 
@@ -236,12 +236,12 @@ class ConsoleThread(WorkerThread):
         if self._prompt == MORE and self._interrupter.wanted:
             self._interpreter.resetbuffer()
             self._write("KeyboardInterrupt\n")
-            self._tell(PROMPT)
+            self._set_prompt(PROMPT)
         self._interrupter.clear()
 
     def _run(self, text: str) -> None:
         prompt = self._prompt
-        self._tell(BUSY)
+        self._set_prompt(BUSY)
         self._write(f"{prompt}{text}\n")
         self._streams = ThreadStreams(self._write, self._read_for_input)
         try:
@@ -249,11 +249,11 @@ class ConsoleThread(WorkerThread):
         finally:
             self._streams.restore()
         if not self.end_requested:
-            self._tell(MORE if more else PROMPT)
+            self._set_prompt(MORE if more else PROMPT)
 
     def _read_for_input(self) -> str:
         """Return the next line for the user's own ``input()``."""
-        self._tell(READING)
+        self._set_prompt(READING)
         try:
             while not self._interrupter.wanted:
                 request = self._inbox.get()
@@ -263,7 +263,7 @@ class ConsoleThread(WorkerThread):
             self._interrupter.clear()
             raise KeyboardInterrupt
         finally:
-            self._tell(BUSY)
+            self._set_prompt(BUSY)
 
     def _complete(self, text: str) -> None:
         import rlcompleter  # loads readline, which only a console needs
@@ -274,7 +274,7 @@ class ConsoleThread(WorkerThread):
             matches.append(match)
         self.completed.emit(text, tuple(dict.fromkeys(matches)))
 
-    def _tell(self, prompt: str) -> None:
+    def _set_prompt(self, prompt: str) -> None:
         self._prompt = prompt
         self.prompt_changed.emit(prompt)
 

@@ -79,7 +79,7 @@ class QuantityField(QLineEdit):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self.setTextMargins(0, 0, self._unit_width_px(), 0)
         self.setAccessibleName(name or DISPLAY[unit])
-        self._tell()
+        self._show_tip()
         self.textEdited.connect(self._on_text_edited)
 
     @property
@@ -112,7 +112,7 @@ class QuantityField(QLineEdit):
     def set_range(self, low: float | None, high: float | None) -> None:
         """Accept `low` to `high` from now on; None leaves that side open."""
         self._low, self._high = low, high
-        self._tell()
+        self._show_tip()
 
     def refuse(self, reason: str) -> None:
         """Show that the entry was refused, by the gate for instance; it keeps its text.
@@ -182,10 +182,10 @@ class QuantityField(QLineEdit):
         self._reason = reason
         self.setProperty("refused", bool(reason))
         restyle(self)
-        self._tell()
+        self._show_tip()
         self.update()
 
-    def _tell(self) -> None:
+    def _show_tip(self) -> None:
         self.setAccessibleDescription(self._reason)
         if self._reason:
             self.setToolTip(f"REFUSED: {self._reason}\nEsc goes back to the last good value")

@@ -56,7 +56,7 @@ class StopKeyFilter(QObject):
         self._key = combination_of(key).key()
         self._moving = moving
         self._cancels: list[Callable[[], bool]] = []
-        self._told = False
+        self._emitted = False
         self._escape_down = self._escape_taken = False
         self._down_stamp = self._up_stamp = 0
         ApplicationEvents.of(app).add(self, self._on_key_event, QKeyEvent)
@@ -84,9 +84,9 @@ class StopKeyFilter(QObject):
         """Emit once per press, and let nobody else have the key."""
         event.accept()  # a shortcut with the same key must not come first
         if event.type() != QEvent.Type.KeyPress:
-            self._told = False
-        elif not event.isAutoRepeat() and not self._told:
-            self._told = True
+            self._emitted = False
+        elif not event.isAutoRepeat() and not self._emitted:
+            self._emitted = True
             self.stop_requested.emit(self._name)
         return True
 

@@ -123,7 +123,7 @@ class StationLease:
                 self._grant = _Grant(name, token, pulse, in_process)
                 self._why = f"taken by {name}"
         if held is None:
-            self._tell_all()
+            self._publish()
 
     def release(self, token: str, why: str = "") -> None:
         """Give it back, if the session `token` holds it; what moves by it stops."""
@@ -132,7 +132,7 @@ class StationLease:
             if held is None or not secrets.compare_digest(held.token, token):
                 return
             self._drop(held, why or f"given back by {held.name}")
-        self._tell_all()
+        self._publish()
 
     def take_over(self) -> None:
         """Take it for the local operator and keep it until `offer`; never refused."""
@@ -140,13 +140,13 @@ class StationLease:
             self._offered = False
             if self._grant is not None:
                 self._drop(self._grant, f"{self._local.name} took over from {self._grant.name}")
-        self._tell_all()
+        self._publish()
 
     def offer(self) -> None:
         """Let other sessions take it again."""
         with self._lock:
             self._offered = True
-        self._tell_all()
+        self._publish()
 
     def beat(self, token: str, sent_s: float) -> None:
         """Note a sign of life of the session `token`, sent at `sent_s` of this station's clock."""
@@ -185,7 +185,7 @@ class StationLease:
             if held is None or not why:
                 return
             self._drop(held, why)
-        self._tell_all()
+        self._publish()
 
     def _drop(self, held: _Grant, why: str) -> None:
         held.pulse.end(why)
@@ -198,7 +198,7 @@ class StationLease:
             holder=held.name, local=self._grant is None, offered=self._offered, why=self._why
         )
 
-    def _tell_all(self) -> None:
+    def _publish(self) -> None:
         with self._lock:
             state = self._state()
         logger.info("the right to move: %s (%s)", state.holder, state.why)

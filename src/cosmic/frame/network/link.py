@@ -212,7 +212,7 @@ class ApplicationLink:
             return known.values[name]
         unknown = declaration_of(address.kind).state[name].unknown
         if unknown is UNKNOWN:
-            raise StationAway(f"{name} is not known: {self._away or 'it was not told yet'}")
+            raise StationAway(f"{name} is not known: {self._away or 'it was not on_result yet'}")
         return unknown
 
     def keys(self, address: Address, name: str) -> tuple[str, ...]:
@@ -234,7 +234,7 @@ class ApplicationLink:
                 declared = declaration_of(address.kind).streams[name]
                 topic = topic_of(self._name, address.at, declared.topic)
                 self._streams[at] = RemoteStream(
-                    declared, topic, self._transport, lambda: self._tell([address.at])
+                    declared, topic, self._transport, lambda: self._publish([address.at])
                 )
             return self._streams[at]
 
@@ -364,18 +364,18 @@ class ApplicationLink:
         if text:
             logger.warning("%s %s: %s", self._name, " ".join(address.at), text)
         if before != text:
-            self._tell([address.at])
+            self._publish([address.at])
 
     def _done_aside(
         self, address: Address, command: CommandDeclaration, arguments: dict[str, object]
     ) -> None:
         """Do something aside, for a thread that must not wait."""
 
-        def told(_result: object, error: CosmicError | None) -> None:
+        def on_result(_result: object, error: CosmicError | None) -> None:
             if error is not None:
                 self._note_refusal(address, str(error))
 
-        self._commands.do(lambda: self._asked_now(address, command, arguments), told)
+        self._commands.do(lambda: self._asked_now(address, command, arguments), on_result)
 
     def _renew(
         self, address: Address, command: CommandDeclaration, arguments: dict[str, object]
@@ -392,7 +392,7 @@ class ApplicationLink:
                 newest = self._newest.pop(key)
             return newest()
 
-        def told(_result: object, error: CosmicError | None) -> None:
+        def on_result(_result: object, error: CosmicError | None) -> None:
             if error is not None:
                 logger.warning("%s: %s", function, error)
 
@@ -400,19 +400,19 @@ class ApplicationLink:
             waits = key in self._newest
             self._newest[key] = send
         if not waits:
-            self._renewals.do(send_newest, told)
+            self._renewals.do(send_newest, on_result)
 
     def _overtake(
         self, address: Address, command: CommandDeclaration, arguments: dict[str, object]
     ) -> None:
         """Have done past everything what a thread that must not wait wants; loud where it fails."""
 
-        def told(_result: object, error: CosmicError | None) -> None:
+        def on_result(_result: object, error: CosmicError | None) -> None:
             if error is not None:
                 where = " ".join((command.name, *address.keys))
                 self.policy.report(error, f"{where} was NOT carried out at the station")
 
-        self._stops.do(lambda: self._asked_now(address, command, arguments), told)
+        self._stops.do(lambda: self._asked_now(address, command, arguments), on_result)
 
     def _begun_aside(
         self, address: Address, command: CommandDeclaration, arguments: dict[str, object]
@@ -426,7 +426,7 @@ class ApplicationLink:
                 raise MoveCancelled(f"{command.name}: cancelled before it was begun")
             return self._asked_now(address, command, arguments)
 
-        def told(begun: object, error: CosmicError | None) -> None:
+        def on_result(begun: object, error: CosmicError | None) -> None:
             if isinstance(begun, Operation):
                 begun.add_callback(lambda ended: _end_as(ended, known))
                 _go_on_as(begun, known)
@@ -434,7 +434,7 @@ class ApplicationLink:
                 self._note_refusal(address, str(error or ""))
                 known.fail(error or ProtocolError(f"{command.name} began nothing"))
 
-        self._commands.do(begin, told)
+        self._commands.do(begin, on_result)
         return known
 
     def _followed(self, begun: RemoteTask, command: CommandDeclaration) -> Operation[Any]:
@@ -472,9 +472,9 @@ class ApplicationLink:
         except (Mismatch, ProtocolError) as exc:
             known.fail(ProtocolError(f"{command.name} ended with something else: {exc}"))
 
-    def aside(self, action: Callable[[], Any], told: Callable[[Any, Any], object]) -> None:
+    def aside(self, action: Callable[[], Any], on_result: Callable[[Any, Any], object]) -> None:
         """Do something in a thread that may wait for the line, and tell how it ended."""
-        self._background.do(action, told)
+        self._background.do(action, on_result)
 
     def _asked_now(
         self, address: Address, command: CommandDeclaration, arguments: dict[str, object]
@@ -532,11 +532,11 @@ class ApplicationLink:
         if waits:
             return
 
-        def told(_found: object, _error: CosmicError | None) -> None:
+        def on_result(_found: object, _error: CosmicError | None) -> None:
             with self._lock:
                 self._asked.discard(key)
 
-        self._background.do(lambda: self._ask(key, address, command, arguments), told)
+        self._background.do(lambda: self._ask(key, address, command, arguments), on_result)
 
     # What the station tells
 
@@ -551,24 +551,26 @@ class ApplicationLink:
         """
         if not isinstance(payload, StateMessage):
             raise ProtocolError(f"a {type(payload).__name__} came instead of state")
-        told = dict(_flat(self._address(payload.at), payload.values))
+        published = dict(_flat(self._address(payload.at), payload.values))
         with self._lock:
             first = payload.start != self._start
-            if (first and payload.at) or not (payload.whole or self._completes(told, first=first)):
+            if (first and payload.at) or not (
+                payload.whole or self._completes(published, first=first)
+            ):
                 self._incomplete = True
                 return False
             if first:
                 self._known.clear()
                 self._start, self._wall_s = payload.start, None
             self._note_wall(payload.wall_s)
-            newer = [at for at in told if self._number(at) < payload.number]
-            changed = [at for at in newer if self._differs(at, told[at])]
+            newer = [at for at in published if self._number(at) < payload.number]
+            changed = [at for at in newer if self._differs(at, published[at])]
             for at in newer:
                 known = self._known.get(at)
                 fixed = known.fixed if known is not None else {}
                 if payload.whole:
-                    fixed = _fixed(*told[at])
-                self._known[at] = _Known(payload.number, {**fixed, **told[at][1]}, fixed)
+                    fixed = _fixed(*published[at])
+                self._known[at] = _Known(payload.number, {**fixed, **published[at][1]}, fixed)
             was_away, self._away = self._away, "" if self._here else self._away
             self._heard_wall_s = WALL.now_s()
         if first:
@@ -579,14 +581,14 @@ class ApplicationLink:
                 each.on_state(first=first)
         if was_away != self._away:
             changed.append(())
-        self._tell(changed)
+        self._publish(changed)
         return True
 
     def _completes(
-        self, told: Mapping[tuple[str, ...], tuple[Address, dict[str, object]]], *, first: bool
+        self, published: Mapping[tuple[str, ...], tuple[Address, dict[str, object]]], *, first: bool
     ) -> bool:
         """Return whether what never changes is known of all that is told; under the lock."""
-        for at, (address, _) in told.items():
+        for at, (address, _) in published.items():
             known = None if first else self._known.get(at)
             for name, each in declaration_of(address.kind).state.items():
                 if each.fixed and (known is None or name not in known.fixed):
@@ -615,8 +617,8 @@ class ApplicationLink:
         known = self._known.get(at)
         return known.number if known is not None else 0
 
-    def _differs(self, at: tuple[str, ...], told: tuple[Address, dict[str, object]]) -> bool:
-        known, (address, values) = self._known.get(at), told
+    def _differs(self, at: tuple[str, ...], published: tuple[Address, dict[str, object]]) -> bool:
+        known, (address, values) = self._known.get(at), published
         states = declaration_of(address.kind).state
         loud = [name for name in values if name not in states or not states[name].quiet]
         return known is None or any(known.values.get(each) != values[each] for each in loud)
@@ -636,9 +638,9 @@ class ApplicationLink:
         with self._lock:
             before, self._away = self._away, why
         if before != why:
-            self._tell([()])
+            self._publish([()])
 
-    def _tell(self, changed: list[tuple[str, ...]]) -> None:
+    def _publish(self, changed: list[tuple[str, ...]]) -> None:
         for at in {*changed, *([()] if changed else [])}:
             self._changed.emit(at)
 

@@ -108,7 +108,7 @@ class Answered:
     state: StateMessage
 
 
-Tell = Callable[[list[object]], None]
+Send = Callable[[list[object]], None]
 
 
 class Tickets:
@@ -116,13 +116,13 @@ class Tickets:
 
     Parameters
     ----------
-    tell : callable
+    send : callable
         Sends ``[ticket, progress or None, done, result, exception or None]`` to the session;
         returns at once.
     """
 
-    def __init__(self, tell: Tell) -> None:
-        self._tell = tell
+    def __init__(self, send: Send) -> None:
+        self._send = send
         self._lock = Lock()
         self._running: dict[str, tuple[Ongoing, bool]] = {}
 
@@ -178,7 +178,7 @@ class Tickets:
             if progress.done:
                 self._finish(number, ongoing)
             else:
-                self._tell([number, progress, False, None, None])
+                self._send([number, progress, False, None, None])
 
         if subscribe is not None:
             subscribe(on_progress)
@@ -194,8 +194,8 @@ class Tickets:
         try:
             result = ongoing.wait(0.0)
         except CosmicError as exc:
-            self._tell([number, None, True, None, to_plain(exc)])
+            self._send([number, None, True, None, to_plain(exc)])
         except Exception as exc:  # noqa: BLE001 - whoever carried it out has reported it
-            self._tell([number, None, True, None, to_plain(RemoteDefect(repr(exc)))])
+            self._send([number, None, True, None, to_plain(RemoteDefect(repr(exc)))])
         else:
-            self._tell([number, None, True, result, None])
+            self._send([number, None, True, result, None])

@@ -75,12 +75,14 @@ class Proxied(Declared):
         return self._link.wall_s_here(wall_s)
 
     @override
-    def carry_out(self, action: Callable[[], T], told: OnResult[T], *, slow: bool = False) -> None:
+    def carry_out(
+        self, action: Callable[[], T], on_result: OnResult[T], *, slow: bool = False
+    ) -> None:
         del slow  # everything may be
         if may_wait_here():
-            do_and_report(action, told)
+            do_and_report(action, on_result)
         else:
-            self._link.aside(action, told)
+            self._link.aside(action, on_result)
 
     def _part(self, name: str, key: str | None = None) -> "Proxied":
         found = self._parts.get((name, key))

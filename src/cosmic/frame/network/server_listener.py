@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from cosmic.frame.errors import CosmicError, ProtocolError
 from cosmic.frame.job_queue import JobQueue
-from cosmic.frame.log_folding import tell_folded
+from cosmic.frame.log_folding import flush_folded
 from cosmic.frame.network.addresses import (
     asks,
     client_of,
@@ -243,7 +243,7 @@ class ServerListener(WorkerThread):
     # Housekeeping, in the listener's own thread
 
     def _look(self) -> None:
-        tell_folded()  # of a flood that has ended nobody else may tell for long
+        flush_folded()  # of a flood that has ended nobody else may tell for long
         self._station.lease.poll()
         self._refusals.answer_due()
         while len(self._gone):

@@ -81,8 +81,8 @@ class LinkedMovement(Movement):
                 return
         failures = [error for part in self.parts.values() if (error := part.exception())]
         if failures:
-            told = (each for each in failures if not isinstance(each, MoveCancelled))
-            self.fail(next(told, failures[0]))
+            causes = (each for each in failures if not isinstance(each, MoveCancelled))
+            self.fail(next(causes, failures[0]))
         else:
             self.finish(self.parts[self._axis].wait())
 
@@ -201,23 +201,23 @@ class AxisElsewhere:
         """Take note of where it is."""
         self._newest = (position, std, read_wall_s)
 
-    def state(self, axis: Declared, told: PositionerState) -> PositionerState:
+    def state(self, axis: Declared, published: PositionerState) -> PositionerState:
         """Return the state that was told last, with the newest position; absent while away."""
         newest, away, seen = self._newest, axis.away, self._seen
-        if seen is not None and seen[0] is told and seen[1] is newest and seen[2] == away:
+        if seen is not None and seen[0] is published and seen[1] is newest and seen[2] == away:
             return seen[3]
-        position, std, read_wall_s = told.position, told.std, told.read_wall_s
+        position, std, read_wall_s = published.position, published.std, published.read_wall_s
         if newest is not None and newest[2] > read_wall_s:
             position, std, read_wall_s = newest
         read_wall_s = axis.wall_s_here(read_wall_s)
-        state = replace(told, position=position, std=std, read_wall_s=read_wall_s)
+        state = replace(published, position=position, std=std, read_wall_s=read_wall_s)
         if away:
             sensed = state.kind is not PositionerKind.OPEN_LOOP
             confidence = Confidence.UNKNOWN if sensed else state.confidence
             state = replace(
                 state, present=False, in_motion=False, error=away, confidence=confidence
             )
-        self._seen = (told, newest, away, state)
+        self._seen = (published, newest, away, state)
         return state
 
 

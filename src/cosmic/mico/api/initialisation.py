@@ -93,7 +93,7 @@ class InitialisationRun:
     def _plan(self) -> tuple[PlannedStep, ...]:
         steps = plan(self._manager, skip_known=self._skip_known)
         reports = tuple(StepReport(step.title, StepState.WAITING) for step in steps)
-        self._tell(SequenceReport(reports))
+        self._publish(SequenceReport(reports))
         return steps
 
     def _step(self, task: Task, number: int, step: PlannedStep) -> None:
@@ -108,9 +108,9 @@ class InitialisationRun:
             self._look(task)
             self._do(task, step)
         except CosmicError as exc:
-            told = _explained(exc, f"step {number + 1} of {count}, {step.title}")
+            explained = _explained(exc, f"step {number + 1} of {count}, {step.title}")
             self._mark(number, StepState.FAILED, str(exc))
-            raise told from exc
+            raise explained from exc
         self._mark(number, StepState.DONE, note)
 
     def _do(self, task: Task, step: PlannedStep) -> None:
@@ -149,13 +149,13 @@ class InitialisationRun:
     def _ask(self, text: str) -> None:
         if self._confirm is None:
             raise MoveCancelled(f"nobody is there to confirm {text!r}; pass confirm")
-        self._tell(replace(self._report, question=text))
+        self._publish(replace(self._report, question=text))
         try:
             agreed = self._confirm(text)
         except Exception:  # a script's own mistake must not end this thread
             logger.exception("what should confirm %r failed", text)
             agreed = False
-        self._tell(replace(self._report, question=""))
+        self._publish(replace(self._report, question=""))
         if not agreed:
             raise MoveCancelled(f"{text!r} was answered with no")
 
@@ -171,9 +171,9 @@ class InitialisationRun:
     def _mark(self, number: int, state: StepState, note: str) -> None:
         steps = list(self._report.steps)
         steps[number] = replace(steps[number], state=state, note=note)
-        self._tell(replace(self._report, steps=tuple(steps)))
+        self._publish(replace(self._report, steps=tuple(steps)))
 
-    def _tell(self, report: SequenceReport) -> None:
+    def _publish(self, report: SequenceReport) -> None:
         self._report = report
         if self._on_report is not None:
             self._on_report(report)

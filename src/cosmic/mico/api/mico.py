@@ -117,7 +117,7 @@ class Mico(Declared):
             raise TypeError(f"policy must be a FailurePolicy, not {str(policy)[:60]}")
         self._begin_here("script")
         self._policy = policy
-        self._told_away = ""
+        self._published_away = ""
 
     @override
     def made_companion(self) -> Companion:
@@ -138,8 +138,8 @@ class Mico(Declared):
     @override
     def note_change(self) -> None:
         super().note_change()
-        if self.elsewhere and self.away != self._told_away:
-            self._told_away = self.away
+        if self.elsewhere and self.away != self._published_away:
+            self._published_away = self.away
             for axis in self.axes.values():
                 axis.note_change()
 
@@ -825,8 +825,8 @@ class Mico(Declared):
     def undo_doubts(self, entry: UndoEntry) -> tuple[str, ...]:
         """Return what speaks against taking `entry` back: felt since, or so now."""
         since = [each for each in self.undo_entries if each.number >= entry.number]
-        told = [text for each in since for text in each.felt]
-        return tuple(dict.fromkeys([*self._application.cautions.reasons(), *told]))
+        felt = [text for each in since for text in each.felt]
+        return tuple(dict.fromkeys([*self._application.cautions.reasons(), *felt]))
 
     # Collisions
 

@@ -191,14 +191,14 @@ def follow_positions(
 
     In the threads of the devices. The last position of a movement is told by the state of the axis.
     """
-    lock, told_s = Lock(), -PERIOD_S
+    lock, sent_s = Lock(), -PERIOD_S
 
     def on_position(_event: PositionChanged) -> None:
-        nonlocal told_s
+        nonlocal sent_s
         now_s = WALL.now_s()
         with lock:
-            due = now_s - told_s >= PERIOD_S
-            told_s = now_s if due else told_s
+            due = now_s - sent_s >= PERIOD_S
+            sent_s = now_s if due else sent_s
         if due:
             states = manager.states().values()
             receiver(

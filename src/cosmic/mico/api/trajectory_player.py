@@ -60,7 +60,7 @@ class TrajectoryPlayer:
         self._control = PlayControl(timed=timed)
         self._changed = self._control.changed
         self._run = TrajectoryRun(site, bound, self._control, source)
-        self._telling = RLock()
+        self._publishing = RLock()
         self._progressed: Event[PlayProgress] = Event()
         self._state = PlayState.READY
         self._failure: CosmicError | None = None
@@ -127,7 +127,7 @@ class TrajectoryPlayer:
 
     def subscribe(self, listener: Callable[[PlayProgress], object]) -> Unsubscribe:
         """Call `listener(progress)` at each line and change, in the thread that makes it."""
-        with self._telling:
+        with self._publishing:
             notify(listener, self.progress)
             return self._progressed.subscribe(listener)
 
@@ -198,7 +198,7 @@ class TrajectoryPlayer:
                 self._set_state(PlayState.CANCELLED)
         if task is not None:
             task.cancel()
-        self._tell()
+        self._publish()
 
     def wait(self, timeout_s: float | None = None) -> None:
         """Wait until it is done; raises what it failed with.
@@ -240,7 +240,7 @@ class TrajectoryPlayer:
             self._set_state(PlayState.RUNNING)
         task.on_cancel(self._halt)
         task.add_callback(self._on_end)
-        self._tell()
+        self._publish()
 
     def _on_end(self, task: Task) -> None:
         """End with a task whose turn never came; any thread."""
@@ -278,7 +278,7 @@ class TrajectoryPlayer:
     def _leave(self, state: PlayState) -> None:
         with self._changed:
             self._set_state(state)
-        self._tell()
+        self._publish()
 
     def _halt(self) -> None:
         """Stop what is under way; any thread."""
@@ -293,8 +293,8 @@ class TrajectoryPlayer:
     def _say(self, task: Task, text: str) -> None:
         self._text = text
         task.report(self.progress.fraction, text)
-        self._tell()
+        self._publish()
 
-    def _tell(self) -> None:
-        with self._telling:
+    def _publish(self) -> None:
+        with self._publishing:
             self._progressed.emit(self.progress)

@@ -20,7 +20,7 @@ from cosmic.mico.core.poses import PoseBook, pose_misfits
 from cosmic.mico.core.trajectory.binding import AxisFacts, Bound, PlatformFacts
 from cosmic.mico.core.trajectory.clearance import ClearanceSearch
 from cosmic.mico.core.trajectory.pure_gate import PureAnswers, pure_copy
-from cosmic.mico.core.trajectory.rehearsal import Rehearsal, Stage, Told, rehearse
+from cosmic.mico.core.trajectory.rehearsal import OnProgress, Rehearsal, Stage, rehearse
 
 if TYPE_CHECKING:
     from cosmic.mico.api.trajectory_player import TrajectoryPlayer
@@ -131,7 +131,7 @@ class TrajectorySite:
         *,
         speed: float = 1.0,
         timed: bool = True,
-        progress: Told | None = None,
+        progress: OnProgress | None = None,
         cancelled: Callable[[], bool] | None = None,
     ) -> Rehearsal:
         """Run a trajectory through the pure gate; one at a time, in the calling thread."""

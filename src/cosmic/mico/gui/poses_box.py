@@ -45,7 +45,7 @@ class PosesBox(QWidget):
         self.group = tipped(QComboBox(), "Which axes the pose holds")
         self.group.addItems([ALL, *(each.title for each in self._settings_groups())])
         self.teach = named(push_button("Teach", "Keep the positions of the axes now"), "teachPose")
-        self.told = ElidedLabel()
+        self.message = ElidedLabel()
         self._arrange()
         self.go.clicked.connect(lambda: self._go(way=False))
         self.way.clicked.connect(lambda: self._go(way=True))
@@ -71,7 +71,7 @@ class PosesBox(QWidget):
         column.setSpacing(STEP_PX // 2)
         for row, _ in (first, second):
             column.addWidget(row)
-        column.addWidget(self.told)
+        column.addWidget(self.message)
 
     def refresh(self) -> None:
         """Show the poses there are now."""
@@ -95,11 +95,11 @@ class PosesBox(QWidget):
         try:
             pose = self._mico.poses.teach(name, None if group == ALL else group)
         except CosmicError as exc:
-            self.told.set_text(str(exc))
+            self.message.set_text(str(exc))
             return
         where = self._mico.poses.path
         kept = f"kept in {where.name}" if where is not None else "kept until the program ends"
-        self.told.set_text(f"{name}: {len(pose.positions)} axes, {kept}")
+        self.message.set_text(f"{name}: {len(pose.positions)} axes, {kept}")
         self.name.clear()
         self.refresh()
         self.poses.setCurrentText(name)
@@ -109,7 +109,7 @@ class PosesBox(QWidget):
         try:
             self._mico.poses.remove(self.poses.currentText())
         except CosmicError as exc:
-            self.told.set_text(str(exc))
+            self.message.set_text(str(exc))
         self.refresh()
         self.poses_changed.emit()
 
@@ -118,11 +118,11 @@ class PosesBox(QWidget):
         try:
             task = self._mico.poses.go(self.poses.currentText(), way=way, wait=False)
         except CosmicError as exc:
-            self.told.set_text(str(exc))
+            self.message.set_text(str(exc))
             return
-        self.told.set_text("")
+        self.message.set_text("")
         task.subscribe(self._relay)
 
     def _on_progressed(self, progress: Progress) -> None:
         if progress.done:
-            self.told.set_text(progress.error or "there")
+            self.message.set_text(progress.error or "there")

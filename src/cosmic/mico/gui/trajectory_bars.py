@@ -54,9 +54,9 @@ class RecordBar(QWidget):
         )
         self.timed.setChecked(True)
         self.pose = tipped(QComboBox(), "Named pose that recorded positions count from")
-        self.told = ElidedLabel()
-        self.told.setFont(number_font())
-        self.told.hide()
+        self.message = ElidedLabel()
+        self.message.setFont(number_font())
+        self.message.hide()
         self._recording = False
         row, flow = QWidget(), FlowLayout(STEP_PX)
         row.setLayout(flow)
@@ -66,7 +66,7 @@ class RecordBar(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(STEP_PX // 2)
         column.addWidget(row)
-        column.addWidget(self.told)
+        column.addWidget(self.message)
         self.button.clicked.connect(self._on_clicked)
         self.set_poses([])
 
@@ -94,8 +94,8 @@ class RecordBar(QWidget):
         self.button.setText("Stop recording" if recording else "Record…")
         for widget in (self.source, self.timed, self.pose):
             widget.setEnabled(not recording)
-        self.told.set_text(text)
-        self.told.setVisible(bool(text))
+        self.message.set_text(text)
+        self.message.setVisible(bool(text))
 
     def _on_clicked(self) -> None:
         (self.stop_requested if self._recording else self.record_requested).emit()

@@ -48,16 +48,16 @@ class TrajectoryLinesModel(QAbstractListModel):
             line = max(1, each.line)
             before = self._problems.get(line)
             self._problems[line] = f"{before}; {each.text}" if before else each.text
-        self._tell(1, len(self._lines))
+        self._emit_changed(1, len(self._lines))
 
     def set_current(self, line: int) -> None:
         """Mark the line under way."""
         if line != self._current:
             before, self._current = self._current, line
-            self._tell(before, before)
-            self._tell(line, line)
+            self._emit_changed(before, before)
+            self._emit_changed(line, line)
 
-    def _tell(self, first: int, last: int) -> None:
+    def _emit_changed(self, first: int, last: int) -> None:
         if 1 <= first <= last <= len(self._lines):
             self.dataChanged.emit(self.index(first - 1), self.index(last - 1))
 

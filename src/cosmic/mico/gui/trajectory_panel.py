@@ -107,9 +107,9 @@ class TrajectoryPanel(QWidget):
             column.addWidget(widget)
 
     def _connect(self) -> None:
-        self._tell_loaded = Relay(self._on_loaded)
-        self._tell_rehearsed = Relay(self._on_rehearsed)
-        self._tell_failed = Relay(self._on_failed)
+        self._loaded_relay = Relay(self._on_loaded)
+        self._rehearsed_relay = Relay(self._on_rehearsed)
+        self._failed_relay = Relay(self._on_failed)
         self._recorder.recorded.connect(self.open)
         self.open_button.clicked.connect(self._on_open)
         self.mirror_button.clicked.connect(self.mirror)
@@ -143,9 +143,9 @@ class TrajectoryPanel(QWidget):
             try:
                 found = self._api.load(path, lambda part: task.report(part, "reading"))
             except CosmicError as exc:
-                self._tell_loaded(path, exc)
+                self._loaded_relay(path, exc)
             else:
-                self._tell_loaded(path, found)
+                self._loaded_relay(path, found)
             task.finish()
 
         self._begin(f"Reading {path.name}", read)
@@ -224,10 +224,10 @@ class TrajectoryPanel(QWidget):
                     trajectory, task.report, speed=speed, cancelled=lambda: task.cancel_requested
                 )
             except CosmicError as exc:
-                self._tell_failed(str(exc))
+                self._failed_relay(str(exc))
                 task.fail(exc)
             else:
-                self._tell_rehearsed(found)
+                self._rehearsed_relay(found)
                 task.finish()
 
         self._say("rehearsing", State.BUSY)

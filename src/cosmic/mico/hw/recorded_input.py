@@ -56,7 +56,9 @@ def read_events(path: Path) -> tuple[InputEvent, ...]:
         raise ConfigError(f"{path}: cannot be read: {exc}") from exc
     if "\0" in text:
         raise ConfigError(f"{path}: no text, it holds zero bytes")
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if _tells(line)]
+    lines = [
+        (number, line) for number, line in enumerate(text.splitlines(), 1) if _has_content(line)
+    ]
     if len(lines) > _LARGEST:
         raise ConfigError(f"{path}: longer than {_LARGEST} lines")
     if not lines or tuple(_cells(lines[0][1])) != HEADER:
@@ -73,7 +75,7 @@ def read_events(path: Path) -> tuple[InputEvent, ...]:
     return tuple(events)
 
 
-def _tells(line: str) -> bool:
+def _has_content(line: str) -> bool:
     return bool(line.strip()) and not line.lstrip().startswith("#")
 
 

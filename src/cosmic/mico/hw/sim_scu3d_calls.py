@@ -123,7 +123,7 @@ def _synchronous(session: Session, base: str, operation: Operation) -> Body:
             now_s = session.clock.now_s()
             device.advance(now_s)
             values, status = _run(operation, channel, now_s, args)
-            status = device.told(status)
+            status = device.reported(status)
         session.scene.keep_up()  # with no lock held
         if latency_s:
             session.clock.sleep(latency_s)

@@ -82,7 +82,7 @@ class Device:
         """Whether the cable is out."""
         return self.faults.find("unplugged", self.number) is not None
 
-    def told(self, code: int) -> int:
+    def reported(self, code: int) -> int:
         """Return a status code as this version of the library tells it."""
         return code if code <= self.newest_error else SA_OTHER_ERROR
 
@@ -91,7 +91,7 @@ class Device:
         if not self.asynchronous:
             return
         if packet[0] == SA_ERROR_PACKET_TYPE:
-            packet = (packet[0], packet[1], self.told(packet[2]), 0, 0)
+            packet = (packet[0], packet[1], self.reported(packet[2]), 0, 0)
         settings = self.settings
         latency_s = self.random.uniform(
             settings.packet_latency_low_s, settings.packet_latency_high_s

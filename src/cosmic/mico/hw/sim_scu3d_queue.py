@@ -27,7 +27,7 @@ class PacketQueue:
         self._heap: list[tuple[float, int, Packet]] = []
         self._number = 0
         self._last_due_s: dict[int, float] = {}
-        self._told = False
+        self._warned = False
 
     def __len__(self) -> int:
         return len(self._heap)
@@ -36,11 +36,11 @@ class PacketQueue:
     def full(self) -> bool:
         """Whether the client has left too much unread; told to the log once."""
         full = len(self._heap) >= self._capacity
-        if full and not self._told:
+        if full and not self._warned:
             logger.warning(
                 "%s: %d packets unread, no more commands are taken", self._name, len(self._heap)
             )
-        self._told = full
+        self._warned = full
         return full
 
     def push(self, packet: Packet, due_s: float) -> None:
@@ -72,4 +72,4 @@ class PacketQueue:
         """Drop everything, packets under way too."""
         self._heap.clear()
         self._last_due_s.clear()
-        self._told = False
+        self._warned = False

@@ -69,7 +69,7 @@ def _kept(
     return Property(dtype, read, write, default, low, high)
 
 
-def _told(dtype: int, read: Callable[[Channel, float], Value]) -> Property[Channel]:
+def _read_only(dtype: int, read: Callable[[Channel, float], Value]) -> Property[Channel]:
     return Property(dtype, read)
 
 
@@ -178,8 +178,8 @@ _STORED: Final[dict[int, tuple[int, int, int, int]]] = {
 CHANNEL: Final[dict[int, Property[Channel]]] = {
     **{key: _kept(key, *rest) for key, rest in _STORED.items()},
     sa.SA_CTL_PKEY_MOVE_VELOCITY: Property(I64, _VELOCITY.read, _set_velocity, 0, 0, 10**11),
-    sa.SA_CTL_PKEY_CHANNEL_STATE: _told(I32, lambda channel, _now_s: channel.state),
-    sa.SA_CTL_PKEY_CHANNEL_TYPE: _told(I32, lambda *_: sa.SA_CTL_STICK_SLIP_PIEZO_DRIVER),
+    sa.SA_CTL_PKEY_CHANNEL_STATE: _read_only(I32, lambda channel, _now_s: channel.state),
+    sa.SA_CTL_PKEY_CHANNEL_TYPE: _read_only(I32, lambda *_: sa.SA_CTL_STICK_SLIP_PIEZO_DRIVER),
     sa.SA_CTL_PKEY_POSITION: Property(
         I64,
         lambda channel, now_s: channel.counts(now_s),
@@ -188,8 +188,8 @@ CHANNEL: Final[dict[int, Property[Channel]]] = {
         -_FAR,
         _FAR,
     ),
-    sa.SA_CTL_PKEY_TARGET_POSITION: _told(I64, _read_target),
-    sa.SA_CTL_PKEY_SCAN_POSITION: _told(I64, lambda channel, _now_s: channel.scan),
+    sa.SA_CTL_PKEY_TARGET_POSITION: _read_only(I64, _read_target),
+    sa.SA_CTL_PKEY_SCAN_POSITION: _read_only(I64, lambda channel, _now_s: channel.scan),
     _OFFSET: Property(
         I64, lambda channel, _: channel.value(_OFFSET), _set_scale(_OFFSET), 0, -_FAR, _FAR
     ),
@@ -199,18 +199,18 @@ CHANNEL: Final[dict[int, Property[Channel]]] = {
     sa.SA_CTL_PKEY_POSITIONER_TYPE: Property(
         I32, lambda channel, _now_s: channel.type_code, _set_type, 0, 0, _INT32
     ),
-    sa.SA_CTL_PKEY_POSITIONER_TYPE_NAME: _told(TEXT, _type_name),
-    sa.SA_CTL_PKEY_POS_BASE_UNIT: _told(I32, _base_unit),
-    sa.SA_CTL_PKEY_POS_BASE_RESOLUTION: _told(
+    sa.SA_CTL_PKEY_POSITIONER_TYPE_NAME: _read_only(TEXT, _type_name),
+    sa.SA_CTL_PKEY_POS_BASE_UNIT: _read_only(I32, _base_unit),
+    sa.SA_CTL_PKEY_POS_BASE_RESOLUTION: _read_only(
         I32, lambda channel, _now_s: -12 if channel.stage.unit == "um" else -9
     ),
-    sa.SA_CTL_PKEY_POS_MOVEMENT_TYPE: _told(I32, _of_type("movement")),
-    sa.SA_CTL_PKEY_POS_REFERENCE_TYPE: _told(I32, _of_type("reference")),
-    sa.SA_CTL_PKEY_POS_IS_CUSTOM_TYPE: _told(I32, lambda *_: 0),
+    sa.SA_CTL_PKEY_POS_MOVEMENT_TYPE: _read_only(I32, _of_type("movement")),
+    sa.SA_CTL_PKEY_POS_REFERENCE_TYPE: _read_only(I32, _of_type("reference")),
+    sa.SA_CTL_PKEY_POS_IS_CUSTOM_TYPE: _read_only(I32, lambda *_: 0),
     sa.SA_CTL_PKEY_SENSOR_POWER_MODE: Property(I32, _POWER.read, _set_power, 1, 0, 2),
-    sa.SA_CTL_PKEY_FOLLOWING_ERROR: _told(I64, lambda *_: 0),
-    sa.SA_CTL_PKEY_CHANNEL_ERROR: _told(I32, _take_error),
-    sa.SA_CTL_PKEY_CHANNEL_TEMPERATURE: _told(
+    sa.SA_CTL_PKEY_FOLLOWING_ERROR: _read_only(I64, lambda *_: 0),
+    sa.SA_CTL_PKEY_CHANNEL_ERROR: _read_only(I32, _take_error),
+    sa.SA_CTL_PKEY_CHANNEL_TEMPERATURE: _read_only(
         I32,
         lambda channel, _now_s: (
             channel.settings.temperature_hot_deg_c

@@ -231,7 +231,7 @@ class SmaractCtlController(Controller):
         if event.type == sa.SA_CTL_EVENT_REQUEST_READY:
             return self._answered(device, at, event.i64 & 0xFF)
         seeks = event.idx in at.seeks_end
-        said = events.told(device, event, serial=at.serial, seeks_end=seeks)
+        said = events.event_of(device, event, serial=at.serial, seeks_end=seeks)
         if event.type == sa.SA_CTL_EVENT_MOVEMENT_FINISHED:
             at.begun_s.pop(event.idx, None)
             if isinstance(said, (Completed, Failed)):

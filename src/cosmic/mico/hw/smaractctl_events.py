@@ -120,7 +120,9 @@ def position_in(wanted: AxisUnit) -> Callable[[Channel, Answers], Event]:
     return make
 
 
-def told(device: int, event: sa.SA_CTL_Event, *, serial: Serial | None, seeks_end: bool) -> Event:
+def event_of(
+    device: int, event: sa.SA_CTL_Event, *, serial: Serial | None, seeks_end: bool
+) -> Event:
     """Return what an event that nobody asked for says; raises `DeviceError` when all is lost.
 
     Parameters

@@ -204,7 +204,7 @@ class SendingCamera(Protocol):
     def carry_out(
         self,
         action: Callable[[], None],
-        told: Callable[[None, CosmicError | None], object],
+        on_result: Callable[[None, CosmicError | None], object],
     ) -> None:
         """Do what may have to wait for the line."""
 

@@ -124,9 +124,9 @@ class Vico(Declared):
         # At once: a call that still waits in a queue when a plain object goes would reach what is
         # no more.
         direct = Qt.ConnectionType.DirectConnection
-        application.status_changed.connect(weakly(self._tell), direct)
+        application.status_changed.connect(weakly(self._publish), direct)
 
-    def _tell(self) -> None:
+    def _publish(self) -> None:
         self.note_change()
         for each in (*self._handles.values(), self._lens, self._light):
             each.note_change()

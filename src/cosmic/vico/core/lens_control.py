@@ -268,7 +268,7 @@ class PeripheralThread(WorkerThread):
         self._state = now
         if replace(now, time_s=before.time_s, wall_s=before.wall_s) != before:
             self.state_changed.emit(now)
-        lens.tell_ends()
+        lens.publish_ends()
 
     def _close(self) -> None:
         with self._wake:
@@ -278,4 +278,4 @@ class PeripheralThread(WorkerThread):
             order.task.fail(NotAvailable("lens and light are closed"))
         self._lens.close()
         self._light.close()
-        self._lens.tell_ends()
+        self._lens.publish_ends()

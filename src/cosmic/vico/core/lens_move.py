@@ -30,7 +30,7 @@ class Move:
     dead_man : DeadMan or None
         Ends it when whoever commanded it from another process falls silent.
     over : bool
-        It has ended, with `error` or well; the task is told by `tell_end`.
+        It has ended, with `error` or well; the task is told by `publish_end`.
     """
 
     task: Task
@@ -60,7 +60,7 @@ class Move:
         if not self.over:
             self.over, self.error = True, error
 
-    def tell_end(self) -> None:
+    def publish_end(self) -> None:
         """Tell whoever waits that it is over."""
         if self.error is None:
             self.task.finish()
@@ -83,7 +83,7 @@ class Move:
         if self.clock.now_s() - self.begun_s > self.timeout_s:
             self.end(self._late(axis, state))
             return
-        self._tell(axis, start, state)
+        self._report(axis, start, state)
 
     def _arrived(self, axis: LensAxis, state: LensState) -> bool:
         target = self.targets[axis]
@@ -91,7 +91,7 @@ class Move:
             return state.homed
         return state.homed and abs(state.position_counts - target) <= NEAR_COUNTS
 
-    def _tell(self, axis: LensAxis, start: int, state: LensState) -> None:
+    def _report(self, axis: LensAxis, start: int, state: LensState) -> None:
         target = self.targets[axis]
         way = (target if target is not None else -state.limit_counts) - start
         part = (state.position_counts - start) / way if way else 0.0

@@ -191,11 +191,11 @@ class LensSide:
         except CosmicError as exc:
             self._lose(exc)
 
-    def tell_ends(self) -> None:
+    def publish_ends(self) -> None:
         """Tell whoever waits for a movement that is over."""
         ended, self._ended = self._ended, []
         for move in ended:
-            move.tell_end()
+            move.publish_end()
 
     def close(self) -> None:
         """Close it; nothing goes on moving when nobody watches."""

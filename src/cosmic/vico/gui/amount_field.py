@@ -73,13 +73,13 @@ class AmountField(NumberEdit):
         self._low, self._high = low, high
         finite = math.isfinite(high - low)
         self._step = step or (plain_steps(low, high) if finite else 1.0)
-        self._tell()
+        self._show_tip()
 
     def set_usable(self, why_not: str) -> None:
         """Disable it, with the reason in the tooltip; an empty reason enables it."""
         self._why_not = why_not
         self.setEnabled(not why_not)
-        self._tell()
+        self._show_tip()
 
     @override
     def refuse(self, reason: str) -> None:
@@ -88,7 +88,7 @@ class AmountField(NumberEdit):
             self._good, self._before = self._before, None
             self._shown = number_text(self._good)
         super().refuse(reason)
-        self._tell()
+        self._show_tip()
 
     def revert(self) -> None:
         """Go back to the last good value."""
@@ -142,7 +142,7 @@ class AmountField(NumberEdit):
         if self.reason:
             self.refuse("")
 
-    def _tell(self) -> None:
+    def _show_tip(self) -> None:
         if self._why_not:
             self.setToolTip(self._why_not)
             return

@@ -24,11 +24,11 @@ class CalibrateButton(QToolButton):
 
     Signals
     -------
-    told(str)
+    message(str)
         How far a calibration is, how it ended, or why it could not be begun.
     """
 
-    told = Signal(str)
+    message = Signal(str)
 
     def __init__(
         self,
@@ -93,7 +93,7 @@ class CalibrateButton(QToolButton):
         try:
             self._watch.follow(start())
         except CosmicError as exc:
-            self.told.emit(f"{REFUSED} {exc}")
+            self.message.emit(f"{REFUSED} {exc}")
 
     def _on_cancel(self) -> None:
         if self._watch.task is not None:
@@ -101,8 +101,8 @@ class CalibrateButton(QToolButton):
 
     def _on_progressed(self, progress: Progress) -> None:
         if progress.error:
-            self.told.emit(f"{REFUSED} {progress.title}: {progress.error}")
+            self.message.emit(f"{REFUSED} {progress.title}: {progress.error}")
         else:
-            self.told.emit(f"{progress.title}: {progress.text}")
+            self.message.emit(f"{progress.title}: {progress.text}")
         if progress.done:
             self.fill()

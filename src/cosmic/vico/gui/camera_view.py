@@ -176,8 +176,8 @@ class CameraView(QWidget):
         self.contrast.levels_changed.connect(view.set_levels)
         self.contrast.marks_changed.connect(view.set_marks)
         view.pointed.connect(self._on_pointed)
-        for telling in (self.calibrate.told, self.tools.told):
-            telling.connect(self.say)
+        for messages in (self.calibrate.message, self.tools.message):
+            messages.connect(self.say)
         self.tools.region_chosen.connect(self.form.read_part)
 
     @override

@@ -18,13 +18,13 @@ class ImageTools(QObject):
 
     Signals
     -------
-    told(str)
+    message(str)
         One line for the operator: what was begun, or why not.
     region_chosen(int, int, int, int)
         x, y, width and height of the part to be read, in pixels of the image shown.
     """
 
-    told = Signal(str)
+    message = Signal(str)
     region_chosen = Signal(int, int, int, int)
 
     def __init__(
@@ -68,24 +68,24 @@ class ImageTools(QObject):
     def _on_tool(self, name: str) -> None:
         self._target = ""
         self._view.set_tool(self._tools.get(name))
-        self.told.emit("")
+        self.message.emit("")
 
     def _on_target(self, target: str) -> None:
         self._view.set_tool(self._click)
         self._target = target
-        self.told.emit(f"click where {target} is to go; press Esc to cancel")
+        self.message.emit(f"click where {target} is to go; press Esc to cancel")
 
     def _on_clicked(self, point_px: Pixel) -> None:
         if not self._view.is_inside(point_px):
             self._refuse("that is outside the image")
             return
         try:
-            self.told.emit(self._camera.click_to_move(point_px, self._target))
+            self.message.emit(self._camera.click_to_move(point_px, self._target))
         except CosmicError as exc:
             self._refuse(str(exc))
 
     def _refuse(self, reason: str) -> None:
-        self.told.emit(f"{state_look(State.REFUSED).glyph} {reason}")
+        self.message.emit(f"{state_look(State.REFUSED).glyph} {reason}")
 
     def _on_region(self, x_px: int, y_px: int, width_px: int, height_px: int) -> None:
         self.put_away()

@@ -313,8 +313,8 @@ class CameraImageView(pg.GraphicsView):  # type: ignore[misc]
     def viewportEvent(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
             point = QPointF(event.pos())
-            told = (layer.tip(point, self) for layer in reversed(self.layers))
-            QToolTip.showText(event.globalPos(), next((text for text in told if text), ""), self)
+            tips = (layer.tip(point, self) for layer in reversed(self.layers))
+            QToolTip.showText(event.globalPos(), next((text for text in tips if text), ""), self)
             return True
         return bool(super().viewportEvent(event))
 

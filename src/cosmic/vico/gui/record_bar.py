@@ -121,8 +121,8 @@ class RecordBar(QWidget):
         self.more.setCheckable(True)
         self.format = tipped(QComboBox(), "File format of recordings")
         self.files = FileFields(camera.directory, camera.name, now=now, elsewhere=camera.elsewhere)
-        self.told, self.tasks = ElidedLabel(), TaskBar()
-        self.told.setFont(number_font())
+        self.message, self.tasks = ElidedLabel(), TaskBar()
+        self.message.setFont(number_font())
         self._fields = QWidget()
         self._build()
         self.snap.clicked.connect(self._on_snap)
@@ -149,7 +149,7 @@ class RecordBar(QWidget):
         folded.addLayout(line)
         self._fields.hide()
         self._lines = QStackedWidget()
-        self._lines.addWidget(self.told)
+        self._lines.addWidget(self.message)
         self._lines.addWidget(self.tasks)
         self._lines.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         top = QHBoxLayout()
@@ -193,7 +193,7 @@ class RecordBar(QWidget):
             "" if recording.active else wrong,
             "Stop recording and close the file" if recording.active else "Record every image",
         )
-        self._tell()
+        self._show_message()
 
     def _show_formats(self) -> None:
         formats = self._camera.formats
@@ -205,15 +205,15 @@ class RecordBar(QWidget):
             self.format.setCurrentIndex(min(row, len(texts) - 1))
             self.format.setMinimumContentsLength(12)
 
-    def _tell(self) -> None:
+    def _show_message(self) -> None:
         recording = self._camera.recording
         failure = self._error or ("" if recording.active else recording.failure)
         if failure:
-            self.told.set_text(f"{state_look(State.ERROR).glyph} {failure}")
+            self.message.set_text(f"{state_look(State.ERROR).glyph} {failure}")
         elif recording.active or recording.path is not None:
-            self.told.set_text(self._recording_text())
+            self.message.set_text(self._recording_text())
         else:
-            self.told.set_text(self._room_text())
+            self.message.set_text(self._room_text())
 
     def _recording_text(self) -> str:
         now = self._camera.recording
@@ -240,7 +240,7 @@ class RecordBar(QWidget):
     def _try(self, action: Callable[[], object]) -> None:
         self._error = ""
         if not self.tasks.watch.busy:
-            self._lines.setCurrentWidget(self.told)
+            self._lines.setCurrentWidget(self.message)
         try:
             action()
         except (CosmicError, OSError) as exc:

@@ -84,7 +84,7 @@ class BaseCamera(Camera, ABC):
         self._info = info
         self._clock = clock
         self._whom = f"camera {info.key}"
-        self._tell_closed = closed
+        self._on_closed = closed
         self._lock = threading.RLock()
         self._receiving = threading.Lock()
         self._stopping = threading.Event()
@@ -278,8 +278,8 @@ class BaseCamera(Camera, ABC):
             self.stop()
             self._closed = True
             self._release()
-        if self._tell_closed is not None:
-            self._tell_closed(self)
+        if self._on_closed is not None:
+            self._on_closed(self)
 
     # --- inside ---------------------------------------------------------------------------------
 

@@ -111,7 +111,7 @@ class HarvestersCamera(BaseCamera):
             raise self._error(f"open: {exc}", DeviceFault.UNSUPPORTED) from exc
         self._answers = self._port_answers()
 
-    def tell_incomplete(self) -> None:
+    def count_incomplete(self) -> None:
         """Count a frame with parts missing; called by the package while it is asked for one."""
         self._incomplete += 1
 
@@ -306,7 +306,7 @@ class HarvestersLibrary(BaseCameraLibrary[HarvestersCamera]):
             listed[key], acquirer, self._clock, errors=self._errors, closed=self._forget
         )
         acquirer.add_callback(
-            acquirer.Events.INCOMPLETE_BUFFER, _Incomplete(camera.tell_incomplete)
+            acquirer.Events.INCOMPLETE_BUFFER, _Incomplete(camera.count_incomplete)
         )
         return camera
 
@@ -348,12 +348,12 @@ def installed_producers() -> tuple[Path, ...]:
 class _Incomplete:
     """Hands the package's word on to a camera."""
 
-    def __init__(self, tell: Callable[[], None]) -> None:
-        self._tell = tell
+    def __init__(self, count: Callable[[], None]) -> None:
+        self._count = count
 
     def emit(self, context: object = None) -> None:  # noqa: ARG002 - the package's signature
         """Count a frame with parts missing."""
-        self._tell()
+        self._count()
 
 
 def _harvesters() -> Any:

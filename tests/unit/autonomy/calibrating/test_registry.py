@@ -81,13 +81,13 @@ def test_a_poor_one_is_listed_with_its_reason_and_never_in_force(
 
 
 def test_one_is_forgotten_and_listeners_are_told(registry: CalibrationRegistry) -> None:
-    told: list[int] = []
-    forget = registry.on_change(lambda: told.append(len(registry.entries)))
+    counts: list[int] = []
+    forget = registry.on_change(lambda: counts.append(len(registry.entries)))
     registry.put(entry(registry))
     registry.forget("height", "left")
     forget()
     registry.forget("height", "left")
-    assert told == [1, 0]
+    assert counts == [1, 0]
 
 
 def test_any_text_comes_back_as_it_was(registry: CalibrationRegistry, tmp_path: Path) -> None:

@@ -15,14 +15,14 @@ from cosmic.autonomy.campaign.resume import resume
 from cosmic.autonomy.campaign.store import CampaignStore
 
 
-def tell(text: str) -> None:
+def say(text: str) -> None:
     os.write(1, f"{text}\n".encode())
 
 
 def write(folder: Path) -> None:
     store = CampaignStore.open(folder)
     serial = resume(store).finished
-    tell("open")
+    say("open")
     pixels = np.zeros((200, 200), np.uint8)
     while True:
         number = store.begin_fibre(Pose(float(serial), 0.0, 0.0), time_s=float(serial))
@@ -39,14 +39,14 @@ def write(folder: Path) -> None:
                 series=(Series("force", "uN", values, values),),
             )
         )
-        tell(str(serial))
+        say(str(serial))
         serial += 1
 
 
 for line in sys.stdin:
     child = os.fork()
     if child == 0:
-        tell(str(os.getpid()))
+        say(str(os.getpid()))
         write(Path(line.strip()))
     os.waitpid(child, 0)
-    tell("gone")
+    say("gone")

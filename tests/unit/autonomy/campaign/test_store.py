@@ -262,21 +262,21 @@ def test_a_writer_killed_at_any_moment_loses_and_doubles_nothing(
     tmp_path: Path, writers: Writers
 ) -> None:
     CampaignStore.create(tmp_path, INFO).close()
-    rng, told = np.random.default_rng(5), []
+    rng, announced = np.random.default_rng(5), []
     for number in range(KILLS):
         process = writers.start(tmp_path)
         if number % 6:  # now and then while it still opens the campaign
             writers.line()
-            told += [int(writers.line()) for _ in range(rng.integers(0, 3))]
+            announced += [int(writers.line()) for _ in range(rng.integers(0, 3))]
         Event().wait(float(rng.uniform(0.0, 0.05)))  # any moment will do
         os.kill(process, signal.SIGKILL)
-        told += writers.to_the_end()
+        announced += writers.to_the_end()
         reader = CampaignReader(tmp_path)
         serials = [each.peak_force_un for each in reader.finished()]
         assert serials == list(range(len(serials)))
         # What was said to be written is; an end may have been written and not been said.
-        assert set(told) <= set(range(len(serials)))
-        assert len(set(told)) == len(told)
+        assert set(announced) <= set(range(len(serials)))
+        assert len(set(announced)) == len(announced)
     finished = CampaignReader(tmp_path).finished()
     assert len(finished) > KILLS / 3
     for each in finished:

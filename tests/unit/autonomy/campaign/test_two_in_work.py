@@ -99,8 +99,8 @@ def test_each_fibre_has_the_operations_of_its_hand_and_no_others(desk: Desk) -> 
     desk.does("right", "push the spans")
     desk.finish(second)
     read = desk.store.reader
-    told = {number: [each.name for each in read.fibre(number).operations] for number in (1, 2)}
-    assert told == {
+    names = {number: [each.name for each in read.fibre(number).operations] for number in (1, 2)}
+    assert names == {
         1: ["close the gripper", "push the spans"],
         2: ["turn the table", "stand by", "push the spans"],
     }

@@ -63,13 +63,13 @@ def test_whoever_waits_is_told_when_the_samples_are_there(
     watched: tuple[Daqco, ManualClock, ForceWatch],
 ):
     daqco, _, watch = watched
-    wanted, told = watch.wanted(0.05), []
-    wanted.add_callback(told.append)
+    wanted, received = watch.wanted(0.05), []
+    wanted.add_callback(received.append)
     daqco.receiver(chunk(0, np.zeros(20)))
-    assert told == []
+    assert received == []
     daqco.receiver(chunk(20, np.zeros(80)))
     daqco.receiver(chunk(100, np.zeros(80)))
-    assert told == [wanted], "once"
+    assert received == [wanted], "once"
 
 
 def test_a_wait_ends_when_no_samples_come(

@@ -27,7 +27,7 @@ class FakeCamera:
         self.frozen = False
         self.thaws = True
         self.dark = False
-        self.told: list[str] = []
+        self.commands: list[str] = []
         self._data = self._noise()
 
     def _noise(self) -> Any:
@@ -56,7 +56,7 @@ class FakeCamera:
         return self._done("start")
 
     def _done(self, what: str) -> Task:
-        self.told.append(what)
+        self.commands.append(what)
         task = Task(what)
         task.finish()
         return task
@@ -85,7 +85,7 @@ def wanted(camera: FakeCamera, clock: ManualClock, last: LastSeen) -> LiveImage:
 def test_a_camera_that_works_is_left_alone(camera: FakeCamera, clock: ManualClock):
     last = LastSeen()
     assert wanted(camera, clock, last).wait(5.0) is not wanted(camera, clock, last).wait(5.0)
-    assert camera.told == []
+    assert camera.commands == []
 
 
 def test_a_frozen_camera_is_begun_anew_and_gives_a_new_image(
@@ -95,7 +95,7 @@ def test_a_frozen_camera_is_begun_anew_and_gives_a_new_image(
     before = wanted(camera, clock, last).wait(5.0)
     camera.frozen = True
     after = wanted(camera, clock, last).wait(5.0)
-    assert camera.told == ["stop", "start"]
+    assert camera.commands == ["stop", "start"]
     assert not np.array_equal(before.data, after.data)
 
 
@@ -107,7 +107,7 @@ def test_one_that_stays_frozen_is_given_up_and_says_what_to_look_at(
     camera.frozen, camera.thaws = True, False
     with pytest.raises(NotAvailable, match=r"same image again and again.*cable"):
         wanted(camera, clock, last).wait(5.0)
-    assert camera.told == ["stop", "start"] * RESTARTS
+    assert camera.commands == ["stop", "start"] * RESTARTS
 
 
 def test_images_without_any_light_are_not_taken_for_a_frozen_camera(
@@ -116,7 +116,7 @@ def test_images_without_any_light_are_not_taken_for_a_frozen_camera(
     last, camera.dark = LastSeen(), True
     wanted(camera, clock, last).wait(5.0)
     wanted(camera, clock, last).wait(5.0)
-    assert camera.told == []
+    assert camera.commands == []
 
 
 def test_an_image_that_is_no_longer_wanted_leaves_the_camera_running(
@@ -126,8 +126,8 @@ def test_an_image_that_is_no_longer_wanted_leaves_the_camera_running(
     wanted(camera, clock, last).wait(5.0)
     camera.frozen, camera.thaws = True, False
     image = wanted(camera, clock, last)
-    while "stop" not in camera.told:
+    while "stop" not in camera.commands:
         assert not image.done
     image.cancel()
     assert image.done
-    assert camera.told[-1] == "start"
+    assert camera.commands[-1] == "start"

@@ -172,9 +172,9 @@ def test_a_fibre_nearer_than_foreseen_is_come_up_to_again_from_further_back():
 
 def test_a_fibre_that_is_not_there_is_told_with_the_place():
     bench = Bench(5e-11, there=False)
-    with pytest.raises(OperationFailed, match="600 um from the jaws") as told:
+    with pytest.raises(OperationFailed, match="600 um from the jaws") as failed:
         carried_out(PushSpans().run(bench))
-    assert told.value.cause == NO_CONTACT
+    assert failed.value.cause == NO_CONTACT
 
 
 def test_the_limit_is_armed_while_the_probe_pushes_and_not_longer():

@@ -118,46 +118,46 @@ def test_an_axis_that_never_comes_on_is_told_in_the_end():
 
 def bumping(times: int) -> tuple[Callable[[], Moved], Callable[[], Moved], list[str]]:
     """Return a way that ends at an obstacle so often, the way back, and the list of both."""
-    told: list[str] = []
+    trace: list[str] = []
 
     def order() -> Moved:
-        told.append("on")
-        stopped = told.count("on") <= times
+        trace.append("on")
+        stopped = trace.count("on") <= times
         return Moved(DeviceError("ran into it", fault=DeviceFault.END_STOP) if stopped else None)
 
     def back() -> Moved:
-        told.append("back")
+        trace.append("back")
         return Moved()
 
-    return order, back, told
+    return order, back, trace
 
 
 def test_an_axis_that_runs_into_something_goes_back_a_little_and_tries_again():
-    order, back, told = bumping(2)
+    order, back, trace = bumping(2)
     assert RetryingMove(order, to_a_position=True, back=back).wait(20.0) == "there"
-    assert told == ["on", "back", "on", "back", "on"]
+    assert trace == ["on", "back", "on", "back", "on"]
 
 
 def test_an_obstacle_that_stays_is_told_after_some_tries():
-    order, back, told = bumping(100)
+    order, back, trace = bumping(100)
     with pytest.raises(DeviceError, match="ran into it"):
         RetryingMove(order, to_a_position=True, back=back).wait(20.0)
-    assert told.count("back") == BUMPS
-    assert told.count("on") == BUMPS + 1
+    assert trace.count("back") == BUMPS
+    assert trace.count("on") == BUMPS + 1
 
 
 def test_a_way_back_that_is_refused_is_not_gone():
-    order, _, told = bumping(1)
+    order, _, trace = bumping(1)
 
     def refused() -> Moved:
         raise MoveRefused(MoveVerdict(allowed=False, reason=Reason.COLLISION, text="no"))
 
     assert RetryingMove(order, to_a_position=True, back=refused).wait(20.0) == "there"
-    assert told == ["on", "on"]
+    assert trace == ["on", "on"]
 
 
 def test_a_way_on_which_nothing_leads_back_ends_at_an_obstacle():
-    order, _, told = bumping(1)
+    order, _, trace = bumping(1)
     with pytest.raises(DeviceError, match="ran into it"):
         RetryingMove(order, to_a_position=True).wait(20.0)
-    assert told == ["on"]
+    assert trace == ["on"]

@@ -142,12 +142,12 @@ def test_each_is_chosen_once_and_the_last_choice_says_to_look_again():
             pass
         places.add(bench.held_fibre().reach.candidate.position_um)
     assert len(places) == 2
-    with pytest.raises(OperationFailed) as told:
+    with pytest.raises(OperationFailed) as failed:
         next(Choose().run(bench))
-    assert told.value.cause == survey.LOOK_AGAIN
+    assert failed.value.cause == survey.LOOK_AGAIN
 
 
 def test_a_plate_with_nothing_on_it_is_said_to_have_no_fibre():
-    with pytest.raises(OperationFailed, match="the plate is empty") as told:
+    with pytest.raises(OperationFailed, match="the plate is empty") as failed:
         next(Choose().run(looked()))
-    assert told.value.cause == survey.NONE_LEFT
+    assert failed.value.cause == survey.NONE_LEFT

@@ -269,7 +269,7 @@ def test_a_rate_of_100_is_a_hundred_times_faster() -> None:
 
 
 def test_a_movement_that_tells_of_its_end_is_not_waited_for_longer() -> None:
-    told: list[Callable[[object], None]] = []
+    callbacks: list[Callable[[object], None]] = []
 
     class Telling(FakeMove):
         @property
@@ -280,7 +280,7 @@ def test_a_movement_that_tells_of_its_end_is_not_waited_for_longer() -> None:
             assert self.done
 
         def add_callback(self, callback: Callable[[object], None]) -> None:
-            told.append(callback)
+            callbacks.append(callback)
 
     ended: list[bool] = []
 
@@ -291,9 +291,9 @@ def test_a_movement_that_tells_of_its_end_is_not_waited_for_longer() -> None:
 
     run, watcher = begun(Moves("a"), rate=1.0)
     run.start()
-    watcher.until(lambda: bool(told))
+    watcher.until(lambda: bool(callbacks))
     ended.append(True)
-    told[0](None)
+    callbacks[0](None)
     run.wait(LIMIT_S)
     assert run.state == "done"
 
@@ -366,9 +366,9 @@ def test_events_come_in_order_with_times_of_the_platform() -> None:
     unsubscribe = run.subscribe(events.append)
     run.run_here()
     unsubscribe()
-    told = [(each.path, str(each.state), each.attempt) for each in events]
+    seen = [(each.path, str(each.state), each.attempt) for each in events]
     a = (0,)
-    assert told == [
+    assert seen == [
         ((), "running", 1),
         (a, "running", 1),
         (a, "failed", 1),

@@ -55,17 +55,17 @@ def test_who_waits_for_what_stands_in_the_tree() -> None:
             Holding(Op("b"), of(probe), name="second"),
         )
     )
-    told: list[tuple[str, str]] = []
+    received: list[tuple[str, str]] = []
     waiting: list[NodeEvent] = []
 
     def note(event: NodeEvent) -> None:
-        told.append((event.name, event.text))
+        received.append((event.name, event.text))
         if event.name == "second":
             waiting.append(event)
 
     run.subscribe(note)
     run.run_here()
-    words = [each for each in told if each[1]]
+    words = [each for each in received if each[1]]
     assert words[:2] == [("first", "has the probe"), ("second", "waits for the probe")]
     assert ("second", "has the probe") in words
     states = [str(each.state) for each in waiting]

@@ -144,9 +144,9 @@ def test_a_defect_stops_all_motion_and_is_told_to_whoever_waits() -> None:
     def defect() -> Exception:
         return KeyError("no such thing")
 
-    told: list[Failure] = []
+    reported: list[Failure] = []
     policy = FailurePolicy()
-    policy.subscribe(told.append)
+    policy.subscribe(reported.append)
     work = Work()
     part = Parallel(
         "both", Op("beside", steps=(MOVE,) * 9), Retry(Op("bad", fails_in="run", error=defect), 3)
@@ -155,7 +155,7 @@ def test_a_defect_stops_all_motion_and_is_told_to_whoever_waits() -> None:
     with pytest.raises(OperationFailed, match="KeyError: 'no such thing'") as caught:
         run.run_here()
     assert caught.value.cause == "defect"
-    assert [failure.defect for failure in told] == [True]
+    assert [failure.defect for failure in reported] == [True]
     assert not work.moving
     assert dict(ends(run)) == {
         "both": "failed",

@@ -97,18 +97,18 @@ def transport() -> ByHand:
 
 
 def made(transport: ByHand, name: str = "pieces") -> tuple[RemoteStream, list[object], list[None]]:
-    told: list[None] = []
+    received: list[None] = []
     declared = declaration_of(Source).streams[name]
-    result = RemoteStream(declared, name, transport, lambda: told.append(None))
+    result = RemoteStream(declared, name, transport, lambda: received.append(None))
     got: list[object] = []
     result.subscribe(got.append)
-    return result, got, told
+    return result, got, received
 
 
 def test_a_gap_is_told_with_its_size_and_what_follows_is_handed_on(
     transport: ByHand, caplog: pytest.LogCaptureFixture
 ) -> None:
-    pieces, got, told = made(transport)
+    pieces, got, received = made(transport)
     put = transport.receivers["pieces", Rule.ALL]
     beyond_32_bit = 2**40
     put(Piece(beyond_32_bit))
@@ -118,28 +118,28 @@ def test_a_gap_is_told_with_its_size_and_what_follows_is_handed_on(
         put(Piece(beyond_32_bit + 47))
     assert pieces.missed == 27
     assert "27 were lost" in caplog.text
-    assert len(told) == 1
+    assert len(received) == 1
     assert got == [Piece(beyond_32_bit + each) for each in (0, 10, 47)]
 
 
 def test_numbers_that_begin_anew_are_no_gap(transport: ByHand) -> None:
-    pieces, got, told = made(transport)
+    pieces, got, received = made(transport)
     put = transport.receivers["pieces", Rule.ALL]
     for first in (500, 20, 30):
         put(Piece(first))
-    assert (pieces.missed, told) == (0, [])
+    assert (pieces.missed, received) == (0, [])
     assert got == [Piece(500), Piece(20), Piece(30)]
 
 
 def test_what_the_line_lost_is_counted_where_nothing_else_says_it(transport: ByHand) -> None:
-    events, got, told = made(transport, "events")
+    events, got, received = made(transport, "events")
     put = transport.receivers["events", Rule.ALL]
     put("one")
     transport.subscriptions[0].gaps = 3
     put("five")
     put("six")
     assert events.missed == 3
-    assert (got, len(told)) == (["one", "five", "six"], 1)
+    assert (got, len(received)) == (["one", "five", "six"], 1)
 
 
 @pytest.mark.parametrize("payload", [None, 5, "x", {"first": 1}])

@@ -184,11 +184,11 @@ def test_a_file_that_is_missing_or_huge_is_refused(
 
 
 def test_reading_tells_how_far_it_is() -> None:
-    told: list[float] = []
-    parse(HEAD + "left.x to 1 um\n" * 2000, progress=told.append)
-    assert told == sorted(told)
-    assert len(told) >= 3
-    assert 0.0 < told[0] <= told[-1] <= 1.0
+    fractions: list[float] = []
+    parse(HEAD + "left.x to 1 um\n" * 2000, progress=fractions.append)
+    assert fractions == sorted(fractions)
+    assert len(fractions) >= 3
+    assert 0.0 < fractions[0] <= fractions[-1] <= 1.0
 
 
 words = st.sampled_from(

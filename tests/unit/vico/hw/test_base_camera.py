@@ -31,12 +31,12 @@ from cosmic.vico.hw.interface import (
 INFO = CameraInfo(key="K", vendor="V", model="M", serial="1")
 
 
-class ToldCamera(BaseCamera):
+class ScriptedCamera(BaseCamera):
     """Gives the frames that a test puts in, and fails when the test says so."""
 
     quiet_s = 0.02
 
-    def __init__(self, library: "ToldLibrary") -> None:
+    def __init__(self, library: "ScriptedLibrary") -> None:
         super().__init__(INFO, WALL, closed=library._forget)
         self.frames: list[Frame | DeviceError] = []
         self.written: list[CameraSettings] = []
@@ -91,18 +91,18 @@ class ToldCamera(BaseCamera):
         return self.gone
 
 
-class ToldLibrary(BaseCameraLibrary[ToldCamera]):
-    name = "told"
+class ScriptedLibrary(BaseCameraLibrary[ScriptedCamera]):
+    name = "scripted"
 
     @override
     def cameras(self) -> tuple[CameraInfo, ...]:
         return (INFO,)
 
     @override
-    def _open(self, key: str) -> ToldCamera:
+    def _open(self, key: str) -> ScriptedCamera:
         if key != INFO.key:
             raise self._not_there(key, [INFO.key], "Plug it in")
-        return ToldCamera(self)
+        return ScriptedCamera(self)
 
     @override
     def _shut(self) -> None:
@@ -110,14 +110,14 @@ class ToldLibrary(BaseCameraLibrary[ToldCamera]):
 
 
 @pytest.fixture
-def library() -> Iterator[ToldLibrary]:
-    made = ToldLibrary()
+def library() -> Iterator[ScriptedLibrary]:
+    made = ScriptedLibrary()
     yield made
     made.close()
 
 
 @pytest.fixture
-def camera(library: ToldLibrary) -> ToldCamera:
+def camera(library: ScriptedLibrary) -> ScriptedCamera:
     return library.open("K")
 
 
@@ -125,7 +125,7 @@ def frame(number: int, status: FrameStatus = FrameStatus.COMPLETE) -> Frame:
     return Frame(np.zeros((3, 4), np.uint8), number, 0.0, 0.0, status=status)
 
 
-def test_frames_are_counted_by_their_numbers_and_their_state(camera: ToldCamera) -> None:
+def test_frames_are_counted_by_their_numbers_and_their_state(camera: ScriptedCamera) -> None:
     camera.start()
     camera.frames = [frame(0), frame(3), frame(4, FrameStatus.INCOMPLETE), frame(5)]
     while camera.receive(0.0) is not None:
@@ -136,7 +136,7 @@ def test_frames_are_counted_by_their_numbers_and_their_state(camera: ToldCamera)
     assert camera.counters == CameraCounters()
 
 
-def test_a_value_that_the_camera_refuses_puts_back_what_was(camera: ToldCamera) -> None:
+def test_a_value_that_the_camera_refuses_puts_back_what_was(camera: ScriptedCamera) -> None:
     before = camera.settings
     camera.refused = DeviceError("not that", fault=DeviceFault.PARAMETER)
     with pytest.raises(ConfigError, match="not that"):
@@ -145,20 +145,20 @@ def test_a_value_that_the_camera_refuses_puts_back_what_was(camera: ToldCamera) 
     assert camera.written[-1] == before
 
 
-def test_a_camera_that_fails_while_it_is_set_is_not_said_to_refuse(camera: ToldCamera) -> None:
+def test_a_camera_that_fails_while_it_is_set_is_not_said_to_refuse(camera: ScriptedCamera) -> None:
     camera.refused = DeviceError("cable", fault=DeviceFault.COMMUNICATION)
     with pytest.raises(DeviceError, match="cable"):
         camera.configure(replace(camera.settings, gain_db=3.0))
 
 
-def test_settings_out_of_range_never_reach_the_driver(camera: ToldCamera) -> None:
+def test_settings_out_of_range_never_reach_the_driver(camera: ScriptedCamera) -> None:
     for wrong in ({"gain_db": 13.0}, {"exposure_s": 0.2}, {"roi": Roi(1, 0, 4, 3)}):
         with pytest.raises(ConfigError):
             camera.configure(replace(camera.settings, **wrong))
     assert not camera.written
 
 
-def test_a_failure_is_raised_again_until_the_camera_is_closed(camera: ToldCamera) -> None:
+def test_a_failure_is_raised_again_until_the_camera_is_closed(camera: ScriptedCamera) -> None:
     camera.start()
     camera.frames = [DeviceError("cable"), frame(0)]
     for attempt in (lambda: camera.receive(1.0), lambda: camera.receive(1.0), camera.start):
@@ -168,7 +168,7 @@ def test_a_failure_is_raised_again_until_the_camera_is_closed(camera: ToldCamera
     assert camera.calls == ["begin", "end", "release"]
 
 
-def test_a_quiet_camera_is_asked_and_given_up_when_it_is_gone(camera: ToldCamera) -> None:
+def test_a_quiet_camera_is_asked_and_given_up_when_it_is_gone(camera: ScriptedCamera) -> None:
     camera.start()
     assert camera.receive(0.1) is None
     camera.gone = "it was unplugged"
@@ -177,7 +177,7 @@ def test_a_quiet_camera_is_asked_and_given_up_when_it_is_gone(camera: ToldCamera
     camera.stop()  # that nobody hears it is no error
 
 
-def test_a_stop_ends_a_long_wait_at_once(camera: ToldCamera) -> None:
+def test_a_stop_ends_a_long_wait_at_once(camera: ScriptedCamera) -> None:
     camera.start()
     got: list[Frame | None] = []
     waiting = threading.Thread(target=lambda: got.append(camera.receive(60.0)))
@@ -187,20 +187,20 @@ def test_a_stop_ends_a_long_wait_at_once(camera: ToldCamera) -> None:
     assert got == [None]
 
 
-def test_a_camera_that_runs_cannot_be_started(camera: ToldCamera) -> None:
+def test_a_camera_that_runs_cannot_be_started(camera: ScriptedCamera) -> None:
     camera.start()
     with pytest.raises(DeviceError, match="already") as caught:
         camera.start()
     assert caught.value.fault is DeviceFault.STATE
 
 
-def test_a_camera_without_a_software_trigger_says_so(camera: ToldCamera) -> None:
+def test_a_camera_without_a_software_trigger_says_so(camera: ScriptedCamera) -> None:
     with pytest.raises(NotAvailable, match="no software trigger"):
         camera.trigger()
 
 
 def test_a_library_closes_what_is_open_and_opens_nothing_more(
-    library: ToldLibrary, camera: ToldCamera
+    library: ScriptedLibrary, camera: ScriptedCamera
 ) -> None:
     other = library.open("K")
     other.close()
@@ -212,6 +212,6 @@ def test_a_library_closes_what_is_open_and_opens_nothing_more(
         library.open("K")
 
 
-def test_a_camera_that_is_not_there_is_named_with_those_that_are(library: ToldLibrary) -> None:
+def test_a_camera_that_is_not_there_is_named_with_those_that_are(library: ScriptedLibrary) -> None:
     with pytest.raises(NotConnectedError, match=r"'X'; it finds: K\. Plug it in"):
         library.open("X")

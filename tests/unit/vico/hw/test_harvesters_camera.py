@@ -32,16 +32,16 @@ def device() -> FakeGenTL:
 
 
 @pytest.fixture
-def told() -> list[Camera]:
+def closings() -> list[Camera]:
     return []
 
 
 @pytest.fixture
-def camera(device: FakeGenTL, told: list[Camera]) -> Iterator[HarvestersCamera]:
-    made = HarvestersCamera(INFO, device, RatedClock(), errors=(NodeError,), closed=told.append)
+def camera(device: FakeGenTL, closings: list[Camera]) -> Iterator[HarvestersCamera]:
+    made = HarvestersCamera(INFO, device, RatedClock(), errors=(NodeError,), closed=closings.append)
     yield made
     made.close()
-    assert told == [made]
+    assert closings == [made]
 
 
 def image(frame_id: int) -> Buffer:
@@ -185,7 +185,7 @@ def test_a_frame_with_parts_missing_is_counted_and_not_taken_for_good(
     camera.receive(0.0)
 
     def incomplete(*, timeout: float) -> None:
-        camera.tell_incomplete()
+        camera.count_incomplete()
 
     with monkeypatch.context() as patch:
         patch.setattr(device, "try_fetch", incomplete)

@@ -32,10 +32,10 @@ def names(directory):
 @pytest.mark.parametrize("to", ImageFormat)
 def test_an_export_has_the_same_images_and_rows(tmp_path, make, to):
     path = make(ImageFormat.FAST)
-    told = []
-    out = export_images(path, to, progress=told.append)
+    fractions = []
+    out = export_images(path, to, progress=fractions.append)
     assert out == tmp_path / f"run_{to}{'' if to in {'tiff', 'png'} else out.suffix}"
-    assert told == [0.0, *(pytest.approx(number / 6) for number in range(1, 7))]
+    assert fractions == [0.0, *(pytest.approx(number / 6) for number in range(1, 7))]
     with open_image_recording(path) as before, open_image_recording(out) as after:
         assert after.complete
         assert after.rows == before.rows

@@ -30,7 +30,7 @@ from unit.vico.recording.image_helpers import (
 Usage = namedtuple("Usage", "total used free")
 
 
-class Told:
+class Heard:
     """What a recorder said."""
 
     def __init__(self, policy):
@@ -66,18 +66,18 @@ def policy():
 
 
 @pytest.fixture
-def told(policy):
-    return Told(policy)
+def heard(policy):
+    return Heard(policy)
 
 
 @pytest.fixture
-def recorders(tmp_path, policy, told):
+def recorders(tmp_path, policy, heard):
     made = []
 
     def make(name="run", image_format=ImageFormat.FFV1, *, start=True, **how):
         how.setdefault("settings", settings())
         recorder = ImageRecorder(tmp_path / name, image_format, policy=policy, axes=AXES, **how)
-        told.listen(recorder)
+        heard.listen(recorder)
         made.append(recorder)
         if start:
             recorder.start()
@@ -97,14 +97,14 @@ def end(recorder):
 
 
 @pytest.mark.parametrize("image_format", ImageFormat)
-def test_everything_put_before_the_end_is_in_the_file(recorders, told, image_format):
+def test_everything_put_before_the_end_is_in_the_file(recorders, heard, image_format):
     recorder = recorders("run", image_format)
     assert all(recorder.put(each) for each in images(40))
     end(recorder)
     assert recorder.error is None
-    assert told.errors == []
-    assert told.closed == [recorder.path]
-    stats = told.stats[-1]
+    assert heard.errors == []
+    assert heard.closed == [recorder.path]
+    stats = heard.stats[-1]
     assert (stats.written, stats.dropped, stats.waiting, stats.waiting_bytes) == (40, 0, 0, 0)
     assert stats.duration_s == pytest.approx(39 / 20.0)
     assert stats.file_bytes > 0
@@ -114,7 +114,7 @@ def test_everything_put_before_the_end_is_in_the_file(recorders, told, image_for
         assert [each.row.frame_id for each in found] == list(range(40))
 
 
-def test_a_full_queue_drops_images_and_tells_which(recorders, told, monkeypatch, caplog):
+def test_a_full_queue_drops_images_and_tells_which(recorders, heard, monkeypatch, caplog):
     gate = Gate(monkeypatch)
     data = noise()
     recorder = recorders(queue_bytes=3 * data.nbytes)
@@ -132,8 +132,8 @@ def test_a_full_queue_drops_images_and_tells_which(recorders, told, monkeypatch,
         assert recorder.put(image(10, data))
         wait_until(lambda: any("7 images dropped" in each for each in caplog.messages))
     end(recorder)
-    assert told.stats[-1].dropped == 7
-    assert told.errors == []
+    assert heard.stats[-1].dropped == 7
+    assert heard.errors == []
     with open_image_recording(recorder.path) as found:
         assert found.complete
         assert [each.row.frame_id for each in found] == [0, 1, 2, 10]
@@ -180,7 +180,7 @@ def test_incomplete_images_are_counted_and_kept_out_of_the_file(recorders):
     ],
 )
 def test_another_size_or_pixel_format_ends_the_recording_in_good_order(
-    recorders, told, other, said
+    recorders, heard, other, said
 ):
     recorder = recorders()
     for each in images(3):
@@ -190,9 +190,9 @@ def test_another_size_or_pixel_format_ends_the_recording_in_good_order(
     assert not recorder.put(image(4))
     end(recorder)
     with pytest.raises(RecordingError, match=said):
-        raise told.errors[0]
-    assert len(told.errors) == 1
-    assert told.stops == []
+        raise heard.errors[0]
+    assert len(heard.errors) == 1
+    assert heard.stops == []
     with open_image_recording(recorder.path) as found:
         assert not found.complete
         assert len(found) == 3
@@ -210,22 +210,22 @@ def test_a_disk_that_is_full_at_the_start_forbids_it(tmp_path, recorders, monkey
 
 @pytest.mark.parametrize("image_format", [ImageFormat.FFV1, ImageFormat.TIFF])
 def test_a_disk_that_fills_ends_the_recording_in_good_order(
-    recorders, told, monkeypatch, image_format
+    recorders, heard, monkeypatch, image_format
 ):
     recorder = recorders("run", image_format)
     for each in images(5):
         assert recorder.put(each)
     wait_until(lambda: recorder.stats.written == 5)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(10**9, 0, RESERVE_BYTES))
-    wait_until(lambda: told.closed)
-    assert "the disk is full" in str(told.errors[0])
-    assert told.stops == []
+    wait_until(lambda: heard.closed)
+    assert "the disk is full" in str(heard.errors[0])
+    assert heard.stops == []
     with open_image_recording(recorder.path) as found:
         assert not found.complete
         assert len(found) == 5
 
 
-def test_what_waits_when_writing_fails_is_told_as_dropped(recorders, told, monkeypatch):
+def test_what_waits_when_writing_fails_is_told_as_dropped(recorders, heard, monkeypatch):
     gate = Gate(monkeypatch)
     recorder = recorders()
     for each in images(5):
@@ -237,9 +237,9 @@ def test_what_waits_when_writing_fails_is_told_as_dropped(recorders, told, monke
 
     monkeypatch.setattr("cosmic.vico.core.recording.video_writer.VideoWriter.write", full)
     gate.open.set()
-    wait_until(lambda: told.closed)
-    assert "No space left on device" in str(told.errors[0])
-    assert told.stats[-1].dropped == 5
+    wait_until(lambda: heard.closed)
+    assert "No space left on device" in str(heard.errors[0])
+    assert heard.stats[-1].dropped == 5
     with open_image_recording(recorder.side_path) as found:
         assert [(row.status, row.dropped) for row in found.rows] == [
             ("dropped", number) for number in range(1, 6)
@@ -254,16 +254,16 @@ def test_what_waits_when_writing_fails_is_told_as_dropped(recorders, told, monke
         (ImageFormat.PNG, "run"),
     ],
 )
-def test_a_file_that_is_taken_away_is_told(tmp_path, recorders, told, image_format, taken):
+def test_a_file_that_is_taken_away_is_told(tmp_path, recorders, heard, image_format, taken):
     recorder = recorders("run", image_format)
     recorder.put(image(0))
     wait_until(lambda: recorder.stats.written == 1)
     path = tmp_path / taken
     shutil.rmtree(path) if path.is_dir() else path.unlink()
     recorder.put(image(1))
-    wait_until(lambda: told.closed)
-    assert "taken away" in str(told.errors[0]) or "writing failed" in str(told.errors[0])
-    assert told.stops == []
+    wait_until(lambda: heard.closed)
+    assert "taken away" in str(heard.errors[0]) or "writing failed" in str(heard.errors[0])
+    assert heard.stops == []
 
 
 def test_a_recording_that_is_there_stays_unless_it_may_go(recorders):
@@ -305,14 +305,14 @@ def test_a_recording_without_an_image_is_complete_and_empty(recorders, image_for
         assert list(found) == []
 
 
-def test_a_running_recording_can_be_read(recorders, told):
+def test_a_running_recording_can_be_read(recorders, heard):
     recorder = recorders()
     data = noise(width=400, height=300)
     for number in range(60):
         recorder.put(image(number, data))
     wait_until(lambda: recorder.stats.written == 60)
-    seen = len(told.stats)
-    wait_until(lambda: len(told.stats) > seen)
+    seen = len(heard.stats)
+    wait_until(lambda: len(heard.stats) > seen)
     with open_image_recording(recorder.path) as found:
         assert not found.complete
         assert len(found) >= 55

@@ -367,9 +367,9 @@ def _numbers(card: FibreCardData) -> list[tuple[str, str]]:
     shape, ei = card.shape, card.ei
     rows = []
     if ei is not None:
-        told = interval(ei.ei_low_n_m2, ei.ei_high_n_m2)
+        bounds = interval(ei.ei_low_n_m2, ei.ei_high_n_m2)
         trusted = "" if ei.trusted else ", not trusted"
-        words = f"{stiffness(ei.ei_n_m2)} ({told}) {EI_LABEL}{trusted}"
+        words = f"{stiffness(ei.ei_n_m2)} ({bounds}) {EI_LABEL}{trusted}"
         rows.append(("stiffness (95 %)", words))
     rows += [
         ("length (95 %)", f"{with_interval(shape.length_um, shape.length_std_um)} µm"),

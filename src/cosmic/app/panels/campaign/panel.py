@@ -159,8 +159,8 @@ class CampaignPanel(QWidget):
         self._writing: JobQueue | None = None
         self._campaign: Campaign | None = None
         self._card: FibreRecord | None = None
-        self._tell_changed = Relay(self._on_changed)
-        self._tell_written = Relay(self._on_written)
+        self._changed_relay = Relay(self._on_changed)
+        self._written_relay = Relay(self._on_written)
         self._make_widgets()
         self._arrange()
         self._redraw = QTimer(self, interval=PERIOD_MS, singleShot=True)
@@ -178,7 +178,7 @@ class CampaignPanel(QWidget):
         self.report = named(
             push_button("Report", "Write the report and the table of the fibres so far"), "report"
         )
-        self.told = named(ElidedLabel(), "campaignTold")
+        self.message = named(ElidedLabel(), "campaignMessage")
         self.procedure = ProcedureTreePanel(self._make_run, self._go_on)
         self.board = CampaignBoard()
         self.card = FibreCard()
@@ -198,9 +198,9 @@ class CampaignPanel(QWidget):
         whole.setSpacing(STEP_PX)
         whole.addWidget(head)
         whole.addWidget(self.folder)
-        whole.addWidget(self.told)
+        whole.addWidget(self.message)
         whole.addWidget(self.tabs, 1)
-        self.told.hide()
+        self.message.hide()
 
     def _connect(self) -> None:
         self.recipe.activated.connect(self._on_recipe)
@@ -258,7 +258,7 @@ class CampaignPanel(QWidget):
         if before is not None and not before.over:
             raise CosmicError("a campaign is running: end it first")
         campaign = self._open(recipe, folder)
-        campaign.on_change(self._tell_changed)
+        campaign.on_change(self._changed_relay)
         self._campaign = campaign
         self.folder.setText(str(folder))
         self._say("")
@@ -321,7 +321,7 @@ class CampaignPanel(QWidget):
         self._say("writing the report", State.BUSY)
         self._writing = JobQueue("campaign report", self._policy)
         written = self._writing.submit(lambda: write_output(folder, wanted), "the report")
-        written.add_callback(self._tell_written)
+        written.add_callback(self._written_relay)
         self.refresh()
 
     def _on_written(self, written: Operation[list[Path]]) -> None:
@@ -340,8 +340,8 @@ class CampaignPanel(QWidget):
             writing.join()
 
     def _say(self, text: str, state: State = State.REFUSED) -> None:
-        self.told.set_text(f"{state_look(state).glyph} {text}" if text else "")
-        self.told.setVisible(bool(text))
+        self.message.set_text(f"{state_look(state).glyph} {text}" if text else "")
+        self.message.setVisible(bool(text))
 
     # Leaving
 

@@ -114,16 +114,16 @@ def gap_along(one: ConvexPiece, other: ConvexPiece, normal: Floats) -> float:
 def separation(one: ConvexPiece, other: ConvexPiece) -> Separation:
     """Return how two pieces stand to each other."""
     result = fcl.DistanceResult()
-    told = fcl.distance(one.fcl_object, other.fcl_object, _REQUEST, result)
+    reported = fcl.distance(one.fcl_object, other.fcl_object, _REQUEST, result)
     here, there = result.nearest_points
     way = there - here
     length = math.sqrt(way @ way)
     places = _point(here), _point(there)
-    if not (told > 0.0 and length > 0.0):
+    if not (reported > 0.0 and length > 0.0):
         return Separation(0.0, (0.0, 0.0, 0.0), *places)
     normal = way / length
     gap = gap_along(one, other, normal)
-    if not gap > 0.0 or not abs(gap - told) <= TRUST_UM + 1e-6 * told:
+    if not gap > 0.0 or not abs(gap - reported) <= TRUST_UM + 1e-6 * reported:
         # One inside the other looks like a distance to python-fcl.
         return Separation(0.0, (0.0, 0.0, 0.0), *places)
     return Separation(gap, _point(normal), *places)

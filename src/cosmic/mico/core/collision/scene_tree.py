@@ -28,8 +28,10 @@ def order_joints(
         by_child.setdefault(text.child, text)
     roots = [name for name in links if name not in by_child]
     if len(roots) != 1:
-        told = f"{len(roots)} roots: {', '.join(roots)}" if roots else "no root: its joints loop"
-        findings.wrong(file.path, f"{told}; one link must be fixed and carry all others")
+        roots_text = (
+            f"{len(roots)} roots: {', '.join(roots)}" if roots else "no root: its joints loop"
+        )
+        findings.wrong(file.path, f"{roots_text}; one link must be fixed and carry all others")
     ordered = _outwards(roots[:1], described.joints)
     for name in links:
         if len(roots) == 1 and name != roots[0] and name not in ordered:

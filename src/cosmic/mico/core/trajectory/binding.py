@@ -151,14 +151,14 @@ class _Binder:
                     steps.append(BoundLeg(found, each.line, each.at_s))
         return Bound(self._trajectory, tuple(steps), start)
 
-    def _tell(self, line: int, text: str) -> None:
+    def _add_problem(self, line: int, text: str) -> None:
         self.problems.append(Problem(line, text))
 
     def _check_platform(self) -> None:
         wanted, here = self._trajectory.platform, self._facts.name
         if here and wanted != here:
             text = f"it is for the platform {wanted!r}, and this one is {here!r}"
-            self._tell(self._trajectory.platform_line, text)
+            self._add_problem(self._trajectory.platform_line, text)
 
     def _find_pose(self) -> None:
         """Find out what relative positions count from."""
@@ -168,7 +168,7 @@ class _Binder:
         pose = self._facts.poses.get(name)
         if pose is None:
             known = ", ".join(self._facts.poses) or "none"
-            self._tell(line, f"there is no pose {name!r}; known poses: {known}")
+            self._add_problem(line, f"there is no pose {name!r}; known poses: {known}")
             return
         wanted = self._trajectory.pose_axes or self._trajectory.axes
         for axis in dict.fromkeys((*wanted, *self._trajectory.start)):
@@ -177,7 +177,7 @@ class _Binder:
                 continue
             if axis not in pose.positions:
                 text = f"the pose {name!r} has no position of {axis}; teach it with {axis}"
-                self._tell(line, text)
+                self._add_problem(line, text)
             else:
                 self._zero[axis] = pose.positions[axis]
 
@@ -187,7 +187,9 @@ class _Binder:
             if facts is None or not facts.has_sensor:
                 continue
             if place.unit != facts.unit:
-                self._tell(place.line, f"{axis} is counted in {facts.unit}, not in {place.unit}")
+                self._add_problem(
+                    place.line, f"{axis} is counted in {facts.unit}, not in {place.unit}"
+                )
                 continue
             self._reach(axis, place.value + self._zero.get(axis, 0.0), facts, place.line)
 
@@ -195,7 +197,7 @@ class _Binder:
         facts = self._facts.axes.get(axis)
         if facts is None:
             known = ", ".join(self._facts.axes) or "none"
-            self._tell(line, f"there is no axis {axis!r}; known axes: {known}")
+            self._add_problem(line, f"there is no axis {axis!r}; known axes: {known}")
         return facts
 
     def _reach(self, axis: str, target: float, facts: AxisFacts, line: int) -> None:
@@ -207,7 +209,7 @@ class _Binder:
         if not low - ROUNDING <= target <= high + ROUNDING:
             limit = format_quantity(high if target > high else low, facts.unit)
             where = format_quantity(target, facts.unit)
-            self._tell(line, f"{axis}: {where} is outside its limit {limit}")
+            self._add_problem(line, f"{axis}: {where} is outside its limit {limit}")
 
     def _motion(self, part: Move | Steps) -> Motion | None:
         facts = self._known(part.axis, part.line)
@@ -221,10 +223,10 @@ class _Binder:
         axis = part.axis
         if not facts.has_sensor:
             text = f"{axis} has no sensor; move it by steps, such as: steps {axis} 100"
-            self._tell(part.line, text)
+            self._add_problem(part.line, text)
             return None
         if part.unit != facts.unit:
-            self._tell(part.line, f"{axis} is moved in {facts.unit}, not in {part.unit}")
+            self._add_problem(part.line, f"{axis} is moved in {facts.unit}, not in {part.unit}")
             return None
         if not part.by:
             self._reach(axis, part.value + self._zero.get(axis, 0.0), facts, part.line)
@@ -246,7 +248,7 @@ class _Binder:
         for value, low, high, unit in checks:
             if not low <= value <= high:
                 text = f"{part.axis}: {value:g} {unit} is outside {low:g} to {high:g} {unit}"
-                self._tell(part.line, text)
+                self._add_problem(part.line, text)
                 return None
         self._at.pop(part.axis, None)
         return Step(part.steps, volts, hertz)
@@ -257,20 +259,20 @@ class _Binder:
             return BoundSpeed(each.axis, None, each.line)
         if not facts.has_sensor:
             text = f"{each.axis} has no sensor; give the frequency with its steps"
-            self._tell(each.line, text)
+            self._add_problem(each.line, text)
             return BoundSpeed(each.axis, None, each.line)
         hertz = each.value
         if each.unit != "Hz":
             if each.unit != f"{facts.unit}/s":
                 text = f"the speed of {each.axis} is in {facts.unit}/s or Hz, not in {each.unit}"
-                self._tell(each.line, text)
+                self._add_problem(each.line, text)
             hertz /= nominal_step(self._facts.defaults, facts.unit)
         low, high = FREQUENCY_HZ
         whole = max(1, round(hertz)) if hertz < high + 1 else high + 1
         if not low <= whole <= high:
             top = high * nominal_step(self._facts.defaults, facts.unit)
             text = f"{each.axis} goes at most {top:g} {facts.unit}/s ({high} Hz)"
-            self._tell(each.line, text)
+            self._add_problem(each.line, text)
         return BoundSpeed(each.axis, whole, each.line)
 
 

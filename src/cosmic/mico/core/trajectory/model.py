@@ -12,7 +12,7 @@ from cosmic.frame.units import AxisUnit
 
 VERSION: Final = 1
 SUFFIX: Final = ".trajectory"
-_MOST_TOLD: Final = 20
+_MOST_LISTED: Final = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +38,11 @@ class TrajectoryError(CosmicError):
 
     def __init__(self, name: str, problems: Iterable[Problem]) -> None:
         self.problems = tuple(sorted(problems, key=lambda each: each.line))
-        told = [f"{name}: {each}" for each in self.problems[:_MOST_TOLD]]
-        left = len(self.problems) - len(told)
+        shown = [f"{name}: {each}" for each in self.problems[:_MOST_LISTED]]
+        left = len(self.problems) - len(shown)
         if left > 0:
-            told.append(f"{name}: and {left} more")
-        super().__init__("\n".join(told))
+            shown.append(f"{name}: and {left} more")
+        super().__init__("\n".join(shown))
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,13 +4,13 @@ from pathlib import Path
 from typing import Final
 
 from cosmic.mico.core.trajectory.model import Problem, Trajectory, TrajectoryError
-from cosmic.mico.core.trajectory.reader import Told, TrajectoryReader
+from cosmic.mico.core.trajectory.reader import OnProgress, TrajectoryReader
 
 LARGEST_BYTES: Final = 32 * 1024 * 1024
 MOST_LINES: Final = 200_000
 
 
-def load(path: Path, progress: Told | None = None, *, cut_off: bool = False) -> Trajectory:
+def load(path: Path, progress: OnProgress | None = None, *, cut_off: bool = False) -> Trajectory:
     """Read a trajectory from a file.
 
     Parameters
@@ -39,7 +39,7 @@ def parse(
     *,
     name: str = "trajectory",
     path: Path | None = None,
-    progress: Told | None = None,
+    progress: OnProgress | None = None,
     cut_off: bool = False,
 ) -> Trajectory:
     """Read a trajectory from what a file holds; arguments and errors as `load`."""

@@ -28,7 +28,7 @@ _TIMED: Final = re.compile(r"t\s*=\s*([^ \t]+[ \t]*(?:ms|s|min))(?=[ \t]|$)[ \t]
 _CONTROL: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f\x85\u2028\u2029]")
 _STEPS: Final = re.compile(r"([+-]?\S+?)(?:\s+(\S+?\s*m?V))?(?:\s+(\S+?\s*k?Hz))?")
 
-Told = Callable[[float], object]
+OnProgress = Callable[[float], object]
 
 
 class TrajectoryReader:
@@ -61,7 +61,7 @@ class TrajectoryReader:
             "end": self._end,
         }
 
-    def read(self, lines: list[str], progress: Told) -> None:
+    def read(self, lines: list[str], progress: OnProgress) -> None:
         """Take all lines."""
         for number, line in enumerate(lines, start=1):
             self._line = number

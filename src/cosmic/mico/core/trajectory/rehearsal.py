@@ -18,7 +18,7 @@ from cosmic.mico.hw.interface import Activity
 
 _LOOK_EVERY = 50
 _TOKEN = "rehearsal"
-Told = Callable[[float, str], object]
+OnProgress = Callable[[float, str], object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,7 @@ class Stage:
     clearance: ClearanceSearch | None = None
     speed: float = 1.0
     timed: bool = True
-    progress: Told = field(default=lambda _part, _text: None)
+    progress: OnProgress = field(default=lambda _part, _text: None)
     cancelled: Callable[[], bool] = field(default=lambda: False)
 
 

@@ -87,7 +87,7 @@ class SegmentBuilder:
         self._zero = dict(zero)
         self._parts: dict[str, _Part] = {}
         self._since_s = 0.0
-        self._told: set[str] = set()
+        self._started: set[str] = set()
         self._speeds: dict[str, tuple[float | None, str]] = {}
 
     def begun(
@@ -125,7 +125,7 @@ class SegmentBuilder:
             self._since_s = now_s
         start = positions.get(event.name, event.from_position or 0.0)
         self._parts[event.name] = _Part(event, start, event.unit, sensed, frequency_hz)
-        self._tell_start(event, start, sensed=sensed)
+        self._emit_start(event, start, sensed=sensed)
         if not isinstance(event.motion, MoveTo | MoveBy | Step | Jog):
             words = MOTION_WORDS[type(event.motion)]
             self._comment(f"{event.name}: {words} is not repeated; where it ended is")
@@ -167,9 +167,9 @@ class SegmentBuilder:
                 )
                 self.ended(name, positions, now_s, well=not missed)
 
-    def _tell_start(self, event: MovementBegun, start: float, *, sensed: bool) -> None:
-        if sensed and event.name not in self._told:
-            self._told.add(event.name)
+    def _emit_start(self, event: MovementBegun, start: float, *, sensed: bool) -> None:
+        if sensed and event.name not in self._started:
+            self._started.add(event.name)
             value = start - self._zero.get(event.name, 0.0)
             self._emit((event.name, Place(value, event.unit, 0)))
 
@@ -196,7 +196,7 @@ class SegmentBuilder:
                 part.written = part.written or found is not None
                 self._parts[name] = part
         if statements:
-            self._tell_speeds(parts)
+            self._emit_speeds(parts)
             at_s = max(0.0, round(self._since_s - self._begin_s, 3))
             self._emit(Leg(tuple(statements), 0, at_s if self._timed else None))
         self._since_s = now_s
@@ -233,7 +233,7 @@ class SegmentBuilder:
             return Steps(name, steps, None, hertz, 0) if steps else None
         return None
 
-    def _tell_speeds(self, parts: Mapping[str, _Part]) -> None:
+    def _emit_speeds(self, parts: Mapping[str, _Part]) -> None:
         """Say how fast axes go, where that is not as fast as usual."""
         if not self._timed:
             return

@@ -123,11 +123,11 @@ def _copy(
     stem: str,
     progress: Progress | None,
 ) -> None:
-    def told(fraction: float) -> None:
+    def report(fraction: float) -> None:
         if progress is not None and progress(fraction) is False:
             raise ExportCancelled(f"{path.parent}: the export was cancelled")
 
-    told(0.0)
+    report(0.0)
     total = len(recording)
     target = ImageFile(
         path,
@@ -140,7 +140,7 @@ def _copy(
     try:
         for image in recording:
             target.append(image.data, image.row or _unknown(recording, image))
-            told(min(1.0, target.count / max(1, total)))
+            report(min(1.0, target.count / max(1, total)))
     except BaseException:
         target.close(complete=False)
         raise

@@ -147,7 +147,7 @@ class ImageRecorder(WorkerThread):
         self._dropped = self._incomplete = self._lost = 0
         # Written by this thread alone:
         self._taken = self._taken_bytes = 0
-        self._told_dropped = 0
+        self._logged_dropped = 0
         self._in_hand: _Came | None = None
         self._times_s: tuple[float, float] | None = None
         self._error: CosmicError | None = None
@@ -298,13 +298,13 @@ class ImageRecorder(WorkerThread):
         directory = self.path.parent
         self._left_s = space_left(directory, self._bytes_per_s).left_s
         check_space(directory, self._bytes_per_s * FLUSH_S)
-        if self._dropped > self._told_dropped:
+        if self._dropped > self._logged_dropped:
             logger.warning(
                 "%s: %d images dropped so far: they arrive faster than they can be written",
                 self.path,
                 self._dropped,
             )
-            self._told_dropped = self._dropped
+            self._logged_dropped = self._dropped
         self.recorded.emit(self.stats)
 
     def _abandon(self) -> None:

@@ -207,15 +207,15 @@ class VideoSource:
         try:
             for packet in self._demuxed():
                 if packet.is_corrupt:
-                    self._tell("an image is cut off")
+                    self._on_damage("an image is cut off")
                     return
                 if checked and packet.size and not is_intact(bytes(packet)):
-                    self._tell("its checksum is wrong")
+                    self._on_damage("its checksum is wrong")
                     return
                 if packet.size:
                     yield packet
         except self._failure as exc:
-            self._tell(exc)
+            self._on_damage(exc)
 
     def _demuxed(self) -> "Iterator[av.Packet[av.VideoStream]]":
         packets = self._container.demux(self._stream)
@@ -234,9 +234,9 @@ class VideoSource:
             for packet in self._packets():
                 yield from packet.decode()
         except self._failure as exc:
-            self._tell(exc)
+            self._on_damage(exc)
 
-    def _tell(self, why: object) -> None:
+    def _on_damage(self, why: object) -> None:
         if self._whole:
             raise RecordingError(f"{self._path}: is damaged; an image cannot be read ({why})")
 
