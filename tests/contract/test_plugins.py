@@ -139,10 +139,16 @@ def test_a_check_names_file_and_option(
     edit(laboratory, "boards = 2", "bords = 2")
     assert main(["check", str(laboratory)]) == 1
     said = capsys.readouterr().err
-    assert f"{laboratory / 'platform.toml'}: daqco: options of backend 'our_board': bords" in said
+    assert (
+        f"{laboratory / 'platform.toml'}: daqco: options of acquisition board 'our_board': bords"
+        in said
+    )
     edit(laboratory, '"our_board"', '"their_board"')
     assert main(["check", str(laboratory)]) == 1
-    assert "no backend 'their_board'" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "no acquisition board 'their_board'" in said
+    assert "our_board (labware 1.2)" in said
+    assert "Did you mean 'our_board'?" in said
 
 
 CAMERA = """
@@ -177,7 +183,7 @@ def test_its_camera_is_named_in_a_platform_file_with_its_options(
     capsys.readouterr()
     assert main(["check", str(folder)]) == 1
     said = capsys.readouterr().err
-    assert "vico: options of backend 'our_camera': film: key is missing" in said
+    assert "vico: options of camera 'our_camera': film: key is missing" in said
     with closing(
         make_camera_library("our_camera", options={"film": "http://127.0.0.1:9/none"})
     ) as library:

@@ -98,10 +98,10 @@ def _add_file_commands(
     split = tasks.add_parser("decompose", help="split a concave mesh into convex pieces")
     split.add_argument("mesh", type=Path, metavar="MESH.stl")
     split.add_argument("folder", type=Path, metavar="FOLDER")
-    export = commands.add_parser("export", help="write a recording as CSV or TDMS")
+    export = commands.add_parser("export", help="write a recording as CSV, TDMS or another format")
     export.add_argument("recording", type=Path, metavar="RECORDING")
     export.add_argument(
-        "--to", choices=("csv", "tdms"), default="csv", help="format (default: csv)"
+        "--to", default="csv", metavar="FORMAT", help="csv, tdms, or what a package brings"
     )
     export.add_argument(
         "--output", type=Path, metavar="FILE", help="output file (default: beside the recording)"

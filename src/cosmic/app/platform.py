@@ -25,6 +25,7 @@ from cosmic.frame.errors import ArgumentError, ConfigError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.application import RemoteApplication
 from cosmic.frame.platform_services import tick_finely
+from cosmic.frame.plugins import Kind, is_simulated, missing_packages
 from cosmic.frame.threads import share_interpreter
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.twin.scene import Scene
@@ -64,7 +65,7 @@ class Platform:
     @property
     def simulated(self) -> bool:
         """True when no hardware moves, neither here nor at the stations used."""
-        real_here = self.file.mico.backend != "simulated" and bool(self.own)
+        real_here = not self.file.moves_nothing and bool(self.own)
         return not real_here and all(each.facts.simulated for each in self.remote.stations)
 
     @property
@@ -191,6 +192,8 @@ def build_platform(
     if not tick_finely():
         logger.warning("Windows keeps its timer resolution of 15.6 ms: waits end up to that late")
     file, path = load_platform(config)
+    for each in missing_packages(file.platform.requires):
+        logger.warning("%s: platform.requires: %s is not installed", path, each)
     _check_simulation(file, path, rate=rate, only_simulated=cold or bool(sample or truth))
     if not 0 <= seed <= LARGEST_SEED:
         raise ArgumentError(f"seed must be a whole number from 0 to {LARGEST_SEED}, not {seed}")
@@ -212,7 +215,7 @@ def build_platform(
         if mistakes := misnamed(file, path, hosted):
             raise ConfigError("\n".join(mistakes))
         scene: Scene | None = None
-        if file.mico.backend == "simulated" and hosted:
+        if file.has_twin and hosted:
             scene = make_scene(file, path, clock, seed=seed, cold=cold, sample=sample, truth=truth)
             undo.callback(scene.close)
         site = Site(file, path, clock, policy, scene, seed)
@@ -239,13 +242,13 @@ def build_platform(
 
 
 def _check_simulation(file: PlatformFile, path: Path, *, rate: float, only_simulated: bool) -> None:
-    if file.mico.backend != "simulated" and (rate != 1.0 or only_simulated):
+    if (rate != 1.0 and not file.moves_nothing) or (only_simulated and not file.has_twin):
         raise ConfigError(
             f"{path}: mico.backend: only the simulated platform has a rate, --cold, --sample or "
             "--truth"
         )
-    boards = {each.backend for each in file.daqco.drivers} if file.daqco is not None else set()
-    if rate != 1.0 and not boards <= {"simulated"}:
+    boards = file.daqco.drivers if file.daqco is not None else ()
+    if rate != 1.0 and not all(is_simulated(Kind.BOARD, each.backend) for each in boards):
         raise ConfigError(f"{path}: daqco.backend: real boards have no rate; leave --rate out")
 
 

@@ -16,6 +16,10 @@ class ConfigError(CosmicError):
     """A configuration file is broken; the text names file, key and reason, all at once."""
 
 
+class PluginError(ConfigError):
+    """What a package brings cannot be loaded; the text names both, and what happened."""
+
+
 class ProtocolError(CosmicError):
     """A peer or a device spoke in a way its protocol does not allow."""
 

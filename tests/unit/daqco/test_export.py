@@ -137,7 +137,7 @@ def test_a_file_is_replaced_only_on_demand(recorded, to, there):
 
 def test_what_cannot_be_is_refused(recorded, tmp_path):
     path, _ = recorded
-    with pytest.raises(RecordingError, match="there are csv and tdms"):
+    with pytest.raises(RecordingError, match=r"no exporter 'xlsx'; there are csv \(cosmic .*tdms"):
         export_file(path, "xlsx")
     with pytest.raises(RecordingError, match="does not exist; create it"):
         export_file(path, "csv", tmp_path / "none" / "run.csv")

@@ -1,11 +1,10 @@
 """What a controller can do is asked of it: channels, steps, frequencies, amplitudes."""
 
 import pytest
-from pydantic import ValidationError
 
 import cosmic
 from cosmic.mico.hw.interface import Capabilities
-from unit.mico.rigs import mico, settings
+from unit.mico.rigs import mico
 from unit.mico.scripted_controller import ScriptedController
 
 ABLE = Capabilities(
@@ -47,8 +46,3 @@ def test_steps_are_refused_beyond_what_this_controller_takes():
         for asked in ({"steps": 100_001}, {"amplitude_v": 0.5}, {"frequency_hz": 20_001}):
             with pytest.raises(cosmic.LimitError):
                 rig["d0.c1"].steps(**{"steps": 1, **asked})
-
-
-def test_an_scu_is_not_configured_with_a_fourth_channel():
-    with pytest.raises(ValidationError, match="an SCU has the channels 0 to 2"):
-        settings(("LLLL",), backend="scu3d")

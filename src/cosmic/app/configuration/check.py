@@ -14,10 +14,11 @@ from cosmic.app.configuration.references import kept_mistakes, misnamed, recipe_
 from cosmic.app.configuration.scene_fit import misfits
 from cosmic.frame.config import load_model, read_toml
 from cosmic.frame.errors import ConfigError, NotAvailable
-from cosmic.frame.plugins import Kind, read_options
+from cosmic.frame.plugins import Kind, missing_packages, read_options
 from cosmic.frame.units import format_quantity
-from cosmic.mico.core.settings import PositionerSettings
+from cosmic.mico.core.settings import MicoSettings, PositionerSettings
 from cosmic.twin.settings import StageKind, TwinSettings
+from cosmic.vico.hw.factory import NONE
 
 
 def find_mistakes(config: str | Path) -> list[str]:
@@ -31,7 +32,7 @@ def find_mistakes(config: str | Path) -> list[str]:
         lines += str(exc).splitlines()
     twin_path = path.parent / (file.platform.twin if file else _named_twin(path))
     twin: TwinSettings | None = None
-    if file is None or file.mico.backend == "simulated":
+    if file is None or "simulated" in file.mico.backends:
         try:
             twin = load_model(twin_path, TwinSettings)
         except ConfigError as exc:
@@ -71,14 +72,28 @@ def _network_mistakes(file: PlatformFile, path: Path) -> list[str]:
 
 
 def _backend_mistakes(file: PlatformFile, path: Path) -> list[str]:
-    named: list[tuple[str, Kind, str, Mapping[str, object]]] = []
+    named: list[tuple[str, Kind, str, Mapping[str, object]]] = [
+        ("mico", Kind.CONTROLLER, file.mico.backend, file.mico.options)
+    ]
+    named += [
+        (f"mico.controller[{index}]", Kind.CONTROLLER, each.backend, each.options)
+        for index, each in enumerate(file.mico.controller)
+    ]
     if file.daqco is not None:
         named += [("daqco", Kind.BOARD, each.backend, each.options) for each in file.daqco.drivers]
     if file.vico is not None:
         options = file.vico.options
         used = dict.fromkeys([*(each.backend for each in file.vico.camera), *options])
         named += [("vico", Kind.CAMERA, name, options.get(name, {})) for name in used]
-    lines: list[str] = []
+        lens, light = file.vico.lens, file.vico.light
+        if lens.backend != NONE:
+            named.append(("vico.lens", Kind.LENS, lens.backend, lens.options))
+        if light.backend != NONE:
+            named.append(("vico.light", Kind.LIGHT, light.backend, light.options))
+    lines = [
+        f"{path}: platform.requires: {each} is not installed: pip install '{each}'"
+        for each in missing_packages(file.platform.requires)
+    ]
     for section, kind, name, given in named:
         try:
             read_options(kind, name, given)
@@ -126,8 +141,11 @@ def _twin_mistakes(
     file: PlatformFile, path: Path, twin: TwinSettings, twin_path: Path
 ) -> list[str]:
     lines: list[str] = []
+    simulated = _simulated_devices(file.mico, len(twin.devices))
     for index, each in enumerate(file.mico.positioner):
-        stage = _stage_at(each, twin)
+        if file.mico.controller and each.device not in simulated:
+            continue
+        stage = _stage_at(each.device - simulated.start, each.channel, twin)
         where = f"{path}: mico.positioner[{index}]"
         if not stage:
             lines.append(
@@ -139,10 +157,20 @@ def _twin_mistakes(
     return lines
 
 
-def _stage_at(positioner: PositionerSettings, twin: TwinSettings) -> str:
-    if positioner.device >= len(twin.devices):
+def _simulated_devices(settings: MicoSettings, there: int) -> range:
+    """Return the numbers of the devices that the twin moves, of which `there` are."""
+    first = 0
+    for each in settings.controllers:
+        if each.backend == "simulated":
+            return range(first, first + (len(each.serials) or there))
+        first += len(each.serials)
+    return range(0)
+
+
+def _stage_at(device: int, channel: int, twin: TwinSettings) -> str:
+    if device >= len(twin.devices) or channel >= len(twin.devices[device].channels):
         return ""
-    return twin.devices[positioner.device].channels[positioner.channel]
+    return twin.devices[device].channels[channel]
 
 
 def _kind_mistakes(

@@ -11,9 +11,11 @@ from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.frame.config import StrictModel, load_model, shipped_config_dir
 from cosmic.frame.errors import ConfigError
+from cosmic.frame.plugins import Kind, has_twin, is_simulated
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.twin.settings import TwinSettings
 from cosmic.vico.core.settings import VicoSettings
+from cosmic.vico.hw.factory import NONE
 
 KNOWN_APPLICATIONS: Final = ("mico", "daqco", "vico")
 
@@ -26,6 +28,7 @@ class PlatformSettings(StrictModel):
     scene: str = ""
     stop_key: str = "F12"
     applications: Annotated[tuple[str, ...], Field(strict=False)] = KNOWN_APPLICATIONS
+    requires: Annotated[tuple[str, ...], Field(strict=False)] = ()
 
 
 class PlatformFile(StrictModel):
@@ -41,13 +44,23 @@ class PlatformFile(StrictModel):
     @property
     def all_simulated(self) -> bool:
         """Whether no part of the platform is real; what is left out counts as simulated."""
-        backends: set[str] = {self.mico.backend}
+        used = {(Kind.CONTROLLER, each) for each in self.mico.backends}
         if self.daqco is not None:
-            backends |= {each.backend for each in self.daqco.drivers}
+            used |= {(Kind.BOARD, each.backend) for each in self.daqco.drivers}
         if self.vico is not None:
-            backends |= {each.backend for each in self.vico.camera}
-            backends |= {self.vico.lens.backend, self.vico.light.backend} - {"none"}
-        return backends == {"simulated"}
+            used |= {(Kind.CAMERA, each.backend) for each in self.vico.camera}
+            used |= {(Kind.LENS, self.vico.lens.backend), (Kind.LIGHT, self.vico.light.backend)}
+        return all(name == NONE or is_simulated(kind, name) for kind, name in used)
+
+    @property
+    def moves_nothing(self) -> bool:
+        """Whether no controller is real."""
+        return all(is_simulated(Kind.CONTROLLER, each) for each in self.mico.backends)
+
+    @property
+    def has_twin(self) -> bool:
+        """Whether a controller moves the simulated platform, so that there is one."""
+        return any(has_twin(Kind.CONTROLLER, each) for each in self.mico.backends)
 
 
 def platform_path(config: str | Path | None) -> Path:

@@ -13,23 +13,26 @@ from cosmic.app.configuration.scene_fit import load_checker
 from cosmic.app.simulation import SimulationFaults
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.core.left_behind import Closing, OpenRecordings, Outcome
-from cosmic.daqco.core.settings import DaqcoSettings
+from cosmic.daqco.core.settings import DaqcoSettings, DriverSettings
+from cosmic.daqco.hw.factory import UnavailableBoards, make_library
 from cosmic.daqco.hw.factory import join as join_boards
-from cosmic.daqco.hw.factory import make_library
-from cosmic.daqco.hw.interface import Source
+from cosmic.daqco.hw.interface import BoardLibrary, Source
 from cosmic.frame.application import GuiFactory
 from cosmic.frame.clock import Clock
+from cosmic.frame.errors import PluginError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.version import __version__
 from cosmic.mico.api.application import MicoApplication
-from cosmic.mico.hw.factory import join, make_controller, make_simulated
+from cosmic.mico.core.settings import ControllerSettings, MicoSettings
+from cosmic.mico.hw.factory import join, make_controller
 from cosmic.mico.hw.interface import Controller
+from cosmic.mico.hw.joined import UnavailableController
 from cosmic.twin.scene import Scene
 from cosmic.vico.api.application import VicoApplication
 from cosmic.vico.core.settings import VicoSettings
 from cosmic.vico.hw.factory import make_camera_library, make_lens, make_light
 from cosmic.vico.hw.interface import CameraLibrary
-from cosmic.vico.hw.peripherals import Lens
+from cosmic.vico.hw.peripherals import Lens, Light
 from cosmic.vico.hw.sim_peripherals import SimPeripherals
 
 logger = logging.getLogger(__name__)
@@ -101,21 +104,11 @@ def _build_mico(
     site: Site, faults: SimulationFaults, gui_factory: GuiFactory | None
 ) -> MicoApplication:
     settings = site.file.mico
-    controller: Controller
-    if site.scene is not None:
-        controller, injected = make_simulated(site.scene)
-        faults.join("controller", injected)
-    else:
-        first = make_controller(
-            settings.backend, library_path=settings.library, serials=settings.serials
-        )
-        others = [
-            make_controller(each.backend, library_path=each.library, serials=each.serials)
-            for each in settings.controller
-        ]
-        controller = join([first, *others])
+    controllers = [_make_controller(site, each) for each in settings.controllers]
+    for each in reversed(controllers):  # the first has the last word
+        faults.join_simulated("controller", each)
     return MicoApplication(
-        controller,
+        join(controllers),
         settings,
         clock=site.clock,
         policy=site.policy,
@@ -126,20 +119,41 @@ def _build_mico(
     )
 
 
-def _build_daqco(
-    site: Site, faults: SimulationFaults, settings: DaqcoSettings, gui_factory: GuiFactory | None
-) -> DaqcoApplication:
-    libraries = [
-        make_library(
-            each.backend,
+def _make_controller(site: Site, settings: MicoSettings | ControllerSettings) -> Controller:
+    try:
+        return make_controller(
+            settings.backend,
+            library_path=settings.library,
+            serials=settings.serials,
+            scene=site.scene,
+            clock=site.clock,
+            options=settings.options,
+            seed=site.seed,
+        )
+    except PluginError as exc:  # the rest of the platform does without it
+        logger.error("%s", exc)
+        return UnavailableController(settings.backend, str(exc))
+
+
+def _make_boards(site: Site, settings: DaqcoSettings, driver: DriverSettings) -> BoardLibrary:
+    try:
+        return make_library(
+            driver.backend,
             clock=site.clock,
             scene_sources=_sources(site.scene),
             clock_sources=settings.clock_sources,
-            options=each.options,
+            options=driver.options,
             seed=site.seed,
         )
-        for each in settings.drivers
-    ]
+    except PluginError as exc:
+        logger.error("%s", exc)
+        return UnavailableBoards(driver.backend, str(exc))
+
+
+def _build_daqco(
+    site: Site, faults: SimulationFaults, settings: DaqcoSettings, gui_factory: GuiFactory | None
+) -> DaqcoApplication:
+    libraries = [_make_boards(site, settings, each) for each in settings.drivers]
     for each in reversed(libraries):  # what is injected reaches the boards of the first
         faults.join_simulated("board", each)
     notes = open_recordings()
@@ -184,16 +198,28 @@ def _build_vico(
         lens = settings.lens
         return make_lens(
             lens.backend,
+            clock=site.clock,
             port=lens.port,
             homed=lens.homed,
             limits_counts=lens.limits_counts,
             simulation=simulation,
+            options=lens.options,
+        )
+
+    def open_light() -> Light | None:
+        light = settings.light
+        return make_light(
+            light.backend,
+            clock=site.clock,
+            port=light.port,
+            simulation=simulation,
+            options=light.options,
         )
 
     return VicoApplication(
         make_library,
         open_lens,
-        lambda: make_light(settings.light.backend, port=settings.light.port, simulation=simulation),
+        open_light,
         settings,
         clock=site.clock,
         policy=site.policy,

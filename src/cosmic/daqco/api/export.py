@@ -1,11 +1,15 @@
-"""Recordings as CSV and TDMS, for programs that do not read HDF5."""
+"""Recordings in other formats, for programs that do not read HDF5: CSV, TDMS and what is brought.
+
+A format is an exporter of the group ``cosmic.exporters``: its name is what ``--to`` says, and how
+its files end.
+"""
 
 import csv
 import os
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -18,13 +22,36 @@ from cosmic.daqco.api.export_targets import (
     position_lines,
 )
 from cosmic.daqco.api.recording import Recording, open_recording
-from cosmic.frame.errors import ExportCancelled, RecordingError, RecordingExistsError
+from cosmic.frame.errors import (
+    ConfigError,
+    ExportCancelled,
+    RecordingError,
+    RecordingExistsError,
+)
+from cosmic.frame.plugins import Backend, Kind, NoOptions, make
 
-FORMATS: Final = ("csv", "tdms")
 READ_SAMPLES: Final = 32_768
 
 Values = npt.NDArray[np.float64]
 Progress = Callable[[float], object]
+
+
+class Exporter(Protocol):
+    """Writes a recording in another format."""
+
+    def __call__(
+        self,
+        recording: Recording,
+        path: Path,
+        progress: Progress | None = None,
+        *,
+        overwrite: bool = False,
+    ) -> Path:
+        """Write `path` and return what was written; as `export_csv`, which says what it raises."""
+
+
+ExporterBackend = Backend[None, Exporter]
+"""What an entry point of the group ``cosmic.exporters`` leads to."""
 
 
 def export_file(
@@ -35,12 +62,12 @@ def export_file(
     *,
     overwrite: bool = False,
 ) -> Path:
-    """Export a recording and return the path of the new file; see `export_csv`, `export_tdms`.
+    """Export a recording and return the path of the new file; see `Exporter`.
 
     Parameters
     ----------
     to : str
-        "csv" or "tdms".
+        "csv", "tdms", or a format that another package brings.
     out_path : path, optional
         Without it the file lies beside the recording, under the same name.
 
@@ -53,9 +80,10 @@ def export_file(
     ExportCancelled
         `progress` returned False.
     """
-    if to not in FORMATS:
-        raise RecordingError(f"cannot export to {to!r}; there are {' and '.join(FORMATS)}")
-    export = export_csv if to == "csv" else export_tdms
+    try:
+        export: Exporter = make(Kind.EXPORTER, to, None)
+    except ConfigError as exc:
+        raise RecordingError(f"cannot export to {to!r}: {exc}") from exc
     source = Path(recording_path)
     target = source.with_suffix(f".{to}") if out_path is None else Path(out_path)
     with open_recording(source) as recording:
@@ -164,3 +192,15 @@ def _check_free(path: Path, *, overwrite: bool) -> None:
         raise RecordingExistsError(
             f"{path}: there is such a file; choose another name, or say that it may be replaced"
         )
+
+
+def _make_csv(_options: NoOptions, _context: None) -> Exporter:
+    return export_csv
+
+
+def _make_tdms(_options: NoOptions, _context: None) -> Exporter:
+    return export_tdms
+
+
+CSV: Final = ExporterBackend(_make_csv)
+TDMS: Final = ExporterBackend(_make_tdms)

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
@@ -18,9 +17,14 @@ from PySide6.QtWidgets import (
 from cosmic.daqco.gui.dialog import FieldDialog, button_box
 from cosmic.frame.gui.build import tipped
 from cosmic.frame.gui.theme import STEP_PX
+from cosmic.frame.plugins import Kind, names
 
-KINDS: Final = {"CSV (*.csv)": ".csv", "TDMS (*.tdms)": ".tdms"}
 Button = QDialogButtonBox.StandardButton
+
+
+def export_kinds() -> dict[str, str]:
+    """Return the name of each format there is, by what a dialog shows: "CSV (*.csv)"."""
+    return {f"{each.upper()} (*.{each})": each for each in names(Kind.EXPORTER)}
 
 
 class StationExportDialog(FieldDialog):
@@ -43,7 +47,8 @@ class StationExportDialog(FieldDialog):
         self.files = tipped(QListWidget(), f"The newest recordings {where}")
         self.files.addItems([each.name for each in self._recordings])
         self.kind = tipped(QComboBox(), "Kind of the new file")
-        self.kind.addItems(list(KINDS))
+        self._kinds = export_kinds()
+        self.kind.addItems(list(self._kinds))
         self.buttons = button_box(Button.Ok | Button.Cancel)
         self.buttons.button(Button.Ok).setText("Export")
         folder = self._recordings[0].parent if self._recordings else ""
@@ -68,5 +73,5 @@ class StationExportDialog(FieldDialog):
 
     def _on_ok(self) -> None:
         source = self._recordings[self.files.currentRow()]
-        self.chosen.emit(source, source.with_suffix(KINDS[self.kind.currentText()]))
+        self.chosen.emit(source, source.with_suffix(f".{self._kinds[self.kind.currentText()]}"))
         self.accept()

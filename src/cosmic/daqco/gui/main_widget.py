@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 from cosmic.daqco.api.daqco import Daqco, daqco_of
 from cosmic.daqco.gui.asking import Asking
 from cosmic.daqco.gui.configure_dialog import UDaqConfigureDialog
-from cosmic.daqco.gui.export_dialog import StationExportDialog
+from cosmic.daqco.gui.export_dialog import StationExportDialog, export_kinds
 from cosmic.daqco.gui.file_widget import UDaqFileWidget
 from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.plotter import UDaqPlotter
@@ -36,7 +36,6 @@ from cosmic.frame.overrides import override
 RECORDINGS: Final = "Recordings (*.h5)"
 LOW_PX: Final = 70 * STEP_PX
 NARROW_PX: Final = 70 * STEP_PX
-EXPORTS: Final = "CSV (*.csv);;TDMS (*.tdms)"
 
 
 class UDaqMainWidget(QWidget):
@@ -215,12 +214,14 @@ class UDaqMainWidget(QWidget):
         self._open(dialog)
 
     def _on_source_chosen(self, source: str) -> None:
-        dialog = QFileDialog(self, "Export to", str(Path(source).with_suffix(".csv")), EXPORTS)
+        kinds = export_kinds()
+        target = str(Path(source).with_suffix(".csv"))
+        dialog = QFileDialog(self, "Export to", target, ";;".join(kinds))
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix("csv")
         dialog.selectFile(Path(source).with_suffix(".csv").name)
         dialog.filterSelected.connect(
-            lambda chosen: dialog.setDefaultSuffix("tdms" if "tdms" in chosen else "csv")
+            lambda chosen: dialog.setDefaultSuffix(kinds.get(chosen, "csv"))
         )
         dialog.fileSelected.connect(
             lambda target: self.export_recording(Path(source), Path(target))
@@ -228,7 +229,7 @@ class UDaqMainWidget(QWidget):
         self._open(dialog)
 
     def export_recording(self, source: Path, target: Path) -> None:
-        """Export a recording to CSV or TDMS, by the suffix of `target`, and show how far it is."""
+        """Export a recording to the format that `target` ends in, and show how far it is."""
         self._asking.ask(lambda: self._daqco.export(source, target), self._on_export_begun)
 
     def _on_export_begun(self, task: Task | None, error: CosmicError | None) -> None:

@@ -2,9 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 
-from cosmic.daqco.hw.interface import BoardContext, BoardLibrary, Source
+from typing_extensions import override
+
+from cosmic.daqco.hw.interface import Board, BoardContext, BoardInfo, BoardLibrary, Source
 from cosmic.daqco.hw.joined_boards import JoinedLibrary
 from cosmic.frame.clock import WALL, Clock
+from cosmic.frame.errors import DeviceFault, NotConnectedError
 from cosmic.frame.plugins import Kind, make
 
 
@@ -48,3 +51,32 @@ def make_library(
 def join(libraries: Sequence[BoardLibrary]) -> BoardLibrary:
     """Return the boards of several makes as one library; one alone stays as it is."""
     return libraries[0] if len(libraries) == 1 else JoinedLibrary(libraries)
+
+
+class UnavailableBoards(BoardLibrary):
+    """In place of boards that cannot be made; there are none, and each call says why.
+
+    Parameters
+    ----------
+    backend : str
+        What the configuration names.
+    reason : str
+        What the operator reads.
+    """
+
+    def __init__(self, backend: str, reason: str) -> None:
+        self._backend = backend
+        self._reason = reason
+
+    @property
+    @override
+    def name(self) -> str:
+        return self._backend
+
+    @override
+    def list_boards(self) -> tuple[BoardInfo, ...]:
+        raise NotConnectedError(self._reason, fault=DeviceFault.UNSUPPORTED)
+
+    @override
+    def open(self, name: str) -> Board:
+        raise NotConnectedError(f"{name}: {self._reason}", fault=DeviceFault.UNSUPPORTED)

@@ -188,4 +188,4 @@ def _make(options: SimulatedOptions, context: BoardContext) -> BoardLibrary:
     )
 
 
-BACKEND: Final = BoardBackend(_make, options=SimulatedOptions, simulated=True)
+BACKEND: Final = BoardBackend(_make, options=SimulatedOptions, simulated=True, twin=True)

@@ -19,7 +19,6 @@ Names = Annotated[tuple[str, ...], Field(strict=False)]
 Text = Annotated[str, Field(min_length=1)]
 
 
-LAST_SCU_CHANNEL: Final = 2
 _COUNTED: Final = ("travel_um", "step_std", "end_std_um")
 
 
@@ -209,16 +208,18 @@ class GroupSettings(StrictModel):
 class ControllerSettings(StrictModel):
     """One more controller library; its devices are numbered behind those before it."""
 
-    backend: Literal["scu3d", "smaractctl"]
+    backend: str = Field(min_length=1)
     library: str = ""
+    options: dict[str, object] = Field(default_factory=dict)
     serials: Annotated[tuple[Serial, ...], Field(strict=False, min_length=1)]
 
 
 class MicoSettings(StrictModel):
     """Section ``[mico]`` of platform.toml."""
 
-    backend: Literal["simulated", "scu3d", "smaractctl"] = "simulated"
+    backend: str = Field(default="simulated", min_length=1)
     library: str = ""
+    options: dict[str, object] = Field(default_factory=dict)
     serials: Annotated[tuple[Serial, ...], Field(strict=False)] = ()
     controller: Annotated[tuple[ControllerSettings, ...], Field(strict=False)] = ()
     defaults: MotionDefaults = MotionDefaults()
@@ -238,7 +239,6 @@ class MicoSettings(StrictModel):
         wrong = [
             *self._twice("name", [each.name for each in self.positioner]),
             *self._same_channel(),
-            *self._beyond_channels(),
             *self._twice("key", self._keys()),
             *self._twice("serial", [str(serial) for serial in self.all_serials]),
             *self._joined_wrongly(),
@@ -262,12 +262,18 @@ class MicoSettings(StrictModel):
         return (*self.serials, *(serial for each in self.controller for serial in each.serials))
 
     def _joined_wrongly(self) -> list[str]:
-        if not self.controller:
-            return []
-        if self.backend == "simulated":
-            return ["controller: the simulated platform takes its makes from twin.toml"]
         missing = "serials: name all devices, so that none takes another's number"
-        return [] if self.serials else [missing]
+        return [missing] if self.controller and not self.serials else []
+
+    @property
+    def controllers(self) -> "tuple[MicoSettings | ControllerSettings, ...]":
+        """What is said of each controller library, in the order of their devices."""
+        return (self, *self.controller)
+
+    @property
+    def backends(self) -> tuple[str, ...]:
+        """Names of the backends of all controllers, in their order."""
+        return tuple(each.backend for each in self.controllers)
 
     @property
     def kinds(self) -> dict[str, str]:
@@ -300,15 +306,6 @@ class MicoSettings(StrictModel):
             f"{' and '.join(group)} are both on device {where.device} channel {where.channel}"
             for where, group in names.items()
             if len(group) > 1
-        ]
-
-    def _beyond_channels(self) -> list[str]:
-        if self.backend != "scu3d" or self.controller:
-            return []
-        return [
-            f"{each.name}: channel {each.channel}: an SCU has the channels 0 to 2"
-            for each in self.positioner
-            if each.channel > LAST_SCU_CHANNEL
         ]
 
     def _unknown_names(self) -> list[str]:

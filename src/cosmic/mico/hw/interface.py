@@ -9,10 +9,15 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
+from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import DeviceError, DeviceFault
+from cosmic.frame.plugins import Backend
 from cosmic.frame.units import AxisUnit
+
+if TYPE_CHECKING:
+    from cosmic.twin.scene import Scene
 
 
 class PositionerKind(StrEnum):
@@ -386,3 +391,32 @@ class Controller(Protocol):
     @abstractmethod
     def stop(self, channel: Channel) -> None:
         """Stop at once; never waits for anything but the library itself. Any thread."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerContext:
+    """What a platform gives to the driver of some of its controllers.
+
+    Attributes
+    ----------
+    clock : Clock
+        The platform's, which paces simulated controllers.
+    library : str
+        Path of the vendor's library; empty looks where the system does.
+    serials : tuple of int or str
+        The devices that are configured for it, in the order of their numbers; empty: all found.
+    scene : Scene or None
+        What simulated controllers move; None where there is no twin.
+    seed : int
+        Of what is random in simulated controllers.
+    """
+
+    clock: Clock = WALL
+    library: str = ""
+    serials: tuple[Serial, ...] = ()
+    scene: "Scene | None" = None
+    seed: int = 0
+
+
+ControllerBackend = Backend[ControllerContext, Controller]
+"""What an entry point of the group ``cosmic.controllers`` leads to."""

@@ -88,13 +88,13 @@ class JoinedController(Controller):
 
     @override
     def find_devices(self) -> tuple[Serial, ...]:
-        return tuple(serial for part in self._parts for serial in part.find_devices())
+        return tuple(serial for part in self._parts for serial in _connected(part))
 
     @override
     def open(self, serials: Sequence[Serial] = ()) -> tuple[DeviceIdentity, ...]:
         if self._places:
             raise DeviceError(f"{self.name} is open already", fault=DeviceFault.STATE)
-        found = [part.find_devices() for part in self._parts]
+        found = [_connected(part) for part in self._parts]
         missing = [each for each in serials if not any(each in one for one in found)]
         if missing:
             raise NotConnectedError(
@@ -239,3 +239,52 @@ class JoinedController(Controller):
             text = f"device {device}: there is no such device"
             raise DeviceError(text, fault=DeviceFault.NO_CHANNEL, device=device)
         return places[device]
+
+
+def _connected(part: Controller) -> tuple[Serial, ...]:
+    """Return the devices of one part; none of one that is not there, which the others outlive."""
+    try:
+        return part.find_devices()
+    except NotConnectedError as exc:
+        logger.error("%s: %s", part.name, exc)
+        return ()
+
+
+class UnavailableController(JoinedController):
+    """In place of a controller that cannot be made; it has no devices, and says why.
+
+    Parameters
+    ----------
+    backend : str
+        What the configuration names.
+    reason : str
+        What the operator reads.
+    """
+
+    def __init__(self, backend: str, reason: str) -> None:
+        super().__init__(())
+        self._backend = backend
+        self._reason = reason
+
+    @property
+    @override
+    def name(self) -> str:
+        return self._backend
+
+    @property
+    @override
+    def simulated(self) -> bool:
+        return False
+
+    @property
+    @override
+    def capabilities(self) -> Capabilities:
+        return Capabilities(group_start=False, velocity=False, position_known=True)
+
+    @override
+    def find_devices(self) -> tuple[Serial, ...]:
+        raise NotConnectedError(self._reason, fault=DeviceFault.UNSUPPORTED)
+
+    @override
+    def open(self, serials: Sequence[Serial] = ()) -> tuple[DeviceIdentity, ...]:
+        raise NotConnectedError(self._reason, fault=DeviceFault.UNSUPPORTED)

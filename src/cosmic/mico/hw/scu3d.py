@@ -9,6 +9,7 @@ from typing import Final
 from typing_extensions import override
 
 from cosmic.frame.errors import DeviceError, DeviceFault
+from cosmic.frame.plugins import NoOptions
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.hw import scu3d_convert as convert
 from cosmic.mico.hw import scu3d_ctypes as sa
@@ -16,6 +17,8 @@ from cosmic.mico.hw.interface import (
     Capabilities,
     Channel,
     Controller,
+    ControllerBackend,
+    ControllerContext,
     DeviceIdentity,
     Direction,
     Event,
@@ -23,6 +26,7 @@ from cosmic.mico.hw.interface import (
 )
 from cosmic.mico.hw.scu3d_errors import nothing_found, place, require_serials, status_error
 from cosmic.mico.hw.scu3d_events import event_from_packet
+from cosmic.mico.hw.scu3d_load import load_library
 
 logger = logging.getLogger(__name__)
 
@@ -289,3 +293,10 @@ class Scu3dController(Controller):
             logger.debug("SA_ReleaseDevices() answered 0")
         else:
             logger.warning("%s", status_error(status, "SA_ReleaseDevices()"))
+
+
+def _make(_options: NoOptions, context: ControllerContext) -> Controller:
+    return Scu3dController(load_library(context.library))
+
+
+BACKEND: Final = ControllerBackend(_make)

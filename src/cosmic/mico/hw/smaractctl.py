@@ -11,6 +11,7 @@ from typing_extensions import override
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
+from cosmic.frame.plugins import NoOptions
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.hw import smaractctl_convert as convert
 from cosmic.mico.hw import smaractctl_ctypes as sa
@@ -22,6 +23,8 @@ from cosmic.mico.hw.interface import (
     Channel,
     Completed,
     Controller,
+    ControllerBackend,
+    ControllerContext,
     DeviceIdentity,
     Direction,
     Event,
@@ -30,6 +33,7 @@ from cosmic.mico.hw.interface import (
     Serial,
 )
 from cosmic.mico.hw.smaractctl_errors import place, result_error
+from cosmic.mico.hw.smaractctl_load import load_library
 
 logger = logging.getLogger(__name__)
 
@@ -558,3 +562,12 @@ class SmaractCtlController(Controller):
         serial = self._devices[index].serial if known and index is not None else None
         channel = None if at is None else at.channel
         raise result_error(code, call, device=index, channel=channel, serial=serial)
+
+
+def _make(_options: NoOptions, context: ControllerContext) -> Controller:
+    # A locator names a device that is not found by itself.
+    locators = [each for each in context.serials if isinstance(each, str) and ":" in each]
+    return SmaractCtlController(load_library(context.library), locators=locators)
+
+
+BACKEND: Final = ControllerBackend(_make)

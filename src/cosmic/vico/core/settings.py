@@ -34,8 +34,9 @@ class MotorLensSettings(StrictModel):
         A movement that has not ended by then has failed.
     """
 
-    backend: Literal["simulated", "navitar", "none"] = "simulated"
+    backend: str = Field(default="simulated", min_length=1)
     port: str = ""
+    options: dict[str, object] = Field(default_factory=dict)
     homed: bool = False
     zoom_limit_counts: int | None = Field(default=None, gt=0)
     focus_limit_counts: int | None = Field(default=None, gt=0)
@@ -72,8 +73,9 @@ class MotorLensSettings(StrictModel):
 class LampSettings(StrictModel):
     """Section ``[vico.light]`` of platform.toml."""
 
-    backend: Literal["simulated", "brightlight", "none"] = "simulated"
+    backend: str = Field(default="simulated", min_length=1)
     port: str = ""
+    options: dict[str, object] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _has_a_port(self) -> Self:

@@ -6,8 +6,9 @@ from typing import Final
 from typing_extensions import override
 
 from cosmic.frame.errors import ConfigError, ProtocolError
-from cosmic.vico.hw.navitar_protocol import Register, Registers
-from cosmic.vico.hw.peripherals import Light
+from cosmic.frame.plugins import NoOptions
+from cosmic.vico.hw.navitar_protocol import Found, Product, Register, Registers, open_line
+from cosmic.vico.hw.peripherals import Light, LightBackend, PeripheralContext
 
 logger = logging.getLogger(__name__)
 
@@ -50,3 +51,21 @@ class BrightLight(Light):
     @override
     def close(self) -> None:
         self._registers.close()
+
+
+def light_on(found: Found, name: str) -> BrightLight:
+    """Return the lamp of a line that answered.
+
+    Raises
+    ------
+    NotConnectedError
+        Something else is there.
+    """
+    return BrightLight(found.expect("a BrightLight", Product.BRIGHTLIGHT).registers, name=name)
+
+
+def _make(_options: NoOptions, context: PeripheralContext) -> Light:
+    return light_on(open_line(context.port, "brightlight"), "BrightLight")
+
+
+BACKEND: Final = LightBackend(_make)

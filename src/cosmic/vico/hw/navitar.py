@@ -9,14 +9,24 @@ from typing_extensions import override
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable
+from cosmic.frame.plugins import NoOptions
 from cosmic.vico.hw.navitar_protocol import (
     SECOND_AXIS,
+    Found,
     MotorCommand,
+    Product,
     Register,
     Registers,
     motor_status,
+    open_line,
 )
-from cosmic.vico.hw.peripherals import Lens, LensAxis, LensState
+from cosmic.vico.hw.peripherals import (
+    Lens,
+    LensAxis,
+    LensBackend,
+    LensState,
+    PeripheralContext,
+)
 
 logger = logging.getLogger(__name__)
 
@@ -166,3 +176,41 @@ class NavitarLens(Lens):
 def counts_anew(registers: Registers) -> bool:
     """Whether both motors count 0, as they do after the controller was switched on."""
     return not any(registers.read(Register.POSITION + first) for first in (0, SECOND_AXIS))
+
+
+def lens_on(found: Found, kind: str, context: PeripheralContext) -> NavitarLens:
+    """Return the lens of a line that answered.
+
+    Raises
+    ------
+    NotConnectedError
+        Something else is there.
+    """
+    found.expect("a lens controller", Product.MOTORS, Product.MOTORS_2)
+    return NavitarLens(
+        found.registers,
+        name=f"{kind}, generation {found.generation}",
+        homed=context.homed and _believable(found),
+        limits_counts=context.limits_counts,
+    )
+
+
+def _believable(found: Found) -> bool:
+    """Whether the counters can be those of a lens that was homed."""
+    try:
+        anew = counts_anew(found.registers)
+    except CosmicError:
+        found.registers.close()
+        raise
+    if anew:
+        logger.warning(
+            "%s: both motors report 0, as after power-up; home the lens", found.registers.name
+        )
+    return not anew
+
+
+def _make(_options: NoOptions, context: PeripheralContext) -> Lens:
+    return lens_on(open_line(context.port, "navitar"), "Navitar", context)
+
+
+BACKEND: Final = LensBackend(_make)

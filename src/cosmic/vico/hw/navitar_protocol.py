@@ -18,13 +18,14 @@ from typing import Final, Protocol
 from typing_extensions import override
 
 from cosmic.frame.errors import (
+    ConfigError,
     CosmicError,
     DeviceFault,
     DeviceTimeout,
     NotConnectedError,
     ProtocolError,
 )
-from cosmic.vico.hw.serial_port import MOST_BYTES, Deadline, SerialPort
+from cosmic.vico.hw.serial_port import MOST_BYTES, Deadline, SerialPort, open_serial_port
 
 logger = logging.getLogger(__name__)
 
@@ -321,6 +322,43 @@ class Found:
     registers: Registers
     product: Product
     generation: int
+
+    def expect(self, what: str, *products: Product) -> "Found":
+        """Return it where it is one of `products`.
+
+        Parameters
+        ----------
+        what : str
+            What they are, such as "a lens controller".
+
+        Raises
+        ------
+        NotConnectedError
+            It is something else; the line is closed then.
+        """
+        if self.product in products:
+            return self
+        self.registers.close()
+        raise NotConnectedError(
+            f"{self.registers.name}: {what} was expected, a {self.product.name} answers "
+            f"({self.product:#x}); are the ports of lens and light exchanged?",
+            fault=DeviceFault.COMMUNICATION,
+        )
+
+
+def open_line(port: str, backend: str) -> Found:
+    """Open a serial port and ask who is there.
+
+    Raises
+    ------
+    ConfigError
+        No port is named for `backend`.
+    NotConnectedError, DeviceError
+        As `open_serial_port` and `probe`.
+    """
+    if not port:
+        raise ConfigError(f"backend {backend!r} needs a port, such as /dev/ttyUSB0 or COM3")
+    return probe(open_serial_port(port))
 
 
 def probe(port: SerialPort) -> Found:

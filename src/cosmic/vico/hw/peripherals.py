@@ -1,9 +1,16 @@
 """What ViCo asks of a motorised lens and of a lamp, whoever made them (thesis 3.3.2)."""
 
 from abc import abstractmethod
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
+
+from cosmic.frame.clock import WALL, Clock
+from cosmic.frame.plugins import Backend
+
+if TYPE_CHECKING:
+    from cosmic.vico.hw.sim_peripherals import SimPeripherals
 
 
 class LensAxis(StrEnum):
@@ -91,3 +98,34 @@ class Light(Protocol):
     @abstractmethod
     def close(self) -> None:
         """Give the line back; harmless the second time."""
+
+
+@dataclass(frozen=True, slots=True)
+class PeripheralContext:
+    """What a platform gives to the driver of its lens or of its lamp.
+
+    Attributes
+    ----------
+    clock : Clock
+        The platform's, which paces simulated ones.
+    port : str
+        Serial port, such as "/dev/ttyUSB0" or "COM3"; empty where none is named.
+    homed : bool
+        The lens was homed and kept under power since.
+    limits_counts : mapping of LensAxis to int
+        Far ends of the lens, in place of those that its controller tells.
+    simulation : SimPeripherals or None
+        Lens and lamp of the twin; None where there is no twin.
+    """
+
+    clock: Clock = WALL
+    port: str = ""
+    homed: bool = False
+    limits_counts: Mapping[LensAxis, int] = field(default_factory=dict)
+    simulation: "SimPeripherals | None" = None
+
+
+LensBackend = Backend[PeripheralContext, Lens]
+"""What an entry point of the group ``cosmic.lenses`` leads to; making it opens the lens."""
+LightBackend = Backend[PeripheralContext, Light]
+"""What an entry point of the group ``cosmic.lights`` leads to; making it opens the lamp."""

@@ -550,4 +550,4 @@ def _make(_options: NoOptions, context: CameraContext) -> CameraLibrary:
     return SimulatedCameraLibrary(scene, context.clock, context.seed)
 
 
-BACKEND: Final = CameraBackend(_make, simulated=True)
+BACKEND: Final = CameraBackend(_make, simulated=True, twin=True)

@@ -49,7 +49,7 @@ def test_what_a_backend_needs_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         make_camera_library("harvesters")
     with pytest.raises(ConfigError, match="scene"):
         make_camera_library("simulated", clock=ManualClock())
-    with pytest.raises(ConfigError, match=r"'webcam'.*opencv, simulated"):
+    with pytest.raises(ConfigError, match=r"'webcam'.*opencv \(cosmic .*simulated"):
         make_camera_library("webcam")
 
 
