@@ -80,7 +80,7 @@ def settings(folder: Path, channels: int = 2, rate_hz: float = 1000.0) -> DaqcoS
 
 
 @contextmanager
-def at_home(wanted: DaqcoSettings) -> Iterator[Home]:
+def used_locally(wanted: DaqcoSettings) -> Iterator[Home]:
     """Acquire with a simulated board."""
     clock, knob, policy = WallClock(), Knob(), FailurePolicy()
     library = SimulatedLibrary(clock, {("Dev1", "ai0"): knob})
@@ -111,7 +111,7 @@ def remote_daqco(transport: Transport, policy: FailurePolicy) -> RemoteApplicati
 
 
 @contextmanager
-def elsewhere(
+def used_remotely(
     transport: Transport, *, initialize: bool = True
 ) -> Iterator[RemoteApplication[Daqco]]:
     """Use it over a transport."""
@@ -128,14 +128,14 @@ def elsewhere(
 def daqco_rig(where: str, wanted: DaqcoSettings) -> Iterator[DaqcoRig]:
     """Yield DAQCo; `where` is "home" or "station"."""
     with ExitStack() as stack:
-        home = stack.enter_context(at_home(wanted))
+        home = stack.enter_context(used_locally(wanted))
         if where == "home":
             yield DaqcoRig(home, Daqco(home.application))
             return
         endpoint = f"tcp/127.0.0.1:{free_port()}"
         station = stack.enter_context(hosted(home, endpoint))
         transport = stack.enter_context(connected(endpoint))
-        remote = stack.enter_context(elsewhere(transport))
+        remote = stack.enter_context(used_remotely(transport))
         yield DaqcoRig(home, remote.api, remote, station)
 
 

@@ -13,13 +13,13 @@ import pytest
 from contract.daqco_rig import (
     DaqcoRig,
     Home,
-    at_home,
     daqco_rig,
-    elsewhere,
     gather,
     hosted,
     remote_daqco,
     settings,
+    used_locally,
+    used_remotely,
 )
 from contract.station_rig import connected, free_port, listening, wait_until
 from cosmic.daqco.api.daqco import Daqco
@@ -249,11 +249,11 @@ class Line:
 def line(tmp_path: Path) -> Iterator[Line]:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with ExitStack() as stack:
-        home = stack.enter_context(at_home(settings(tmp_path)))
+        home = stack.enter_context(used_locally(settings(tmp_path)))
         served = stack.enter_context(ExitStack())
         served.enter_context(hosted(home, endpoint))
         transport = stack.enter_context(connected(endpoint))
-        remote = stack.enter_context(elsewhere(transport))
+        remote = stack.enter_context(used_remotely(transport))
         made = Line(home, endpoint, remote, remote.api, served=served)
         remote.api.guard.trip = made.stops.append
         remote.api.on_crossing(made.crossings.append)
@@ -344,7 +344,7 @@ def test_a_station_without_daqco_is_told_as_the_reason() -> None:
     with (
         listening(Station("fibres", FailurePolicy()), line),
         connected(endpoint) as transport,
-        elsewhere(transport, initialize=False) as remote,
+        used_remotely(transport, initialize=False) as remote,
     ):
         remote.initialize_later()
         assert wait_until(lambda: "hosts no 'daqco'" in remote.api.away)

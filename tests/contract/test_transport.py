@@ -272,7 +272,7 @@ def test_a_task_that_fails_raises_the_same_exception(rig: StationRig) -> None:
         task.wait(5.0)
 
 
-def test_a_task_can_be_cancelled_from_afar(rig: StationRig) -> None:
+def test_a_task_can_be_cancelled_remote_daqco(rig: StationRig) -> None:
     rig.client.take_lease()
     task: Any = rig.client.call("stage", "travel")
     task.cancel()

@@ -15,10 +15,10 @@ from contract.station_rig import connected, free_port, listening
 from contract.vico_rig import (
     LIMIT_S,
     VicoRig,
-    at_home,
     following,
     hosted,
     soon,
+    used_locally,
     vico_rig,
     with_exposure,
 )
@@ -420,14 +420,14 @@ def test_a_path_without_a_root_begins_on_the_stations_disk(away: VicoRig, tmp_pa
         assert soon(lambda: away.home.application.unit("top").recordings.state.written)
     assert (tmp_path / "run.mkv").exists()
     assert camera.directory == tmp_path
-    assert camera.elsewhere
+    assert camera.remote
 
 
 def test_who_may_only_look_sees_all_and_changes_nothing(tmp_path: Path) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     line = Line(endpoint, listens=True, station="fibres")
     with (
-        at_home(tmp_path, rate=1.0) as home,
+        used_locally(tmp_path, rate=1.0) as home,
         hosted(home) as station,
         listening(station, line, lambda _: Access.VIEW),
         connected(endpoint, "guest") as client,
@@ -538,7 +538,7 @@ def test_moving_the_lens_needs_the_right_to_move(away: VicoRig) -> None:
 
 def test_the_lens_stops_when_who_moves_it_is_gone(tmp_path: Path) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
-    with at_home(tmp_path, rate=1.0) as home, hosted(home, endpoint):
+    with used_locally(tmp_path, rate=1.0) as home, hosted(home, endpoint):
         peripherals = home.application.peripherals
         with connected(endpoint) as client, following(client, home.policy) as remote:
             client.take_lease()
@@ -636,7 +636,7 @@ def test_a_handle_from_elsewhere_has_no_camera_of_its_own(away: VicoRig) -> None
 def test_a_station_that_goes_away_says_so_and_comes_back(tmp_path: Path) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with ExitStack() as stack:
-        home = stack.enter_context(at_home(tmp_path))
+        home = stack.enter_context(used_locally(tmp_path))
         first = stack.enter_context(ExitStack())
         first.enter_context(hosted(home, endpoint))
         client = stack.enter_context(connected(endpoint))

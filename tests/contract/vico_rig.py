@@ -287,7 +287,7 @@ def settings(folder: Path) -> VicoSettings:
 
 
 @contextmanager
-def at_home(
+def used_locally(
     folder: Path, size_px: tuple[int, int] = (64, 48), rate: float = 20.0
 ) -> Iterator[Home]:
     """Run ViCo in this process, its lens `rate` times as fast as a real one."""
@@ -344,7 +344,7 @@ def vico_rig(
 ) -> Iterator[VicoRig]:
     """Yield ViCo as it is used at "home" or over a "station"."""
     with ExitStack() as stack:
-        home = stack.enter_context(at_home(folder, size_px, rate))
+        home = stack.enter_context(used_locally(folder, size_px, rate))
         endpoint = f"tcp/127.0.0.1:{free_port()}" if where != "home" else ""
         station = stack.enter_context(hosted(home, endpoint))
         if where == "home":

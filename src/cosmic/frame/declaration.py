@@ -24,6 +24,7 @@ from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.transfer import let_travel
 from cosmic.frame.network.transport import CALL_TIMEOUT_S, Rule
 from cosmic.frame.operation import Operation
+from cosmic.frame.renamed import Renamed
 
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
@@ -235,6 +236,8 @@ class Declared:
     Here it is used directly. The attributes below are the same wherever it is.
     """
 
+    elsewhere = Renamed("remote")
+    moves_elsewhere = Renamed("moves_remotely")
     _change_event: "Event[[]] | None" = None
 
     @property
@@ -248,8 +251,8 @@ class Declared:
         return ""
 
     @property
-    def elsewhere(self) -> str:
-        """Where it runs, as the operator is told, such as "at the station fibres"; empty here."""
+    def remote(self) -> str:
+        """Where it runs, for the operator, such as "at the station fibres"; empty here."""
         return ""
 
     @property
@@ -263,7 +266,7 @@ class Declared:
         return 0
 
     @property
-    def moves_elsewhere(self) -> bool:
+    def moves_remotely(self) -> bool:
         """Something that was begun through this object still moves at another station."""
         return False
 

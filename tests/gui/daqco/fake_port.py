@@ -97,7 +97,7 @@ class FakePort:
         self.running = True
         self.problem = ""
         self.away = ""
-        self.elsewhere = ""
+        self.remote = ""
         self.counters = Counted()
         self.recording = Recorded()
         self.limits: tuple[Limited, ...] = tuple(Limited(each) for each in given.limit)

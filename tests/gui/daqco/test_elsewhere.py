@@ -6,7 +6,7 @@ from threading import Event
 import pytest
 from PySide6.QtWidgets import QDialogButtonBox
 
-from contract.daqco_rig import at_home, connected, elsewhere, free_port, hosted, settings
+from contract.daqco_rig import connected, free_port, hosted, settings, used_locally, used_remotely
 from cosmic.daqco.core.file_writer import UDaqFileWriter
 from cosmic.daqco.gui.configure_dialog import UDaqConfigureDialog
 from cosmic.daqco.gui.export_dialog import StationExportDialog
@@ -39,13 +39,13 @@ def seen(qtbot, tmp_path, monkeypatch):
     # A machine that is busy with other tests falls silent for a moment now and then.
     monkeypatch.setattr("cosmic.daqco.api.limit_watch.SILENCE_LIMIT_S", 5.0)
     with ExitStack() as stack:
-        home = stack.enter_context(at_home(settings(tmp_path)))
+        home = stack.enter_context(used_locally(settings(tmp_path)))
         endpoint = f"tcp/127.0.0.1:{free_port()}"
         served = stack.enter_context(ExitStack())
         served.enter_context(hosted(home, endpoint))
         transport = stack.enter_context(connected(endpoint))
         stack.callback(declare_gui_thread())
-        remote = stack.enter_context(elsewhere(transport, initialize=False))
+        remote = stack.enter_context(used_remotely(transport, initialize=False))
         main = make_daqco_gui(remote)
         qtbot.addWidget(main)
         main.resize(1000, 700)
@@ -164,7 +164,7 @@ def test_the_window_does_not_wait_for_a_slow_disk_to_close_the_file(qtbot, tmp_p
         return join(writer, timeout_s)
 
     monkeypatch.setattr(UDaqFileWriter, "join", slow_join)
-    with at_home(settings(tmp_path)) as home:
+    with used_locally(settings(tmp_path)) as home:
         main = make_daqco_gui(home.application)
         qtbot.addWidget(main)
         files = main.files
@@ -185,7 +185,7 @@ def test_the_window_does_not_wait_for_a_slow_disk_to_close_the_file(qtbot, tmp_p
 @pytest.mark.defects
 def test_a_mistake_in_what_is_carried_out_aside_is_reported_and_told(qtbot, tmp_path):
     results = []
-    with at_home(settings(tmp_path)) as home:
+    with used_locally(settings(tmp_path)) as home:
         home.application.carry_out(lambda: 1 / 0, lambda *how: results.append(how), slow=True)
         qtbot.waitUntil(lambda: bool(results))
         assert "ZeroDivisionError" in str(results[0][1])

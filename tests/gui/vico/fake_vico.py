@@ -130,7 +130,7 @@ class FakeCamera:
 
     def __init__(self, port: "FakeVico", name: str, directory: Path) -> None:
         self._port, self.name, self.directory = port, name, directory
-        self.elsewhere = self.refused = ""
+        self.remote = self.refused = ""
         self.info: CameraInfo | None = INFO
         self.ranges: CameraRanges | None = RANGES
         self.settings: CameraSettings | None = SETTINGS

@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtWidgets import QWidget
 
 from contract.station_rig import connected, free_port
-from contract.vico_rig import VicoRig, at_home, following, hosted, vico_rig
+from contract.vico_rig import VicoRig, following, hosted, used_locally, vico_rig
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.gui.theme import State
 from cosmic.frame.network.application import RemoteApplication
@@ -103,7 +103,7 @@ def test_a_movement_that_is_refused_is_told_in_the_panel(qtbot, own, rig, window
 def test_the_panels_are_grey_while_the_station_is_away(qtbot, own, window, tmp_path) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with ExitStack() as stack:
-        home = stack.enter_context(at_home(tmp_path, SIZE_PX))
+        home = stack.enter_context(used_locally(tmp_path, SIZE_PX))
         first = stack.enter_context(ExitStack())
         first.enter_context(hosted(home, endpoint))
         client = stack.enter_context(connected(endpoint))

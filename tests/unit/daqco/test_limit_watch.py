@@ -20,7 +20,7 @@ class There:
     def __init__(self) -> None:
         self.clock: Clock = WallClock()
         self.away = ""
-        self.elsewhere = "at the station fibres"
+        self.remote = "at the station fibres"
         self.running = True
         self.latest_chunk: DataChunk | None = None
         self.limits_there: tuple[Limit, ...] = (ARMED,)

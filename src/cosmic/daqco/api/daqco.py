@@ -39,7 +39,7 @@ from cosmic.frame.declaration import Companion, Declared, command, newest, state
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable, RecordingError
 from cosmic.frame.file_names import NameOption, directory_problem, space_left
 from cosmic.frame.network.application import remote_api
-from cosmic.frame.network.caller import called_from_elsewhere
+from cosmic.frame.network.caller import called_remotely
 from cosmic.frame.network.transport import Rule
 from cosmic.frame.operation import Task
 from cosmic.frame.weakly import weakly
@@ -296,7 +296,7 @@ class Daqco(Declared):
         NotAvailable
             Rate or channels would change while recording.
         """
-        if called_from_elsewhere():
+        if called_remotely():
             self._check_change(settings)
         self._application.apply(settings)
 
@@ -383,7 +383,7 @@ class Daqco(Declared):
     @command(reads=True, remembered_s=FOLDER_AGE_S, meanwhile="")
     def folder_problem(self, directory: str) -> str:
         """Return why nothing can be recorded in `directory`; empty when it can."""
-        if not called_from_elsewhere() or not directory.strip():
+        if not called_remotely() or not directory.strip():
             return directory_problem(directory)
         try:
             return directory_problem(str(self._folders.folder(directory)))
@@ -443,10 +443,10 @@ class Daqco(Declared):
 
     def _file(self, path: str | Path, suffixes: tuple[str, ...]) -> Path:
         """Return a file as it was named here, or where other stations may have it."""
-        return self._folders.file(str(path), suffixes) if called_from_elsewhere() else Path(path)
+        return self._folders.file(str(path), suffixes) if called_remotely() else Path(path)
 
     def _folder(self, directory: Path) -> Path:
-        return self._folders.folder(str(directory)) if called_from_elsewhere() else directory
+        return self._folders.folder(str(directory)) if called_remotely() else directory
 
     # Limits
 

@@ -35,7 +35,7 @@ class Watched(Protocol):
         """Why the station cannot be reached."""
 
     @property
-    def elsewhere(self) -> str:
+    def remote(self) -> str:
         """Where the station is."""
 
     @property
@@ -152,7 +152,7 @@ class LimitWatch(Companion):
         self._take(crossing, quiet=False)
 
     def _on_failure(self, text: str) -> None:
-        logger.error("DAQCo %s: %s", self._daqco.elsewhere, text[:500])
+        logger.error("DAQCo %s: %s", self._daqco.remote, text[:500])
 
     def _trip_silent(self, limit: Limit) -> None:
         why = self._daqco.away or "it sends nothing"

@@ -266,12 +266,12 @@ class UDaqFileWidget(QWidget):
         self.full_name.setToolTip(tip)
 
     def _show_browse(self) -> None:
-        where = self._daqco.elsewhere
+        where = self._daqco.remote
         self.browse.setEnabled(self.browse.isEnabled() and not where)
         self.browse.setToolTip(f"The files lie {where}; type the directory" if where else _BROWSE)
 
     def _example(self) -> str:
-        if self._daqco.elsewhere:
+        if self._daqco.remote:
             return "The name is completed when the recording begins"
         try:
             return f"Now: {self._name_now().path.name}"

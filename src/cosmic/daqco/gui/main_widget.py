@@ -152,7 +152,7 @@ class UDaqMainWidget(QWidget):
         self.start_recording.setEnabled(running and not recording)
         self.stop_recording.setEnabled(recording and not away)
         self.export.setEnabled(not away)
-        self.quit.setText("&Close this panel" if daqco.elsewhere else "&Stop DAQCo")
+        self.quit.setText("&Close this panel" if daqco.remote else "&Stop DAQCo")
         self._say(daqco.problem)
 
     def _say(self, text: str) -> None:
@@ -176,7 +176,7 @@ class UDaqMainWidget(QWidget):
         self._do(self._daqco.stop)
 
     def _on_quit(self) -> None:
-        if self._daqco.running and not self._daqco.elsewhere:
+        if self._daqco.running and not self._daqco.remote:
             self._do(self._daqco.stop)
         self.close_requested.emit()
         if self.isWindow():
@@ -196,7 +196,7 @@ class UDaqMainWidget(QWidget):
     # Export
 
     def _on_export(self) -> None:
-        if self._daqco.elsewhere:
+        if self._daqco.remote:
             folder = self.files.folder
             self._asking.ask(lambda: self._daqco.recordings(folder), self._on_listed)
             return
@@ -209,7 +209,7 @@ class UDaqMainWidget(QWidget):
         if found is None:
             self._say(str(error))
             return
-        dialog = StationExportDialog(found, self._daqco.elsewhere, self)
+        dialog = StationExportDialog(found, self._daqco.remote, self)
         dialog.chosen.connect(self.export_recording)
         self._open(dialog)
 

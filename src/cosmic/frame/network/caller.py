@@ -80,7 +80,7 @@ def current_call() -> Call | None:
     return _current.get()
 
 
-def called_from_elsewhere() -> bool:
+def called_remotely() -> bool:
     """Return whether this thread does what another process asked for."""
     call = _current.get()
     return call is not None and not call.caller.local

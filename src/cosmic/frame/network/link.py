@@ -134,7 +134,7 @@ class ApplicationLink:
         self._newest: dict[tuple[str, ...], Callable[[], object]] = {}
         self._numbers = count(1)
         self._moving: set[Operation[Any]] = set()
-        self._keeper = _Keeper(f"{name} elsewhere", self._look, policy)
+        self._keeper = _Keeper(f"remote {name}", self._look, policy)
         self._lock = Lock()
         self._start = ""
         self._known: dict[tuple[str, ...], _Known] = {}
@@ -190,7 +190,7 @@ class ApplicationLink:
         return self._away
 
     @property
-    def elsewhere(self) -> str:
+    def remote(self) -> str:
         """Where it runs, as the operator is told."""
         return f"at the station {self._station}" if self._station else "at another station"
 

@@ -51,8 +51,8 @@ class Proxied(Declared):
 
     @property
     @override
-    def elsewhere(self) -> str:
-        return self._link.elsewhere
+    def remote(self) -> str:
+        return self._link.remote
 
     @property
     @override
@@ -66,7 +66,7 @@ class Proxied(Declared):
 
     @property
     @override
-    def moves_elsewhere(self) -> bool:
+    def moves_remotely(self) -> bool:
         return self._link.moves
 
     @override

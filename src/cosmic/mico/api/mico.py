@@ -138,7 +138,7 @@ class Mico(Declared):
     @override
     def note_change(self) -> None:
         super().note_change()
-        if self.elsewhere and self.away != self._published_away:
+        if self.remote and self.away != self._published_away:
             self._published_away = self.away
             for axis in self.axes.values():
                 axis.note_change()
@@ -180,8 +180,8 @@ class Mico(Declared):
 
     def __getitem__(self, name: str) -> Axis:
         """Return an axis; raises `UnknownAxisError`, a `CosmicError` and `KeyError`."""
-        if self.elsewhere:
-            return self._axis_elsewhere(name)
+        if self.remote:
+            return self._remote_axis(name)
         address = self._manager.address(name)
         axis = self._axes.get(name)
         if axis is None:
@@ -191,7 +191,7 @@ class Mico(Declared):
             self._axes[name] = axis
         return axis
 
-    def _axis_elsewhere(self, name: str) -> Axis:
+    def _remote_axis(self, name: str) -> Axis:
         axis = self.axes.get(name) if isinstance(name, str) else None
         if axis is None:
             raise UnknownAxisError(name, self.names)
@@ -220,7 +220,7 @@ class Mico(Declared):
     @property
     def names(self) -> list[str]:
         """Names of all axes, in the order of the configuration."""
-        return list(self.axes) if self.elsewhere else self._manager.names()
+        return list(self.axes) if self.remote else self._manager.names()
 
     @property
     @state(fixed=True, unknown=NOTHING_KNOWN)
@@ -502,7 +502,7 @@ class Mico(Declared):
         Where the axes are at another station and this thread must not wait (a window), it is what
         can be said without collisions; the gate there decides each movement in any case.
         """
-        if self.elsewhere and not may_wait_here():
+        if self.remote and not may_wait_here():
             return self._foreseen(motions, consent)
         try:
             return self.check_motions(dict(motions), consent=consent)
@@ -805,7 +805,7 @@ class Mico(Declared):
         if not wait:
             return movement
         reached = wait_or_cancel(movement)
-        if not self.elsewhere:  # what ends a movement tells it after whoever waits
+        if not self.remote:  # what ends a movement tells it after whoever waits
             self._home.undo.drop(entry)
         return reached
 
@@ -909,7 +909,7 @@ class _MicoCompanion(Companion):
 
     def _on_safe_stop(self, reason: str) -> None:
         """Stop what was begun here, when something here has failed."""
-        if self._mico.moves_elsewhere and not self._mico.away:
+        if self._mico.moves_remotely and not self._mico.away:
             self._mico.carry_out(partial(self._mico.stop, reason), self._on_stopped)
 
     def _on_stopped(self, _result: None, error: CosmicError | None) -> None:

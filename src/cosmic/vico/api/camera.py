@@ -13,7 +13,7 @@ from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.file_names import space_left
 from cosmic.frame.job_queue import JobQueue
-from cosmic.frame.network.caller import called_from_elsewhere
+from cosmic.frame.network.caller import called_remotely
 from cosmic.frame.network.transport import Rule
 from cosmic.frame.operation import Task
 from cosmic.frame.renamed import Renamed
@@ -416,7 +416,7 @@ class CameraHandle(CameraCoordinates, CameraShape, Declared):
 
     def _on_disk(self, path: Path | str) -> Path:
         """Return a path on this disk; named elsewhere, it begins where images go."""
-        if not called_from_elsewhere():
+        if not called_remotely():
             return Path(path)
         return self._application.directory / Path(path).expanduser()
 

@@ -25,7 +25,7 @@ class FileFields(QWidget):
 
     Parameters
     ----------
-    elsewhere : str
+    station : str
         Whose disk it is, where it is not this computer's: nobody can look at it from here.
 
     Signals
@@ -43,16 +43,16 @@ class FileFields(QWidget):
         parent: QWidget | None = None,
         *,
         now: Callable[[], datetime] = datetime.now,
-        elsewhere: str = "",
+        station: str = "",
     ) -> None:
         super().__init__(parent)
-        self._now, self._elsewhere = now, elsewhere
+        self._now, self._station = now, station
         self.base = tipped(QLineEdit(base), "Base of the file names")
         self.stamp = tipped(QCheckBox("append time"), "Append date and time to each name")
         self.stamp.setChecked(True)
-        self.directory = tipped(QLineEdit(str(directory)), elsewhere or "Where files are stored")
-        self.browse = push_button("Browse…", elsewhere or "Choose the directory")
-        self.browse.setEnabled(not elsewhere)
+        self.directory = tipped(QLineEdit(str(directory)), station or "Where files are stored")
+        self.browse = push_button("Browse…", station or "Choose the directory")
+        self.browse.setEnabled(not station)
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setSpacing(STEP_PX // 2)
@@ -73,7 +73,7 @@ class FileFields(QWidget):
     def folder(self) -> Path:
         """The directory as it stands in its field."""
         folder = Path(self.directory.text())
-        return folder if self._elsewhere else folder.expanduser()
+        return folder if self._station else folder.expanduser()
 
     @property
     def problem(self) -> str:
@@ -82,7 +82,7 @@ class FileFields(QWidget):
 
     @property
     def _directory_problem(self) -> str:
-        return "" if self._elsewhere else directory_problem(self.directory.text())
+        return "" if self._station else directory_problem(self.directory.text())
 
     def path(self, suffix: str, *, exact: bool = False) -> Path:
         """Return the whole path for a file that begins now; `exact` names milliseconds too."""

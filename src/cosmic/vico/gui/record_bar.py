@@ -120,7 +120,7 @@ class RecordBar(QWidget):
         self.more = push_button("File…", "Show the fields for name, directory and format")
         self.more.setCheckable(True)
         self.format = tipped(QComboBox(), "File format of recordings")
-        self.files = FileFields(camera.directory, camera.name, now=now, elsewhere=camera.elsewhere)
+        self.files = FileFields(camera.directory, camera.name, now=now, station=camera.remote)
         self.message, self.tasks = ElidedLabel(), TaskBar()
         self.message.setFont(number_font())
         self._fields = QWidget()
@@ -179,7 +179,7 @@ class RecordBar(QWidget):
         recording, wrong = self._camera.recording, self.files.problem
         self.files.setEnabled(not recording.active)
         self.format.setEnabled(not recording.active)
-        away = self._camera.problem if self._camera.elsewhere else ""
+        away = self._camera.problem if self._camera.remote else ""
         still_wrong = wrong or away or ("" if self._camera.latest() else "There is no image yet")
         chosen = self.chosen
         wrong = wrong or (chosen.problem if chosen is not None else "No format is available")
@@ -249,7 +249,7 @@ class RecordBar(QWidget):
 
     def _unless_there(self, path: Path, act: Callable[[bool], object]) -> None:
         """Do it, after a question where it would overwrite something."""
-        if not self._camera.elsewhere and path.exists():
+        if not self._camera.remote and path.exists():
             overwrite_question(self, path, lambda: self._try(lambda: act(True))).open()
             self.refresh()
         else:
