@@ -43,11 +43,14 @@ from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.elsewhere import MicoElsewhere
 from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.mico.api.stepwise import StepwiseMove
+from cosmic.mico.api.trajectory_places import AwayFromStartError
+from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.motion.orders import Jog, MoveTo, Steer
 from cosmic.mico.core.motion.positioner import Confidence, Status
 
 SLOW_HZ = 10
+HEAD = "cosmic-trajectory 1\nplatform FiberStation\n"
 
 
 @pytest.fixture(scope="module")
@@ -268,12 +271,11 @@ def test_poses_ways_and_collisions(mico: Mico) -> None:
 def test_a_trajectory_is_rehearsed_against_the_scene(mico: Mico) -> None:
     assert "left_jaw_a" in mico.collision.scene.bodies
     assert mico.check({"left.z": -5_000.0}).reason is Reason.COLLISION
-    head = "cosmic-trajectory 1\nplatform FiberStation\n"
-    into_the_plate = mico.trajectories.parse(f"{head}left.z to -5000 um\n")
+    into_the_plate = mico.trajectories.parse(f"{HEAD}left.z to -5000 um\n")
     found = mico.trajectories.rehearse(into_the_plate)
     assert not found.allowed
     assert "plate" in str(found.verdict)
-    assert mico.trajectories.rehearse(mico.trajectories.parse(f"{head}left.x to 50 um\n")).allowed
+    assert mico.trajectories.rehearse(mico.trajectories.parse(f"{HEAD}left.x to 50 um\n")).allowed
 
 
 def test_the_initialisation_tells_how_far_it_is(mico: Mico) -> None:
@@ -292,6 +294,65 @@ def test_a_trajectory_runs_pauses_and_goes_on(mico: Mico, tmp_path: Path) -> Non
     player = mico.trajectories.run(path, start="straight")
     assert player.state == "ended"
     assert mico["left.x"].position_um == pytest.approx(20.0, abs=1.0)
+
+
+def test_a_trajectory_is_stepped_watched_and_goes_on_where_it_failed(mico: Mico) -> None:
+    text = f"{HEAD}left.x to 30 um\n# a comment\nleft.y to 40 um\nleft.x to 5000 um\n"
+    player = mico.trajectories.prepare(mico.trajectories.parse(text), speed=0.5)
+    told: list[PlayProgress] = []
+    player.subscribe(told.append)
+    assert (player.state, player.line, player.speed) == (PlayState.READY, 0, 0.5)
+    player.step()
+    assert player.wait_for_pause(10.0)
+    assert (player.state, player.line) == (PlayState.PAUSED, 5)
+    assert mico["left.x"].position_um == pytest.approx(30.0, abs=1.0)
+    assert player.rehearsal is not None
+    assert player.rehearsal.allowed
+    mico["left.x"].move_to(0.0)
+    with pytest.raises(AwayFromStartError, match=r"left\.x at") as away:
+        player.resume()
+    assert away.value.targets["left.x"] == pytest.approx(30.0, abs=1.0)
+    player.speed, player.loops = 10.0, 1
+    mico.application.manager.stop("test")
+    with pytest.raises(StoppedError):
+        player.resume("straight")
+        player.wait(10.0)
+    assert player.failure is not None
+    mico.reset_stop()
+    player.resume("straight")
+    player.wait(10.0)
+    assert mico["left.x"].position_um == pytest.approx(5000.0, abs=1.0)
+    wait_for(lambda: told[-1].state is PlayState.ENDED)
+    assert {each.state for each in told} >= {PlayState.READY, PlayState.PAUSED}
+    assert mico.trajectories.player is not None
+    assert mico.trajectories.player.trajectory.lines == tuple(text.splitlines())
+
+
+def test_what_another_program_plays_is_seen_and_can_be_paused(hosted: HostedMico) -> None:
+    text = f"{HEAD}wait 5 s\nleft.x to 30 um\n"
+    player = hosted.mico.trajectories.run(hosted.mico.trajectories.parse(text), wait=False)
+    with remote_mico(hosted, "memory", takes_lease=False) as (mico, _, _):
+        wait_for(lambda: mico.trajectories.player is not None)
+        seen = mico.trajectories.player
+        assert seen is not None
+        assert seen.trajectory.lines == player.trajectory.lines
+        seen.pause()
+        assert player.wait_for_pause(10.0)
+        assert seen.wait_for_pause(10.0)
+        with pytest.raises((MoveRefused, CallRefused)):
+            seen.resume()
+        seen.cancel()
+        wait_for(lambda: player.state is PlayState.CANCELLED)
+
+
+def test_a_long_trajectory_travels_in_pieces(hosted: HostedMico, how: str) -> None:
+    lines = [f"left.x to {each % 50} um" for each in range(8000)]
+    text = HEAD + "\n".join(lines) + "\n"
+    with remote_mico(hosted, how) as (mico, _, _):
+        player = mico.trajectories.prepare(mico.trajectories.parse(text))
+        assert player.text() == text
+        assert hosted.mico.trajectories.player is not None
+        assert hosted.mico.trajectories.player.trajectory.lines == tuple(text.splitlines())
 
 
 def test_a_long_move_is_made_in_parts(mico: Mico) -> None:
@@ -435,6 +496,46 @@ def test_what_the_station_carries_out_for_a_client_ends_with_its_lease(
         assert (hosted.mico["left.x"].position_um or 0.0) < 4_000.0
 
 
+@pytest.mark.parametrize("ended_by", ["lease", "line"])
+def test_a_trajectory_ends_with_the_program_that_runs_it(
+    hosted: HostedMico, how: str, ended_by: str
+) -> None:
+    text = f"{HEAD}left.x to 5000 um\nleft.x to 0 um\n"
+    with remote_mico(hosted, how) as (mico, _, transport):
+        mico["left.x"].set_closed_loop_frequency(SLOW_HZ)
+        player = mico.trajectories.run(mico.trajectories.parse(text), wait=False)
+        wait_for(lambda: hosted.mico["left.x"].details.in_motion)
+        assert mico.moves_remotely
+        if ended_by == "lease":
+            transport.release_lease()
+            with pytest.raises(MoveCancelled):
+                player.wait(5.0)
+        else:
+            transport.close()
+            with pytest.raises(NotAvailable):
+                player.wait(5.0)
+        there = hosted.mico.trajectories.player
+        assert there is not None
+        wait_for(lambda: there.done)
+        wait_for(lambda: not hosted.mico["left.x"].details.in_motion)
+        assert (hosted.mico["left.x"].position_um or 0.0) < 4_000.0
+
+
+def test_going_to_a_pose_ends_with_the_program_that_began_it(hosted: HostedMico, how: str) -> None:
+    hosted.mico["left.x"].move_to(4_500.0)
+    hosted.mico.poses.teach("far", ["left.x"])
+    hosted.mico["left.x"].move_to(0.0)
+    with remote_mico(hosted, how) as (mico, _, transport):
+        mico["left.x"].set_closed_loop_frequency(SLOW_HZ)
+        task = mico.poses.go("far", wait=False)
+        wait_for(lambda: hosted.mico["left.x"].details.in_motion)
+        transport.release_lease()
+        with pytest.raises(MoveCancelled):
+            task.wait(5.0)
+        wait_for(lambda: not hosted.mico["left.x"].details.in_motion)
+        assert (hosted.mico["left.x"].position_um or 0.0) < 4_000.0
+
+
 def test_what_a_program_has_begun_stops_when_it_closes_mico(hosted: HostedMico, how: str) -> None:
     with transport_to(hosted, how) as client:
         client.take_lease()
@@ -566,12 +667,16 @@ def test_an_ill_typed_order_moves_nothing(hosted: HostedMico, how: str) -> None:
             ("axes.begin_jog", {"key": "3", "motion": Steer(1, 5.0, 1e9)} | left),
             ("add_link", {"first": "left.x", "second": "left.gripper", "ratio": 1.0}),
             ("add_link", {"first": "left.x", "second": "right.x", "ratio": nan}),
-            ("put_pose", {"name": "x", "positions": {"left.x": nan}}),
+            ("poses.learn", {"name": "x", "axes": ["nowhere"]}),
+            ("poses.learn", {"name": "a\nb"}),
+            ("poses.begin", {"name": "nowhere"}),
+            ("trajectories.begin_player", {"given": "never given"}),
+            ("trajectories.players.begin", {"@": ("7",)}),
             ("begin_search", {"targets": {"left.x": 1.0}, "budget_s": 1e9}),
             ("axes.limit_frequency", {"frequency_hz": 0} | left),
             ("axes.halt", {"@": ("nowhere",)}),
         ):
-            with pytest.raises((MoveRefused, NotAvailable, CallRefused)):
+            with pytest.raises((MoveRefused, NotAvailable, CallRefused, UnknownAxisError)):
                 client.call("mico", function, arguments)
         client.call("mico", "stop", {"reason": "a\nforged line\x1b[31m" + 500 * "x"})
         reason = hosted.application.manager.latch.state.reason or ""

@@ -149,7 +149,7 @@ class FullDisk(io.FileIO):
 def test_a_full_disk_is_told_and_keeps_the_lines_written_before(mico: Mico, tmp_path: Path) -> None:
     path = tmp_path / "a.trajectory"
     recorder = TrajectoryRecorder(
-        mico.application.manager,
+        mico,
         path,
         Trajectory("any", (), recorded="today"),
         FailurePolicy(),

@@ -298,7 +298,7 @@ class Declared:
         del slow
         do_and_report(action, on_result)
 
-    def prepare(self, key: str, policy: FailurePolicy) -> None:
+    def set_up_proxy(self, key: str, policy: FailurePolicy) -> None:
         """Prepare what a proxy of this class keeps on this side; `key` is that of the part."""
 
     def take_lease_of(self, lease: StationLease) -> None:

@@ -35,7 +35,7 @@ class Proxied(Declared):
         self._link = link
         self._address = address
         self._parts: dict[tuple[str, str | None], Proxied] = {}
-        self.prepare(address.keys[-1] if address.keys else "", link.policy)
+        self.set_up_proxy(address.keys[-1] if address.keys else "", link.policy)
         if not address.at:
             link.join(self.made_companion(), self._on_change)
 

@@ -17,6 +17,8 @@ _FIELDS: Final[dict[str, tuple[type, ...]]] = {
     "device": (int, type(None)),
     "channel": (int, type(None)),
     "text": (str,),
+    "targets": (dict,),
+    "problems": (tuple,),
 }
 
 

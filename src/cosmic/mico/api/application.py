@@ -14,6 +14,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Operation, Task
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.initialisation import Asker, Confirm, InitialisationRun
+from cosmic.mico.api.trajectory_player import Players
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.ways import Way, follow, way_from_plan
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT, CollisionChecker
@@ -70,6 +71,7 @@ class MicoApplication(MicoApplicationBase):
         self.undo = UndoHistory(self.manager, self.cautions)
         self.teleoperation = Teleoperation(self.manager, policy, folder=folder)
         self.trajectories = TrajectorySite(self, policy, platform, folder)
+        self.players = Players()
         self._failure = ""
         self._report = SequenceReport(())
         self._asker = Asker(lambda: True)
@@ -240,7 +242,7 @@ class MicoApplication(MicoApplicationBase):
         """Stop every movement, release the hold, end all threads; any state."""
         self.request_end()
         self.teleoperation.close()
-        self.trajectories.close()
+        self.recordings.close()
         if self.clearance_watch is not None:
             self.clearance_watch.request_end()
             self.clearance_watch.join()

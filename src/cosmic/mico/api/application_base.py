@@ -4,14 +4,16 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QObject, Signal
 
+from cosmic.frame.application import GuiFactory
 from cosmic.frame.errors import CosmicError, MoveRefused
+from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Task
 from cosmic.frame.task_application import TaskApplication
 from cosmic.mico.api.initialisation import Confirm
 from cosmic.mico.api.ports import CollisionPort, UndoPort
-from cosmic.mico.api.trajectory_site import TrajectorySite
+from cosmic.mico.api.trajectory_recording import Recordings
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.motion.undo import Cautions
@@ -50,7 +52,16 @@ class MicoApplicationBase(TaskApplication):
     undo: UndoPort
     cautions: Cautions
     teleoperation: Teleoperation
-    trajectories: TrajectorySite
+
+    def __init__(
+        self,
+        title: str,
+        policy: FailurePolicy,
+        gui_factory: GuiFactory | None = None,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(title, policy, gui_factory, parent)
+        self.recordings = Recordings(policy)
 
     @property
     @abstractmethod

@@ -243,7 +243,7 @@ class Axis(AxisShape, Declared):
         self._movable = AxisMovable(self)
 
     @override
-    def prepare(self, key: str, policy: FailurePolicy) -> None:
+    def set_up_proxy(self, key: str, policy: FailurePolicy) -> None:
         if not isinstance(policy, FailurePolicy):
             raise TypeError(f"policy must be a FailurePolicy, not {str(policy)[:60]}")
         self._name = key

@@ -21,7 +21,6 @@ from cosmic.mico.api.initialisation import POLL_S, Confirm
 from cosmic.mico.api.manager_elsewhere import ManagerElsewhere
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.mirrors import CollisionElsewhere
-from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.model import SceneModel
@@ -37,9 +36,10 @@ _CLOSED: Final = "MiCo is closed here"
 class MicoElsewhere(MicoApplicationBase):
     """Shows and commands the axes of a station as if they were here.
 
-    Everything goes through `Mico`, as the station declares it. Initialisation and detours run at
-    the station, trajectories and teleoperation in this process, each movement by the station; what
-    moves there stops when this process ends, freezes or loses the lease.
+    Everything goes through `Mico`, as the station declares it. Initialisation, detours, poses
+    and trajectories run at the station; teleoperation reads its device in this process, and jogs
+    there under the dead man. What moves there stops when this process ends, freezes or loses the
+    lease.
 
     Parameters
     ----------
@@ -79,8 +79,6 @@ class MicoElsewhere(MicoApplicationBase):
         self.undo = self.manager.undo
         self.cautions = Cautions()  # what the station felt stands in the entries it tells
         self.teleoperation = Teleoperation(self.manager, policy)
-        self.trajectories = TrajectorySite(self, policy)
-        self.trajectories.poses = self.manager.poses
         self.manager.changed.connect(self.status_changed, Qt.ConnectionType.DirectConnection)
         self.api.on_change(self._on_change)
 
@@ -147,7 +145,6 @@ class MicoElsewhere(MicoApplicationBase):
             self._asked = False  # the next word of the station asks again
             return
         self.collision.learn(scene)
-        self.trajectories.platform = self.api.platform
         if not self._dressed:
             self._dressed = True
             self.teleoperation.close()
@@ -166,7 +163,7 @@ class MicoElsewhere(MicoApplicationBase):
         self._closed = True
         self.request_end()
         self.teleoperation.close()
-        self.trajectories.close()
+        self.recordings.close()
         self.clearance_watch.request_end()
         self.clearance_watch.join()
         self._end_movements()

@@ -21,7 +21,6 @@ from cosmic.mico.api.mirrors import (
     ControllerElsewhere,
     LatchElsewhere,
     LinksElsewhere,
-    PosesElsewhere,
     UndoElsewhere,
 )
 from cosmic.mico.api.news import (
@@ -261,7 +260,6 @@ class ManagerElsewhere(QObject):
         self.links = LinksElsewhere(mico)
         self.links.subscribe(self.links_changed.emit)
         self.collision = CollisionElsewhere(mico)
-        self.poses = PosesElsewhere(mico)
         self.undo = UndoElsewhere()
 
     # What there is
@@ -371,7 +369,6 @@ class ManagerElsewhere(QObject):
                 self._on_axis(axis, axis.details)
         self.latch.show(mico.stop_state)
         self.links.show(mico.links)
-        self.poses.show(mico.kept_poses)
         self.undo.show(mico.undo_entries)
         self.collision.show(mico.taken_out, mico.allowed_contacts)
         outline = (mico.ready, mico.failure, tuple(mico.axes), mico.missing)

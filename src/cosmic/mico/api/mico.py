@@ -37,6 +37,8 @@ from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.initialisation import Confirm
 from cosmic.mico.api.links import check_linkable, check_links_may_change
 from cosmic.mico.api.news import (
+    AxisBegun,
+    AxisEnded,
     AxisPositions,
     MovementNews,
     SentMotion,
@@ -45,6 +47,7 @@ from cosmic.mico.api.news import (
 )
 from cosmic.mico.api.poses import Poses
 from cosmic.mico.api.trajectories import Trajectories
+from cosmic.mico.api.trajectory_recording import Recordings
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
@@ -53,6 +56,7 @@ from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.motion.links import Link
 from cosmic.mico.core.motion.orders import Motion, MoveBy, MoveTo
+from cosmic.mico.core.motion.positioner import PositionerState, class_for
 from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.mico.core.motion.undo import UndoEntry, undo_text
 from cosmic.mico.core.ports import DevicePort, ManagerPort
@@ -60,6 +64,8 @@ from cosmic.mico.core.poses import Pose
 from cosmic.mico.core.sequence.report import SequenceReport
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
+from cosmic.mico.core.trajectory.binding import AxisFacts, PlatformFacts
+from cosmic.mico.core.trajectory_recorder import Recorded
 
 SCENE_LIMIT_S: Final = 10.0
 """How long the shapes of all bodies may take on the way."""
@@ -87,6 +93,8 @@ class Mico(Declared):
         self._home: MicoApplication = application
         self._manager: ManagerPort = application.manager
         self._begin_here(source)
+        self._poses = Poses(application.trajectories, source)
+        self._trajectories = Trajectories(self, application.trajectories, application.players)
         direct = Qt.ConnectionType.DirectConnection
         manager, changed = application.manager, weakly(self.note_change)
         manager.links_changed.connect(changed, direct)
@@ -112,7 +120,7 @@ class Mico(Declared):
     # Where the axes are at another station
 
     @override
-    def prepare(self, key: str, policy: FailurePolicy) -> None:
+    def set_up_proxy(self, key: str, policy: FailurePolicy) -> None:
         if not isinstance(policy, FailurePolicy):
             raise TypeError(f"policy must be a FailurePolicy, not {str(policy)[:60]}")
         self._begin_here("script")
@@ -130,6 +138,9 @@ class Mico(Declared):
             raise TypeError(f"application must be a MiCo, not {str(application)[:60]}")
         self._application, self._manager = application, application.manager
         self._source = source or self._source
+        if self.remote:
+            self.trajectories.belong_to(self)
+            self.poses.belong_to(self._source)
         self._connect()
         # Direct, because a script has no event loop that a queued call could arrive in.
         direct = Qt.ConnectionType.DirectConnection
@@ -253,6 +264,15 @@ class Mico(Declared):
         return self._home.collision is not None
 
     @property
+    def source(self) -> str:
+        """Who commands through this object, for the log."""
+        return self._source
+
+    def states(self) -> dict[str, PositionerState]:
+        """Return the state of every axis by name, in gate coordinates."""
+        return {name: axis.details for name, axis in self.axes.items()}
+
+    @property
     def missing(self) -> tuple[str, ...]:
         """What was configured and is not there, a line each."""
         return (self.away, *self._missing) if self.away else self._missing
@@ -305,12 +325,6 @@ class Mico(Declared):
     def initialisation(self) -> SequenceReport:
         """How far the initialisation sequence is, or was."""
         return self._home.initialisation
-
-    @property
-    @state
-    def kept_poses(self) -> tuple[Pose, ...]:
-        """All named poses."""
-        return tuple(self._home.trajectories.poses.poses.values())
 
     @property
     def taken_out(self) -> tuple[str, ...]:
@@ -521,9 +535,8 @@ class Mico(Declared):
         return self._manager.check(motions, consent=consent)
 
     def _foreseen(self, motions: Mapping[str, Motion], consent: bool) -> MoveVerdict:
-        states = {axis.name: axis.details for axis in self}
         reason = self.stop_state.reason
-        return foreseen(motions, states, self.settings, consent=consent, stop_reason=reason)
+        return foreseen(motions, self.states(), self.settings, consent=consent, stop_reason=reason)
 
     def _in_gate(self, name: str, value: Number) -> float:
         axis = self[name]
@@ -696,14 +709,47 @@ class Mico(Declared):
     # Trajectories and named poses
 
     @property
+    @part
     def trajectories(self) -> Trajectories:
         """Records, reads, rehearses and runs trajectories."""
-        return Trajectories(self._application.trajectories, self._source)
+        return self._trajectories
 
     @property
+    @part
     def poses(self) -> Poses:
         """Named poses: teach, go, remove."""
-        return Poses(self._application.trajectories, self._source)
+        return self._poses
+
+    def pose(self, name: str) -> Pose:
+        """Return a named pose; raises `NotAvailable`."""
+        return self.poses[name]
+
+    def facts(self) -> PlatformFacts:
+        """Return what a trajectory is checked against, as it is known here."""
+        axes = {
+            name: AxisFacts(
+                unit=each.unit,
+                has_sensor=class_for(each.kind, each.positioner).has_sensor,
+                limits=each.limits,
+            )
+            for name, each in self.states().items()
+        }
+        poses = {each.name: each for each in self.poses}
+        return PlatformFacts(self.platform, axes, self.settings.defaults, poses)
+
+    @property
+    def recordings(self) -> Recordings:
+        """What this process records of movements."""
+        return self._application.recordings
+
+    def follow_recorded(self, receiver: Callable[[Recorded], object]) -> Callable[[], None]:
+        """Call `receiver` with every movement as a recorder takes it; returns what ends it."""
+
+        def on_movement(news: MovementNews) -> None:
+            if isinstance(news, AxisBegun | AxisEnded):
+                receiver(news.recorded())
+
+        return self.follow_movements(on_movement)
 
     # Links
 
@@ -870,23 +916,6 @@ class Mico(Declared):
         if model is None:
             raise NotAvailable(f"{NO_MODEL_TEXT}: name a scene in the station's platform file")
         return model
-
-    # What poses are kept
-
-    @command(aside=True)
-    def put_pose(self, name: str, positions: dict[str, float]) -> None:
-        """Keep a named pose, in gate coordinates."""
-        for axis, position in positions.items():
-            self._manager.address(axis)
-            finite(position, f"{axis}: a position")
-        self._home.trajectories.poses.put(Pose(name, dict(positions)))
-        self.note_change()
-
-    @command(aside=True)
-    def remove_pose(self, name: str) -> None:
-        """Forget a named pose."""
-        self._home.trajectories.poses.remove(name)
-        self.note_change()
 
 
 class _MicoCompanion(Companion):

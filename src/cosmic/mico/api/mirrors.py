@@ -17,7 +17,6 @@ from cosmic.mico.core.collision.model import BodyPair, SceneModel, pair_of
 from cosmic.mico.core.motion.links import Link, LinkTable
 from cosmic.mico.core.motion.stop_latch import StopLatch, StopState
 from cosmic.mico.core.motion.undo import UndoEntry
-from cosmic.mico.core.poses import Pose, PoseBook
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,27 +149,6 @@ class CollisionElsewhere(Exemptions):
             self._note_ignored()
         if changed:
             self._changed.emit()
-
-
-class PosesElsewhere(PoseBook):
-    """The named poses of a station."""
-
-    def __init__(self, mico: Mico) -> None:
-        super().__init__()
-        self._mico = mico
-
-    @override
-    def put(self, pose: Pose) -> None:
-        self._mico.put_pose(pose.name, dict(pose.positions))
-
-    @override
-    def remove(self, name: str) -> None:
-        self._mico.remove_pose(name)
-
-    def show(self, poses: Iterable[Pose]) -> None:
-        """Take what was told."""
-        with self._guard:
-            self._poses = {pose.name: pose for pose in poses}
 
 
 class UndoElsewhere(QObject):

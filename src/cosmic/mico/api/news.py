@@ -25,6 +25,13 @@ from cosmic.mico.core.motion.orders import (
     Step,
     ToEndStop,
 )
+from cosmic.mico.core.motion.positioner import PositionerState, class_for
+from cosmic.mico.core.trajectory_recorder import (
+    RecordedBegin,
+    RecordedEnd,
+    positions_of,
+    resting_of,
+)
 
 PERIOD_S: Final = 1 / 30
 """The least time between two tellings of positions."""
@@ -57,7 +64,19 @@ class AxisRefused:
 
 @dataclass(frozen=True, slots=True)
 class AxisBegun:
-    """A movement was sent to the controller; as `MovementBegun`."""
+    """A movement was sent to the controller; as `MovementBegun`, with what was so then.
+
+    Attributes
+    ----------
+    positions : mapping of float
+        Where all axes were, as far as that is known, in gate coordinates.
+    resting : tuple of str
+        The axes at rest.
+    sensed : bool
+        The axis has a sensor.
+    frequency_hz : int or None
+        Its closed-loop frequency; None where that is the configured one.
+    """
 
     name: str
     motion: SentMotion | Steer | Jog
@@ -66,6 +85,10 @@ class AxisBegun:
     unit: AxisUnit
     time_s: float
     source: str
+    positions: Mapping[str, float]
+    resting: tuple[str, ...]
+    sensed: bool
+    frequency_hz: int | None
 
     def heard(self) -> MovementBegun:
         """Return it as devices tell it."""
@@ -79,19 +102,38 @@ class AxisBegun:
             source=self.source,
         )
 
+    def recorded(self) -> RecordedBegin:
+        """Return it as a recorder of movements takes it."""
+        resting = frozenset(self.resting)
+        return RecordedBegin(self.heard(), self.positions, resting, self.sensed, self.frequency_hz)
+
 
 @dataclass(frozen=True, slots=True)
 class AxisEnded:
-    """A movement ended; as `MovementEnded`, with the exception as plain values."""
+    """A movement ended; as `MovementEnded`, with the exception as plain values.
+
+    Attributes
+    ----------
+    positions : mapping of float
+        Where all axes were then, as far as that is known, in gate coordinates.
+    time_s : float
+        Platform time.
+    """
 
     name: str
     position: float | None
     error: list[object] | None
+    positions: Mapping[str, float]
+    time_s: float
 
     def heard(self) -> MovementEnded:
         """Return it as devices tell it."""
         error = None if self.error is None else from_plain(self.error)
         return MovementEnded(self.name, self.position, error)
+
+    def recorded(self) -> RecordedEnd:
+        """Return it as a recorder of movements takes it."""
+        return RecordedEnd(self.name, self.positions, self.time_s, well=self.error is None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +188,8 @@ def follow_movements(
     """Tell of every movement; returns the function that ends it. In the threads of the devices."""
 
     def on_begun(event: MovementBegun) -> None:
+        states = manager.states()
+        state = states[event.name]
         receiver(
             AxisBegun(
                 event.name,
@@ -155,12 +199,18 @@ def follow_movements(
                 event.unit,
                 event.time_s,
                 event.source,
+                positions_of(states),
+                tuple(resting_of(states)),
+                class_for(state.kind, state.positioner).has_sensor,
+                _own_frequency_hz(manager, state),
             )
         )
 
     def on_ended(event: MovementEnded) -> None:
         error = to_plain(event.error) if isinstance(event.error, CosmicError) else None
-        receiver(AxisEnded(event.name, event.position, error))
+        positions = positions_of(manager.states())
+        now_s = manager.clock.now_s()
+        receiver(AxisEnded(event.name, event.position, error, positions, now_s))
 
     def on_refused(verdict: MoveVerdict) -> None:
         receiver(AxisRefused(verdict, together=False))
@@ -182,6 +232,13 @@ def follow_movements(
     feed.join(manager, "group_refused", on_group_refused)
     feed.join(manager, "group_started", on_group_started)
     return feed.close
+
+
+def _own_frequency_hz(manager: DeviceManager, state: PositionerState) -> int | None:
+    """Return the closed-loop frequency of an axis; None where it is the configured one."""
+    found = manager.device(state.name).container.positioner(state.address.channel)
+    own = found.frequency_hz if found is not None else None
+    return None if own == manager.settings.defaults.closed_loop_frequency_hz else own
 
 
 def follow_positions(

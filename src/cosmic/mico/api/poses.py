@@ -3,47 +3,70 @@
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from typing_extensions import override
+
 from cosmic.frame.arguments import checked_class
+from cosmic.frame.declaration import Declared, command, state
 from cosmic.frame.errors import CosmicError, MoveCancelled, NotAvailable, UnknownAxisError
+from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Task, wait_or_cancel
+from cosmic.mico.api.entry import source_of
 from cosmic.mico.api.group import move_together
 from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.core.motion.orders import Motion, MoveTo
 from cosmic.mico.core.motion.positioner import Confidence
-from cosmic.mico.core.poses import Pose, pose_misfits
+from cosmic.mico.core.poses import Pose, pose_misfits, pose_named
 
 WAY_BUDGET_S = 2.0
 
 
 @checked_class
-class Poses:
+class Poses(Declared):
     """The named poses of the platform; any thread.
 
-    Positions are kept as the gate counts them: a user's zero changes nothing.
+    They are kept, taught and gone to where the axes are. Positions are kept as the gate counts
+    them: a user's zero changes nothing.
     """
+
+    _source = "script"
 
     def __init__(self, site: TrajectorySite, source: str = "script") -> None:
         self._site = site
         self._source = source
 
-    @property
-    def names(self) -> list[str]:
-        """Names of all poses."""
-        return list(self._site.poses.poses)
+    @override
+    def set_up_proxy(self, key: str, policy: FailurePolicy) -> None:
+        """Nothing is kept on this side but who commands."""
+
+    def belong_to(self, source: str) -> None:
+        """Command by this name, for the log; for whoever makes a proxy."""
+        self._source = source
 
     @property
+    @state
+    def kept(self) -> tuple[Pose, ...]:
+        """All of them."""
+        return tuple(self._site.poses.poses.values())
+
+    @property
+    @state
     def path(self) -> Path | None:
         """The file they are kept in; None: they are kept until the program ends."""
         return self._site.poses.path
 
+    @property
+    def names(self) -> list[str]:
+        """Names of all poses."""
+        return [pose.name for pose in self.kept]
+
     def __getitem__(self, name: str) -> Pose:
-        return self._site.poses[name]
+        return pose_named(name, {pose.name: pose for pose in self.kept})
 
     def __contains__(self, name: object) -> bool:
         return name in self.names
 
     def __iter__(self) -> Iterator[Pose]:
-        return iter(self._site.poses.poses.values())
+        return iter(self.kept)
 
     def __len__(self) -> int:
         return len(self.names)
@@ -64,6 +87,13 @@ class Poses:
         UnknownAxisError
             There is no such axis or group.
         """
+        wanted = axes if axes is None or isinstance(axes, str) else list(axes)
+        self.learn(name, wanted)
+        return self[name]
+
+    @command(aside=True)
+    def learn(self, name: str, axes: str | list[str] | None = None) -> None:
+        """Keep where axes stand now under a name; arguments and errors as `teach`."""
         facts = self._site.facts().axes
         positions: dict[str, float] = {}
         for axis in self._axes(axes):
@@ -75,9 +105,8 @@ class Poses:
             if state.position is None or state.confidence is not Confidence.KNOWN:
                 raise NotAvailable(f"{axis}: its position is not known; initialise it first")
             positions[axis] = state.position
-        pose = Pose(name, positions)
-        self._site.poses.put(pose)
-        return pose
+        self._site.poses.put(Pose(name, positions))
+        self.note_change()
 
     def _axes(self, axes: str | Iterable[str] | None) -> tuple[str, ...]:
         manager = self._site.manager
@@ -90,9 +119,11 @@ class Poses:
                 return group.positioners
         return (axes,)
 
+    @command(aside=True)
     def remove(self, name: str) -> None:
         """Forget a pose; raises `NotAvailable` where there is none."""
         self._site.poses.remove(name)
+        self.note_change()
 
     def go(self, name: str, *, way: bool = False, wait: bool = True) -> Task:
         """Move to a pose, all its axes together.
@@ -112,18 +143,23 @@ class Poses:
         MoveRefused
             The gate refused it; with `way`, none was found.
         """
-        pose = self._site.poses[name]
-        wrong = pose_misfits({name: pose}, self._site.manager.settings.kinds)
-        if wrong:
-            raise NotAvailable(f"pose {'; '.join(wrong)}")
-        task = self._site.worker.begin(
-            f"Going to {name}", lambda task: self._go(pose, task, way=way)
-        )
+        task = self.begin(name, way=way, source=self._source)
         if wait:
             wait_or_cancel(task)
         return task
 
-    def _go(self, pose: Pose, task: Task, *, way: bool) -> None:
+    @command(moves=True)
+    def begin(self, name: str, *, way: bool = False, source: str = "script") -> Task:
+        """Begin to move to a pose, where the axes are; raises `NotAvailable` as `go`."""
+        pose, said = self._site.poses[name], source_of(source)
+        wrong = pose_misfits({name: pose}, self._site.manager.settings.kinds)
+        if wrong:
+            raise NotAvailable(f"pose {'; '.join(wrong)}")
+        return self._site.worker.begin(
+            f"Going to {name}", lambda task: self._go(pose, task, said, way=way)
+        )
+
+    def _go(self, pose: Pose, task: Task, source: str, *, way: bool) -> None:
         manager = self._site.manager
         try:
             parts = [pose.positions]
@@ -139,7 +175,7 @@ class Poses:
                     axis: MoveTo(target, manager.state(axis).unit)
                     for axis, target in targets.items()
                 }
-                move_together(manager, motions, task, source=self._source)
+                move_together(manager, motions, task, source=source)
             task.finish()
         except CosmicError as exc:
             task.fail(exc)

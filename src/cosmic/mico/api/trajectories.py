@@ -1,50 +1,115 @@
 """Trajectories of the scripted API: ``rig.mico.trajectories`` (SCM, thesis 3.4.1)."""
 
-from collections.abc import Callable, Collection
-from datetime import datetime
+import secrets
+from abc import abstractmethod
+from collections import OrderedDict
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
+from threading import Lock
+from typing import Final, Protocol
+
+from typing_extensions import override
 
 from cosmic.frame.arguments import checked_class
-from cosmic.frame.errors import NotAvailable, RecordingError
-from cosmic.mico.api.trajectory_player import SPEEDS, TrajectoryPlayer
-from cosmic.mico.api.trajectory_recording import TrajectoryRecording
+from cosmic.frame.declaration import Declared, command, part
+from cosmic.frame.errors import DeviceTimeout, NotAvailable, RecordingError
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.transfer import transferable
+from cosmic.frame.operation import Operation, Progress
+from cosmic.frame.weakly import weakly
+from cosmic.mico.api.entry import source_of
+from cosmic.mico.api.trajectory_player import SPEEDS, Players, TrajectoryPlayer, text_of
+from cosmic.mico.api.trajectory_recording import Recordings, TrajectoryRecording
 from cosmic.mico.api.trajectory_site import TrajectorySite
-from cosmic.mico.api.trajectory_state import PlayProgress, PlayState, StartMode
+from cosmic.mico.api.trajectory_state import PlayProgress, StartMode
+from cosmic.mico.core.poses import Pose
+from cosmic.mico.core.settings import MicoSettings
 from cosmic.mico.core.trajectory import parser
-from cosmic.mico.core.trajectory.binding import Bound, bind
+from cosmic.mico.core.trajectory.binding import Bound, PlatformFacts, bind
 from cosmic.mico.core.trajectory.mirror import mirrored
-from cosmic.mico.core.trajectory.model import Trajectory
+from cosmic.mico.core.trajectory.model import Problem, Trajectory
 from cosmic.mico.core.trajectory.rehearsal import Rehearsal
 from cosmic.mico.core.trajectory.writer import to_text
-from cosmic.mico.core.trajectory_recorder import TrajectoryRecorder
+from cosmic.mico.core.trajectory_recorder import Recordable
+
+transferable(Problem)  # a `TrajectoryError` lists them
+
+_PIECE: Final = 12_000
+"""How many characters of a text go in one call: a call is at most 64 KiB."""
+_MOST_TEXTS: Final = 8
+_LOOK_S: Final = 0.1
+"""How often whoever waits for a rehearsal looks whether it shall end."""
+_SLOW_S: Final = 30.0
+"""How long it may take to read a long trajectory at the station."""
+
+
+class Platform(Recordable, Protocol):
+    """What is known, in this process, of the platform that trajectories are for."""
+
+    @property
+    @abstractmethod
+    def settings(self) -> MicoSettings:
+        """What the platform file says."""
+
+    @property
+    @abstractmethod
+    def recordings(self) -> Recordings:
+        """What this process records."""
+
+    @property
+    @abstractmethod
+    def source(self) -> str:
+        """Who commands through it, for the log."""
+
+    @abstractmethod
+    def pose(self, name: str) -> Pose:
+        """Return a named pose; raises `NotAvailable`."""
+
+    @abstractmethod
+    def facts(self) -> PlatformFacts:
+        """Return what a trajectory is checked against."""
 
 
 @checked_class
-class Trajectories:
+class Trajectories(Declared):
     """Records, reads, rehearses and runs trajectories; any thread.
 
-    Parameters
-    ----------
-    source : str
-        Who commands through this object, for the log: "script", "window".
+    They are rehearsed and run where the axes are, and read, checked and written in this process.
     """
 
-    def __init__(self, site: TrajectorySite, source: str = "script") -> None:
+    _platform: Platform
+
+    def __init__(self, platform: Platform, site: TrajectorySite, players: Players) -> None:
+        self._platform = platform
         self._site = site
-        self._source = source
+        self._players = players
+        self._lock = Lock()
+        self._texts: OrderedDict[str, str] = OrderedDict()
+        players.changed.subscribe(weakly(self.note_change))
+
+    @override
+    def set_up_proxy(self, key: str, policy: FailurePolicy) -> None:
+        """Nothing is known of the platform before `belong_to`."""
+
+    def belong_to(self, platform: Platform) -> None:
+        """Read and check for this platform; for whoever makes a proxy."""
+        self._platform = platform
+
+    @property
+    @part
+    def players(self) -> Mapping[str, TrajectoryPlayer]:
+        """The players that were made last, by number, the newest last."""
+        return self._players.by_number
 
     @property
     def player(self) -> TrajectoryPlayer | None:
         """What was run last, whoever ran it; None before that."""
-        return self._site.player
+        return next(reversed(list(self.players.values())), None)
 
     @property
     def recording(self) -> TrajectoryRecording | None:
-        """What is being recorded, whoever began it; None while nothing is."""
-        recorder = self._site.recorder
-        if recorder is None or not recorder.recording:
-            return None
-        return TrajectoryRecording(recorder)
+        """What this process records, whoever began it; None while nothing is recorded."""
+        return self._platform.recordings.current
 
     # Recording
 
@@ -59,6 +124,8 @@ class Trajectories:
         overwrite: bool = False,
     ) -> TrajectoryRecording:
         """Begin to record every movement into a file, until `stop` or the end of a with block.
+
+        The file is one of this computer, wherever the axes are.
 
         Parameters
         ----------
@@ -79,32 +146,16 @@ class Trajectories:
         NotAvailable
             Something is being recorded already, or there is no such pose.
         """
-        running = self.recording
-        if running is not None:
-            raise NotAvailable(f"{running.path} is being recorded; stop that first")
-        pose = self._site.poses[relative_to] if relative_to else None
-        if "\n" in title or "#" in title:
-            raise RecordingError("a title is one line without #")
-        head = Trajectory(
-            platform=self._site.platform or "any",
-            statements=(),
-            title=title.strip(),
-            recorded=f"{datetime.now():%Y-%m-%d %H:%M:%S}",
-            pose=relative_to,
-            pose_axes=tuple(pose.positions) if pose is not None else None,
-        )
-        recorder = TrajectoryRecorder(
-            self._site.manager,
+        return self._platform.recordings.begin(
+            self._platform,
             Path(path),
-            head,
-            self._site.policy,
+            platform=self._platform.facts().name,
+            title=title,
+            pose=self._platform.pose(relative_to) if relative_to else None,
             timed=timed,
-            zero=pose.positions if pose is not None else None,
             sources=sources,
             overwrite=overwrite,
         )
-        self._site.recorder = recorder
-        return TrajectoryRecording(recorder)
 
     # Reading and writing
 
@@ -141,7 +192,7 @@ class Trajectories:
 
     def check(self, trajectory: Trajectory) -> None:
         """Check a trajectory on this platform: axes, units, limits; raises `TrajectoryError`."""
-        bind(trajectory, self._site.facts())
+        bind(trajectory, self._platform.facts())
 
     def save(self, trajectory: Trajectory, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a trajectory to a file; raises `RecordingError`."""
@@ -160,7 +211,7 @@ class Trajectories:
             An axis has no counterpart, or the mirrored positions are outside its limits.
         """
         found = parser.parse(
-            to_text(mirrored(trajectory, self._site.manager.settings.mirror)),
+            to_text(mirrored(trajectory, self._platform.settings.mirror)),
             name=trajectory.name,
         )
         self.check(found)
@@ -191,6 +242,10 @@ class Trajectories:
         low, high = SPEEDS
         if not low <= speed <= high:
             raise NotAvailable(f"speed lies between {low:g} and {high:g}: {speed!r}")
+        if self.remote:
+            given = self._sent(trajectory)
+            begun = self.begin_rehearsal(given, trajectory.path, speed=speed, timed=timed)
+            return _waited_for(begun, progress, cancelled)
         return self._site.rehearse(
             self._bound(trajectory),
             speed=speed,
@@ -198,6 +253,54 @@ class Trajectories:
             progress=progress,
             cancelled=cancelled,
         )
+
+    @command(timeout_s=_SLOW_S)
+    def begin_rehearsal(
+        self, given: str, path: Path | None = None, *, speed: float = 1.0, timed: bool = True
+    ) -> Operation[Rehearsal]:
+        """Begin to rehearse a text that was given; raises as `rehearse`.
+
+        Parameters
+        ----------
+        given : str
+            Under which key `give` has the text.
+        path : Path
+            What the file of it is called, for messages.
+        """
+        bound = self._bound(self._read(given, path))
+        return self._site.begin_rehearsal(bound, speed=speed, timed=timed)
+
+    @command
+    def give(self, key: str, text: str) -> None:
+        """Take the text of a trajectory, or more of it, under a key of the caller's choice.
+
+        Raises
+        ------
+        NotAvailable
+            It is longer than any file may be.
+        """
+        with self._lock:
+            whole = self._texts.get(key, "") + text
+            if len(whole) > parser.LARGEST_BYTES:
+                del self._texts[key]
+                raise NotAvailable("the trajectory is longer than any file may be; split it")
+            self._texts[key] = whole
+            while len(self._texts) > _MOST_TEXTS:
+                self._texts.popitem(last=False)
+
+    def _sent(self, trajectory: Trajectory) -> str:
+        """Send a trajectory to where the axes are, piece by piece; returns its key there."""
+        key, text = secrets.token_hex(8), text_of(trajectory)
+        for start in range(0, len(text), _PIECE):
+            self.give(key, text[start : start + _PIECE])
+        return key
+
+    def _read(self, given: str, path: Path | None) -> Trajectory:
+        with self._lock:
+            text = self._texts.pop(given, None)
+        if text is None:
+            raise NotAvailable("the text of the trajectory did not come; try again")
+        return parser.parse(text, path=path, cut_off=True)
 
     def _bound(self, trajectory: Trajectory) -> Bound:
         axes = trajectory.axes
@@ -226,19 +329,49 @@ class Trajectories:
             Another trajectory is running, or one of its axes is linked to one that it does not
             move.
         """
-        running = self._site.player
-        if running is not None and running.state is PlayState.RUNNING:
-            raise NotAvailable(f"{running.trajectory.name} is running; pause or cancel it first")
+        source = self._platform.source
+        if not self.remote:
+            number = self._made(trajectory, speed, loops, timed=timed, source=source)
+            return self.players[number]
+        number = self.begin_player(
+            self._sent(trajectory),
+            trajectory.path,
+            speed=speed,
+            loops=loops,
+            timed=timed,
+            source=source,
+        )
+        player = self.players[number]
+        player.keep_trajectory(trajectory)
+        return player
+
+    @command(moves=True, timeout_s=_SLOW_S)
+    def begin_player(
+        self,
+        given: str,
+        path: Path | None = None,
+        *,
+        speed: float = 1.0,
+        loops: int | None = 1,
+        timed: bool = True,
+        source: str = "script",
+    ) -> str:
+        """Make a player of a text that was given, and return its number; raises as `prepare`."""
+        trajectory = self._read(given, path)
+        return self._made(trajectory, speed, loops, timed=timed, source=source_of(source))
+
+    def _made(
+        self, trajectory: Trajectory, speed: float, loops: int | None, *, timed: bool, source: str
+    ) -> str:
         player = TrajectoryPlayer(
             self._site,
             self._bound(trajectory),
-            source=self._source,
+            source=source,
             speed=speed,
             loops=loops,
             timed=timed,
         )
-        self._site.player = player
-        return player
+        return self._players.add(player)
 
     def run(
         self,
@@ -289,3 +422,29 @@ class Trajectories:
                 player.cancel()
                 raise
         return player
+
+
+def _waited_for(
+    begun: Operation[Rehearsal],
+    progress: Callable[[float, str], object] | None,
+    cancelled: Callable[[], bool] | None,
+) -> Rehearsal:
+    """Return the result of a rehearsal; whoever waits is told how far it is, and may end it."""
+
+    def on_progress(told: Progress) -> None:
+        if progress is not None and not told.done:
+            progress(told.fraction, told.text)
+
+    begun.subscribe(on_progress)
+    try:
+        while True:
+            try:
+                return begun.wait(None if cancelled is None else _LOOK_S)
+            except DeviceTimeout:
+                if begun.done:
+                    raise
+                if cancelled is not None and cancelled():
+                    begun.cancel()
+    except KeyboardInterrupt:
+        begun.cancel()
+        raise

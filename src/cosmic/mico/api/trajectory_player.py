@@ -1,11 +1,17 @@
 """`TrajectoryPlayer`: makes the movements of a trajectory, line by line, through the gate (SCM)."""
 
 import logging
-from collections.abc import Callable
-from threading import RLock
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from itertools import count
+from threading import Event, Lock, RLock
 from typing import Final
 
+from typing_extensions import override
+
 from cosmic.frame.arguments import checked_class
+from cosmic.frame.clock import WALL
+from cosmic.frame.declaration import Declared, command, state
 from cosmic.frame.errors import (
     CosmicError,
     DeviceTimeout,
@@ -13,7 +19,10 @@ from cosmic.frame.errors import (
     NotAvailable,
     OperationCancelled,
 )
-from cosmic.frame.events import Event, Unsubscribe, notify
+from cosmic.frame.events import Event as ChangeEvent
+from cosmic.frame.events import Unsubscribe, notify
+from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.network.travelling_errors import from_plain, to_plain
 from cosmic.frame.operation import Task
 from cosmic.frame.threads import forbid_waiting_here
 from cosmic.mico.api.trajectory_moves import at_line
@@ -22,28 +31,40 @@ from cosmic.mico.api.trajectory_site import TrajectorySite
 from cosmic.mico.api.trajectory_state import (
     START_MODES,
     PlayControl,
+    PlayerSnapshot,
     PlayProgress,
     PlayState,
     StartMode,
 )
+from cosmic.mico.core.trajectory import parser
 from cosmic.mico.core.trajectory.binding import Bound
-from cosmic.mico.core.trajectory.model import Trajectory
+from cosmic.mico.core.trajectory.model import Trajectory, TrajectoryError
 from cosmic.mico.core.trajectory.rehearsal import Rehearsal
+from cosmic.mico.core.trajectory.writer import to_text
 
 logger = logging.getLogger(__name__)
 
 SPEEDS: Final = (0.01, 10.0)
+MOST_PLAYERS: Final = 4
+"""How many players other programs can still reach."""
 _RESUMABLE: Final = (PlayState.READY, PlayState.PAUSED, PlayState.FAILED)
+_DONE: Final = (PlayState.ENDED, PlayState.CANCELLED, PlayState.FAILED)
+_LOOK_S: Final = 0.25
+"""How often whoever waits looks whether the station is still there."""
 
 
 @checked_class
-class TrajectoryPlayer:
+class TrajectoryPlayer(Declared):
     """Makes the movements of one trajectory; any thread, and every method returns at once.
 
-    The gate decides each line when its turn comes. A stop, a refusal or a failure ends it at a
-    line; `resume` goes on there once the reason is gone. During a pause nothing of it runs, so
-    that a platform can be repaired, initialised or moved meanwhile.
+    It runs where the axes are, and what it runs for another program ends with that program as a
+    movement does. The gate decides each line when its turn comes. A stop, a refusal or a failure
+    ends it at a line; `resume` goes on there once the reason is gone. During a pause nothing of it
+    runs, so that a platform can be repaired, initialised or moved meanwhile.
     """
+
+    _failure: CosmicError | None = None
+    _trajectory: Trajectory | None = None
 
     def __init__(
         self,
@@ -61,75 +82,120 @@ class TrajectoryPlayer:
         self._changed = self._control.changed
         self._run = TrajectoryRun(site, bound, self._control, source)
         self._publishing = RLock()
-        self._progressed: Event[PlayProgress] = Event()
+        self._brief: Rehearsal | None = None
         self._state = PlayState.READY
-        self._failure: CosmicError | None = None
         self._task: Task | None = None
         self._played: Task | None = None
         self._text = ""
         self.speed = speed
         self.loops = loops
 
+    @override
+    def set_up_proxy(self, key: str, policy: FailurePolicy) -> None:
+        self._publishing = RLock()
+
     # What it is at
 
     @property
-    def trajectory(self) -> Trajectory:
-        """What it plays."""
-        return self._trajectory
+    @state
+    def now(self) -> PlayerSnapshot:
+        """All that is known of it."""
+        error = self._failure
+        return PlayerSnapshot(
+            self._progress(),
+            self._control.speed,
+            self._rehearsed(),
+            None if error is None else to_plain(error),
+        )
 
-    @property
-    def rehearsal(self) -> Rehearsal | None:
-        """What was found before the first movement; None before that."""
-        return self._run.rehearsal
+    def _rehearsed(self) -> Rehearsal | None:
+        """Return what the rehearsal found without its poses, which are many."""
+        found, brief = self._run.rehearsal, self._brief
+        if found is not None and brief is None:
+            brief = self._brief = replace(found, poses=(), left_s=())
+        return brief
 
-    @property
-    def state(self) -> PlayState:
-        """What it is at: ready, running, paused, failed, cancelled, ended."""
-        return self._state
-
-    @property
-    def done(self) -> bool:
-        """True when it has ended, was cancelled, or has failed and was not resumed."""
-        return self._state in (PlayState.ENDED, PlayState.CANCELLED, PlayState.FAILED)
-
-    @property
-    def failure(self) -> CosmicError | None:
-        """Why it stopped, with the line; None while nothing went wrong."""
-        return self._failure
-
-    @property
-    def line(self) -> int:
-        """Line of the file that is being carried out, or comes next; 0 before the first."""
-        return 0 if self._state is PlayState.READY else self._run.line
-
-    @property
-    def left_s(self) -> float | None:
-        """How long this pass still takes, without pauses; None before the rehearsal."""
-        return 0.0 if self._state is PlayState.ENDED else self._run.left_s
-
-    @property
-    def progress(self) -> PlayProgress:
-        """How far it is."""
-        left_s, rehearsal = self.left_s, self._run.rehearsal
-        share = 1.0 if self._state is PlayState.ENDED else 0.0
+    def _progress(self) -> PlayProgress:
+        begun, rehearsal = self._state is not PlayState.READY, self._run.rehearsal
+        ended = self._state is PlayState.ENDED
+        left_s = 0.0 if ended else self._run.left_s
+        share = 1.0 if ended else 0.0
         if left_s is not None and rehearsal is not None and rehearsal.duration_s > 0.0:
             share = 1.0 - left_s / rehearsal.duration_s
         return PlayProgress(
             state=self._state,
-            line=self.line,
+            line=self._run.line if begun else 0,
             text=self._text,
             fraction=share,
             left_s=left_s,
             loop=self._run.loop,
-            loops=self.loops,
+            loops=self._control.loops,
             error=str(self._failure) if self._failure else "",
         )
 
+    @command(reads=True)
+    def text(self) -> str:
+        """Return the text of what it plays."""
+        return text_of(self.trajectory)
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """What it plays."""
+        if self._trajectory is None:  # somebody else had it prepared
+            self._trajectory = parser.parse(self.text())
+        return self._trajectory
+
+    def keep_trajectory(self, trajectory: Trajectory) -> None:
+        """Know what it plays; for whoever had it prepared."""
+        self._trajectory = trajectory
+
+    @property
+    def rehearsal(self) -> Rehearsal | None:
+        """What was found before the first movement; None before that.
+
+        Of a player at another station it is without poses.
+        """
+        return self.now.rehearsal if self.remote else self._run.rehearsal
+
+    @property
+    def done(self) -> bool:
+        """True when it has ended, was cancelled, or has failed and was not resumed."""
+        return self.progress.state in _DONE
+
+    @property
+    def failure(self) -> CosmicError | None:
+        """Why it stopped, with the line; None while nothing went wrong."""
+        plain = self.now.failure
+        return None if plain is None else self._failure or from_plain(plain)
+
+    @property
+    def line(self) -> int:
+        """Line of the file that is being carried out, or comes next; 0 before the first."""
+        return self.progress.line
+
+    @property
+    def left_s(self) -> float | None:
+        """How long this pass still takes, without pauses; None before the rehearsal."""
+        return self.progress.left_s
+
+    @property
+    def progress(self) -> PlayProgress:
+        """How far it is."""
+        return self.now.progress
+
     def subscribe(self, listener: Callable[[PlayProgress], object]) -> Unsubscribe:
-        """Call `listener(progress)` at each line and change, in the thread that makes it."""
+        """Call `listener(progress)` at each line and change, in the thread that makes it.
+
+        Of a player at another station it is called with what was published last.
+        """
+
+        def on_change() -> None:
+            with self._publishing:
+                notify(listener, self.progress)
+
         with self._publishing:
-            notify(listener, self.progress)
-            return self._progressed.subscribe(listener)
+            on_change()
+            return self.on_change(on_change)
 
     # How it goes
 
@@ -139,10 +205,15 @@ class TrajectoryPlayer:
 
         Times ``t=`` scale with it; a ``wait`` lasts as long as it says.
         """
-        return self._control.speed
+        return self.now.speed
 
     @speed.setter
     def speed(self, factor: float) -> None:
+        self.go_at(factor)
+
+    @command(moves=True, aside=True)
+    def go_at(self, factor: float) -> None:
+        """Go at another speed from the next line on; raises `NotAvailable`."""
         low, high = SPEEDS
         if not low <= factor <= high:
             raise NotAvailable(f"the speed factor lies between {low:g} and {high:g}: {factor!r}")
@@ -152,10 +223,15 @@ class TrajectoryPlayer:
     @property
     def loops(self) -> int | None:
         """How many times it is run; None: until it is paused or cancelled."""
-        return self._control.loops
+        return self.progress.loops
 
     @loops.setter
     def loops(self, loops: int | None) -> None:
+        self.repeat(loops)
+
+    @command(moves=True, aside=True)
+    def repeat(self, loops: int | None) -> None:
+        """Run it so many times; None: until it is paused or cancelled. Raises `NotAvailable`."""
         if loops is not None and not loops >= 1:
             raise NotAvailable(f"a trajectory is run once or more, not {loops!r} times")
         self._control.loops = loops
@@ -178,18 +254,20 @@ class TrajectoryPlayer:
         AwayFromStartError
             Axes stand elsewhere, and `start` is "refuse"; nothing moved.
         """
-        self._begin(start, one_line=False)
+        self.begin(start, one_line=False)
 
     def step(self, start: StartMode = "refuse") -> None:
         """Carry out one line, then pause; raises as `resume`."""
-        self._begin(start, one_line=True)
+        self.begin(start, one_line=True)
 
+    @command(at_once=True)
     def pause(self) -> None:
         """Pause when the line under way is over; harmless while it does not run."""
         with self._changed:
             self._control.pausing = True
             self._changed.notify_all()
 
+    @command(at_once=True)
     def cancel(self) -> None:
         """End it now and stop its axes; nothing is latched."""
         with self._changed:
@@ -212,19 +290,37 @@ class TrajectoryPlayer:
         """
         if not self.done:
             forbid_waiting_here("waiting for a trajectory")
-        with self._changed:
-            if not self._changed.wait_for(lambda: self.done, timeout_s):
-                raise DeviceTimeout(f"the trajectory had not ended after {timeout_s:g} s")
-        if self._failure is not None:
-            raise self._failure
+        if not self._wait_until(lambda: self.done, timeout_s):
+            raise DeviceTimeout(f"the trajectory had not ended after {timeout_s:g} s")
+        if (failure := self.failure) is not None:
+            raise failure
 
     def wait_for_pause(self, timeout_s: float | None = None) -> bool:
         """Wait until nothing of it runs; False after `timeout_s` of wall time."""
         forbid_waiting_here("waiting for a trajectory")
-        with self._changed:
-            return self._changed.wait_for(lambda: self._state is not PlayState.RUNNING, timeout_s)
+        return self._wait_until(lambda: self.progress.state is not PlayState.RUNNING, timeout_s)
 
-    def _begin(self, start: StartMode, *, one_line: bool) -> None:
+    def _wait_until(self, over: Callable[[], bool], timeout_s: float | None) -> bool:
+        """Wait until something is so; raises `NotAvailable` where the station is away."""
+        until_s = float("inf") if timeout_s is None else WALL.now_s() + timeout_s
+        changed = Event()
+        end = self.on_change(changed.set)
+        try:
+            while not over():
+                if self.away:
+                    raise NotAvailable(self.away)
+                left_s = until_s - WALL.now_s()
+                if left_s <= 0.0:
+                    return False
+                changed.wait(min(left_s, _LOOK_S))
+                changed.clear()
+        finally:
+            end()
+        return True
+
+    @command(moves=True)
+    def begin(self, start: StartMode = "refuse", *, one_line: bool = False) -> Task:
+        """Begin, or go on, and return what ends with a pause, too; raises as `resume`."""
         if start not in START_MODES:
             raise NotAvailable(f"start is one of {', '.join(START_MODES)}, not {start!r}")
         with self._changed:
@@ -241,6 +337,7 @@ class TrajectoryPlayer:
         task.on_cancel(self._halt)
         task.add_callback(self._on_end)
         self._publish()
+        return task
 
     def _on_end(self, task: Task) -> None:
         """End with a task whose turn never came; any thread."""
@@ -297,4 +394,63 @@ class TrajectoryPlayer:
 
     def _publish(self) -> None:
         with self._publishing:
-            self._progressed.emit(self.progress)
+            self.note_change()
+
+    # Last, for the name is that of a declaration as well
+
+    @property
+    def state(self) -> PlayState:
+        """What it is at: ready, running, paused, failed, cancelled, ended."""
+        return self.progress.state
+
+
+class Players:
+    """The players that were made last, by number; any thread."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._numbers = count(1)
+        self._players: dict[str, TrajectoryPlayer] = {}
+        self.changed: ChangeEvent[[]] = ChangeEvent()
+
+    @property
+    def newest(self) -> TrajectoryPlayer | None:
+        """What was made last; None before that."""
+        return next(reversed(self._players.values()), None)
+
+    @property
+    def by_number(self) -> Mapping[str, TrajectoryPlayer]:
+        """Those that other programs can reach, the newest last."""
+        return self._players
+
+    def add(self, player: TrajectoryPlayer) -> str:
+        """Keep a player and return its number.
+
+        Raises
+        ------
+        NotAvailable
+            Another trajectory is running.
+        """
+        with self._lock:
+            running = self.newest
+            if running is not None and running.state is PlayState.RUNNING:
+                name = running.trajectory.name
+                raise NotAvailable(f"{name} is running; pause or cancel it first")
+            number = str(next(self._numbers))
+            kept = list(self._players.items())[1 - MOST_PLAYERS :]
+            self._players = {**dict(kept), number: player}
+        self.changed.emit()
+        return number
+
+
+def text_of(trajectory: Trajectory) -> str:
+    """Return a trajectory as text, with the lines of its file where it still says the same."""
+    text = "\n".join([*trajectory.lines, ""])
+    if trajectory.lines:
+        try:
+            same = parser.parse(text, cut_off=True).statements == trajectory.statements
+        except TrajectoryError:
+            same = False
+        if same:
+            return text
+    return to_text(trajectory)

@@ -1,6 +1,7 @@
 """A recording of movements under way, as scripts and windows see it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+from datetime import datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -8,9 +9,12 @@ from typing import Self
 from PySide6.QtCore import QObject, Qt
 
 from cosmic.frame.arguments import checked_class
-from cosmic.frame.errors import RecordingError
+from cosmic.frame.errors import NotAvailable, RecordingError
 from cosmic.frame.events import notify
-from cosmic.mico.core.trajectory_recorder import TrajectoryRecorder
+from cosmic.frame.failure import FailurePolicy
+from cosmic.mico.core.poses import Pose
+from cosmic.mico.core.trajectory.model import Trajectory
+from cosmic.mico.core.trajectory_recorder import Recordable, TrajectoryRecorder
 
 
 @checked_class
@@ -78,3 +82,64 @@ class TrajectoryRecording:
         trace: TracebackType | None,
     ) -> None:
         self.stop()
+
+
+class Recordings:
+    """What this process records of movements, wherever the axes are: one file at a time.
+
+    The movements are dated and placed where the axes are; the file is written here. Any thread.
+    """
+
+    def __init__(self, policy: FailurePolicy) -> None:
+        self._policy = policy
+        self._recorder: TrajectoryRecorder | None = None
+
+    @property
+    def current(self) -> TrajectoryRecording | None:
+        """What is being recorded; None while nothing is."""
+        recorder = self._recorder
+        running = recorder is not None and recorder.recording
+        return TrajectoryRecording(recorder) if recorder is not None and running else None
+
+    def begin(
+        self,
+        axes: Recordable,
+        path: Path,
+        *,
+        platform: str,
+        title: str,
+        pose: Pose | None,
+        timed: bool,
+        sources: Collection[str] | None,
+        overwrite: bool,
+    ) -> TrajectoryRecording:
+        """Begin to record; the arguments and errors are those of `Trajectories.record`."""
+        running = self.current
+        if running is not None:
+            raise NotAvailable(f"{running.path} is being recorded; stop that first")
+        if "\n" in title or "#" in title:
+            raise RecordingError("a title is one line without #")
+        head = Trajectory(
+            platform=platform or "any",
+            statements=(),
+            title=title.strip(),
+            recorded=f"{datetime.now():%Y-%m-%d %H:%M:%S}",
+            pose=pose.name if pose is not None else "",
+            pose_axes=tuple(pose.positions) if pose is not None else None,
+        )
+        self._recorder = TrajectoryRecorder(
+            axes,
+            path,
+            head,
+            self._policy,
+            timed=timed,
+            zero=pose.positions if pose is not None else None,
+            sources=sources,
+            overwrite=overwrite,
+        )
+        return TrajectoryRecording(self._recorder)
+
+    def close(self) -> None:
+        """End a recording that goes on."""
+        if self._recorder is not None:
+            self._recorder.stop()

@@ -1,14 +1,15 @@
-"""What trajectories need of a platform: its facts, its poses, and a stage for rehearsals."""
+"""What trajectories need where the axes are: players, poses, and a stage for rehearsals."""
 
 import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from cosmic.frame.config import user_file
+from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
-from cosmic.frame.operation import Task
+from cosmic.frame.operation import Operation, Task
 from cosmic.frame.task_application import Job
 from cosmic.mico.api.ports import CollisionPort
 from cosmic.mico.api.ways import Way
@@ -21,10 +22,6 @@ from cosmic.mico.core.trajectory.binding import AxisFacts, Bound, PlatformFacts
 from cosmic.mico.core.trajectory.clearance import ClearanceSearch
 from cosmic.mico.core.trajectory.pure_gate import PureAnswers, pure_copy
 from cosmic.mico.core.trajectory.rehearsal import OnProgress, Rehearsal, Stage, rehearse
-
-if TYPE_CHECKING:
-    from cosmic.mico.api.trajectory_player import TrajectoryPlayer
-    from cosmic.mico.core.trajectory_recorder import TrajectoryRecorder
 
 logger = logging.getLogger(__name__)
 
@@ -67,8 +64,6 @@ class TrajectorySite:
     ) -> None:
         self.worker = worker
         self.policy = policy
-        self.player: TrajectoryPlayer | None = None
-        self.recorder: TrajectoryRecorder | None = None
         self.manager = worker.manager
         self.platform = platform
         self.poses = PoseBook(user_file(self.manager.settings.poses, folder))
@@ -76,11 +71,6 @@ class TrajectorySite:
             logger.warning("%s: %s", self.poses.path, text)
         self._answers: PureAnswers | None = None
         self._rehearsing = Lock()
-
-    def close(self) -> None:
-        """End a recording that is under way."""
-        if self.recorder is not None:
-            self.recorder.stop()
 
     def states(self) -> dict[str, PositionerState]:
         """Return the state of every axis."""
@@ -152,6 +142,33 @@ class TrajectorySite:
                 cancelled=cancelled or (lambda: False),
             )
             return rehearse(bound, stage)
+
+    def begin_rehearsal(
+        self, bound: Bound, *, speed: float = 1.0, timed: bool = True
+    ) -> Operation[Rehearsal]:
+        """Begin to rehearse in the application's thread; raises `NotAvailable`. See `rehearse`."""
+        found: Operation[Rehearsal] = Operation(f"Rehearsing {bound.trajectory.name}")
+
+        def job(task: Task) -> None:
+            try:
+                rehearsal = self.rehearse(
+                    bound,
+                    speed=speed,
+                    timed=timed,
+                    progress=found.report,
+                    cancelled=lambda: task.cancel_requested,
+                )
+            except CosmicError as exc:
+                found.fail(exc)
+                task.fail(exc)
+            else:
+                found.finish(rehearsal)
+                task.finish()
+
+        task = self.worker.begin(found.title, job)
+        task.when_failed(found.fail)
+        found.on_cancel(task.cancel)
+        return found
 
     def _pure_gate(self, bound: Bound) -> tuple[CollisionChecker, ClearanceSearch | None]:
         live = self.worker.collision

@@ -5,6 +5,8 @@ from enum import StrEnum
 from threading import Condition, RLock
 from typing import Final, Literal
 
+from cosmic.mico.core.trajectory.rehearsal import Rehearsal
+
 StartMode = Literal["refuse", "straight", "way"]
 START_MODES: Final = ("refuse", "straight", "way")
 
@@ -46,6 +48,24 @@ class PlayProgress:
     loop: int
     loops: int | None
     error: str
+
+
+@dataclass(frozen=True, slots=True)
+class PlayerSnapshot:
+    """All that is known of a player, as it is published.
+
+    Attributes
+    ----------
+    rehearsal : Rehearsal or None
+        What was found before the first movement, without its poses.
+    failure : list or None
+        Why it stopped, as plain values.
+    """
+
+    progress: PlayProgress
+    speed: float
+    rehearsal: Rehearsal | None
+    failure: list[object] | None
 
 
 class PlayControl:

@@ -39,6 +39,14 @@ def check_pose_name(name: str) -> str:
     return name
 
 
+def pose_named(name: str, poses: Mapping[str, Pose]) -> Pose:
+    """Return one of some poses; raises `NotAvailable` where it is not among them."""
+    if name not in poses:
+        known = ", ".join(poses) or "none"
+        raise NotAvailable(f"there is no pose {name!r}; known poses: {known}")
+    return poses[name]
+
+
 class PoseBook:
     """The named poses of a platform; any thread.
 
@@ -70,11 +78,7 @@ class PoseBook:
             return dict(self._poses)
 
     def __getitem__(self, name: str) -> Pose:
-        poses = self.poses
-        if name not in poses:
-            known = ", ".join(poses) or "none"
-            raise NotAvailable(f"there is no pose {name!r}; known poses: {known}")
-        return poses[name]
+        return pose_named(name, self.poses)
 
     def put(self, pose: Pose) -> None:
         """Keep a pose, in the place of one of the same name.

@@ -1,22 +1,23 @@
 """`TrajectoryRecorder`: writes all movements into a trajectory as they happen (thesis 6.1.3)."""
 
 import os
+from abc import abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import BinaryIO, Final
+from typing import BinaryIO, Final, Protocol
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from typing_extensions import override
 
+from cosmic.frame.clock import Clock
 from cosmic.frame.errors import RecordingError, RecordingExistsError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.file_names import check_base_name, check_directory
 from cosmic.frame.threads import WorkerThread
-from cosmic.mico.core.motion.messages import MovementBegun, MovementEnded
-from cosmic.mico.core.motion.positioner import class_for
-from cosmic.mico.core.ports import DevicePort, ManagerPort
+from cosmic.mico.core.motion.messages import MovementBegun
+from cosmic.mico.core.motion.positioner import PositionerState
 from cosmic.mico.core.trajectory.model import Place, Statement, Trajectory
 from cosmic.mico.core.trajectory.reader import END_OF_RECORDING
 from cosmic.mico.core.trajectory.segments import SegmentBuilder
@@ -28,7 +29,21 @@ OpenFile = Callable[[Path, str], BinaryIO]
 
 
 @dataclass(frozen=True, slots=True)
-class _Begun:
+class RecordedBegin:
+    """A movement that began, and what was so where the axes are.
+
+    Attributes
+    ----------
+    positions : mapping of float
+        Where all axes were, as far as that is known, in gate coordinates.
+    resting : frozenset of str
+        The axes at rest: their state knows before their end is published.
+    sensed : bool
+        The axis has a sensor.
+    frequency_hz : int or None
+        Its closed-loop frequency; None where that is the configured one.
+    """
+
     event: MovementBegun
     positions: Mapping[str, float]
     resting: frozenset[str]
@@ -37,11 +52,43 @@ class _Begun:
 
 
 @dataclass(frozen=True, slots=True)
-class _Ended:
+class RecordedEnd:
+    """A movement that ended; `positions` as in `RecordedBegin`."""
+
     name: str
     positions: Mapping[str, float]
     time_s: float
     well: bool
+
+
+Recorded = RecordedBegin | RecordedEnd
+
+
+class Recordable(Protocol):
+    """The axes whose movements are recorded."""
+
+    @property
+    @abstractmethod
+    def clock(self) -> Clock:
+        """By which movements are dated."""
+
+    @abstractmethod
+    def states(self) -> Mapping[str, PositionerState]:
+        """Return the state of every axis by name."""
+
+    @abstractmethod
+    def follow_recorded(self, receiver: Callable[[Recorded], object]) -> Callable[[], None]:
+        """Call `receiver` with every movement, in order; returns the function that ends it."""
+
+
+def positions_of(states: Mapping[str, PositionerState]) -> dict[str, float]:
+    """Return where the axes are, as far as that is known, in gate coordinates."""
+    return {name: each.position for name, each in states.items() if each.position is not None}
+
+
+def resting_of(states: Mapping[str, PositionerState]) -> frozenset[str]:
+    """Return the axes at rest."""
+    return frozenset(name for name, each in states.items() if not each.in_motion)
 
 
 def _open(path: Path, mode: str) -> BinaryIO:
@@ -85,7 +132,7 @@ class TrajectoryRecorder(WorkerThread):
 
     def __init__(
         self,
-        manager: ManagerPort,
+        axes: Recordable,
         path: Path,
         head: Trajectory,
         policy: FailurePolicy,
@@ -99,11 +146,10 @@ class TrajectoryRecorder(WorkerThread):
         check_base_name(path.name)
         directory = check_directory(path.parent)
         super().__init__(f"recorder {path.name}", policy)
-        self._manager = manager
+        self._axes = axes
         self.path = directory / path.name
         self._sources = None if sources is None else frozenset(sources)
-        self._queue: SimpleQueue[_Begun | _Ended | None] = SimpleQueue()
-        self._joined: list[DevicePort] = []
+        self._queue: SimpleQueue[Recorded | None] = SimpleQueue()
         self._error: RecordingError | None = None
         self._lines = 0
         self._size = 0
@@ -111,7 +157,7 @@ class TrajectoryRecorder(WorkerThread):
         self._builder = SegmentBuilder(
             self._take,
             lambda text: self._write([f"# {text}"]),
-            begin_s=manager.clock.now_s(),
+            begin_s=axes.clock.now_s(),
             timed=timed,
             zero=zero or {},
         )
@@ -120,8 +166,7 @@ class TrajectoryRecorder(WorkerThread):
         if self._error is not None:
             self._file.close()
             raise self._error
-        self._join_devices()
-        manager.changed.connect(self._join_devices, Qt.ConnectionType.DirectConnection)
+        self._end_following = axes.follow_recorded(self._on_recorded)
         self.start()
 
     def _create(self, open_file: OpenFile, *, overwrite: bool) -> BinaryIO:
@@ -133,15 +178,6 @@ class TrajectoryRecorder(WorkerThread):
         except OSError as exc:
             text = f"{self.path} cannot be written: {exc.strerror or exc}"
             raise RecordingError(text) from exc
-
-    def _join_devices(self) -> None:
-        """Hear of the movements of the devices there are now."""
-        direct = Qt.ConnectionType.DirectConnection
-        for device in self._manager.devices.values():
-            if device not in self._joined:
-                self._joined.append(device)
-                device.movement_begun.connect(self._on_movement_begun, direct)
-                device.movement_ended.connect(self._on_movement_ended, direct)
 
     # For any thread
 
@@ -162,6 +198,7 @@ class TrajectoryRecorder(WorkerThread):
 
     def stop(self) -> None:
         """Write what is left and close the file; harmless the second time."""
+        self._end_following()
         self.request_end()
         self.join()
 
@@ -176,40 +213,18 @@ class TrajectoryRecorder(WorkerThread):
         super().request_end()
         self._queue.put(None)
 
-    # Device threads
+    # The threads that hear of movements
 
-    def _on_movement_begun(self, event: MovementBegun) -> None:
+    def _on_recorded(self, item: Recorded) -> None:
         if not self.recording:
             return
-        if self._sources is not None and event.source not in self._sources:
-            return
-        address = self._manager.address(event.name)
-        positioner = self._manager.device(event.name).container.positioner(address.channel)
-        hertz = positioner.frequency_hz if positioner is not None else None
-        if hertz == self._manager.settings.defaults.closed_loop_frequency_hz:
-            hertz = None
-        state = self._manager.state(event.name)
-        sensed = class_for(state.kind, state.positioner).has_sensor
-        self._under_way.add(event.name)
-        self._queue.put(_Begun(event, self._positions(), self._resting(), sensed, hertz))
-
-    def _on_movement_ended(self, event: MovementEnded) -> None:
-        if not self.recording or event.name not in self._under_way:
-            return
-        positions = self._positions()
-        now_s = self._manager.clock.now_s()
-        well = event.error is None
-        self._queue.put(_Ended(event.name, positions, now_s, well=well))
-
-    def _positions(self) -> dict[str, float]:
-        states = self._manager.states().values()
-        return {each.name: each.position for each in states if each.position is not None}
-
-    def _resting(self) -> frozenset[str]:
-        """Return the axes at rest: their state knows before their end is told."""
-        return frozenset(
-            name for name, each in self._manager.states().items() if not each.in_motion
-        )
+        if isinstance(item, RecordedBegin):
+            if self._sources is not None and item.event.source not in self._sources:
+                return
+            self._under_way.add(item.event.name)
+            self._queue.put(item)
+        elif item.name in self._under_way:
+            self._queue.put(item)
 
     # Its own thread
 
@@ -217,8 +232,9 @@ class TrajectoryRecorder(WorkerThread):
     def run_body(self) -> None:
         try:
             self._record()
-            now_s = self._manager.clock.now_s()
-            self._builder.close(self._positions(), now_s, self._resting())
+            states = self._axes.states()
+            now_s = self._axes.clock.now_s()
+            self._builder.close(positions_of(states), now_s, resting_of(states))
             self._write([END_OF_RECORDING])
         finally:
             self._close()
@@ -228,12 +244,12 @@ class TrajectoryRecorder(WorkerThread):
             try:
                 item = self._queue.get(timeout=IDLE_S)
             except Empty:
-                self._builder.idle(self._manager.clock.now_s())
+                self._builder.idle(self._axes.clock.now_s())
                 continue
             match item:
                 case None:
                     return
-                case _Begun():
+                case RecordedBegin():
                     self._builder.begun(
                         item.event,
                         item.positions,
@@ -241,7 +257,7 @@ class TrajectoryRecorder(WorkerThread):
                         frequency_hz=item.frequency_hz,
                         resting=item.resting,
                     )
-                case _Ended():
+                case RecordedEnd():
                     self._builder.ended(item.name, item.positions, item.time_s, well=item.well)
 
     def _take(self, found: Statement | tuple[str, Place]) -> None:

@@ -14,6 +14,7 @@ from cosmic.frame.gui.theme import STEP_PX
 from cosmic.frame.operation import Progress
 from cosmic.frame.overrides import override
 from cosmic.mico.api.mico import Mico
+from cosmic.mico.core.poses import Pose
 from cosmic.mico.core.settings import GroupSettings
 
 ALL: Final = "all axes"
@@ -34,6 +35,7 @@ class PosesBox(QWidget):
         super().__init__(parent)
         self._mico = mico
         self._relay = Relay(self._on_progressed)
+        self._taught, self._removed = Relay(self._on_taught), Relay(self._on_removed)
         self.poses = named(tipped(QComboBox(), "Named poses"), "poses")
         self.go = named(push_button("Go", "Move all axes of the pose there, together"), "goPose")
         self.way = named(
@@ -55,7 +57,7 @@ class PosesBox(QWidget):
         self.refresh()
 
     def _settings_groups(self) -> tuple[GroupSettings, ...]:
-        return self._mico.application.manager.settings.group
+        return self._mico.settings.group
 
     def _arrange(self) -> None:
         first, second = tight_row(STEP_PX), tight_row(STEP_PX)
@@ -80,7 +82,7 @@ class PosesBox(QWidget):
         self.poses.addItems(names)
         if chosen in names:
             self.poses.setCurrentText(chosen)
-        has_model = self._mico.application.collision is not None
+        has_model = self._mico.checks_collisions
         for button in (self.go, self.remove):
             button.setEnabled(bool(names))
         self.way.setEnabled(bool(names) and has_model)
@@ -92,24 +94,28 @@ class PosesBox(QWidget):
 
     def _on_teach(self) -> None:
         name, group = self.name.text().strip(), self.group.currentText()
-        try:
-            pose = self._mico.poses.teach(name, None if group == ALL else group)
-        except CosmicError as exc:
-            self.message.set_text(str(exc))
+        poses, axes = self._mico.poses, None if group == ALL else group
+        self._mico.carry_out(lambda: poses.teach(name, axes), self._taught)
+
+    def _on_taught(self, pose: Pose | None, error: CosmicError | None) -> None:
+        if pose is None:
+            self.told.set_text(str(error))
             return
         where = self._mico.poses.path
         kept = f"kept in {where.name}" if where is not None else "kept until the program ends"
-        self.message.set_text(f"{name}: {len(pose.positions)} axes, {kept}")
+        self.told.set_text(f"{pose.name}: {len(pose.positions)} axes, {kept}")
         self.name.clear()
         self.refresh()
-        self.poses.setCurrentText(name)
+        self.poses.setCurrentText(pose.name)
         self.poses_changed.emit()
 
     def _on_remove(self) -> None:
-        try:
-            self._mico.poses.remove(self.poses.currentText())
-        except CosmicError as exc:
-            self.message.set_text(str(exc))
+        poses, name = self._mico.poses, self.poses.currentText()
+        self._mico.carry_out(lambda: poses.remove(name), self._removed)
+
+    def _on_removed(self, _nothing: None, error: CosmicError | None) -> None:
+        if error is not None:
+            self.told.set_text(str(error))
         self.refresh()
         self.poses_changed.emit()
 

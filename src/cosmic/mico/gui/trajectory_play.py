@@ -31,14 +31,16 @@ class PlayControl(QObject):
 
     def __init__(self, mico: Mico, bar: RunBar, question: StartQuestion, parent: QObject) -> None:
         super().__init__(parent)
-        self._application = mico.application
+        self._mico = mico
         self._api = mico.trajectories
         self._bar = bar
         self._question = question
         self._trajectory: Trajectory | None = None
         self._player: TrajectoryPlayer | None = None
-        self._asked: Callable[[StartMode], None] | None = None
+        self._asked: Callable[[StartMode], TrajectoryPlayer] | None = None
         self._relay = Relay(self._on_progressed)
+        self._made = Relay(self._on_made)
+        self._begun = Relay(self._on_begun)
         bar.run_requested.connect(self.run)
         bar.step_requested.connect(self.step)
         bar.pause_requested.connect(self._on_pause)
@@ -77,42 +79,44 @@ class PlayControl(QObject):
         self._start(lambda player, start: player.step(start))
 
     def _start(self, begin: Callable[[TrajectoryPlayer, StartMode], None]) -> None:
-        player = self._usable_player()
-        if player is None:
+        """Have the player begun, or a new one, where that may wait for a line."""
+        player, trajectory = self._player, self._trajectory
+        if trajectory is None:
             return
-        player.loops = self._bar.wanted_loops
-        player.speed = self._bar.speed.value()
-        self._asked = lambda start: begin(player, start)
+        loops, speed = self._bar.wanted_loops, self._bar.speed.value()
+        if player is not None and player.state in (PlayState.ENDED, PlayState.CANCELLED):
+            player = None
+
+        def begun(start: StartMode) -> TrajectoryPlayer:
+            nonlocal player
+            if player is None:
+                player = self._api.prepare(trajectory)
+                self._made(player)
+            player.loops, player.speed = loops, speed
+            begin(player, start)
+            return player
+
+        self._asked = begun
         self._try_start("refuse")
 
     def _try_start(self, start: StartMode) -> None:
-        if self._asked is None:
-            return
-        self._question.hide()
-        try:
-            self._asked(start)
-        except AwayFromStartError as exc:
-            self._question.ask(str(exc), has_model=self._application.collision is not None)
-        except CosmicError as exc:
-            self.refused.emit(str(exc))
+        if self._asked is not None:
+            self._question.hide()
+            asked = self._asked
+            self._mico.carry_out(lambda: asked(start), self._begun)
+
+    def _on_made(self, player: TrajectoryPlayer) -> None:
+        self._player = player
+        player.subscribe(partial(self._relay, player))
+
+    def _on_begun(self, _player: TrajectoryPlayer | None, error: CosmicError | None) -> None:
+        if isinstance(error, AwayFromStartError):
+            self._question.ask(str(error), has_model=self._mico.checks_collisions)
+        elif error is not None:
+            self.refused.emit(str(error))
 
     def _on_start_chosen(self, mode: str) -> None:
         self._try_start("way" if mode == "way" else "straight")
-
-    def _usable_player(self) -> TrajectoryPlayer | None:
-        """Return a player that can go on, or a new one."""
-        done = (PlayState.ENDED, PlayState.CANCELLED)
-        if self._player is not None and self._player.state not in done:
-            return self._player
-        if self._trajectory is None:
-            return None
-        try:
-            player = self._player = self._api.prepare(self._trajectory)
-        except CosmicError as exc:
-            self.refused.emit(str(exc))
-            return None
-        player.subscribe(partial(self._relay, player))
-        return player
 
     def _on_pause(self) -> None:
         if self._player is not None:

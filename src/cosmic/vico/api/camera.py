@@ -69,7 +69,7 @@ class CameraHandle(CameraCoordinates, CameraShape, Declared):
         self._images: CameraImages = LocalImages(application, self._unit)
 
     @override
-    def prepare(self, key: str, policy: FailurePolicy) -> None:
+    def set_up_proxy(self, key: str, policy: FailurePolicy) -> None:
         """Take images over the line."""
         self.name = key
         self._images = RemoteImages(self, policy)

@@ -132,7 +132,7 @@ class Vico(Declared):
             each.note_change()
 
     @override
-    def prepare(self, key: str, policy: FailurePolicy) -> None:
+    def set_up_proxy(self, key: str, policy: FailurePolicy) -> None:
         """Read points from the images that come."""
         self._on_images = ImageTransform(self)
 
