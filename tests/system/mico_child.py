@@ -2,6 +2,7 @@
 
 import sys
 import threading
+from collections.abc import Callable
 
 from contract.station_rig import connected
 from cosmic.frame.clock import WALL
@@ -9,6 +10,7 @@ from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import FailurePolicy
 from cosmic.mico.api.elsewhere import MicoElsewhere
 from cosmic.mico.api.mico import mico_of
+from cosmic.mico.core.motion.movement import Movement
 
 
 def say(text: str) -> None:
@@ -22,16 +24,21 @@ def main(what: str, endpoint: str) -> None:
         application = MicoElsewhere(client, FailurePolicy())
         application.initialize()
         axis = mico_of(application)["left.x"]
-        ended = threading.Event()
+        ended, movement = threading.Event(), Movement()
+        renew: Callable[[], object] = bool
         if what == "jog":
             jog = axis.jog(1, 10.0)
             jog.movement.add_callback(lambda _: ended.set())
             renew, movement = jog.renew, jog.movement
+        elif what == "trajectory":
+            axis.set_closed_loop_frequency(10)
+            trajectories = mico_of(application).trajectories
+            text = "cosmic-trajectory 1\nplatform FiberStation\nleft.x to 5000 um\nleft.x to 0 um\n"
+            trajectories.run(trajectories.parse(text), wait=False)
         else:
             axis.set_closed_loop_frequency(10)
             movement = axis.move_to(5_000.0, wait=False)
             movement.add_callback(lambda _: ended.set())
-            renew = lambda: None  # noqa: E731
         say("moving")
         until_s = WALL.now_s() + 30.0
         while not ended.wait(0.04) and WALL.now_s() < until_s:

@@ -76,7 +76,7 @@ def stops_within_s(hosted: HostedMico, monkeypatch: pytest.MonkeyPatch, limit_s:
     return stopped_s[0] - began_s
 
 
-@pytest.mark.parametrize("what", ["jog", "travel"])
+@pytest.mark.parametrize("what", ["jog", "travel", "trajectory"])
 def test_an_axis_stops_when_the_program_that_moves_it_is_killed(
     hosted: HostedMico, what: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
