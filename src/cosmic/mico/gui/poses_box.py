@@ -99,11 +99,11 @@ class PosesBox(QWidget):
 
     def _on_taught(self, pose: Pose | None, error: CosmicError | None) -> None:
         if pose is None:
-            self.told.set_text(str(error))
+            self.message.set_text(str(error))
             return
         where = self._mico.poses.path
         kept = f"kept in {where.name}" if where is not None else "kept until the program ends"
-        self.told.set_text(f"{pose.name}: {len(pose.positions)} axes, {kept}")
+        self.message.set_text(f"{pose.name}: {len(pose.positions)} axes, {kept}")
         self.name.clear()
         self.refresh()
         self.poses.setCurrentText(pose.name)
@@ -115,7 +115,7 @@ class PosesBox(QWidget):
 
     def _on_removed(self, _nothing: None, error: CosmicError | None) -> None:
         if error is not None:
-            self.told.set_text(str(error))
+            self.message.set_text(str(error))
         self.refresh()
         self.poses_changed.emit()
 
