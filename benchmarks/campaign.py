@@ -62,7 +62,7 @@ class Kind:
 KINDS = (
     Kind(NAME, seeds=10),
     Kind(f"{NAME}, wet", sample="forty-wet"),
-    Kind(f"{NAME}, two grippers", procedure="bend test with two hands"),
+    Kind(f"{NAME}, two grippers", procedure="bend test with two grippers"),
 )
 
 
@@ -96,7 +96,7 @@ class Run:
         return known.get(held[-1]) if held else None
 
     def truth_held(self) -> list[tuple[int, float, float]]:
-        """Return which fibre was in jaws, from when to when; of two hands both, as they began."""
+        """Return which fibre was in jaws, from when to when; of two grippers both, by begin."""
         held: list[tuple[int, float, float]] = []
         since: dict[int, float] = {}
         for event in self.truth.events:

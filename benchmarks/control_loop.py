@@ -11,7 +11,7 @@ from typing_extensions import override
 import cosmic
 from benchmarks.figures import Figure, main
 from cosmic.autonomy.control.handle import ControlHandle
-from cosmic.autonomy.control.pace import Pacer, PaceStatistics, ask_real_time
+from cosmic.autonomy.control.pace import LoopTimer, PaceStatistics, ask_real_time
 from cosmic.frame.clock import WALL
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.threads import WorkerThread
@@ -28,14 +28,14 @@ class Bare(WorkerThread):
     def __init__(self, cycles: int) -> None:
         super().__init__("bare pace", FailurePolicy())
         self._cycles = cycles
-        self.pacer = Pacer(PERIOD_S)
+        self.timer = LoopTimer(PERIOD_S)
 
     @override
     def run_body(self) -> None:
         ask_real_time(10)
-        self.pacer.begin()
+        self.timer.begin()
         for _ in range(self._cycles):
-            self.pacer.wait()
+            self.timer.wait()
 
 
 def bare(cycles: int) -> PaceStatistics:
@@ -43,7 +43,7 @@ def bare(cycles: int) -> PaceStatistics:
     thread = Bare(cycles)
     thread.start()
     thread.join(cycles * PERIOD_S * 10 + 5)
-    return thread.pacer.meter.statistics()
+    return thread.timer.meter.statistics()
 
 
 def errors_un(loop: ControlHandle, hold_s: float) -> tuple[float, float]:

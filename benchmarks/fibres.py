@@ -66,7 +66,7 @@ def nearest(fibres: list[Fibre], truth: Truth) -> Fibre | None:
     return min(fibres, key=away, default=None)
 
 
-def judged(fibres: list[Fibre], truth: Truth) -> Found:
+def compared(fibres: list[Fibre], truth: Truth) -> Found:
     """Return how well a fibre was found; one that was missed is wholly wrong and not certain."""
     fibre = nearest(fibres, truth)
     if fibre is None:
@@ -103,7 +103,7 @@ def row(recipe: Recipe, seeds: range) -> tuple[list[Found], list[float], int]:
         began = time.thread_time()
         fibres = find_fibres(image)
         times.append(1e3 * (time.thread_time() - began))
-        found += [judged(fibres, truth) for truth in truths]
+        found += [compared(fibres, truth) for truth in truths]
         false += max(0, sum(fibre.certain for fibre in fibres) - len(truths))
     return found, times, false
 

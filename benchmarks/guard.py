@@ -162,7 +162,7 @@ def full(names: Sequence[str] = FULL) -> Ratios:
     return found
 
 
-def judged(
+def worse_than(
     kept: Ratios,
     names: Sequence[str],
     measure: Callable[[Sequence[str]], Ratios],
@@ -223,11 +223,11 @@ def compare(state: State, names: Sequence[str], *, long: bool) -> dict[str, str]
     if state.machine != machine():
         print(f"the last good state was measured elsewhere: {state.machine}")
     kept = {key: value for key, value in state.ratios.items() if key.split(": ")[0] in names}
-    bad = judged(kept, names, probed, allowed(state))
+    bad = worse_than(kept, names, probed, allowed(state))
     if long:
         speed = 1e6 * statistics.median(reference_s() for _ in range(15)) / state.reference_us
         print(f"the reference takes {speed:.2f} times as long as then; tails are judged by that")
-        bad |= judged({name: speed * each for name, each in state.full.items()}, FULL, full)
+        bad |= worse_than({name: speed * each for name, each in state.full.items()}, FULL, full)
     return bad
 
 

@@ -120,7 +120,7 @@ class Copy:
             raise DoesNotApplyError(f"its text fits {len(fitting)} files")
         return fitting[0]
 
-    def judge(self, mutant: Mutant, longest_s: float) -> Outcome:
+    def run_on(self, mutant: Mutant, longest_s: float) -> Outcome:
         """Make the edit, run the tests, and undo it."""
         began_s = time.monotonic()
         try:
@@ -290,17 +290,17 @@ def judge_all(root: Path, mutants: Sequence[Mutant], jobs: int, longest_s: float
         unharmed_s = _run_unharmed(copies, mutants)
         longest_s = max(longest_s, PATIENCE * unharmed_s)
 
-        def judged(mutant: Mutant) -> Outcome:
+        def checked(mutant: Mutant) -> Outcome:
             copy = copies.get()
             try:
-                outcome = copy.judge(mutant, longest_s)
+                outcome = copy.run_on(mutant, longest_s)
             finally:
                 copies.put(copy)
             print(f"{outcome.what}: {mutant.name} ({outcome.by})", file=sys.stderr, flush=True)
             return outcome
 
         with ThreadPoolExecutor(jobs) as pool:
-            return list(pool.map(judged, mutants))
+            return list(pool.map(checked, mutants))
 
 
 def _run_unharmed(copies: "queue.SimpleQueue[Copy]", mutants: Iterable[Mutant]) -> float:

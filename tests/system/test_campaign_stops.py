@@ -60,7 +60,7 @@ def operations_of(part: Part) -> Iterator[UnitOperation]:
 def all_operations() -> dict[str, tuple[str, Way]]:
     """Return each operation with the first procedure that has it, and how it is come to."""
     found: dict[str, tuple[str, Way]] = {}
-    # What two arms do in turn is stopped in test_two_hands.py.
+    # What two arms do in turn is stopped in test_dual_gripper.py.
     alone = {name: each for name, each in PROCEDURES.items() if each.arms == 1}
     for procedure, shipped in alone.items():
         for each in operations_of(shipped.build(HandlingSettings()).root):

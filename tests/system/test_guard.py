@@ -45,12 +45,12 @@ def test_what_is_beyond_once_is_measured_again_and_only_that() -> None:
             else {"commands: stop": 10.0}
         )
 
-    assert guard.judged(KEPT, ["gate", "commands"], measure) == {}
+    assert guard.worse_than(KEPT, ["gate", "commands"], measure) == {}
     assert asked == ["gate", "commands", "gate"]
 
 
 def test_a_probe_that_does_not_run_fails_by_the_names_of_its_ratios() -> None:
-    bad = guard.judged(KEPT, ["gate", "commands"], lambda names: {})
+    bad = guard.worse_than(KEPT, ["gate", "commands"], lambda names: {})
     assert set(bad) == set(KEPT)
 
 

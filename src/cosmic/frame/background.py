@@ -37,4 +37,4 @@ class BackgroundJobs(JobQueue):
             else:
                 on_result(None, CosmicError(f"{type(error).__name__}: {error}"))
 
-        self.submit(action, "an errand").add_callback(report)
+        self.submit(action, "a background job").add_callback(report)

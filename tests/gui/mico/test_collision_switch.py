@@ -53,7 +53,7 @@ def test_collision_detection_is_on_at_first(card: PositionerBaseGUI) -> None:
     assert card.axis.collision_detection
     assert switch(card).isEnabled()
     assert switch(card).text() == "CD on"
-    assert switch(card).sign.text() == ""
+    assert switch(card).indicator.text() == ""
 
 
 def test_taking_out_asks_once_more_and_is_loud_afterwards(
@@ -68,7 +68,7 @@ def test_taking_out_asks_once_more_and_is_loud_afterwards(
     assert not card.axis.collision_detection
     assert f"{card.axis.name} was taken out of collision detection by window" in caplog.text
     qtbot.waitUntil(lambda: switch(card).text() == "CD OFF")
-    assert switch(card).sign.text() == "▲"
+    assert switch(card).indicator.text() == "▲"
     assert "NOT checked" in part(card, "status", QLabel).text()
     border = card.grab().toImage().pixelColor(card.width() // 2, 1)
     assert border == QColor(OKABE_ITO["vermillion"])
@@ -167,8 +167,8 @@ def test_without_a_model_the_switch_says_why_it_cannot_be_used(bare: MicoWidget)
         button = part(bare.cards[name], object_name, QAbstractButton)
         assert not button.isEnabled()
         assert "collision model" in button.toolTip()
-    sign = part(bare.cards["left.x"], "MiCoCL_2", QLabel)
-    assert sign.text() == "▲"
-    assert sign.accessibleName() == "no collision model"
+    indicator = part(bare.cards["left.x"], "MiCoCL_2", QLabel)
+    assert indicator.text() == "▲"
+    assert indicator.accessibleName() == "no collision model"
     forward = part(bare.cards["left.x"], "MiCoCL_6", QPushButton)
     assert forward.isEnabled()

@@ -60,7 +60,7 @@ def press_start(qtbot, panel: TeleoperationPanel) -> None:
 def begin(qtbot, panel: TeleoperationPanel, key: str = HAPTIC, profile: str = "stylus"):
     choose(panel, key, profile)
     press_start(qtbot, panel)
-    qtbot.waitUntil(lambda: panel.sign.words == "armed")
+    qtbot.waitUntil(lambda: panel.indicator.words == "armed")
 
 
 def haptic(panel: TeleoperationPanel):
@@ -68,14 +68,14 @@ def haptic(panel: TeleoperationPanel):
 
 
 def test_a_device_and_a_profile_are_chosen_and_steering_is_begun_and_ended(qtbot, panel):
-    assert panel.sign.words == "off"
+    assert panel.indicator.words == "off"
     assert panel.start.text() == "Start"
     begin(qtbot, panel)
     assert panel.start.text() == "Stop"
     assert not panel.devices.isEnabled()
     assert teleoperation(panel).state.profile == "stylus"
     press_start(qtbot, panel)
-    assert panel.sign.words == "off"
+    assert panel.indicator.words == "off"
     assert panel.start.text() == "Start"
     assert panel.devices.isEnabled()
 
@@ -84,7 +84,7 @@ def test_bars_and_velocities_follow_the_hand_and_the_force_is_shown(qtbot, panel
     begin(qtbot, panel)
     haptic(panel).move_hand(y=0.5)
     qtbot.waitUntil(lambda: panel.bars.axes.get("y", 0.0) > 0.3)
-    qtbot.waitUntil(lambda: panel.sign.words == "steering")
+    qtbot.waitUntil(lambda: panel.indicator.words == "steering")
     qtbot.waitUntil(lambda: "µm/s" in panel.table.item(1, NOW).text())
     teleoperation(panel).feel({"y": -0.25})
     qtbot.waitUntil(lambda: panel.force.text == "felt force 25 %")
@@ -97,8 +97,8 @@ def test_a_loss_is_said_in_words_and_steering_can_be_begun_again(qtbot, panel):
     begin(qtbot, panel)
     with qtbot.waitSignal(panel.phase_changed, check_params_cb="stopped: unplugged".__eq__):
         haptic(panel).unplug()
-    assert panel.sign.words == "stopped: unplugged"
-    assert panel.sign.accessibleName() == "teleoperation stopped: unplugged"
+    assert panel.indicator.words == "stopped: unplugged"
+    assert panel.indicator.accessibleName() == "teleoperation stopped: unplugged"
     assert panel.start.text() == "Start"
     panel.grab()
     begin(qtbot, panel)
@@ -108,10 +108,10 @@ def test_a_window_out_of_focus_pauses(qtbot, panel, monkeypatch):
     begin(qtbot, panel)
     inactive = Qt.ApplicationState.ApplicationInactive
     monkeypatch.setattr(type(panel._app), "applicationState", lambda *_: inactive)
-    qtbot.waitUntil(lambda: panel.sign.words == "paused: the window is out of focus")
+    qtbot.waitUntil(lambda: panel.indicator.words == "paused: the window is out of focus")
     assert teleoperation(panel).state.phase is Phase.PAUSED
     monkeypatch.undo()
-    qtbot.waitUntil(lambda: panel.sign.words == "armed")
+    qtbot.waitUntil(lambda: panel.indicator.words == "armed")
 
 
 def test_the_mapping_is_edited_in_the_table(qtbot, panel):
@@ -153,7 +153,7 @@ def test_the_number_keys_of_the_window_steer_as_long_as_they_are_held(qtbot, pan
     qtbot.keyPress(panel, Qt.Key.Key_6)
     qtbot.waitUntil(lambda: axis.state.velocities.get("d0.c0", 0.0) == 200.0)
     qtbot.keyRelease(panel, Qt.Key.Key_6)
-    qtbot.waitUntil(lambda: panel.sign.words == "armed")
+    qtbot.waitUntil(lambda: panel.indicator.words == "armed")
 
 
 def test_what_cannot_be_started_says_why(qtbot, panel):
@@ -161,7 +161,7 @@ def test_what_cannot_be_started_says_why(qtbot, panel):
     teleoperation(panel)._manager.stop("test")
     press_start(qtbot, panel)
     assert "reset the stop first" in panel.message.text()
-    assert panel.sign.words == "off"
+    assert panel.indicator.words == "off"
 
 
 def test_a_changed_profile_is_taken_back_as_it_was_configured(panel, qtbot):

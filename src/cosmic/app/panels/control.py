@@ -260,18 +260,18 @@ class ControlPanel(QWidget):
     # What the operator does
 
     def _on_start(self) -> None:
-        wish = self.form.request()
-        if wish is None:
+        asked = self.form.request()
+        if asked is None:
             return
         try:
             self._mine = self._control.hold_force(
-                wish.channel,
-                wish.axis,
-                wish.set_point,
-                direction=wish.direction,
-                limit_un=wish.limit,
-                travel_um=wish.travel,
-                gains=None if wish.gain is None else PidGains(wish.gain),
+                asked.channel,
+                asked.axis,
+                asked.set_point,
+                direction=asked.direction,
+                limit_un=asked.limit,
+                travel_um=asked.travel,
+                gains=None if asked.gain is None else PidGains(asked.gain),
             )
         except CosmicError as exc:
             self._shown = None
@@ -280,11 +280,11 @@ class ControlPanel(QWidget):
         self.refresh()
 
     def _on_aim(self) -> None:
-        wish, handle = self.form.request(), self._control.newest
-        if wish is None or handle is None:
+        asked, handle = self.form.request(), self._control.newest
+        if asked is None or handle is None:
             return
         try:
-            handle.aim(wish.set_point)
+            handle.aim(asked.set_point)
         except CosmicError as exc:
             self.form.set_point.refuse(str(exc))
 

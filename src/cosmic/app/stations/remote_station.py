@@ -93,7 +93,7 @@ class RemoteStation:
         self._connection = ClientSideConnection(
             address.name, client, lambda: ZenohWire(line), policy
         )
-        self._background = JobQueue(f"errands to {address.name}", policy)
+        self._background = JobQueue(f"calls to {address.name}", policy)
         self._lock = Lock()
         self._facts: StationFacts | None = None
         self._lease: LeaseState | None = None
@@ -189,7 +189,7 @@ class RemoteStation:
 
     def later(self, what: Callable[[], object], failed: Callable[[CosmicError], object]) -> None:
         """Do `what` in a thread of the station's own, for windows, which must not wait."""
-        self._background.submit(what, f"an errand to {self.name}").when_failed(failed)
+        self._background.submit(what, f"a call to {self.name}").when_failed(failed)
 
     def close(self) -> None:
         """Give control back and end the line; any state."""

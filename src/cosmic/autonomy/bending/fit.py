@@ -43,7 +43,7 @@ def _has_value(fit: SpanFit) -> bool:
     return math.isfinite(fit.k_un_um) and 0.0 < fit.k_std_un_um < math.inf
 
 
-def judged(result: BendingResult, settings: FitSettings) -> BendingResult:
+def with_quality(result: BendingResult, settings: FitSettings) -> BendingResult:
     """Return the result with its flags, whether it is trusted, and why not."""
     flags, reasons = set(result.flags), []
     for number, fit in enumerate(result.spans):
@@ -107,10 +107,10 @@ def fit_bending(spans: Sequence[Span], *, settings: FitSettings | None = None) -
     if lever is not None and abs(lever.offset_um - offset) > NEAR_PART * min(positions):
         fits, lever, used = _once(spans, positions, lever.offset_um, settings)
     if lever is None:
-        return judged(_nothing(fits, settings), settings)
+        return with_quality(_nothing(fits, settings), settings)
     low, high = _interval(fits, used, lever, settings)
     scale = N_M2_PER_UN_UM2
-    return judged(
+    return with_quality(
         BendingResult(
             ei_n_m2=lever.ei_un_um2 * scale,
             ei_low_n_m2=low * scale,

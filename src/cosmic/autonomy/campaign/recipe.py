@@ -5,13 +5,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from cosmic.autonomy.campaign.stop_rule import StopSettings
 from cosmic.frame.config import StrictModel, check_model, load_model, shipped_config_dir
 from cosmic.frame.errors import ConfigError
 
 RECIPES: Final = "recipes"
+RENAMED: Final = {"bend test with two hands": "bend test with two grippers"}
+"""Names that procedures had before, still read in recipes."""
 
 
 class SampleSettings(StrictModel):
@@ -66,6 +68,11 @@ class RecipeFile(StrictModel):
     parameters: dict[str, Any] = Field(default_factory=dict)
     output: OutputSettings = OutputSettings()
     twin: TwinChoice = TwinChoice()
+
+    @field_validator("procedure")
+    @classmethod
+    def _present_name(cls, procedure: str) -> str:
+        return RENAMED.get(procedure, procedure)
 
 
 @dataclass(frozen=True, slots=True)

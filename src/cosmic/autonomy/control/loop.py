@@ -10,7 +10,7 @@ from threading import Lock
 from typing_extensions import override
 
 from cosmic.autonomy.control.law import Answer, ControlState, Law
-from cosmic.autonomy.control.pace import Pacer, PaceStatistics, ask_real_time, quick_switching
+from cosmic.autonomy.control.pace import LoopTimer, PaceStatistics, ask_real_time, quick_switching
 from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.autonomy.control.sink import AxisSink
 from cosmic.autonomy.control.sources import Sample, Source
@@ -118,7 +118,7 @@ class ControlLoop(WorkerThread):
         self.source, self.law, self.sink = source, law, sink
         self._settings = settings
         self._rate = rate or 1.0
-        self._pacer = Pacer(1.0 / settings.rate_hz)
+        self._timer = LoopTimer(1.0 / settings.rate_hz)
         self._trace = TraceKeeper(settings.rate_hz)
         self._on_end = on_end
         self._lock = Lock()
@@ -148,7 +148,7 @@ class ControlLoop(WorkerThread):
 
     def statistics(self) -> ControlStatistics:
         """Return how it is doing; any thread."""
-        return ControlStatistics(self._pacer.meter.statistics(), self.sink.packets, self._real_time)
+        return ControlStatistics(self._timer.meter.statistics(), self.sink.packets, self._real_time)
 
     def trace(self, seconds: float) -> ControlTrace:
         """Return what it did in the last `seconds`; any thread."""
@@ -175,7 +175,7 @@ class ControlLoop(WorkerThread):
             return
         self.sink.close(error)
         self._end_requested.set()
-        self._pacer.end()
+        self._timer.end()
         log = logger.info if error is None else logger.warning
         log("control loop: %s by %s ended: %s", self.source.name, self.sink.name, self.reason)
 
@@ -218,9 +218,9 @@ class ControlLoop(WorkerThread):
                 self._on_end(self)
 
     def _run(self) -> None:
-        self._pacer.begin()
+        self._timer.begin()
         while not self.end_requested:
-            passed_s = self._pacer.wait()
+            passed_s = self._timer.wait()
             if passed_s <= 0.0 or self.end_requested:
                 return
             self._cycle(passed_s)

@@ -105,7 +105,7 @@ def _percentile(values: npt.NDArray[np.float64], percent: float) -> float:
     return float(np.percentile(values, percent)) if values.size else math.nan
 
 
-class Pacer:
+class LoopTimer:
     """Wakes one thread at absolute times, so that nothing adds up.
 
     What was missed is counted and left out; there is no catching up.

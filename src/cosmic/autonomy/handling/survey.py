@@ -76,11 +76,11 @@ def look(work: HandlingContext, seen: list[SeenFibre]) -> None:
     angle, frame = work.table_deg, work.calibration.frame
     found = [_candidate(work, each, frame.on_plate(each.line_um, angle)) for each in seen]
     before, work.shared.lines_um = work.shared.lines_um, [each.line_um for each in found]
-    judged = [replace(each, problem=each.problem or _lonely(work, each)) for each in found]
-    judged = leave_dropped(judged, work.shared.dropped)
-    judged = _leave_fallen(work, judged, before)
-    work.shared.candidates = [each for each in judged if not each.problem]
-    work.shared.skip_reasons = Counter(each.problem for each in judged if each.problem)
+    checked = [replace(each, problem=each.problem or _lonely(work, each)) for each in found]
+    checked = leave_dropped(checked, work.shared.dropped)
+    checked = _leave_fallen(work, checked, before)
+    work.shared.candidates = [each for each in checked if not each.problem]
+    work.shared.skip_reasons = Counter(each.problem for each in checked if each.problem)
     work.shared.surveyed, work.shared.since_survey, work.shared.survey_deg = True, 0, angle
 
 

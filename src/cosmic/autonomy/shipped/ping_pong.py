@@ -1,4 +1,4 @@
-"""The bend test with two hands: one measures while the other fetches and puts away."""
+"""The bend test with two grippers: one measures while the other fetches and puts away."""
 
 from collections.abc import Callable
 
@@ -64,9 +64,9 @@ def build_ping_pong(settings: HandlingSettings | None = None) -> Procedure[Handl
         EndRound(),
     )
     return Procedure(
-        "bend test with two hands",
+        "bend test with two grippers",
         Sequence(
-            "bend test with two hands",
+            "bend test with two grippers",
             prepare(settings),
             Repeat(one_round, lambda work: work.shared.enough(), name="until none is left"),
         ),

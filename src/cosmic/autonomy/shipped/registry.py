@@ -33,7 +33,7 @@ class ShippedProcedure:
 
 PROCEDURES: Final[Mapping[str, ShippedProcedure]] = {
     "bend test": ShippedProcedure(build_bend_test),
-    "bend test with two hands": ShippedProcedure(build_ping_pong, arms=2),
+    "bend test with two grippers": ShippedProcedure(build_ping_pong, arms=2),
     "transport": ShippedProcedure(build_transport, measures=False),
 }
 

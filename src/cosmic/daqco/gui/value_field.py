@@ -47,7 +47,7 @@ class ValueField(NumberEdit):
         self.refuse("")
 
     def take(self) -> bool:
-        """Judge the text; False when it was refused, and the reason then stands at the field."""
+        """Check the text; False when it was refused, and the reason then stands at the field."""
         if self._empty and not self.text().strip():
             self._good = None
             return True

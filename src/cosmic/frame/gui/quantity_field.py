@@ -132,7 +132,7 @@ class QuantityField(QLineEdit):
         self.selectAll()
 
     def commit(self) -> bool:
-        """Judge the text as Enter does; False when it was refused."""
+        """Check the text as Enter does; False when it was refused."""
         try:
             value = self._parse()
         except QuantityError as exc:

@@ -175,18 +175,18 @@ class TopBar(QWidget):
         self._first_row.addWidget(self._message_state)
         self._first_row.addWidget(self._message, 1)
         # Where they are seen while stopped, too.
-        for sign in (self._controls, self._contacts, self._unwatched):
-            self._first_row.addWidget(sign)
+        for warning in (self._controls, self._contacts, self._unwatched):
+            self._first_row.addWidget(warning)
         self._first_row.addWidget(self._theme)
         second = QHBoxLayout()
         second.setSpacing(2 * STEP_PX)
         second.addWidget(self._title)
         second.addWidget(self._simulated)
         second.addWidget(self._pages, 1)
-        signs = QWidget()
+        warnings = QWidget()
         # Cut off at the right where the window is too narrow: STOP never is.
-        signs.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        rows = QVBoxLayout(signs)
+        warnings.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        rows = QVBoxLayout(warnings)
         rows.setContentsMargins(0, 0, 0, 0)
         rows.setSpacing(STEP_PX // 2)
         rows.addLayout(self._first_row)
@@ -194,7 +194,7 @@ class TopBar(QWidget):
         whole = QHBoxLayout(self)
         whole.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX)
         whole.setSpacing(2 * STEP_PX)
-        whole.addWidget(signs, 1)
+        whole.addWidget(warnings, 1)
         whole.addWidget(self._stop)
 
     def add_indicator(self, indicator: QWidget) -> None:

@@ -102,14 +102,14 @@ class PositionDisplay(QWidget):
         self._figures.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         widest = format_quantity(-99999.9 if unit == "um" else -359.9999, unit).split(" ")[0]
         self._figures.setFixedWidth(self._figures.fontMetrics().horizontalAdvance(widest) + 2)
-        sign = QLabel(DISPLAY[unit])
-        sign.setProperty("role", "dim")
-        sign.setFixedWidth(sign.fontMetrics().horizontalAdvance("µm") + 2)
+        unit_label = QLabel(DISPLAY[unit])
+        unit_label.setProperty("role", "dim")
+        unit_label.setFixedWidth(unit_label.fontMetrics().horizontalAdvance("µm") + 2)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(STEP_PX // 2)
         row.addWidget(self._figures)
-        row.addWidget(sign)
+        row.addWidget(unit_label)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Preferred)
 
     @property

@@ -40,7 +40,7 @@ class ClosedLoopGUI(PositionerBaseGUI):
     position_name: ClassVar[str] = "MiCoCL_5"
     forward_name: ClassVar[str] = "MiCoCL_6"
     backward_name: ClassVar[str] = "MiCoCL_7"
-    sign_name: ClassVar[str] = "MiCoCL_2"
+    indicator_name: ClassVar[str] = "MiCoCL_2"
     switch_name: ClassVar[str] = "MiCoCL_13"
 
     # Putting it together
@@ -57,7 +57,7 @@ class ClosedLoopGUI(PositionerBaseGUI):
 
     def _make_indicators(self) -> None:
         self._link = named(LinkSwitch(self.settings.name), "MiCoCL_12")
-        self._linked = named(self._link.sign, "MiCoCL_3")
+        self._linked = named(self._link.indicator, "MiCoCL_3")
         self._link.opened.connect(self._on_link_opened)
         self._link.link_wanted.connect(self.link_wanted)
         self._link.unlink_wanted.connect(self.unlink_wanted)
@@ -86,8 +86,8 @@ class ClosedLoopGUI(PositionerBaseGUI):
 
     @override
     def _first_row(self) -> Sequence[QWidget]:
-        signs = (self._linked, self._link)
-        return *super()._first_row()[:-1], *signs, self._stop
+        indicators = (self._linked, self._link)
+        return *super()._first_row()[:-1], *indicators, self._stop
 
     @override
     def _second_row(self) -> Sequence[QWidget]:

@@ -42,8 +42,8 @@ class CollisionSwitch(QPushButton):
         styled(self, "narrow")
         self.setFixedWidth(self.fontMetrics().horizontalAdvance("CD OFF") + 2 * STEP_PX + 2)
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self.sign = QLabel("▲")
-        self.sign.setFixedWidth(self.sign.fontMetrics().horizontalAdvance("▲") + 2)
+        self.indicator = QLabel("▲")
+        self.indicator.setFixedWidth(self.indicator.fontMetrics().horizontalAdvance("▲") + 2)
         self.clicked.connect(self._on_clicked)
         self.show_detection(model=False, watched=True)
 
@@ -65,18 +65,18 @@ class CollisionSwitch(QPushButton):
         self.setAccessibleName(f"{self._axis} collision detection {'on' if watched else 'off'}")
         set_style_property(self, "watched", watched or not model)
         if not model:
-            tip, sign = f"Not available: {NO_MODEL_TIP.lower()}", "no collision model"
+            tip, meaning = f"Not available: {NO_MODEL_TIP.lower()}", "no collision model"
         elif watched:
             tip = f"{self._axis} is checked for collisions; press to take it out"
-            sign = "checked for collisions"
+            meaning = "checked for collisions"
         else:
             tip = f"{self._axis} is NOT checked for collisions; press to check it again"
-            sign = "not checked for collisions"
+            meaning = "not checked for collisions"
         self.setToolTip(tip)
         calm = model and watched
-        self.sign.setText("" if calm else "▲")
-        self.sign.setAccessibleName(sign)
-        tipped(self.sign, tip if model else NO_MODEL_TIP)
+        self.indicator.setText("" if calm else "▲")
+        self.indicator.setAccessibleName(meaning)
+        tipped(self.indicator, tip if model else NO_MODEL_TIP)
 
     def _on_clicked(self) -> None:
         if not self._watched:

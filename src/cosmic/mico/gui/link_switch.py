@@ -52,8 +52,8 @@ class LinkSwitch(QPushButton):
         styled(self, "narrow")
         self.setFixedWidth(self.fontMetrics().horizontalAdvance("Link off") + 2 * STEP_PX + 2)
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self.sign = QLabel("○")
-        self.sign.setFixedWidth(self.sign.fontMetrics().horizontalAdvance("●") + 2)
+        self.indicator = QLabel("○")
+        self.indicator.setFixedWidth(self.indicator.fontMetrics().horizontalAdvance("●") + 2)
         self.clicked.connect(self._on_clicked)
         self.show_links({})
 
@@ -72,9 +72,9 @@ class LinkSwitch(QPushButton):
         self.setAccessibleName(f"{self._axis} link {'on' if on else 'off'}")
         with_what = f"{self._axis} moves with {others}"
         self.setToolTip(f"{with_what}; press to unlink" if on else f"{self._axis} {OFF_TIP}")
-        self.sign.setText("●" if on else "○")
-        self.sign.setAccessibleName(f"linked with {others}" if on else "not linked")
-        tipped(self.sign, with_what if on else f"{self._axis} is linked with none")
+        self.indicator.setText("●" if on else "○")
+        self.indicator.setAccessibleName(f"linked with {others}" if on else "not linked")
+        tipped(self.indicator, with_what if on else f"{self._axis} is linked with none")
 
     def _on_clicked(self) -> None:
         if self._linked:

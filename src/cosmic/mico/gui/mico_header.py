@@ -124,8 +124,8 @@ class MicoHeader(QWidget):
 
     def set_missing(self, lines: tuple[str, ...]) -> None:
         """List what was configured and is not there."""
-        sign = state_look(State.UNKNOWN).glyph
-        self._missing.setText("\n".join(f"{sign} {line}" for line in lines))
+        shape = state_look(State.UNKNOWN).glyph
+        self._missing.setText("\n".join(f"{shape} {line}" for line in lines))
         self._missing.setToolTip("Switch it on or connect it, then press Rescan")
         self._missing.setVisible(bool(lines))
 

@@ -73,17 +73,17 @@ class MoveFields:
         self.target.set_value(position)
 
     def commit_step(self) -> bool:
-        """Judge the entries that a button needs; False when one was refused."""
+        """Check the entries that a button needs; False when one was refused."""
         return self._commit(self.distance)
 
     def commit_target(self) -> bool:
-        """Judge the entries that Go to needs; False when one was refused."""
+        """Check the entries that Go to needs; False when one was refused."""
         return self._commit(self.target)
 
     def _commit(self, field: QuantityField) -> bool:
         fields = [field, *([self.largest] if self.split.isChecked() else [])]
-        judged = [each.commit() for each in fields]  # each shows its own reason
-        return all(judged)
+        accepted = [each.commit() for each in fields]  # each shows its own reason
+        return all(accepted)
 
     def move_by(self, direction: int, *, consent: bool) -> Movement | StepwiseMove:
         """Move by the step size in `direction`, 1 or -1, at once or in parts."""

@@ -55,9 +55,9 @@ class StepsPart(QWidget):
         return self.steps, self.frequency, self.amplitude
 
     def commit(self) -> bool:
-        """Judge all three entries; False when one was refused."""
-        judged = [field.commit() for field in self.fields]  # each shows its own reason
-        return all(judged)
+        """Check all three entries; False when one was refused."""
+        accepted = [field.commit() for field in self.fields]  # each shows its own reason
+        return all(accepted)
 
     def make(self, direction: int, *, consent: bool) -> Movement:
         """Make the steps in `direction`, 1 or -1."""
@@ -118,7 +118,7 @@ class PositionerBaseGUI(Card):
     forward_name: ClassVar[str] = "MiCoOL_3"
     backward_name: ClassVar[str] = "MiCoOL_4"
     position_name: ClassVar[str] = "position"
-    sign_name: ClassVar[str] = "collisionSign"
+    indicator_name: ClassVar[str] = "collisionSign"
     switch_name: ClassVar[str] = "collisionSwitch"
 
     def __init__(
@@ -164,7 +164,7 @@ class PositionerBaseGUI(Card):
         self._position = PositionDisplay(settings.unit, self.position_name)
         self._confidence = ConfidenceMark()
         self._detection = named(CollisionSwitch(settings.name), self.switch_name)
-        self._detection.sign.setObjectName(self.sign_name)
+        self._detection.indicator.setObjectName(self.indicator_name)
         self._detection.wanted.connect(self._on_detection_wanted)
         self._stop = named(QToolButton(), "stopAxis")
         self._stop.setText("■")
@@ -202,7 +202,7 @@ class PositionerBaseGUI(Card):
         column.addWidget(self._line)
 
     def _first_row(self) -> Sequence[QWidget]:
-        detection = (self._detection.sign, self._detection)
+        detection = (self._detection.indicator, self._detection)
         return self._badge, self._title, self._position, self._confidence, *detection, self._stop
 
     def _second_row(self) -> Sequence[QWidget]:

@@ -170,7 +170,7 @@ class TeleoperationPanel(QWidget):
             push_button("As configured", "Take this profile as the platform file has it"),
             "profileAsConfigured",
         )
-        self.sign = PhaseIndicator()
+        self.indicator = PhaseIndicator()
         self.rates = ElidedLabel()
         self.bars = InputBars()
         self.force = ForceBar()
@@ -204,7 +204,7 @@ class TeleoperationPanel(QWidget):
         choice.addWidget(self.start)
         status_row = QHBoxLayout()
         status_row.setSpacing(STEP_PX)
-        status_row.addWidget(self.sign, 3)
+        status_row.addWidget(self.indicator, 3)
         status_row.addWidget(self.force, 2)
         pace = QHBoxLayout()
         pace.setSpacing(STEP_PX // 2)
@@ -326,7 +326,7 @@ class TeleoperationPanel(QWidget):
         """Show how it is now."""
         self._on_attention()
         state = self._teleoperation.state
-        self.sign.show_phase(state.phase, state.words)
+        self.indicator.show_phase(state.phase, state.words)
         self.bars.show_inputs(state.inputs)
         self.force.show_force(state.force, state.slowed)
         self.fine.show_pace(fine=state.fine)

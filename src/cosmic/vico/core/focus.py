@@ -233,7 +233,7 @@ class FocusSearch:
         self._here.clear()
         self._targets.pop(0)
         if not self._targets:
-            self._judge()
+            self._evaluate()
 
     def _begin(self, low: float, high: float, step: float) -> None:
         count = math.ceil((high - low) / step - 1e-9) + 1
@@ -241,7 +241,7 @@ class FocusSearch:
         self._sweep: list[tuple[float, float]] = []
         self._sweeps += 1
 
-    def _judge(self) -> None:
+    def _evaluate(self) -> None:
         if not self._coarse:
             self._coarse = self._sweep
             if not self._rises():

@@ -97,8 +97,8 @@ class AmountField(NumberEdit):
         self.selectAll()
 
     def commit(self) -> bool:
-        """Judge the text as Enter does; False when it was refused."""
-        value = self._judge()
+        """Check the text as Enter does; False when it was refused."""
+        value = self._checked()
         if value is None:
             return False
         self.refuse("")
@@ -110,7 +110,7 @@ class AmountField(NumberEdit):
             self.committed.emit(value)
         return not self.reason
 
-    def _judge(self) -> float | None:
+    def _checked(self) -> float | None:
         try:
             value = read_number(self.text().strip().removesuffix(self._unit))
         except QuantityError as exc:

@@ -13,8 +13,8 @@ from cosmic.vico.hw.interface import CameraInfo
 
 def camera_text(info: CameraInfo) -> str:
     """Return how a camera stands in the list."""
-    sign = "simulated" if info.simulated else info.serial
-    return f"{info.vendor} {info.model} ({sign})" if sign else f"{info.vendor} {info.model}"
+    origin = "simulated" if info.simulated else info.serial
+    return f"{info.vendor} {info.model} ({origin})" if origin else f"{info.vendor} {info.model}"
 
 
 class CameraChooser(QWidget):

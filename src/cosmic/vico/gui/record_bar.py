@@ -77,9 +77,9 @@ class TimeLapseDialog(QDialog):
             self.total.setText(duration_text(interval_s * max(0.0, count - 1.0)))
 
     def _on_begin(self) -> None:
-        judged = [field.commit() for field in (self.interval, self.count)]
+        committed = [field.commit() for field in (self.interval, self.count)]
         interval_s, count = self.interval.value(), self.count.value()
-        if all(judged) and interval_s is not None and count is not None:
+        if all(committed) and interval_s is not None and count is not None:
             self.agreed.emit(interval_s, round(count))
             self.accept()
 

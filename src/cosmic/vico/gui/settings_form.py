@@ -135,7 +135,7 @@ class SettingsForm(QObject):
         x, width = _fitting(settings.roi.x_px + x_px, width_px, ranges.width_px, sensor[0])
         y, height = _fitting(settings.roi.y_px + y_px, height_px, ranges.height_px, sensor[1])
         roi = Roi(x, y, width, height)
-        self._wish(lambda now: replace(now, roi=roi))
+        self._request(lambda now: replace(now, roi=roi))
 
     def read_all(self) -> None:
         """Read the whole sensor."""
@@ -143,7 +143,7 @@ class SettingsForm(QObject):
         if settings is not None:
             width, height = self._sensor(settings)
             roi = Roi(0, 0, width, height)
-            self._wish(lambda now: replace(now, roi=roi))
+            self._request(lambda now: replace(now, roi=roi))
 
     def _sensor(self, settings: CameraSettings) -> tuple[int, int]:
         """Return the sensor's size in binned pixels."""
@@ -155,13 +155,13 @@ class SettingsForm(QObject):
         return int(ranges.width_px.high), int(ranges.height_px.high)
 
     def _on_exposure(self, exposure_ms: float) -> None:
-        self._wish(lambda now: replace(now, exposure_s=exposure_ms / MS), self.exposure)
+        self._request(lambda now: replace(now, exposure_s=exposure_ms / MS), self.exposure)
 
     def _on_gain(self, gain_db: float) -> None:
-        self._wish(lambda now: replace(now, gain_db=gain_db), self.gain)
+        self._request(lambda now: replace(now, gain_db=gain_db), self.gain)
 
     def _on_rate(self, rate_hz: float) -> None:
-        self._wish(lambda now: replace(now, rate_hz=rate_hz), self.rate)
+        self._request(lambda now: replace(now, rate_hz=rate_hz), self.rate)
 
     def _on_binning(self) -> None:
         settings = self._camera.settings
@@ -170,15 +170,15 @@ class SettingsForm(QObject):
         binning = int(self.binning.currentData())
         width, height = self._sensor(replace(settings, binning=binning))
         roi = Roi(0, 0, width, height)
-        self._wish(lambda now: replace(now, binning=binning, roi=roi))
+        self._request(lambda now: replace(now, binning=binning, roi=roi))
 
     def _on_format(self) -> None:
         chosen = PixelFormat(self.pixel_format.currentData())
-        self._wish(lambda now: replace(now, pixel_format=chosen))
+        self._request(lambda now: replace(now, pixel_format=chosen))
 
     def _on_trigger(self) -> None:
         chosen = Trigger(self.trigger.currentData())
-        self._wish(lambda now: replace(now, trigger=chosen))
+        self._request(lambda now: replace(now, trigger=chosen))
 
     def _on_shoot(self) -> None:
         try:
@@ -186,7 +186,7 @@ class SettingsForm(QObject):
         except CosmicError as exc:
             self._refuse(str(exc))
 
-    def _wish(self, change: Change, field: SliderField | None = None) -> None:
+    def _request(self, change: Change, field: SliderField | None = None) -> None:
         self._waiting.append((change, field))
         if not self._watch.busy:
             self._ask()

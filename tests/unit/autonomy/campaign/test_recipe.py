@@ -6,6 +6,7 @@ import pytest
 
 from cosmic.autonomy.bending.plan import SpanLimits
 from cosmic.autonomy.campaign.recipe import load_recipe, shipped_recipes
+from cosmic.autonomy.shipped.registry import PARAMETERS
 from cosmic.frame.config import StrictModel
 from cosmic.frame.errors import ConfigError
 
@@ -68,6 +69,13 @@ def test_a_wrong_recipe_is_refused_with_file_key_and_reason(
         load_recipe(path, procedures=PROCEDURES)
     for word in (str(path), *words):
         assert word in str(caught.value)
+
+
+def test_a_procedure_under_the_name_that_it_had_before_is_found(tmp_path: Path) -> None:
+    path = written(tmp_path, 'procedure = "bend test with two hands"\n[stop]\ncount = 1\n')
+    recipe = load_recipe(path, procedures=PARAMETERS)
+    assert recipe.file.procedure == "bend test with two grippers"
+    assert recipe.file.procedure in PARAMETERS
 
 
 def test_a_recipe_that_is_not_there_says_which_ones_ship() -> None:

@@ -6,7 +6,7 @@ import sys
 import pytest
 from typing_extensions import override
 
-from cosmic.autonomy.control.pace import Pacer, ask_real_time, quick_switching
+from cosmic.autonomy.control.pace import LoopTimer, ask_real_time, quick_switching
 from cosmic.frame.clock import ManualClock
 
 
@@ -26,13 +26,13 @@ class Late(ManualClock):
 
 def test_deadlines_do_not_drift_with_lateness() -> None:
     clock = Late()
-    pacer = Pacer(0.005, clock)
-    pacer.begin()
+    timer = LoopTimer(0.005, clock)
+    timer.begin()
     for number in range(400):
         clock.late_s = 0.001 if number % 2 else 0.002
-        pacer.wait()
+        timer.wait()
     assert clock.now_s() == pytest.approx(400 * 0.005 + 0.001)
-    seen = pacer.meter.statistics()
+    seen = timer.meter.statistics()
     assert seen.cycles == 400
     assert seen.missed == 0
     assert seen.late_p99_s == pytest.approx(0.002)
@@ -41,13 +41,13 @@ def test_deadlines_do_not_drift_with_lateness() -> None:
 
 def test_missed_periods_are_counted_and_not_caught_up() -> None:
     clock = Late()
-    pacer = Pacer(0.005, clock)
-    pacer.begin()
-    pacer.wait()
+    timer = LoopTimer(0.005, clock)
+    timer.begin()
+    timer.wait()
     clock.late_s = 0.0174
-    assert pacer.wait() == pytest.approx(0.0224)
-    assert pacer.wait() == pytest.approx(0.0026), "the grid of deadlines stays"
-    seen = pacer.meter.statistics()
+    assert timer.wait() == pytest.approx(0.0224)
+    assert timer.wait() == pytest.approx(0.0026), "the grid of deadlines stays"
+    seen = timer.meter.statistics()
     assert seen.missed == 3
     assert seen.longest_s == pytest.approx(0.0224)
     assert seen.histogram.sum() == 3
@@ -55,10 +55,10 @@ def test_missed_periods_are_counted_and_not_caught_up() -> None:
 
 
 def test_an_end_wakes_it() -> None:
-    pacer = Pacer(1000.0)
-    pacer.begin()
-    pacer.end()
-    assert pacer.wait() == 0.0
+    timer = LoopTimer(1000.0)
+    timer.begin()
+    timer.end()
+    assert timer.wait() == 0.0
 
 
 def test_refused_priority_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -21,14 +21,14 @@ class CollisionChecker(Protocol):
 
     @abstractmethod
     def check(self, spans: Spans, *, advice: bool = True) -> MoveVerdict:
-        """Judge where all axes may be, those about to move, in flight and at rest; any thread.
+        """Check where all axes may be, those about to move, in flight and at rest; any thread.
 
         An exception counts as a refusal. Without `advice` a refusal does not say how far the
         axis could go, which takes longer to find out than that it cannot.
         """
 
     def check_promptly(self, spans: Spans) -> MoveVerdict | None:
-        """Judge as `check` where that takes a few milliseconds at most; None where it may not.
+        """Answer as `check` where that takes a few milliseconds at most; None where it may not.
 
         A refusal is said without haste: None leaves it to `check`, as a checker may always do.
         """

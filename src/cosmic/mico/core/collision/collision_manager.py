@@ -55,7 +55,7 @@ class Answering(Protocol):
 
 
 class CollisionManager(Exemptions, CollisionChecker):
-    """Judges movements on the scene, in words for the operator; any thread.
+    """Checks movements on the scene, in words for the operator; any thread.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class CollisionManager(Exemptions, CollisionChecker):
         try:
             for _ in range(MOST_JUDGED):
                 before = self.taken_out, self.ignored_pairs
-                verdict = self._judge(self._with_freed(spans), advice=advice)
+                verdict = self._decide(self._with_freed(spans), advice=advice)
                 if not verdict.allowed or before == (self.taken_out, self.ignored_pairs):
                     return verdict
             return words.changed()
@@ -154,7 +154,7 @@ class CollisionManager(Exemptions, CollisionChecker):
             for axis, span in spans.items()
         }
 
-    def _judge(self, spans: Spans, *, advice: bool) -> MoveVerdict:
+    def _decide(self, spans: Spans, *, advice: bool) -> MoveVerdict:
         ignored = self.ignored_pairs
         responses: dict[BodyPair, Response] = {}
 
@@ -169,7 +169,7 @@ class CollisionManager(Exemptions, CollisionChecker):
                 return self._allow(spans)
             approach = answer.approach
             if approach is None:
-                return words.cannot_judge(answer.reason or "it gave no reason")
+                return words.cannot_check(answer.reason or "it gave no reason")
             if approach.bodies in ignored:
                 return words.no_answer(f"it does not leave {approach.bodies} aside")
             free_to = None

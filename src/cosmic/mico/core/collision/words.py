@@ -45,7 +45,7 @@ def changed() -> MoveVerdict:
     )
 
 
-def cannot_judge(reason: str) -> MoveVerdict:
+def cannot_check(reason: str) -> MoveVerdict:
     """Return the refusal of a question that makes no sense to the gate."""
     return refuse(
         Reason.NO_ANSWER,

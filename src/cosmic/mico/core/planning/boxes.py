@@ -10,7 +10,7 @@ from cosmic.frame.errors import refusal
 from cosmic.mico.core.collision.answer import Approach, AxisSpan, Spans
 from cosmic.mico.core.collision.model import BodyPair, SceneModel
 from cosmic.mico.core.collision.sweep import Sweep
-from cosmic.mico.core.collision.words import cannot_judge
+from cosmic.mico.core.collision.words import cannot_check
 from cosmic.mico.core.planning.problem import Problem
 from cosmic.mico.core.planning.space import Path, Point, Space, between
 
@@ -192,7 +192,7 @@ class Boxes:
         if answer.clear:
             return None
         if answer.approach is None:
-            raise refusal(cannot_judge(answer.reason or "no reason given"))
+            raise refusal(cannot_check(answer.reason or "no reason given"))
         self.refused[answer.approach.bodies] += 1
         return answer.approach
 

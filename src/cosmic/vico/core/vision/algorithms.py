@@ -82,22 +82,22 @@ class TrackFibre:
 
     def __init__(self) -> None:
         self._tracker = FibreTracker()
-        self._wish: Fibre | None = None
+        self._requested: Fibre | None = None
         self._end = False
 
     def follow(self, fibre: Fibre) -> None:
         """Follow `fibre` from the next image on; any thread."""
-        self._end, self._wish = False, fibre
+        self._end, self._requested = False, fibre
 
     def end(self) -> None:
         """Follow none from the next image on; any thread."""
-        self._end, self._wish = True, None
+        self._end, self._requested = True, None
 
     def run(self, image: CameraImage, results: Results) -> object:  # noqa: ARG002
         """Say which it is among the fibres found."""
-        wish, self._wish = self._wish, None
-        if wish is not None:
-            self._tracker.start(wish)
+        requested, self._requested = self._requested, None
+        if requested is not None:
+            self._tracker.start(requested)
         if self._end:
             self._tracker.end()
         if not self._tracker.followed:
@@ -116,27 +116,27 @@ class TrackPoint:
 
     def __init__(self) -> None:
         self._tracker: TemplateTracker | None = None
-        self._wish: tuple[float, float] | None = None
+        self._requested: tuple[float, float] | None = None
         self._end = False
 
     def follow(self, at_px: tuple[float, float]) -> None:
         """Follow what is there on the next image; any thread."""
-        self._end, self._wish = False, at_px
+        self._end, self._requested = False, at_px
 
     def end(self) -> None:
         """Follow nothing from the next image on; any thread."""
-        self._end, self._wish = True, None
+        self._end, self._requested = True, None
 
     def run(self, image: CameraImage, results: Results) -> object:  # noqa: ARG002
         """Find it again."""
         data = grey(image.data)
-        wish, self._wish = self._wish, None
+        requested, self._requested = self._requested, None
         if self._end:
             self._tracker = None
-        if wish is not None:
+        if requested is not None:
             fresh = TemplateTracker()
             try:
-                fresh.start(data, wish)
+                fresh.start(data, requested)
             except ConfigError as exc:
                 return Unavailable(str(exc))
             self._tracker = fresh

@@ -121,9 +121,9 @@ class FibreTracker:
         if not possible:
             self._step = np.zeros(2)
             return FibreTrack(TrackState.LOST, None, reason=_why_none(alike, self._reach_px))
-        return self._judge(possible)
+        return self._decide(possible)
 
-    def _judge(self, possible: Sequence[_Likeness]) -> FibreTrack:
+    def _decide(self, possible: Sequence[_Likeness]) -> FibreTrack:
         best = possible[0]
         if len(possible) > 1:
             costs = [each.cost(self._reach_px) for each in possible[:2]]

@@ -98,7 +98,7 @@ def _found(pixels: Pixels) -> list[Fibre]:
         course = refine(scene, strand, neighbours(scene, kept, index))
         if course is not None and slender(course, least):
             courses.append((strand, course))
-    return judged(scene, courses, crowd=crowd)
+    return checked_fibres(scene, courses, crowd=crowd)
 
 
 def long_enough(strand: Strand, factor: int, least: float) -> bool:
@@ -259,7 +259,9 @@ def clear_around(scene: Scene, line: Floats, width: float) -> npt.NDArray[np.boo
     return np.asarray(inside & (distance[rows, columns] * scene.factor > reach))
 
 
-def judged(scene: Scene, courses: list[tuple[Strand, Course]], *, crowd: bool) -> list[Fibre]:
+def checked_fibres(
+    scene: Scene, courses: list[tuple[Strand, Course]], *, crowd: bool
+) -> list[Fibre]:
     """Return the fibres, the longest first, with what is doubtful about them together."""
     lines = [course.line for _, course in courses]
     widths = [course.width for _, course in courses]

@@ -263,7 +263,7 @@ def pair(graph: Graph, joint: Joint, half_width: list[float]) -> None:
     base = LOOSE * (count % 2)
     worth, next_worth = (float(np.sqrt(max(0.0, prices[k] - base))) for k in order[:2])
     unclear = next_worth < 1.6 * worth + 0.1 or ends_meet(graph, joint, half_width)
-    judge(joint, costs, best, unclear)
+    note_doubt(joint, costs, best, unclear)
 
 
 def ends_meet(graph: Graph, joint: Joint, half_width: list[float]) -> bool:
@@ -282,7 +282,7 @@ def ends_meet(graph: Graph, joint: Joint, half_width: list[float]) -> bool:
     return len(loose) >= least and len(set(others)) == len(others)
 
 
-def judge(joint: Joint, costs: Floats, best: Pairing, unclear: bool) -> None:
+def note_doubt(joint: Joint, costs: Floats, best: Pairing, unclear: bool) -> None:
     """Write down what is doubtful about a crossing."""
     paired = {index for both in best for index in both}
     for index, stub in enumerate(joint.stubs):

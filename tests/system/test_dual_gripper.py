@@ -15,7 +15,7 @@ from cosmic.twin.truth import TruthRecord
 from system.campaign_bench import GRACE_WALL_S, Bench, Strike, bench, wait_for
 
 RATE: Final = 8.0
-PROCEDURE: Final = "bend test with two hands"
+PROCEDURE: Final = "bend test with two grippers"
 GOOD: Final = 4
 LIMIT_UN: Final = 0.8 * 180.0
 
