@@ -35,12 +35,15 @@ from cosmic.mico.core.teleoperation.settings import (
 )
 from cosmic.mico.core.trajectory.settings import MirrorSettings
 from cosmic.twin.force_settings import (
+    ClimateSettings,
     ContactSettings,
     FibreSettings,
     ForceSensorSettings,
     GeometrySettings,
     GripperGeometry,
     JointDrive,
+    PlateSettings,
+    StandardSettings,
 )
 from cosmic.twin.handling_settings import HandlingSettings
 from cosmic.twin.lens_settings import LensMotorSettings, LensSettings, LightSettings
@@ -109,6 +112,9 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[handling]": HandlingSettings,
     "[[fibres]]": FibreSettings,
     "[samples.NAME]": SampleSettings,
+    "[standards.NAME]": StandardSettings,
+    "[plate]": PlateSettings,
+    "[climate]": ClimateSettings,
     "[force_sensors.NAME]": ForceSensorSettings,
     "[lens]": LensSettings,
     "[lens.zoom]": LensMotorSettings,
@@ -121,6 +127,12 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
 WHOLE_FILES: Final = (PlatformFile, TwinSettings)
 
 _UNITS: Final = (
+    ("_un_mm", "µN/mm"),
+    ("_un_k", "µN/K"),
+    ("_uc_m2", "µC/m²"),
+    ("_deg_mm", "°/mm"),
+    ("_ppm_k", "ppm/K"),
+    ("_k", "K"),
     ("_n_m2", "N m²"),
     ("_un_sqrt_s", "µN/√s"),
     ("_un_um", "µN/µm"),

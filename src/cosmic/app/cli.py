@@ -58,6 +58,7 @@ def _parser() -> argparse.ArgumentParser:
         cold=False,
         sample=None,
         truth=None,
+        world=None,
         offscreen=None,
         screenshot=None,
         size=None,
@@ -183,6 +184,7 @@ def _platform_options() -> argparse.ArgumentParser:
     add("--rate", type=float, help="how many times faster than the wall the simulation runs")
     add("--cold", action="store_true", help="start the simulation at power-up, nothing referenced")
     add("--sample", metavar="NAME", help="sample on the simulated plate, such as forty-dry")
+    add("--world", metavar="NAME", help="plain, friendly, realistic, harsh, or a file in worlds/")
     add("--truth", type=Path, metavar="FILE", help="write the ground truth of the simulation")
     return options
 

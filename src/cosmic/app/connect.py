@@ -23,6 +23,7 @@ def connect(
     seed: int = 0,
     sample: str | None = None,
     truth: str | Path | None = None,
+    world: str | None = None,
     certificates: str | Path | None = None,
 ) -> Rig:
     """Start the platform in this process and return it; no window and no event loop needed.
@@ -49,6 +50,9 @@ def connect(
     sample : str or None
         What lies on the simulated plate, as twin.toml names it, such as "forty-dry"; None: the
         fibres that twin.toml lists.
+    world : str or None
+        How far the simulated platform is from what twin.toml says: "plain", "friendly",
+        "realistic", "harsh", or a file in the folder `worlds`; None: the one that twin.toml names.
     truth : path or None
         A new file for what truly happens on the simulated platform, for whoever scores a run; see
         `cosmic.twin.truth.read_truth`.
@@ -82,6 +86,7 @@ def connect(
         seed=seed,
         sample=sample,
         truth=truth,
+        world=world,
         uses=uses,
     )
     rig = Rig(platform)

@@ -60,7 +60,7 @@ class Platform:
     daqco: DaqcoApplication | RemoteApplication[Daqco] | None = None
     vico: VicoApplication | RemoteApplication[Vico] | None = None
     remote: RemoteApplications = field(default_factory=RemoteApplications)
-    end: Callable[[], None] | None = None
+    scene: Scene | None = None
 
     @property
     def simulated(self) -> bool:
@@ -119,8 +119,8 @@ class Platform:
     def shut_down(self) -> None:
         """Stop and close every application; any state. Motion ends first."""
         with ExitStack() as at_end:  # from the last line to the first, whatever fails
-            if self.end is not None:
-                at_end.callback(self.end)
+            if self.scene is not None:
+                at_end.callback(self.scene.close)
             at_end.callback(self.garbage.end)
             at_end.callback(self.remote.close)
             for each in (self.vico, self.daqco, self.mico):
@@ -159,6 +159,7 @@ def build_platform(
     seed: int = 0,
     sample: str | None = None,
     truth: str | Path | None = None,
+    world: str | None = None,
     uses: Uses = Uses(),
     mico_gui: GuiFactory | None = None,
     daqco_gui: GuiFactory | None = None,
@@ -172,7 +173,7 @@ def build_platform(
         A platform.toml or its folder; None is the one that ships with CoSMic.
     applications : tuple of str
         Which to make, as far as the platform file names them and no station hosts them.
-    rate, cold, seed, sample, truth
+    rate, cold, seed, sample, truth, world
         Of the simulated platform; see `cosmic.connect`.
     uses : Uses
         Stations to connect to; the lines stand when this returns.
@@ -194,7 +195,7 @@ def build_platform(
     file, path = load_platform(config)
     for each in missing_packages(file.platform.requires):
         logger.warning("%s: platform.requires: %s is not installed", path, each)
-    _check_simulation(file, path, rate=rate, only_simulated=cold or bool(sample or truth))
+    _check_simulation(file, path, rate=rate, only_simulated=cold or bool(sample or truth or world))
     if not 0 <= seed <= LARGEST_SEED:
         raise ArgumentError(f"seed must be a whole number from 0 to {LARGEST_SEED}, not {seed}")
     try:
@@ -216,7 +217,9 @@ def build_platform(
             raise ConfigError("\n".join(mistakes))
         scene: Scene | None = None
         if file.has_twin and hosted:
-            scene = make_scene(file, path, clock, seed=seed, cold=cold, sample=sample, truth=truth)
+            scene = make_scene(
+                file, path, clock, seed=seed, cold=cold, sample=sample, truth=truth, world=world
+            )
             undo.callback(scene.close)
         site = Site(file, path, clock, policy, scene, seed)
         own = build_applications(site, hosted, guis)
@@ -233,7 +236,7 @@ def build_platform(
             daqco=own.daqco or used["daqco"],
             vico=own.vico or used["vico"],
             remote=remote,
-            end=None if scene is None else scene.close,
+            scene=scene,
         )
         undo.callback(platform.shut_down)
         platform.begin_remote()
@@ -244,8 +247,8 @@ def build_platform(
 def _check_simulation(file: PlatformFile, path: Path, *, rate: float, only_simulated: bool) -> None:
     if (rate != 1.0 and not file.moves_nothing) or (only_simulated and not file.has_twin):
         raise ConfigError(
-            f"{path}: mico.backend: only the simulated platform has a rate, --cold, --sample or "
-            "--truth"
+            f"{path}: mico.backend: only the simulated platform has a rate, --cold, --sample, "
+            "--world or --truth"
         )
     boards = file.daqco.drivers if file.daqco is not None else ()
     if rate != 1.0 and not all(is_simulated(Kind.BOARD, each.backend) for each in boards):

@@ -279,6 +279,23 @@ class Rig:
             raise NotAvailable("faults can be injected into a simulated platform only")
         return self._platform.faults
 
+    def change_plate(self) -> int:
+        """Put the next plate with new fibres on the simulated table, and return its number.
+
+        Takes as long of the platform's time as somebody takes to do it.
+
+        Raises
+        ------
+        NotAvailable
+            The platform is real or runs elsewhere, something is in the jaws, or they stand low.
+        """
+        scene = self._platform.scene
+        if scene is None:
+            raise NotAvailable("plates change by themselves on a simulated platform here only")
+        scene.check_plate_change()
+        self._platform.clock.sleep(scene.settings.plate.exchange_s)
+        return scene.change_plate()
+
     def close(self) -> None:
         """Stop everything, release the hold and end all threads; harmless the second time."""
         if not self._closed:

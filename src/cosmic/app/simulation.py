@@ -1,5 +1,6 @@
 """The simulated part of a platform: its scene, the file of its truth, and all faults by name."""
 
+import os
 from pathlib import Path
 from typing import Any, Final, Protocol
 
@@ -7,11 +8,14 @@ from cosmic.app.configuration.platform_file import PlatformFile, load_twin
 from cosmic.daqco.hw.sim_faults import NAMES as BOARD_NAMES
 from cosmic.frame.clock import Clock
 from cosmic.mico.hw.sim_scu3d_faults import NAMES as CONTROLLER_NAMES
-from cosmic.twin.sample import put_on
+from cosmic.twin.plates import Plates
 from cosmic.twin.scene import Scene
 from cosmic.twin.truth import NO_TRUTH, TruthFile
 from cosmic.twin.twin_faults import NAMES as SCENE_NAMES
+from cosmic.twin.world import load_world
 from cosmic.vico.hw.sim_camera_faults import NAMES as CAMERA_NAMES
+
+WORLD_VARIABLE: Final = "COSMIC_WORLD"
 
 FAULT_NAMES: Final = {
     "controller": CONTROLLER_NAMES,
@@ -143,6 +147,7 @@ def make_scene(
     cold: bool,
     sample: str | None,
     truth: str | Path | None,
+    world: str | None = None,
 ) -> Scene:
     """Return the scene that a platform file describes, with a sample on the plate.
 
@@ -152,14 +157,19 @@ def make_scene(
         Its name in twin.toml; None: the fibres that are listed there.
     truth : path or None
         Where to write what truly happens; nothing on the platform reads it back.
+    world : str or None
+        Its name; None: what the variable COSMIC_WORLD says, or twin.toml.
 
     Raises
     ------
     ConfigError
-        The configuration is wrong, there is no such sample, or `truth` cannot be written.
+        The configuration is wrong, there is no such sample or world, or `truth` cannot be written.
     """
     twin = load_twin(file, path)
-    twin = twin if sample is None else put_on(twin, sample, seed)
+    name = world or os.environ.get(WORLD_VARIABLE) or twin.world
+    drawn = load_world(name, path.parent)
+    plates = Plates(drawn.applied(twin, seed), drawn, seed, sample)
+    twin = plates.first()
     truth_log = NO_TRUTH if truth is None else TruthFile(Path(truth))
     try:
         return Scene.from_settings(
@@ -169,6 +179,8 @@ def make_scene(
             cold=cold,
             folder=path.parent,
             sample=sample or "",
+            world=name,
+            plates=plates,
             truth=truth_log,
             apart=True,
         )

@@ -23,9 +23,14 @@ class Bonds:
         self._fibres = fibres
         self._partner_un = partner_un
         self._record = record
-        self._bonds = [
-            (each.settings.bonded_to, number, each.settings.bond_un)
-            for number, each in enumerate(fibres)
+        self._bonds: list[tuple[int, int, float]] = []
+        self.add(fibres, 0)
+
+    def add(self, fibres: list[Fibre], begin: int) -> None:
+        """Take note of the fibres of a plate; its first has the number `begin`."""
+        self._bonds += [
+            (begin + each.settings.bonded_to, each.number, each.settings.bond_un)
+            for each in fibres
             if each.settings.bonded_to is not None
         ]
 

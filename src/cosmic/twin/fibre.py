@@ -139,7 +139,7 @@ class Fibre:
         self.holds: dict[str, Hold] = {}
         self.carried: Carried | None = None
         self.plate_pose: PlatePose = settings.x_um, settings.y_um, math.radians(settings.angle_deg)
-        self.gone = False
+        self.gone = self.removed = False
         self.on_plate = True
         self.grasps = 0
         self.falls = 0

@@ -6,6 +6,7 @@ from typing import Final
 
 from cosmic.twin.felt import Moment
 from cosmic.twin.force_sensor import ForceSensor
+from cosmic.twin.force_settings import FibreSettings
 from cosmic.twin.kinematics import Point
 from cosmic.twin.settings import TwinSettings
 from cosmic.twin.stage import Stage
@@ -106,6 +107,30 @@ class ForceSide:
         For who has time to spare and holds no lock that others wait for.
         """
         self._timeline.keep_up(now_s)
+
+    def check_plate_change(self, now_s: float) -> None:
+        """Check that the plate can be taken away now.
+
+        Raises
+        ------
+        NotAvailable
+            Something is held, or jaws stand too low.
+        """
+        self._timeline.change(now_s, self._workspace.check_plate_change)
+
+    def change_plate(self, now_s: float, number: int, fibres: tuple[FibreSettings, ...]) -> None:
+        """Take everything off the plate, and put another with other fibres there.
+
+        Raises
+        ------
+        NotAvailable
+            Something is held, or jaws stand too low.
+        """
+
+        def change(values: Mapping[str, float]) -> None:
+            self._workspace.change_plate(values, number, fibres)
+
+        self._timeline.change(now_s, change)
 
     def finish(self, now_s: float) -> None:
         """Tell the truth what lasts until the end, which is now."""

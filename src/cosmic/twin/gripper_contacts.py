@@ -175,6 +175,13 @@ class GripperContacts:
         """How far tools may go before anything can happen to a fibre; as of the last look."""
         return self._slack_um
 
+    def plate_changed(self, begin: int) -> None:
+        """Take note that the fibres from number `begin` on lie on a new plate."""
+        widths = [each.settings.width_um for each in self.fibres[begin:]]
+        self._narrowest = min(widths, default=0.0)
+        self._thickest = max(widths, default=0.0)
+        self._bonds.add(self.fibres[begin:], begin)
+
     def look(self, around: Surroundings) -> None:
         """Go on to where everything is now."""
         if not self._begun:

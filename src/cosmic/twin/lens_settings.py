@@ -62,6 +62,9 @@ class LightSettings(StrictModel):
     ----------
     start_percent : float
         How bright it is when it is switched on.
+    fading_per_h : float
+        Part of its light that it loses in an hour.
     """
 
     start_percent: float = Field(ge=0.0, le=100.0)
+    fading_per_h: float = Field(default=0.0, ge=0.0, lt=1.0)

@@ -21,8 +21,22 @@ NODE_UM: Final = 30.0
 """Fibres are kept apart by points so far apart along them."""
 
 
-def put_on(settings: TwinSettings, name: str, seed: int) -> TwinSettings:
+def put_on(
+    settings: TwinSettings,
+    name: str,
+    seed: int,
+    *,
+    number: int = 0,
+    keep_clear: tuple[FibreSettings, ...] = (),
+) -> TwinSettings:
     """Return `settings` with the sample `name` on the plate, and grippers open and empty.
+
+    Parameters
+    ----------
+    number : int
+        Which plate with this sample it is.
+    keep_clear : tuple of FibreSettings
+        What lies there already.
 
     Raises
     ------
@@ -37,7 +51,7 @@ def put_on(settings: TwinSettings, name: str, seed: int) -> TwinSettings:
     for gripper in settings.geometry.grippers.values():
         position = stages[gripper.stage]
         stages[gripper.stage] = position.model_copy(update={"start": sample.gap_um})
-    fibres = Spread(name, sample, seed).fibres()
+    fibres = Spread(name, sample, seed, number, keep_clear).fibres()
     handling = settings.handling.model_copy(update={"default_faults": sample.faults})
     return settings.model_copy(update={"fibres": fibres, "stages": stages, "handling": handling})
 
@@ -51,12 +65,29 @@ class Spread:
         Of the sample, for messages.
     """
 
-    def __init__(self, name: str, sample: SampleSettings, seed: int) -> None:
+    def __init__(
+        self,
+        name: str,
+        sample: SampleSettings,
+        seed: int,
+        number: int = 0,
+        keep_clear: tuple[FibreSettings, ...] = (),
+    ) -> None:
         self._name = name
         self._sample = sample
-        self._rng = np.random.default_rng([0x5A, sample.seed, seed])
-        self._points = np.empty((0, 2))
-        self._halves = np.empty(0)
+        key = [0x5A, sample.seed, seed, number] if number else [0x5A, sample.seed, seed]
+        self._rng = np.random.default_rng(key)
+        lines = [dense(centre_line_um(each)) for each in keep_clear]
+        self._points = np.concatenate([np.empty((0, 2)), *lines])
+        self._halves = np.concatenate(
+            [
+                np.empty(0),
+                *(
+                    np.full(len(line), 0.5 * each.width_um)
+                    for line, each in zip(lines, keep_clear, strict=True)
+                ),
+            ]
+        )
 
     def fibres(self) -> tuple[FibreSettings, ...]:
         """Return all of them; partners of a pair follow one another.

@@ -9,12 +9,14 @@ from typing import Final, Self
 
 from cosmic.frame.clock import Clock
 from cosmic.frame.config import shipped_config_dir
+from cosmic.frame.errors import NotAvailable
 from cosmic.twin.force_side import ForceSide
 from cosmic.twin.kinematics import Point
 from cosmic.twin.lasting_faults import LastingFaults
 from cosmic.twin.lens import TwinLens
 from cosmic.twin.light import TwinLight
 from cosmic.twin.optics.optics import Optics
+from cosmic.twin.plates import Plates
 from cosmic.twin.settings import StageKind, TwinSettings
 from cosmic.twin.stage import Stage
 from cosmic.twin.truth import NO_TRUTH, Truth, record_sample
@@ -81,6 +83,8 @@ class Scene:
         Trouble with fibres, tips, lamp, lens and sensors, by name.
     truth : Truth
         Told what happens.
+    plates : Plates or None
+        What lies on later plates.
     """
 
     def __init__(
@@ -99,6 +103,7 @@ class Scene:
         optics: Optics | None = None,
         faults: TwinFaults | None = None,
         truth: Truth = NO_TRUTH,
+        plates: Plates | None = None,
     ) -> None:
         self.settings = settings
         self.clock = clock
@@ -113,6 +118,8 @@ class Scene:
         self.optics = optics
         self.faults = faults or TwinFaults()
         self._truth = truth
+        self._plates = plates
+        self._plate = 0
 
     @classmethod
     def from_settings(
@@ -124,6 +131,8 @@ class Scene:
         cold: bool = False,
         folder: Path | None = None,
         sample: str = "",
+        world: str = "",
+        plates: Plates | None = None,
         truth: Truth = NO_TRUTH,
         apart: bool = False,
     ) -> Self:
@@ -139,6 +148,10 @@ class Scene:
             Where twin.toml was read, for the files it names; None: what ships with CoSMic.
         sample : str
             Name of what lies on the plate, for the truth.
+        world : str
+            Name of the world, for the truth.
+        plates : Plates or None
+            What lies on later plates; None: there is only this one.
         truth : Truth
             Told what happens; `close` ends it.
         apart : bool
@@ -167,7 +180,7 @@ class Scene:
         files = folder or shipped_config_dir()
         lens, light = TwinLens(settings.lens, seed, cold=cold), TwinLight(settings.light)
         faults = TwinFaults()
-        record_sample(truth, sample, seed, settings.fibres)
+        record_sample(truth, sample, seed, settings.fibres, world)
         force_side = ForceSide(settings, files, stages, seed, faults=faults, truth=truth)
         faults.begin = LastingFaults(clock, stages, force_side, lens, light)
         return cls(
@@ -184,6 +197,7 @@ class Scene:
             optics=Optics(settings, files, stages, force_side, lens, light, seed, apart=apart),
             faults=faults,
             truth=truth,
+            plates=plates,
         )
 
     @classmethod
@@ -250,6 +264,37 @@ class Scene:
             self.force_side.finish(self.clock.now_s())
         self._truth.record(self.clock.now_s(), "end")
         self._truth.close()
+
+    def change_plate(self) -> int:
+        """Put another plate with new fibres there, at once, and return its number, from 1 on.
+
+        Who calls it lets `settings.plate.exchange_s` of the platform's time pass first, as long
+        as somebody takes to do it.
+
+        Raises
+        ------
+        NotAvailable
+            There are no other plates, something is in the jaws, or they stand too low.
+        """
+        self.check_plate_change()
+        number = self._plate + 1
+        if self._plates is not None and self.force_side is not None:
+            fibres = self._plates.fibres(number)
+            self.force_side.change_plate(self.clock.now_s(), number, fibres)
+        self._plate = number
+        return number
+
+    def check_plate_change(self) -> None:
+        """Check that the plate can be changed now.
+
+        Raises
+        ------
+        NotAvailable
+            As for `change_plate`.
+        """
+        if self._plates is None or self.force_side is None:
+            raise NotAvailable("this scene has no other plate")
+        self.force_side.check_plate_change(self.clock.now_s())
 
     def keep_up(self) -> None:
         """Do some of the physics that nobody has asked for yet; see `ForceSide.keep_up`."""

@@ -8,10 +8,13 @@ from pydantic import Field, model_validator
 from cosmic.frame.config import StrictModel, load_model, shipped_config_dir
 from cosmic.frame.units import AxisUnit
 from cosmic.twin.force_settings import (
+    ClimateSettings,
     ContactSettings,
     FibreSettings,
     ForceSensorSettings,
     GeometrySettings,
+    PlateSettings,
+    StandardSettings,
 )
 from cosmic.twin.handling_settings import HandlingSettings
 from cosmic.twin.lens_settings import LensSettings, LightSettings
@@ -36,6 +39,14 @@ class StageKind(StrictModel):
         Amplitude at and below which a step has no length.
     step_noise : float
         Standard deviation of one step as a part of it.
+    scale_error : float
+        Standard deviation of what a stage really goes for one unit of its sensor, less one.
+    reversal : float
+        Play that no sensor sees: so much is lost when the direction changes.
+    yaw_um : float
+        How far the guideway leads a tool's tip aside over the whole travel, um.
+    lag_part, lag_s : float
+        Part of a way by which the tip lags behind the sensor, and how fast it creeps after.
     """
 
     unit: AxisUnit
@@ -58,6 +69,11 @@ class StageKind(StrictModel):
     calibration_span: float = Field(gt=0.0)
     drift_per_min_low: float = Field(ge=0.0)
     drift_per_min_high: float = Field(ge=0.0)
+    scale_error: float = Field(default=0.0, ge=0.0, lt=0.1)
+    reversal: float = Field(default=0.0, ge=0.0)
+    yaw_um: float = Field(default=0.0, ge=0.0)
+    lag_part: float = Field(default=0.0, ge=0.0, lt=0.1)
+    lag_s: float = Field(default=2.0, gt=0.0)
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -144,8 +160,15 @@ class DeviceWiring(StrictModel):
 
 
 class TwinSettings(StrictModel):
-    """The whole of twin.toml."""
+    """The whole of twin.toml.
 
+    Attributes
+    ----------
+    world : str
+        Which world it is unless one is asked for; see `cosmic.twin.world`.
+    """
+
+    world: str = "plain"
     kinds: dict[str, StageKind]
     controller: ControllerSettings
     devices: tuple[DeviceWiring, ...] = Field(strict=False, min_length=1)
@@ -153,6 +176,9 @@ class TwinSettings(StrictModel):
     geometry: GeometrySettings
     contact: ContactSettings
     fibres: tuple[FibreSettings, ...] = Field(default=(), strict=False)
+    standards: dict[str, StandardSettings] = Field(default_factory=dict)
+    plate: PlateSettings = PlateSettings()
+    climate: ClimateSettings = ClimateSettings()
     handling: HandlingSettings = HandlingSettings()
     samples: dict[str, SampleSettings] = Field(default_factory=dict)
     force_sensors: dict[str, ForceSensorSettings]

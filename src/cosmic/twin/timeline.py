@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from threading import Lock
 from typing import Final
 
@@ -149,6 +149,12 @@ class Timeline:
         with self._lock:
             self._advance(time_s)
             return self._workspace.moment(self._times_s[-1], self._values, self._felt)
+
+    def change(self, time_s: float, change: Callable[[Mapping[str, float]], None]) -> None:
+        """Go on to `time_s`, and change the workspace there; given where all stages are."""
+        with self._lock:
+            self._advance(time_s)
+            change(self._values)
 
     def finish(self, time_s: float) -> None:
         """Go on to the end, and have the workplace tell what lasts until then."""

@@ -106,7 +106,13 @@ class TruthEvent:
 
 @dataclass(frozen=True, slots=True)
 class TrueFibre:
-    """One fibre as it was at the start; lengths in um, on the plate."""
+    """One fibre as it was when its plate came; lengths in um, on the plate.
+
+    Attributes
+    ----------
+    ei_n_m2 : float
+        Flat way, at 50 % humidity; what a push is really about stands in its event "touched".
+    """
 
     number: int
     length_um: float
@@ -128,6 +134,10 @@ class TruthRecord:
     ----------
     sample : str
         Its name; "" for the fibres that twin.toml lists.
+    fibres : tuple of TrueFibre
+        Of all plates.
+    world : str
+        "" in files from before there were worlds.
     complete : bool
         The platform was closed in order.
     """
@@ -135,6 +145,7 @@ class TruthRecord:
     sample: str
     seed: int
     fibres: tuple[TrueFibre, ...]
+    world: str
     events: tuple[TruthEvent, ...]
     complete: bool
 
@@ -147,14 +158,27 @@ class TruthRecord:
         )
 
 
-def record_sample(truth: Truth, sample: str, seed: int, fibres: tuple[FibreSettings, ...]) -> None:
+def record_sample(
+    truth: Truth, sample: str, seed: int, fibres: tuple[FibreSettings, ...], world: str = ""
+) -> None:
     """Tell what lies on the plate at the start."""
+    table = _table(0, fibres)
+    truth.record(0.0, "sample", format=FORMAT, sample=sample, seed=seed, world=world, fibres=table)
+
+
+def record_plate(
+    truth: Truth, time_s: float, number: int, begin: int, fibres: tuple[FibreSettings, ...]
+) -> None:
+    """Tell what lies on a new plate; its first fibre has the number `begin`."""
+    truth.record(time_s, "plate", plate=number, fibres=_table(begin, fibres))
+
+
+def _table(begin: int, fibres: tuple[FibreSettings, ...]) -> list[dict[str, object]]:
     names = TrueFibre.__slots__[1:]
-    table = [
-        {"number": number, **{name: getattr(each, name) for name in names}}
-        for number, each in enumerate(fibres)
+    return [
+        {"number": begin + place, **{name: getattr(each, name) for name in names}}
+        for place, each in enumerate(fibres)
     ]
-    truth.record(0.0, "sample", format=FORMAT, sample=sample, seed=seed, fibres=table)
 
 
 def read_truth(path: str | Path) -> TruthRecord:
@@ -184,7 +208,12 @@ def read_truth(path: str | Path) -> TruthRecord:
     return TruthRecord(
         sample=head["sample"],
         seed=head["seed"],
-        fibres=tuple(TrueFibre(**each) for each in head["fibres"]),
+        fibres=tuple(
+            TrueFibre(**each)
+            for table in (head, *(each for each in rest if each["event"] == "plate"))
+            for each in table["fibres"]
+        ),
+        world=head.get("world", ""),
         events=events,
         complete=bool(events) and events[-1].event == "end",
     )

@@ -4,17 +4,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from cosmic.twin.contacts import Contacts
+from cosmic.frame.errors import NotAvailable
+from cosmic.twin.contacts import PLATE_HALF_UM, Contacts
 from cosmic.twin.felt import Felt, Moment, Push
 from cosmic.twin.fibre import Fibre, Floats, Line
 from cosmic.twin.fibre_state import state_of
+from cosmic.twin.force_settings import FibreSettings
 from cosmic.twin.gripper_contacts import GripperContacts
 from cosmic.twin.kinematics import Point, Skeleton
 from cosmic.twin.offsets import ToolOffsets
 from cosmic.twin.settings import TwinSettings
 from cosmic.twin.tools import Gripper, Tool, added
 from cosmic.twin.touch import Touch
-from cosmic.twin.truth import NO_TRUTH, Truth
+from cosmic.twin.truth import NO_TRUTH, Truth, record_plate
 from cosmic.twin.twin_faults import TwinFaults
 
 NOTHING: Final = 0.0
@@ -87,6 +89,8 @@ class Workspace:
         truth: Truth = NO_TRUTH,
         folder: Path | None = None,
     ) -> None:
+        self._settings = settings
+        self._seed = seed
         self._geometry = settings.geometry
         self._contact = settings.contact
         self._sensor = sensor_un_um
@@ -152,7 +156,8 @@ class Workspace:
         """Return the truth at the moment looked at last."""
         tools = self._tools(values, time_s)
         tips, plate = self.tips(values, time_s), self.plate(values)
-        states = tuple(state_of(fibre, tools, tips, plate) for fibre in self.fibres)
+        there = (fibre for fibre in self.fibres if not fibre.removed)
+        states = tuple(state_of(fibre, tools, tips, plate) for fibre in there)
         return Moment(time_s, felt.total_un, felt.pushes, felt.jaw_un, tips, states)
 
     # ------------------------------------------------------------------ going through time
@@ -177,6 +182,45 @@ class Workspace:
         self._note(pushes, on_jaws)
         jaw_un = sum(on_jaws.values())
         return Felt(pushes, jaw_un, self._slack_um, self._gripper_contacts.gap_um)
+
+    def change_plate(
+        self, values: Mapping[str, float], number: int, fibres: tuple[FibreSettings, ...]
+    ) -> None:
+        """Take everything off the plate, and put another with other fibres there.
+
+        Raises
+        ------
+        NotAvailable
+            As for `check_plate_change`.
+        """
+        self.check_plate_change(values)
+        for fibre in self.fibres:
+            fibre.gone = fibre.removed = True
+        begin = len(self.fibres)
+        self.fibres += [
+            Fibre(begin + place, each, self._contact, self._settings.handling, self._seed)
+            for place, each in enumerate(fibres)
+        ]
+        self._gripper_contacts.plate_changed(begin)
+        record_plate(self._truth, self._time_s, number, begin, fibres)
+
+    def check_plate_change(self, values: Mapping[str, float]) -> None:
+        """Check that the plate can be taken away.
+
+        Raises
+        ------
+        NotAvailable
+            A gripper holds something, something sticks to a jaw, or jaws stand too low.
+        """
+        if any(fibre.holds or fibre.carried for fibre in self.fibres):
+            raise NotAvailable("a fibre is in the jaws or sticks to them; put it away first")
+        top = float(self.plate(values)[2, 3])
+        clear = self._settings.plate.clear_um
+        for name, (x, y, z) in self.tips(values, self._time_s).items():
+            if ".jaw_" in name and z - top < clear and max(abs(x), abs(y)) < PLATE_HALF_UM:
+                raise NotAvailable(
+                    f"{name} stands {z - top:.0f} um above the plate; lift it to {clear:g} um"
+                )
 
     def _nothing_before(self, slack_um: float) -> None:
         """Take note that something may happen after so much way."""

@@ -32,6 +32,7 @@ def run(chosen: argparse.Namespace) -> int:
         cold=chosen.cold,
         sample=chosen.sample,
         truth=chosen.truth,
+        world=chosen.world,
         stations=endpoints_of(chosen),
         certificates=chosen.certificates,
     ) as rig:

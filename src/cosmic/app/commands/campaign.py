@@ -54,6 +54,7 @@ def run(chosen: argparse.Namespace) -> int:
             seed=seed,
             sample=sample,
             truth=chosen.truth,
+            world=chosen.world,
             stations=endpoints_of(chosen),
             certificates=chosen.certificates,
         ) as rig,

@@ -46,6 +46,7 @@ class ServeOptions:
     cold: bool = False
     sample: str | None = None
     truth: Path | None = None
+    world: str | None = None
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -63,6 +64,7 @@ def run(chosen: argparse.Namespace) -> int:
             cold=chosen.cold,
             sample=chosen.sample,
             truth=chosen.truth,
+            world=chosen.world,
         )
     )
 
@@ -116,6 +118,7 @@ def _build(options: ServeOptions, how: Serving, hosted: tuple[str, ...]) -> Plat
         seed=options.seed,
         sample=options.sample,
         truth=options.truth,
+        world=options.world,
         uses=Uses(options.stations, how.name, options.certificates, every=True),
     )
     for name in options.applications:

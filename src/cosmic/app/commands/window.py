@@ -28,6 +28,7 @@ def _options(chosen: argparse.Namespace) -> WindowOptions:
         cold=chosen.cold,
         sample=chosen.sample,
         truth=chosen.truth,
+        world=chosen.world,
         offscreen_s=chosen.offscreen,
         screenshot=chosen.screenshot,
         size=size,

@@ -51,6 +51,8 @@ class WindowOptions:
         What lies on the simulated plate, as twin.toml names it.
     truth : Path or None
         Where to write what truly happens on the simulated platform.
+    world : str or None
+        Which simulated world it is; None: as twin.toml has it.
     size : tuple of int or None
         Width and height of the window; None leaves it as it was.
     serve, listen, name, certificates
@@ -66,6 +68,7 @@ class WindowOptions:
     cold: bool = False
     sample: str | None = None
     truth: Path | None = None
+    world: str | None = None
     offscreen_s: float | None = None
     screenshot: Path | None = None
     size: tuple[int, int] | None = None
@@ -157,6 +160,7 @@ def _build(options: WindowOptions) -> Platform:
         cold=options.cold,
         sample=options.sample,
         truth=options.truth,
+        world=options.world,
         uses=Uses(options.stations, "window", options.certificates, every=not options.only),
         mico_gui=make_mico_gui,
         daqco_gui=make_daqco_gui,

@@ -63,6 +63,13 @@ class ViewSettings(StrictModel):
         From the lens to the plate: what lies higher looks larger.
     focus_low_um, focus_high_um : float
         Height above the plate that is sharp, at the ends of the focus.
+    distortion : float
+        By how much the corners are moved outwards, as a part of their way from the middle.
+    focus_shift_um : float
+        How far the focus moves up from the lowest to the highest zoom.
+    zoom_scale, zoom_shift_um, zoom_focus_um : float
+        How far scale, place and focus differ from one run of the zoom to the next; standard
+        deviations.
     """
 
     lens: bool
@@ -79,6 +86,11 @@ class ViewSettings(StrictModel):
     working_distance_um: float = Field(gt=10_000.0)
     focus_low_um: float
     focus_high_um: float
+    distortion: float = Field(default=0.0, gt=-0.1, lt=0.1)
+    focus_shift_um: float = 0.0
+    zoom_scale: float = Field(default=0.0, ge=0.0, lt=0.1)
+    zoom_shift_um: float = Field(default=0.0, ge=0.0)
+    zoom_focus_um: float = Field(default=0.0, ge=0.0)
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -106,6 +118,8 @@ class ImageSettings(StrictModel):
         Walls of a fibre and its hollow middle.
     wall_part : float
         How much of a fibre's width its two walls take.
+    contrast : float
+        Fibres darken the ground by that part of what `wall` and `lumen` say.
     steel, silicon : float
         Grippers and probe, each darker at its rim.
     hidden : tuple of str
@@ -132,6 +146,7 @@ class ImageSettings(StrictModel):
     wall: float = Field(ge=0.0, le=1.0)
     lumen: float = Field(ge=0.0, le=1.0)
     wall_part: float = Field(gt=0.0, lt=1.0)
+    contrast: float = Field(default=1.0, gt=0.0, le=1.5)
     steel: float = Field(ge=0.0, le=1.0)
     silicon: float = Field(ge=0.0, le=1.0)
     hidden: tuple[str, ...] = Field(strict=False)
