@@ -86,7 +86,7 @@ def test_chunks_follow_each_other_without_a_gap(rig: BoardRig) -> None:
     assert board.receive(0.0) is None
 
 
-def test_the_rate_that_is_told_is_near_the_one_asked(rig: BoardRig) -> None:
+def test_the_rate_that_is_reported_is_near_the_one_asked(rig: BoardRig) -> None:
     asked_hz = 0.9 * rig.sum_hz / 12
     made_hz = rig.open().configure(some_inputs(12), asked_hz, 140)
     assert made_hz == pytest.approx(asked_hz, rel=1e-3)
@@ -334,7 +334,9 @@ def test_modes_and_ranges_can_be_mixed(rig: BoardRig) -> None:
 # --- trouble ----------------------------------------------------------------------------------
 
 
-def test_a_board_that_another_program_has_is_told_and_works_once_it_is_free(rig: BoardRig) -> None:
+def test_a_board_that_another_program_has_is_reported_and_works_once_it_is_free(
+    rig: BoardRig,
+) -> None:
     board = rig.open()
     rig.take_away(rig.one, taken=True)
     with pytest.raises(DeviceError, match=rf"{rig.one}.*another program") as caught:

@@ -171,7 +171,7 @@ def test_a_board_of_ni_and_one_of_labjack_acquire_together(
     assert chunks[0].volts.mean(axis=1) == pytest.approx([0.3, 0.1, 0.3, 0.1], abs=5e-3)
 
 
-def test_how_well_the_clocks_of_two_makes_agree_is_told(
+def test_how_well_the_clocks_of_two_makes_agree_is_reported(
     makes: tuple[NidaqmxRig, LabjackRig],
 ) -> None:
     group = both(makes)

@@ -139,7 +139,7 @@ def test_a_handle_is_opened_once_and_given_back(rig: LabjackRig) -> None:
 # --- what is written to the board -------------------------------------------------------------
 
 
-def test_a_t7_is_told_range_and_negative_input_of_each(rig: LabjackRig) -> None:
+def test_a_t7_is_given_range_and_negative_input_of_each(rig: LabjackRig) -> None:
     board = rig.open()
     inputs = [one_input("ai2", DIFFERENTIAL, -0.05, 0.05), one_input("ai5", low_v=0.0, high_v=5.0)]
     board.configure(inputs, 1000.0, 10)
@@ -169,7 +169,7 @@ def test_a_t4_has_four_inputs_for_10_v_and_others_for_2_5_v() -> None:
     board.close()
 
 
-def test_the_rate_told_is_the_one_that_the_board_makes(rig: LabjackRig) -> None:
+def test_the_rate_reported_is_the_one_that_the_board_makes(rig: LabjackRig) -> None:
     board = rig.open()
     made_hz = board.configure(some_inputs(2), 3333.0, 10)
     assert made_hz == 80e6 / 24002 != 3333.0

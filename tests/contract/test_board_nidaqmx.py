@@ -125,7 +125,7 @@ def test_devices_without_analogue_inputs_or_answers_are_left_out(rig: NidaqmxRig
         rig.library.open("Dev1")
 
 
-def test_the_library_tells_the_version_of_its_driver(rig: NidaqmxRig) -> None:
+def test_the_library_reports_the_version_of_its_driver(rig: NidaqmxRig) -> None:
     assert rig.library.name == "NI-DAQmx 26.8"
 
 
@@ -184,7 +184,7 @@ def test_inputs_go_to_the_driver_in_volts_with_their_wiring_and_range(rig: Nidaq
     ]
 
 
-def test_a_board_takes_its_sample_clock_from_another_when_told(rig: NidaqmxRig) -> None:
+def test_a_board_takes_its_sample_clock_from_another_when_configured(rig: NidaqmxRig) -> None:
     terminal = "/Dev1/ai/SampleClock"
     library = NidaqmxLibrary(rig.clock, api=rig.driver, clock_sources={"Dev2": terminal})
     boards = [library.open(name) for name in ("Dev1", "Dev2")]
@@ -319,7 +319,7 @@ def test_reads_that_bring_nothing_end_the_acquisition(rig: NidaqmxRig) -> None:
     assert "3 of 10 samples" in str(error)
 
 
-def test_a_buffer_that_was_overwritten_tells_how_much_is_lost(rig: NidaqmxRig) -> None:
+def test_a_buffer_that_was_overwritten_reports_how_much_is_lost(rig: NidaqmxRig) -> None:
     board = rig.running()
     rig.driver.take(10)
     rig.driver.take(10_123, events=False)
@@ -328,7 +328,7 @@ def test_a_buffer_that_was_overwritten_tells_how_much_is_lost(rig: NidaqmxRig) -
     assert "123 samples of each channel were lost" in str(error)
 
 
-def test_an_overflow_on_the_board_tells_how_much_is_lost(rig: NidaqmxRig) -> None:
+def test_an_overflow_on_the_board_reports_how_much_is_lost(rig: NidaqmxRig) -> None:
     board = rig.running()
     rig.driver.take(10)
     task_of(rig).taken += 44
@@ -427,7 +427,7 @@ def test_a_board_that_dies_without_a_word_is_found_out_within_a_second(
     assert not rig.driver.tasks
 
 
-def test_a_task_that_ended_by_itself_is_told(rig: NidaqmxRig, wall: ManualClock) -> None:
+def test_a_task_that_ended_by_itself_is_reported(rig: NidaqmxRig, wall: ManualClock) -> None:
     board = rig.running()
     task_of(rig).running = False
     wall.advance(1.1)
@@ -477,7 +477,7 @@ def test_a_living_board_without_samples_is_warned_of_but_goes_on(
         (-12345, DeviceError, DeviceFault.OTHER, "does not know"),
     ],
 )
-def test_an_error_of_the_driver_is_told_with_board_code_and_advice(
+def test_an_error_of_the_driver_is_reported_with_board_code_and_advice(
     code: int, kind: type[DeviceError], fault: DeviceFault, advice: str
 ) -> None:
     error = board_error(DaqError("The driver's words.\nMore of them.", code), "read", "Dev1")
@@ -504,7 +504,7 @@ def test_a_rate_or_range_that_the_driver_refuses_is_a_limit(code: int) -> None:
         (Error(""), DeviceError, "failed"),
     ],
 )
-def test_errors_without_a_code_are_told_too(
+def test_errors_without_a_code_are_reported_too(
     raised: Error, kind: type[CosmicError], word: str
 ) -> None:
     error = board_error(raised, "list the boards", "NI-DAQmx")

@@ -228,7 +228,7 @@ def test_stopping_and_starting_again_and_again_leaves_nothing_behind(
 
 
 @on([each for each in RIGS if Can.SOFTWARE_TRIGGER in each.can or each.quiet_rate_hz])
-def test_a_receive_waits_no_longer_than_it_is_told(rig: CameraRig, camera: Camera) -> None:
+def test_a_receive_waits_no_longer_than_its_timeout(rig: CameraRig, camera: Camera) -> None:
     quiet = rig.quiet(camera.settings)
     assert quiet is not None
     camera.configure(quiet)

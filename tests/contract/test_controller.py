@@ -53,7 +53,7 @@ def test_the_devices_are_found_before_anything_is_open(controller: Controller) -
     assert len(serials) == len(set(serials)) == 4
 
 
-def test_open_tells_place_serial_and_firmware_of_each_device(controller: Controller) -> None:
+def test_open_reports_number_serial_and_firmware_of_each_device(controller: Controller) -> None:
     serials = controller.find_devices()
     devices = controller.open()
     assert [device.index for device in devices] == [0, 1, 2, 3]
@@ -145,7 +145,7 @@ def test_waiting_ends_without_an_event_when_nothing_happens(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize(("at", "present"), [(LINEAR, True), (ROTARY, True), (NO_SENSOR, False)])
-def test_a_channel_tells_whether_it_has_a_sensor(rig: Rig, at: Channel, present: bool) -> None:
+def test_a_channel_reports_whether_it_has_a_sensor(rig: Rig, at: Channel, present: bool) -> None:
     rig.controller.ask_sensor_present(at)
     assert rig.event(SensorPresentRead, at).present is present
 
@@ -153,7 +153,7 @@ def test_a_channel_tells_whether_it_has_a_sensor(rig: Rig, at: Channel, present:
 @pytest.mark.parametrize(
     ("at", "kind"), [(LINEAR, PositionerKind.LINEAR), (ROTARY, PositionerKind.ROTARY)]
 )
-def test_a_channel_tells_its_type(rig: Rig, at: Channel, kind: PositionerKind) -> None:
+def test_a_channel_reports_its_type(rig: Rig, at: Channel, kind: PositionerKind) -> None:
     rig.controller.ask_type(at)
     assert rig.event(TypeRead, at).positioner.kind is kind
 
@@ -165,7 +165,7 @@ def test_a_position_needs_a_sensor(rig: Rig) -> None:
     assert (failed.error.device, failed.error.channel) == (NO_SENSOR.device, NO_SENSOR.channel)
 
 
-def test_a_position_in_the_wrong_unit_is_told_as_the_wrong_kind(rig: Rig) -> None:
+def test_a_position_in_the_wrong_unit_is_reported_as_the_wrong_kind(rig: Rig) -> None:
     rig.controller.ask_position(ROTARY, "um")
     assert rig.event(Failed, ROTARY).error.fault is DeviceFault.WRONG_KIND
     rig.controller.ask_position(LINEAR, "deg")
@@ -225,7 +225,7 @@ def test_steps_need_no_sensor_and_come_to_an_end(rig: Rig) -> None:
     assert rig.come_to_rest(NO_SENSOR) is Activity.STOPPED
 
 
-def test_steps_go_the_way_of_their_sign(rig: Rig) -> None:
+def test_steps_go_in_the_direction_of_their_sign(rig: Rig) -> None:
     start_um = rig.position(OTHER_LINEAR)
     rig.controller.step(OTHER_LINEAR, -50, amplitude_v=80.0, frequency_hz=1000)
     rig.come_to_rest(OTHER_LINEAR)
@@ -245,7 +245,7 @@ def test_a_referenced_positioner_knows_its_position(rig: Rig) -> None:
     assert rig.event(PositionKnownRead, LINEAR).known
 
 
-def test_a_channel_tells_which_way_it_looks_for_its_reference(rig: Rig) -> None:
+def test_a_channel_reports_which_way_it_looks_for_its_reference(rig: Rig) -> None:
     rig.controller.ask_safe_direction(LINEAR)
     assert rig.event(SafeDirectionRead, LINEAR).direction is Direction.BACKWARD
 

@@ -26,7 +26,7 @@ def rig(library: SimulatedLibrary) -> Iterator[Rig]:
         yield opened
 
 
-def test_an_unplugged_device_is_told_at_once_and_spares_the_others(
+def test_an_unplugged_device_is_reported_at_once_and_spares_the_others(
     rig: Rig, library: SimulatedLibrary
 ) -> None:
     library.faults.inject("unplugged", device=0)

@@ -37,7 +37,7 @@ def rig(
 # --- what is known ----------------------------------------------------------------------------
 
 
-def test_everything_is_known_as_it_is_at_home(rig: DaqcoRig) -> None:
+def test_everything_is_known_as_it_is_locally(rig: DaqcoRig) -> None:
     daqco, home = rig.daqco, rig.home.application
     assert daqco.running
     assert daqco.problem == daqco.away == ""
@@ -195,7 +195,7 @@ def test_a_recording_lies_on_the_disk_of_the_boards_and_is_complete(rig: DaqcoRi
 # --- limits -----------------------------------------------------------------------------------
 
 
-def test_a_limit_stops_where_the_board_is_and_is_heard_of_elsewhere(rig: DaqcoRig) -> None:
+def test_a_limit_stops_where_the_board_is_and_is_heard_of_remotely(rig: DaqcoRig) -> None:
     stopped_there: list[str] = []
     stopped_here: list[str] = []
     crossings: list[Crossing] = []

@@ -308,7 +308,7 @@ def test_a_station_that_falls_silent_while_a_limit_is_armed_counts_as_a_crossing
     assert all("silent" in each for each in line.stops)
 
 
-def test_a_limit_crossed_while_the_line_was_cut_is_told_when_it_is_back(line: Line) -> None:
+def test_a_limit_crossed_while_the_line_was_cut_is_reported_when_it_is_back(line: Line) -> None:
     line.daqco.arm_limit("force", high=30.0)
     line.down()
     assert wait_until(lambda: bool(line.stops))
@@ -319,7 +319,7 @@ def test_a_limit_crossed_while_the_line_was_cut_is_told_when_it_is_back(line: Li
     assert wait_until(lambda: any(each.sample >= 0 for each in line.crossings))
 
 
-def test_whoever_comes_later_is_told_of_a_limit_that_still_is_crossed(
+def test_whoever_comes_later_hears_of_a_limit_that_still_is_crossed(
     rig: DaqcoRig,
 ) -> None:
     assert rig.remote is not None
@@ -338,7 +338,7 @@ def test_whoever_comes_later_is_told_of_a_limit_that_still_is_crossed(
         late.shut_down()
 
 
-def test_a_station_without_daqco_is_told_as_the_reason() -> None:
+def test_a_station_without_daqco_is_reported_as_the_reason() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     line = NetworkLine(endpoint, listens=True, station="fibres")
     with (

@@ -341,7 +341,7 @@ def test_what_is_refused_raises_the_same_and_changes_nothing(rig: Rig) -> None:
     assert not rig.failures
 
 
-def test_every_change_is_told_where_it_happened(rig: Rig) -> None:
+def test_every_change_is_reported_where_it_happened(rig: Rig) -> None:
     received: list[str] = []
     end = rig.far.on_change(lambda: received.append("cabinet"))
     rig.far.lamp.on_change(lambda: received.append("lamp"))
@@ -370,7 +370,7 @@ def test_a_stream_of_which_all_count_comes_whole_and_in_order(rig: Rig) -> None:
     assert rig.far.missed == 0
 
 
-def test_what_takes_long_tells_its_progress_and_its_end(rig: Rig) -> None:
+def test_what_takes_long_reports_its_progress_and_its_end(rig: Rig) -> None:
     task = rig.far.export()
     steps: list[Progress] = []
     task.subscribe(steps.append)

@@ -181,7 +181,7 @@ def test_nobody_waits_for_ever_when_a_job_ends_the_thread(
         after.wait(SOON_S)
 
 
-def test_what_runs_is_not_ended_by_the_patience_of_who_waits(queue: JobQueue, gate: Gate) -> None:
+def test_what_runs_is_not_ended_by_the_timeout_of_who_waits(queue: JobQueue, gate: Gate) -> None:
     waiting = queue.submit(lambda: 42, "counting")
     with pytest.raises(DeviceTimeout):
         waiting.wait(0.001)

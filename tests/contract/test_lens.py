@@ -73,7 +73,7 @@ def cold_bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
     made.close()
 
 
-def test_it_tells_which_generation_it_is(bench: Bench) -> None:
+def test_it_reports_which_generation_it_is(bench: Bench) -> None:
     assert str(bench.generation) in bench.lens.name
 
 

@@ -47,7 +47,7 @@ def test_opening_it_changes_nothing(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("percent", [0.0, 0.1, 33.3, 100.0])
-def test_it_shines_as_told_and_says_so(bench: Bench, percent: float) -> None:
+def test_it_shines_as_commanded_and_reports_it(bench: Bench, percent: float) -> None:
     bench.rig.clock.advance(1.0)
     bench.light.set_percent(percent)
     assert bench.light.percent() == pytest.approx(percent)

@@ -197,7 +197,7 @@ def test_a_jog_that_nobody_renews_ends_by_itself(mico: Mico) -> None:
     wait_for(lambda: jog.done, 3.0)
 
 
-def test_a_steered_axis_follows_the_hand_and_ends_without_it(mico: Mico) -> None:
+def test_a_steered_axis_follows_the_input_and_ends_without_it(mico: Mico) -> None:
     axis = mico["left.x"]
     order = axis.commander.steer(0, 5.0, dead_man_s=0.5)
     until_s = WALL.now_s() + 0.7
@@ -246,7 +246,7 @@ def test_steps_zero_links_and_undo(mico: Mico) -> None:
     assert left.position_um == pytest.approx(50.0, abs=1.0)
 
 
-def test_poses_ways_and_collisions(mico: Mico) -> None:
+def test_poses_paths_and_collisions(mico: Mico) -> None:
     mico.poses.teach("there", ["left.x"])
     assert "there" in mico.poses
     mico["left.x"].move_to(80.0)
@@ -278,7 +278,7 @@ def test_a_trajectory_is_rehearsed_against_the_scene(mico: Mico) -> None:
     assert mico.trajectories.rehearse(mico.trajectories.parse(f"{HEAD}left.x to 50 um\n")).allowed
 
 
-def test_the_initialisation_tells_how_far_it_is(mico: Mico) -> None:
+def test_the_initialisation_reports_how_far_it_is(mico: Mico) -> None:
     progress: list[Progress] = []
     mico.initialise(progress.append, skip_known=True)
     assert progress[-1].done
@@ -408,7 +408,7 @@ def test_a_new_command_of_mico_is_called_by_script_window_and_station(
 # --- who may move ------------------------------------------------------------------------------
 
 
-def test_without_the_lease_nothing_moves_from_elsewhere(hosted: HostedMico, how: str) -> None:
+def test_without_the_lease_nothing_moves_remotely(hosted: HostedMico, how: str) -> None:
     with remote_mico(hosted, how, takes_lease=False) as (mico, application, _):
         for move in (
             lambda: mico["left.x"].move_to(50.0),
@@ -447,7 +447,7 @@ def test_while_another_holds_the_lease_the_station_itself_does_not_move(
     hosted.mico["left.x"].move_to(0.0)
 
 
-def test_the_operator_takes_over_and_what_moved_from_elsewhere_stops(
+def test_the_operator_takes_over_and_what_moved_remotely_stops(
     hosted: HostedMico, how: str
 ) -> None:
     with remote_mico(hosted, how) as (mico, _, transport):
@@ -467,7 +467,7 @@ def test_the_operator_takes_over_and_what_moved_from_elsewhere_stops(
         hosted.mico["left.x"].move_to(0.0)
 
 
-def test_the_station_stops_what_moves_from_elsewhere_by_itself(hosted: HostedMico) -> None:
+def test_the_station_stops_what_moves_remotely_by_itself(hosted: HostedMico) -> None:
     """The thread that moves looks at the dead man; nobody has to tell it."""
     caller, lease = Caller("vision", "a token"), hosted.station.lease
     lease.take(caller.name, caller.token)
@@ -737,7 +737,9 @@ def test_an_older_word_changes_nothing(hosted: HostedMico) -> None:
         assert axis.position_um == pytest.approx(now.position, abs=1.0)
 
 
-def test_who_commands_is_told_and_positions_are_told_seldom(hosted: HostedMico, how: str) -> None:
+def test_who_commands_is_reported_and_positions_are_reported_seldom(
+    hosted: HostedMico, how: str
+) -> None:
     commands: list[object] = []
     positions: list[float] = []
     with remote_mico(hosted, how) as (mico, _, transport):
@@ -757,7 +759,7 @@ def test_who_commands_is_told_and_positions_are_told_seldom(hosted: HostedMico, 
     assert 1 <= len(positions) <= 31 * took_s + 2
 
 
-def test_what_is_done_at_the_station_is_seen_from_elsewhere(hosted: HostedMico, how: str) -> None:
+def test_what_is_done_at_the_station_is_seen_remotely(hosted: HostedMico, how: str) -> None:
     with remote_mico(hosted, how, takes_lease=False) as (mico, application, _):
         hosted.mico["left.x"].move_to(70.0)
         wait_for(lambda: abs((mico["left.x"].position_um or 0.0) - 70.0) < 1.0)

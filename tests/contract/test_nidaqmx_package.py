@@ -107,7 +107,7 @@ def test_a_task_that_cannot_be_made_is_cleared(driver: FakeLibrary, function: st
     board.close()
 
 
-def test_an_old_driver_without_a_function_is_told_to_be_updated(
+def test_an_old_driver_without_a_function_is_refused_with_the_advice_to_update(
     driver: FakeLibrary, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     board = NidaqmxLibrary(ManualClock()).open("Dev1")

@@ -39,9 +39,7 @@ def mico() -> Iterator[Mico]:
 
 
 @pytest.mark.parametrize("name", THINGS)
-def test_odd_arguments_of_what_is_elsewhere_are_named_and_break_nothing(
-    mico: Mico, name: str
-) -> None:
+def test_odd_arguments_of_what_is_remote_are_named_and_break_nothing(mico: Mico, name: str) -> None:
     wrong: dict[str, None] = {}
     tries = 0
     for call in calls_of(name, THINGS[name](mico), SENSIBLE, LEFT_OUT | LONG):

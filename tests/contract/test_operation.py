@@ -89,7 +89,7 @@ def test_waiting_too_long_says_so_and_leaves_it_running(clock: Clock) -> None:
     assert not operation.done
 
 
-def test_its_patience_is_counted_by_its_clock() -> None:
+def test_its_timeout_is_counted_by_its_clock() -> None:
     clock = ManualClock(auto_advance=True)
     operation = Operation[None]("the work", clock=clock)
     began_s = time.monotonic()

@@ -197,7 +197,7 @@ def test_two_packages_with_one_name_are_refused(write_package: Write) -> None:
         find_backend(Kind.BOARD, "our_board")
 
 
-def test_nobody_takes_the_place_of_what_is_shipped(write_package: Write) -> None:
+def test_nobody_replaces_what_is_shipped(write_package: Write) -> None:
     write_package("labware", "[cosmic.boards]\nsimulated = {}:BACKEND\n", BOARD)
     with pytest.raises(ConfigError, match=r"cosmic \S+ and labware 1\.2"):
         find_backend(Kind.BOARD, "simulated")

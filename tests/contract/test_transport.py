@@ -127,7 +127,7 @@ def test_an_exception_with_parameters_of_its_own_keeps_its_text(rig: StationRig)
 
 
 @pytest.mark.defects
-def test_a_mistake_in_the_program_is_reported_there_and_told_here(rig: StationRig) -> None:
+def test_a_mistake_in_the_program_is_reported_there_and_shown_here(rig: StationRig) -> None:
     with pytest.raises(RemoteDefect, match="ZeroDivisionError"):
         rig.client.call("stage", "be_wrong")
     assert [failure.defect for failure in rig.failures] == [True]
@@ -377,7 +377,7 @@ def test_a_client_publishes_to_shared_topics_only(rig: StationRig) -> None:
 # --- presence ---------------------------------------------------------------------------------
 
 
-def test_presence_is_told_at_once_and_when_it_ends(rig: StationRig) -> None:
+def test_presence_is_reported_at_once_and_when_it_ends(rig: StationRig) -> None:
     other = rig.another("other")
     seen: list[Presence] = []
     other.presence(seen.append)

@@ -94,7 +94,7 @@ def while_waiting(rig: VicoRig, ask: Callable[[], Any], level: int) -> Any:
 # --- what there is ----------------------------------------------------------------------------
 
 
-def test_a_camera_tells_what_it_is_and_what_is_in_force(rig: VicoRig) -> None:
+def test_a_camera_reports_what_it_is_and_what_is_in_force(rig: VicoRig) -> None:
     camera = rig.vico.camera()
     assert list(rig.vico.cameras) == ["top"]
     assert (camera.name, camera.title) == ("top", "From above")
@@ -123,7 +123,7 @@ def test_settings_are_in_force_when_their_task_has_ended(rig: VicoRig) -> None:
     assert camera.settings.exposure_s == 0.02
 
 
-def test_stopping_and_starting_is_told(rig: VicoRig) -> None:
+def test_stopping_and_starting_is_reported(rig: VicoRig) -> None:
     camera, noticed = rig.vico.camera(), Event()
     forget = rig.vico.on_change(noticed.set)
     camera.stop().wait(LIMIT_S)
@@ -479,7 +479,7 @@ def test_a_time_lapse_ends_where_no_image_came_until_after_its_end(tmp_path: Pat
 # --- lens and light ---------------------------------------------------------------------------
 
 
-def test_lens_and_light_do_as_they_are_told(rig: VicoRig) -> None:
+def test_lens_and_light_carry_out_commands(rig: VicoRig) -> None:
     take_lease(rig)
     lens, light = rig.vico.lens, rig.vico.light
     assert lens is not None and light is not None
@@ -556,7 +556,7 @@ def test_the_lens_stops_when_who_moves_it_is_gone(tmp_path: Path) -> None:
 # --- places -----------------------------------------------------------------------------------
 
 
-def test_pixels_are_places_on_the_platform(rig: VicoRig) -> None:
+def test_pixels_are_points_on_the_platform(rig: VicoRig) -> None:
     take_lease(rig)
     camera, places = rig.vico.camera(), rig.home.places
     rig.home.camera.push(noise(1))
@@ -617,7 +617,7 @@ def test_a_window_never_waits_and_hears_of_refusals(away: VicoRig, tmp_path: Pat
     assert camera.refused == ""
 
 
-def test_a_handle_from_elsewhere_has_no_camera_of_its_own(away: VicoRig) -> None:
+def test_a_remote_handle_has_no_camera_of_its_own(away: VicoRig) -> None:
     """Whatever a script can read of it is known without one."""
     lens, light = away.vico.lens, away.vico.light
     assert lens is not None and light is not None

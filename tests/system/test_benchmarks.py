@@ -24,7 +24,7 @@ def quick(repository, *names):
     return done.stdout
 
 
-def test_a_quick_run_tells_every_figure_with_its_target(repository):
+def test_a_quick_run_reports_every_figure_with_its_target(repository):
     lines = quick(repository, "commander", "simulator").splitlines()
     assert any("call without gate, p50 to bare" in line and "<= 3" in line for line in lines)
     assert any("SA_Stop_A" in line for line in lines)
@@ -70,7 +70,7 @@ def test_each_section_of_figures_names_commands_that_exist_and_when_it_was_measu
             assert re.search(r"`[0-9a-f]{7,12}`", text), f"{title}: with which commit?"
 
 
-def test_every_benchmark_has_its_place_among_the_figures(repository):
+def test_every_benchmark_is_among_the_figures(repository):
     all_pages = "".join(sections(repository).values())
     missing = [name for name in ALL if f"benchmarks.{name}" not in all_pages]
     assert missing == []

@@ -44,7 +44,9 @@ def test_channels_of_both_makes_come_in_one_chunk(rig: cosmic.Rig) -> None:
     assert {each.product for each in rig.daqco.boards()} == {"PCI-6229", "T7"}
 
 
-def test_how_well_their_clocks_agree_is_told_and_recorded(rig: cosmic.Rig, tmp_path: Path) -> None:
+def test_how_well_their_clocks_agree_is_reported_and_recorded(
+    rig: cosmic.Rig, tmp_path: Path
+) -> None:
     (told,) = [each for each in rig.daqco.clock_agreement if each.board == "T7_1"]
     assert told.drift_ppm == 100.0, "each may be off by clock_ppm"
     with rig.daqco.record(tmp_path / "run.h5"):

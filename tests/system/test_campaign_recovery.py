@@ -79,7 +79,9 @@ def test_a_campaign_that_ended_in_order_goes_on_without_it(rig: Rig, tmp_path: P
 
 
 @pytest.mark.slow
-def test_a_sensor_that_stays_at_its_end_lets_no_fibre_be_taken_and_is_told(tmp_path: Path) -> None:
+def test_a_sensor_that_stays_at_its_end_lets_no_fibre_be_taken_and_is_reported(
+    tmp_path: Path,
+) -> None:
     with cosmic.connect(rate=RATE, sample="three-dry", seed=2) as rig:
         rig.daqco.disarm_limit("force")  # else it stops everything first, see below
         rig.faults.inject("sensor_saturated")

@@ -51,7 +51,7 @@ def test_a_refused_move_says_which_bodies_where_and_what_to_do(rig: cosmic.Rig) 
     assert rig.mico["left.z"].position_um == pytest.approx(0.0, abs=1.0), "nothing moved"
 
 
-def test_the_way_that_is_told_to_be_free_is_free(rig: cosmic.Rig) -> None:
+def test_the_travel_that_is_said_to_be_free_is_free(rig: cosmic.Rig) -> None:
     verdict = rig.mico.check({"left.z": -3000.0})
     assert verdict.limit is not None
     assert rig.mico.check({"left.z": verdict.limit + 0.5}).allowed
@@ -83,7 +83,7 @@ def test_an_initialisation_that_was_stopped_half_way_can_be_begun_again() -> Non
         assert rig.mico.check({"left.x": 10.0}).allowed
 
 
-def test_long_runs_are_judged_by_all_they_can_sweep(rig: cosmic.Rig) -> None:
+def test_long_runs_are_checked_by_all_they_can_sweep(rig: cosmic.Rig) -> None:
     left_z = rig.mico["left.z"]
     with pytest.raises(cosmic.CollisionError):
         left_z.move_to_end_stop("backward")
@@ -202,7 +202,7 @@ def test_a_hundred_commands_at_once_are_all_answered(rig: cosmic.Rig) -> None:
     assert [verdict.allowed for verdict in verdicts] == [number % 2 == 1 for number in range(100)]
 
 
-def test_a_way_is_found_where_the_straight_one_collides(rig: cosmic.Rig) -> None:
+def test_a_path_is_found_where_the_straight_one_collides(rig: cosmic.Rig) -> None:
     mico = rig.mico
     mico["left.x"].move_to(4000.0)
     mico["left.y"].move_to(-2000.0)
@@ -219,7 +219,7 @@ def test_a_way_is_found_where_the_straight_one_collides(rig: cosmic.Rig) -> None
     assert mico["left.z"].position_um == pytest.approx(0.0, abs=1.0)
 
 
-def test_no_way_to_a_place_that_is_taken_says_what_is_there(rig: cosmic.Rig) -> None:
+def test_no_path_to_a_position_that_is_taken_says_what_is_there(rig: cosmic.Rig) -> None:
     with pytest.raises(cosmic.CollisionError) as refused:
         rig.mico.find_way({"left.z": -3000.0})
     assert "plate" in refused.value.verdict.bodies

@@ -300,7 +300,7 @@ def test_what_cannot_be_is_refused_before_anything_moves(
     assert far.truth_um() == pytest.approx(-4500.0, abs=1.0)
 
 
-def test_a_stop_that_is_latched_is_told_at_the_begin(far: Bench) -> None:
+def test_a_stop_that_is_latched_is_reported_at_the_begin(far: Bench) -> None:
     far.rig.stop("pressed")
     with pytest.raises(cosmic.StoppedError, match="pressed"):
         far.hold()

@@ -68,7 +68,7 @@ def check_good(plate: Bench, good: list[FibreRecord]) -> None:
     assert not [each for each in truth.of("contact over") if not each.facts["meant"]]
 
 
-def test_both_hands_measure_rightly_and_the_probe_is_one_hands_at_a_time(plate: Bench) -> None:
+def test_both_arms_measure_rightly_and_the_probe_belongs_to_one_at_a_time(plate: Bench) -> None:
     campaign = plate.campaign(plate.recipe(PROCEDURE, good=GOOD), "both")
     campaign.run_here()
     assert campaign.end_reason == f"{GOOD} good fibres"
@@ -133,7 +133,7 @@ class Trial:
 
 
 @pytest.mark.parametrize("operation", ["draw back from the plate", "push the spans", "release"])
-def test_a_stop_stops_both_hands_and_nothing_is_lost(plate: Bench, operation: str) -> None:
+def test_a_stop_stops_both_arms_and_nothing_is_lost(plate: Bench, operation: str) -> None:
     trial = Trial(plate, operation, f"stop in {operation}")
     plate.rig.stop("a hand on the button")
     end_s = WALL.now_s() + GRACE_WALL_S
@@ -145,7 +145,7 @@ def test_a_stop_stops_both_hands_and_nothing_is_lost(plate: Bench, operation: st
     trial.goes_on()
 
 
-def test_an_abort_leaves_both_hands_safe(plate: Bench) -> None:
+def test_an_abort_leaves_both_arms_safe(plate: Bench) -> None:
     trial = Trial(plate, "draw back from the probe", "abort")
     trial.campaign.abort("enough")
     trial.ended("enough")
@@ -158,7 +158,7 @@ def test_an_abort_leaves_both_hands_safe(plate: Bench) -> None:
     trial.goes_on()
 
 
-def test_a_pause_lets_both_hands_rest_and_go_on(plate: Bench) -> None:
+def test_a_pause_lets_both_arms_rest_and_go_on(plate: Bench) -> None:
     trial = Trial(plate, "push the spans", "pause")
     trial.campaign.pause()
     wait_for(lambda: trial.campaign.phase is CampaignPhase.PAUSED, "the rest", 60.0)
@@ -170,7 +170,7 @@ def test_a_pause_lets_both_hands_rest_and_go_on(plate: Bench) -> None:
 
 
 @pytest.mark.parametrize("fault", ["drop", "jaw_adhesion"])
-def test_a_hand_that_fails_gives_its_fibre_up_and_the_other_goes_on(
+def test_an_arm_that_fails_gives_its_fibre_up_and_the_other_goes_on(
     plate: Bench, fault: str
 ) -> None:
     plate.rig.faults.inject(fault)

@@ -117,7 +117,7 @@ def test_a_force_is_held_changed_and_let_go(said: str) -> None:
 
 
 @example("write_a_procedure.py")
-def test_a_procedure_of_ones_own_goes_from_place_to_place(said: str) -> None:
+def test_a_procedure_of_ones_own_goes_from_point_to_point(said: str) -> None:
     lines = said.splitlines()
     assert lines[:4] == ["bring near: done", "touch: done", "push: done", "draw back: done"]
     found = [float(line.split()[3]) for line in lines if line.startswith("at ")]

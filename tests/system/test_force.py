@@ -168,7 +168,7 @@ def test_a_limit_needs_a_rate_that_is_fast_enough() -> None:
         assert "force" in rig.daqco.latest()
 
 
-def test_a_board_that_was_lost_is_told_and_acquires_again_when_it_is_back() -> None:
+def test_a_board_that_was_lost_is_reported_and_acquires_again_when_it_is_back() -> None:
     with cosmic.connect(rate=2.0, applications=("daqco",)) as rig:
         faults = rig.daqco.application.library.faults  # type: ignore[attr-defined]
         faults.inject("unplugged", board="Dev1")

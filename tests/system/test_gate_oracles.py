@@ -88,7 +88,7 @@ def _check_retreats(found) -> None:
     assert found["turns retreat refused"] == 0
 
 
-def test_what_overlaps_two_pieces_leaves_by_the_way_out_and_not_through_their_seam() -> None:
+def test_what_overlaps_two_pieces_leaves_outwards_and_not_through_their_seam() -> None:
     build = Builder()
     build.box("base", (-1000.0, -1000.0, -1000.0), (3.0, 1000.0, 0.0))
     build.box("base", (3.0, -1000.0, -1000.0), (1000.0, 1000.0, 0.0))
@@ -183,7 +183,7 @@ def test_a_piece_wholly_inside_another_may_not_move_on() -> None:
 
 
 @pytest.mark.parametrize("size", [1.0, 1e6])
-def test_bodies_of_a_micrometre_and_of_a_metre_are_judged_alike(size) -> None:
+def test_bodies_of_a_micrometre_and_of_a_metre_are_checked_alike(size) -> None:
     sweep = Sweep(two_blocks(size, 3.0 * size + 20.0))
     assert sweep.check(going(-2.0 * size - 10.0, -5.0 - 1e-4)).clear
     assert not sweep.check(going(-2.0 * size - 10.0, -5.0 + 1e-4)).clear
@@ -202,7 +202,7 @@ def test_faces_that_lie_flat_on_each_other_slide_at_the_margin() -> None:
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_a_place_that_is_no_number_is_never_clear(bad) -> None:
+def test_a_position_that_is_no_number_is_never_clear(bad) -> None:
     sweep = Sweep(two_blocks(100.0, 6000.0))
     assert not sweep.check({"block.x": AxisSpan(-200.0, -150.0, bad, moving=True)}).clear
     assert not sweep.check({"block.x": AxisSpan(bad, bad, None, moving=True)}).clear
@@ -219,7 +219,7 @@ def test_a_scene_without_pieces_or_pairs_is_clear_and_has_nothing_nearest() -> N
         assert Sweep(model).nearest({}) is None
 
 
-def test_pieces_of_four_vertices_are_judged_by_their_exact_distance() -> None:
+def test_pieces_of_four_vertices_are_checked_by_their_exact_distance() -> None:
     build = Builder()
     build.piece("base", np.array([[0, 0, 0], [1000, 0, 0], [0, 1000, 0], [0, 0, 1000]]))
     build.body("tip", "base", X, axis="block.x")
@@ -233,7 +233,7 @@ def test_pieces_of_four_vertices_are_judged_by_their_exact_distance() -> None:
         assert Sweep(model).check(going(2500.0, end)).clear == (least > 20.0)
 
 
-def test_hulls_of_bumpy_meshes_are_judged_as_their_exact_distance_says() -> None:
+def test_hulls_of_bumpy_meshes_are_checked_as_their_exact_distance_says() -> None:
     model = blobs(two_blocks(1000.0, 6000.0))
     one, other = (piece.vertices_um for piece in model.pieces)
     rng = np.random.default_rng(17)

@@ -18,7 +18,7 @@ def test_what_is_at_most_one_and_a_half_times_as_much_is_good() -> None:
     assert guard.beyond(KEPT, {"gate: check": 3.0, "commands: stop": 0.1}) == {}
 
 
-def test_what_is_worse_is_told_by_its_name_with_both_values() -> None:
+def test_what_is_worse_is_reported_by_its_name_with_both_values() -> None:
     bad = guard.beyond(KEPT, {"gate: check": 3.02, "commands: stop": 10.0})
     assert bad == {"gate: check": "3.02 now, 2 kept: 1.51 times as much"}
 

@@ -120,7 +120,7 @@ def test_a_single_fault_is_recovered_from_alone(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", ["slip_in_lift", "drop"])
-def test_a_fibre_that_was_lost_on_the_way_is_found_and_measured_all_the_same(
+def test_a_fibre_that_was_lost_on_the_path_is_found_and_measured_all_the_same(
     fault: str, tmp_path: Path
 ):
     truth = tmp_path / "truth.jsonl"

@@ -91,7 +91,7 @@ def test_matched_axes_arrive_together_and_others_do_not(twin: tuple[Mico, Scene]
     assert max(ends_s) - min(ends_s) > 0.3 * took_s
 
 
-def test_the_way_of_matched_axes_is_nearly_straight(twin: tuple[Mico, Scene]) -> None:
+def test_the_path_of_matched_axes_is_nearly_straight(twin: tuple[Mico, Scene]) -> None:
     mico, scene = twin
     began_s = scene.clock.now_s()
     stages = scene.stages["left.x"], scene.stages["right.y"]
@@ -127,7 +127,7 @@ def test_a_cable_pulled_in_the_middle_stops_the_axes_of_the_other_devices() -> N
         )
 
 
-def test_an_end_stop_in_the_way_of_one_stops_the_other(twin: tuple[Mico, Scene]) -> None:
+def test_an_end_stop_before_one_stops_the_other(twin: tuple[Mico, Scene]) -> None:
     mico, scene = twin
     stage = scene.stages["right.x"]
     stage.obstruct(stage.position(scene.clock.now_s()) + 60.0, 1)

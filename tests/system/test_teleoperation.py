@@ -104,7 +104,7 @@ def test_a_gamepad_moves_the_assembly_and_each_kind_of_loss_stops_it_in_time():
         assert teleoperation.state.words == "stopped: unplugged"
 
 
-def test_what_stands_in_the_way_slows_a_hand_down_and_is_shown_not_hit():
+def test_an_obstacle_slows_steering_down_and_is_shown_not_hit():
     with steered() as (rig, watched, pad):
         teleoperation, axis = rig.mico.teleoperation, rig.mico["left.z"]
         axis.move_to(-1440.0)
@@ -127,7 +127,7 @@ def test_what_stands_in_the_way_slows_a_hand_down_and_is_shown_not_hit():
         assert teleoperation.state.refused == {}
 
 
-def test_the_hand_feels_the_fibre_that_the_probe_pushes_and_cannot_push_too_hard():
+def test_the_operator_feels_the_fibre_that_the_probe_pushes_and_cannot_push_too_hard():
     with cosmic.connect(applications=("mico", "daqco")) as rig:
         mico, teleoperation = rig.mico, rig.mico.teleoperation
         for target in ({"left.x": 3600.0}, {"left.z": -810.0}, {"probe.y": -4950.0}):
@@ -151,7 +151,7 @@ def test_the_hand_feels_the_fibre_that_the_probe_pushes_and_cannot_push_too_hard
         wait_until(lambda: abs(rig.daqco.latest()["force"]) < 20.0, timeout_s=10.0)
 
 
-def test_the_force_channel_is_not_renamed_under_the_hand_and_its_lack_is_told(caplog):
+def test_the_force_channel_is_not_renamed_while_it_is_felt_and_its_lack_is_reported(caplog):
     with cosmic.connect(applications=("mico", "daqco")) as rig, VirtualGamepad() as pad:
         teleoperation, daqco = rig.mico.teleoperation, rig.daqco
         daqco.disarm_limit("force")

@@ -130,7 +130,7 @@ def test_a_synchronous_library_finds_homes_moves_and_reads(stand: SyncController
     assert stand.status(0, 0) == 4
 
 
-def test_a_synchronous_library_tells_kinds_by_asking_for_positions(stand: SyncController) -> None:
+def test_a_synchronous_library_finds_kinds_by_asking_for_positions(stand: SyncController) -> None:
     assert stand.is_rotary(3, 0)
     assert not stand.is_rotary(0, 0)
     stand.home(3, 0)

@@ -146,7 +146,9 @@ class FullDisk(io.FileIO):
 
 
 @pytest.mark.defects
-def test_a_full_disk_is_told_and_keeps_the_lines_written_before(mico: Mico, tmp_path: Path) -> None:
+def test_a_full_disk_is_reported_and_keeps_the_lines_written_before(
+    mico: Mico, tmp_path: Path
+) -> None:
     path = tmp_path / "a.trajectory"
     recorder = TrajectoryRecorder(
         mico,
@@ -186,7 +188,7 @@ def test_a_recording_goes_on_over_a_rescan_and_ends_with_the_platform(tmp_path: 
 # Running
 
 
-def test_lines_are_told_with_progress_and_time_left(mico: Mico) -> None:
+def test_lines_are_reported_with_progress_and_time_left(mico: Mico) -> None:
     reports: list[PlayProgress] = []
     player = mico.trajectories.run(
         written("left.x to 500 um\nwait 1 s\nleft.x by -100 um\n"), reports.append
@@ -491,7 +493,7 @@ def test_the_rehearsal_promises_what_the_run_then_does(rig: Rig) -> None:
     assert player.rehearsal.end == {"left.z": 0.0, "left.x": 0.0}
 
 
-def test_a_way_to_the_start_is_found_round_what_is_in_between(rig: Rig) -> None:
+def test_a_path_to_the_start_is_found_around_what_is_in_between(rig: Rig) -> None:
     mico = rig.mico
     trajectory = mico.trajectories.parse(
         "cosmic-trajectory 1\nplatform FiberStation\nstart left.z 300 um\nleft.z by 50 um\n"
@@ -524,7 +526,7 @@ def test_poses_are_taught_and_gone_to(rig: Rig) -> None:
     assert "here" not in mico.poses
 
 
-def test_the_example_records_repeats_and_tells_mistakes(
+def test_the_example_records_repeats_and_reports_mistakes(
     capsys: pytest.CaptureFixture[str], repository: Path
 ) -> None:
     runpy.run_path(str(repository / "examples" / "record_and_repeat.py"), run_name="__main__")

@@ -163,7 +163,7 @@ def test_a_part_of_the_sensor_means_the_same_places(lab: Lab) -> None:
         camera.next_image()
 
 
-def test_at_a_zoom_without_calibration_no_place_is_told(lab: Lab) -> None:
+def test_at_a_zoom_without_calibration_no_position_is_given(lab: Lab) -> None:
     zoom_to(lab.rig, 1.0)
     try:
         camera = lab.rig.vico.camera()
@@ -200,7 +200,7 @@ def test_the_tips_are_seen_where_stages_and_calibration_expect_them(lab: Lab) ->
 # ------------------------------------------------------------------ calibrating
 
 
-def test_a_calibration_is_told_with_zoom_height_and_residual(lab: Lab) -> None:
+def test_a_calibration_is_reported_with_zoom_height_and_residual(lab: Lab) -> None:
     (shown,) = lab.rig.vico.calibrated
     assert (shown.camera, shown.tool) == ("microscope", "right")
     assert shown.scale_um_px == pytest.approx(2.2, rel=0.003)
@@ -369,7 +369,7 @@ def test_a_camera_unplugged_while_it_records_leaves_a_file_that_can_be_read(
         assert set(row.circumstances.positions) == set(lab.rig.mico.names)
 
 
-def test_a_lens_that_was_not_homed_says_so_and_nothing_is_told_in_um() -> None:
+def test_a_lens_that_was_not_homed_says_so_and_nothing_is_given_in_um() -> None:
     with cosmic.connect(None, ("mico", "vico"), rate=6.0, cold=True) as rig:
         camera, lens = rig.vico.camera(), rig.vico.lens
         assert lens is not None

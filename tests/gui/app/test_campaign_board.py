@@ -68,7 +68,7 @@ def cell(board: CampaignBoard, row: int, column: int) -> str:
     return str(rows.data(rows.index(row, column)))
 
 
-def test_the_board_tells_how_a_campaign_stands(board: CampaignBoard) -> None:
+def test_the_board_reports_how_a_campaign_stands(board: CampaignBoard) -> None:
     board.set_state(state(FIBRES, operation="lift"))
     assert board.state.text() == "running"
     assert board.indicator.state is State.BUSY

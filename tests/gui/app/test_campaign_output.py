@@ -25,7 +25,7 @@ def test_a_campaign_is_printed_with_its_figures(tmp_path: Path, qtbot: QtBot) ->
     assert whole.count(b"/Subtype /Image") > empty.count(b"/Subtype /Image")
 
 
-def test_a_place_that_cannot_be_written_is_told(tmp_path: Path, qtbot: QtBot) -> None:
+def test_a_path_that_cannot_be_written_is_reported(tmp_path: Path, qtbot: QtBot) -> None:
     CampaignStore.create(tmp_path / "run", INFO).close()
     with pytest.raises(CampaignError, match="cannot be written"):
         write_pdf(CampaignReader(tmp_path / "run"), tmp_path / "nowhere" / "report.pdf")

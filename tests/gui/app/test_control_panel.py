@@ -80,7 +80,7 @@ def test_a_loop_is_started_shown_changed_and_ended(
     assert panel.reason.text() == "asked to"
 
 
-def test_what_is_refused_is_told_and_begins_nothing(
+def test_what_is_refused_is_reported_and_begins_nothing(
     rig: cosmic.Rig, panel: ControlPanel, qtbot: QtBot
 ) -> None:
     panel.form.set_point.set_value(500.0)

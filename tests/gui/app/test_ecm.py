@@ -99,13 +99,15 @@ def test_in_mcm_a_blocked_move_is_refused_with_a_hint(window: OperatorWindow, qt
     assert position(card(window, "left.y")) == pytest.approx(-2000.0, abs=1.0)
 
 
-def test_a_refusal_that_no_way_would_help_has_no_hint(window: OperatorWindow, qtbot: QtBot) -> None:
+def test_a_refusal_that_no_detour_would_help_has_no_hint(
+    window: OperatorWindow, qtbot: QtBot
+) -> None:
     go_to(window, qtbot, "9 m")
     qtbot.waitUntil(lambda: bool(reason(window)))
     assert "ECM" not in reason(window)
 
 
-def test_in_ecm_a_way_is_offered_and_gone_on_the_word_go(
+def test_in_ecm_a_detour_is_offered_and_driven_after_go(
     blocked: OperatorWindow, qtbot: QtBot
 ) -> None:
     before = where(blocked)
@@ -181,7 +183,7 @@ def test_enter_presses_go_only_in_the_bar(blocked: OperatorWindow, qtbot: QtBot)
     qtbot.waitUntil(lambda: shown.state is PreviewState.NONE, timeout=8000)
 
 
-def test_no_way_says_what_blocks(blocked: OperatorWindow, qtbot: QtBot) -> None:
+def test_without_a_path_it_says_what_blocks(blocked: OperatorWindow, qtbot: QtBot) -> None:
     before = where(blocked)
     go_to(blocked, qtbot, "-3000", "left.z")
     shown = bar(blocked)
@@ -198,7 +200,7 @@ def test_no_way_says_what_blocks(blocked: OperatorWindow, qtbot: QtBot) -> None:
     assert not shown.isVisible()
 
 
-def test_the_note_that_there_is_no_way_goes_when_the_axis_moves_again(
+def test_the_note_that_there_is_no_path_goes_when_the_axis_moves_again(
     blocked: OperatorWindow, qtbot: QtBot
 ) -> None:
     go_to(blocked, qtbot, "-3000", "left.z")
@@ -209,7 +211,7 @@ def test_the_note_that_there_is_no_way_goes_when_the_axis_moves_again(
     qtbot.waitUntil(lambda: bar(blocked).state is PreviewState.NONE)
 
 
-def test_stop_on_the_way_ends_it(make: Make, stored: QSettings, qtbot: QtBot) -> None:
+def test_a_stop_on_the_path_ends_it(make: Make, stored: QSettings, qtbot: QtBot) -> None:
     stored.setValue("window/mode", "ECM")
     window = make(rate=4.0)
     qtbot.waitUntil(lambda: "µm" in window.top_bar.clearance_text, timeout=8000)
@@ -236,7 +238,7 @@ def test_stop_takes_an_offer_away(blocked: OperatorWindow, qtbot: QtBot) -> None
     assert scene(blocked, qtbot).content.planned == ()
 
 
-def test_cancel_on_the_way_stops_there(make: Make, qtbot: QtBot) -> None:
+def test_a_cancel_while_it_moves_stops_there(make: Make, qtbot: QtBot) -> None:
     window = make(rate=4.0)
     qtbot.waitUntil(lambda: "µm" in window.top_bar.clearance_text, timeout=8000)
     place(window, qtbot)
@@ -265,7 +267,7 @@ def test_go_looks_again_when_an_axis_moved_since(blocked: OperatorWindow, qtbot:
     qtbot.waitUntil(lambda: shown.state is PreviewState.NONE, timeout=8000)
 
 
-def test_a_way_that_is_blocked_meanwhile_is_left_with_the_reason(
+def test_a_path_that_is_blocked_meanwhile_is_left_with_the_reason(
     blocked: OperatorWindow, qtbot: QtBot
 ) -> None:
     shown = find(blocked, qtbot)
@@ -334,7 +336,7 @@ def test_back_in_mcm_an_offer_is_gone_and_moves_are_refused(
     assert shown.state is PreviewState.NONE
 
 
-def test_a_way_is_told_in_one_line() -> None:
+def test_a_path_is_described_in_one_line() -> None:
     way = Way({"a": 0.0}, ({"a": 1.0}, {"a": 2.0}), "detour", 9230.0, 400.0, 3.14)
     assert path_text(way) == "detour, 9.2 mm instead of 400 µm, about 3.1 s, 2 waypoints"
     assert poses_along(way, {"a": 9.0, "b": 5.0}) == [

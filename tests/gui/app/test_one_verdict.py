@@ -75,7 +75,7 @@ def by_button(card: PositionerBaseGUI, qtbot: QtBot, target: float) -> None:
     click(qtbot, card, "MiCoCL_7")
 
 
-def test_every_way_in_meets_the_same_verdict(window: OperatorWindow, qtbot: QtBot) -> None:
+def test_every_entry_meets_the_same_verdict(window: OperatorWindow, qtbot: QtBot) -> None:
     mico, rig, card = panel(window).mico, Rig(window.platform), panel(window).cards[AXIS]
     start = free_end(window) + NEAR_UM
     mico[AXIS].move_to(start, wait=False)

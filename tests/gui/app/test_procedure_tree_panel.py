@@ -216,7 +216,7 @@ def test_many_changes_are_drawn_a_few_times(
     assert panel.tree.row(())[STATE] == "done"
 
 
-def test_what_changes_after_a_drawing_is_told_again(qtbot: QtBot) -> None:
+def test_what_changes_after_a_drawing_is_reported_again(qtbot: QtBot) -> None:
     panel = shown(qtbot, ProcedureTreePanel())
     bridge = ChangeBridge(panel)
     received = count()

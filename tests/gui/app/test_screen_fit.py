@@ -111,7 +111,7 @@ def test_a_dialog_opens_inside_the_screen(qtbot: QtBot, screen: Screen, stored: 
     qtbot.waitUntil(lambda: on(SMALL, dialog), timeout=5000)
 
 
-def test_stop_keeps_its_place_when_the_bar_has_much_to_say(
+def test_stop_keeps_its_position_when_the_bar_has_much_to_say(
     qtbot: QtBot, screen: Screen, stored: QSettings
 ) -> None:
     screen(SMALL)

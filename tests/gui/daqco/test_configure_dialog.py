@@ -259,7 +259,7 @@ def test_a_limit_goes_with_its_channel(qtbot, tmp_path):
     assert port.settings.limit == ()
 
 
-def test_what_the_application_refuses_is_told_and_the_dialog_stays(qtbot, dialog, port):
+def test_what_the_application_refuses_is_reported_and_the_dialog_stays(qtbot, dialog, port):
     port.refuse = "Dev1 is taken by another program"
     write(qtbot, dialog.rate, "500")
     press(qtbot, dialog, Button.Ok)
@@ -281,7 +281,7 @@ def test_rate_and_channels_are_locked_while_recording_and_it_says_why(qtbot, dia
     assert dialog.message.text() == ""
 
 
-def test_a_board_that_is_gone_is_told(qtbot, port):
+def test_a_board_that_is_gone_is_reported(qtbot, port):
     port.known = ()
     dialog = shown(qtbot, port)
     assert "not connected" in dialog.tree.topLevelItem(0).text(0)

@@ -85,7 +85,7 @@ def test_start_stays_disabled_until_the_file_is_closed(qtbot, widget, port):
     qtbot.waitUntil(widget.start.isEnabled, timeout=2000)
 
 
-def test_a_file_that_could_not_be_closed_well_is_told(qtbot, widget, port):
+def test_a_file_that_could_not_be_closed_well_is_reported(qtbot, widget, port):
     click(qtbot, widget.start)
     port.fail_close = "disk full: the last 0.5 s are missing"
     click(qtbot, widget.stop)
@@ -161,7 +161,7 @@ def test_nothing_can_be_recorded_while_nothing_is_acquired(qtbot, widget, port):
     assert "start the acquisition" in widget.start.toolTip()
 
 
-def test_time_left_on_the_disk_is_told_for_the_channels_and_rate_in_force(qtbot, widget, port):
+def test_time_left_on_the_disk_is_reported_for_the_channels_and_rate_in_force(qtbot, widget, port):
     port.free = 2 * 1000 * 8 * 7200  # two channels, 1 kHz, 8 bytes
     widget.refresh()
     assert "2 h 00 min" in widget.room.text()
@@ -170,20 +170,20 @@ def test_time_left_on_the_disk_is_told_for_the_channels_and_rate_in_force(qtbot,
     assert "little room" in widget.room.text()
 
 
-def test_a_writer_that_falls_behind_is_told(qtbot, widget, port):
+def test_a_writer_that_falls_behind_is_reported(qtbot, widget, port):
     port.counters = Counted(backlog=2500)
     port.change(recording=Recorded(active=True, path=port.directory / "x.h5"))
     qtbot.waitUntil(lambda: "2.5 s behind" in widget.message.text())
 
 
-def test_length_and_size_of_the_recording_are_told(qtbot, widget, port):
+def test_length_and_size_of_the_recording_are_reported(qtbot, widget, port):
     path = port.directory / "x.h5"
     recording = Recorded(active=True, path=path, duration_s=72.0, size_bytes=12_300_000)
     port.change(recording=recording)
     qtbot.waitUntil(lambda: "1 min 12 s, 12.3 MB" in widget.message.text())
 
 
-def test_a_recording_that_broke_off_by_itself_is_told(qtbot, widget, port):
+def test_a_recording_that_broke_off_by_itself_is_reported(qtbot, widget, port):
     port.change(recording=Recorded(path=port.directory / "x.h5", failure="the disk is full"))
     qtbot.waitUntil(lambda: "the disk is full" in widget.message.text())
     assert widget.start.isEnabled()

@@ -15,14 +15,14 @@ def shown(qtbot, limited):
     return banner.text.text()
 
 
-def test_a_force_that_crossed_its_limit_is_told_with_limit_value_and_reaction(qtbot):
+def test_a_force_that_crossed_its_limit_is_reported_with_limit_value_and_reaction(qtbot):
     text = shown(
         qtbot, Limited(LIMIT, crossed=True, value=151.2, reaction_ms=3.1, reason="reached")
     )
     assert text == "force crossed its limit (high 150 µN): 151.2 µN, stopped after 3.1 ms"
 
 
-def test_missing_data_are_not_told_as_a_limit_that_was_crossed(qtbot):
+def test_missing_data_are_not_reported_as_a_limit_that_was_crossed(qtbot):
     text = shown(qtbot, Limited(LIMIT, crossed=True, value=None, reaction_ms=0.2, reason=SILENT))
     assert text == f"{SILENT}, stopped after 0.2 ms"
     assert "crossed" not in text

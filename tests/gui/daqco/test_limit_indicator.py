@@ -26,6 +26,6 @@ DISARMED = ARMED.model_copy(update={"armed": False})
         (Limited(ARMED, crossed=True), 10.0, "■ force limit -150 to 150 µN: STOPPED", "alarm"),
     ],
 )
-def test_a_limit_is_told_with_its_state_and_the_distance_to_it(limit, value, text, tone):
+def test_a_limit_is_reported_with_its_state_and_the_distance_to_it(limit, value, text, tone):
     shown = reading(limit, "uN", value)
     assert (shown.text, shown.tone) == (text, tone)

@@ -76,13 +76,13 @@ def test_recording_can_be_started_and_stopped_from_the_menu(qtbot, main, port):
     assert [call[0] for call in port.calls] == ["record", "stop recording"]
 
 
-def test_what_is_refused_is_told_in_one_line(main, port):
+def test_what_is_refused_is_reported_in_one_line(main, port):
     port.refuse = "Dev1 does not answer"
     main.stop.trigger()
     assert "Dev1 does not answer" in main.error.text()
 
 
-def test_channels_and_rate_in_force_are_told(qtbot, main, port):
+def test_channels_and_rate_in_force_are_reported(qtbot, main, port):
     assert main.rate_text.text() == "2 × 1000 Hz"
     port.change(settings=many(32, rate_hz=7800.0))
     qtbot.waitUntil(lambda: main.rate_text.text() == "32 × 7800 Hz")
@@ -225,7 +225,7 @@ def test_a_limit_that_makes_no_sense_is_refused(qtbot, limits, port, low, high, 
     assert limits.isVisible()
 
 
-def test_a_limit_that_the_application_refuses_is_told(qtbot, limits, port):
+def test_a_limit_that_the_application_refuses_is_reported(qtbot, limits, port):
     port.refuse = "limits need 200 Hz and more"
     limits.high.setText("5")
     ok(qtbot, limits)
@@ -255,7 +255,7 @@ def test_a_channel_opens_the_dialog_at_its_limit(qtbot, main):
     dialog.close()
 
 
-def test_a_recording_that_the_application_ends_is_told_by_the_widget(qtbot, main, port):
+def test_a_recording_that_the_application_ends_is_reported_by_the_widget(qtbot, main, port):
     failed = Recorded(path=port.directory / "x.h5", failure="the disk is full")
     port.change(recording=failed)
     qtbot.waitUntil(lambda: "the disk is full" in main.files.message.text())

@@ -214,7 +214,7 @@ def test_ctrl_and_the_wheel_zoom_the_values(plotter):
     assert not plotter.chart.frozen
 
 
-def test_cursors_tell_values_and_what_is_between_them(qtbot, plotter, port):
+def test_cursors_report_values_and_what_is_between_them(qtbot, plotter, port):
     acquire(port, [0.5, 1.0], seconds=5.0)
     acquire(port, [2.5, 3.0], seconds=5.0)
     plotter.refresh()
@@ -248,7 +248,7 @@ def test_limits_are_lines_at_their_height(qtbot, plotter, port):
     assert plotter.limit_lines.lines == []
 
 
-def test_a_crossed_limit_is_told_with_value_and_reaction_and_can_be_reset(qtbot, plotter, port):
+def test_a_crossed_limit_is_reported_with_value_and_reaction_and_can_be_reset(qtbot, plotter, port):
     limit = Limited(
         LimitSettings(channel="force", high=60.0, armed=True),
         crossed=True,
@@ -290,7 +290,7 @@ def test_a_window_that_hangs_keeps_ten_seconds_and_says_what_it_left_out(plotter
     assert "not shown 5000" in plotter.lost.text()
 
 
-def test_what_another_station_passed_over_is_told_as_not_shown(plotter, port):
+def test_what_another_station_passed_over_is_reported_as_not_shown(plotter, port):
     port.push(np.zeros((2, 50)))
     port.push(np.zeros((2, 50)), lost_before=150)
     port.next_sample = 0
@@ -300,7 +300,7 @@ def test_what_another_station_passed_over_is_told_as_not_shown(plotter, port):
     assert plotter.lost.text() == "lost 0, not shown 150"
 
 
-def test_a_lost_board_is_told(qtbot, plotter, port):
+def test_a_lost_board_is_reported(qtbot, plotter, port):
     port.change(problem="Dev1 is gone: check its cable", running=False)
     qtbot.waitUntil(lambda: "Dev1 is gone" in plotter.problem.text())
 

@@ -88,7 +88,7 @@ def test_acquisition_is_started_stopped_and_configured_from_the_menus(seen):
     seen.wait(lambda: "2000 Hz" in main.rate_text.text())
 
 
-def test_a_limit_is_set_crossed_and_reset_and_a_refusal_is_told(seen):
+def test_a_limit_is_set_crossed_and_reset_and_a_refusal_is_reported(seen):
     main = seen.main
     main.edit_limit("force")
     dialog = main.findChild(LimitDialog)
@@ -183,7 +183,7 @@ def test_the_window_does_not_wait_for_a_slow_disk_to_close_the_file(qtbot, tmp_p
 
 
 @pytest.mark.defects
-def test_a_mistake_in_what_is_carried_out_aside_is_reported_and_told(qtbot, tmp_path):
+def test_a_mistake_in_what_is_carried_out_aside_is_reported_and_shown(qtbot, tmp_path):
     results = []
     with used_locally(settings(tmp_path)) as home:
         home.application.carry_out(lambda: 1 / 0, lambda *how: results.append(how), slow=True)

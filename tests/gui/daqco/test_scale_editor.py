@@ -127,7 +127,7 @@ def test_a_scale_in_use_cannot_be_removed_and_it_says_by_whom(qtbot, editor):
     assert [each.name for each in editor.accepted_scales[0][0]] == ["Probe"]
 
 
-def test_a_scale_that_turns_back_is_told(editor):
+def test_a_scale_that_turns_back_is_reported(editor):
     editor.list.setCurrentRow(1)
     assert "two voltages give the same value" in editor.plot.hint.text()
 

@@ -202,7 +202,7 @@ def test_it_follows_after_thousands_of_lines_with_a_filter(
         assert at_end(panel)
 
 
-def test_scrolled_up_it_keeps_the_place_and_says_how_many_are_new(
+def test_scrolled_up_it_keeps_the_line_and_says_how_many_are_new(
     qtbot: QtBot, panel: LogPanel, log: logging.Logger
 ) -> None:
     fill(qtbot, panel, log, 180)

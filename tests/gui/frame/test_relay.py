@@ -58,7 +58,7 @@ def test_in_the_gui_thread_it_is_heard_at_once_unless_it_is_queued(qtbot):
     qtbot.waitUntil(lambda: len(widget.heard) == 2)
 
 
-def test_it_stops_listening_when_the_widget_goes_and_when_it_is_told_to(qapp, event):
+def test_it_stops_listening_when_the_widget_goes_and_when_it_is_ended(qapp, event):
     kept = []
     widget = Shown()
     relay = Relay(widget.hear).follow(event.subscribe)

@@ -160,7 +160,7 @@ def test_a_damaged_layout_is_ignored(qtbot: QtBot, settings: QSettings, damaged:
     assert gui.dockWidgetArea(gui.dock("Log")) == AREA.BottomDockWidgetArea
 
 
-def test_the_window_tells_before_it_closes(qtbot: QtBot, gui: CosmicServerGui) -> None:
+def test_the_window_notifies_before_it_closes(qtbot: QtBot, gui: CosmicServerGui) -> None:
     show(qtbot, gui)
     visible: list[bool] = []
     gui.closing.connect(lambda: visible.append(gui.isVisible()))

@@ -26,7 +26,7 @@ from cosmic.frame.gui.refusal import mark_refusal, show_refusal
         (math.nan, "?"),
     ],
 )
-def test_a_duration_is_told_in_words(duration_s, text):
+def test_a_duration_is_written_in_words(duration_s, text):
     assert duration_text(duration_s) == text
 
 
@@ -34,7 +34,7 @@ def test_a_duration_is_told_in_words(duration_s, text):
     ("size_bytes", "text"),
     [(0, "0 B"), (999, "999 B"), (12_340_000, "12.3 MB"), (2.5e12, "2.5 TB"), (1e16, "10000.0 TB")],
 )
-def test_an_amount_of_data_is_told_in_words(size_bytes, text):
+def test_an_amount_of_data_is_written_in_words(size_bytes, text):
     assert size_text(size_bytes) == text
 
 

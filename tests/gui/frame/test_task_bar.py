@@ -38,14 +38,14 @@ def test_it_says_how_far_a_task_is_and_how_it_ended(qtbot, bar):
     assert not bar.cancel.isVisible()
 
 
-def test_a_failure_is_told_with_its_reason(bar):
+def test_a_failure_is_reported_with_its_reason(bar):
     task = Task("Homing")
     bar.follow(task)
     task.fail(ConfigError("no lens"))
     assert bar.text.text().endswith("Homing: no lens")
 
 
-def test_of_an_older_task_nothing_is_told_any_more(bar):
+def test_of_an_older_task_nothing_is_shown_any_more(bar):
     first, second = Task("First"), Task("Second")
     bar.follow(first)
     bar.follow(second)

@@ -33,7 +33,7 @@ def test_the_matrices_of_the_camera_agree_with_where_it_says_points_are_seen(azi
     assert np.allclose(((clip[0] / clip[3] + 1) * 320, (1 - clip[1] / clip[3]) * 240), seen)
 
 
-def test_a_ball_of_the_radius_of_the_sight_fits_into_the_picture():
+def test_a_ball_of_the_radius_of_the_sight_fits_into_the_view():
     camera = Camera(Sight((0.0, 0.0, 0.0), 10.0, -90.0, 0.0))
     at_edge = camera.project(np.array([[0.0, 0.0, 9.5], [9.5, 0.0, 0.0]]), 640, 480)[0]
     assert 0.0 < at_edge[0, 1] < 20.0

@@ -150,7 +150,7 @@ def test_the_operator_can_take_the_ghost_away(qtbot, scene):
     assert scene.refused_text == ""
 
 
-def test_a_refusal_does_not_make_the_picture_jump(scene):
+def test_a_refusal_does_not_make_the_image_jump(scene):
     before = scene.view.size()
     scene.show_refused(TOUCH)
     QApplication.processEvents()
@@ -163,7 +163,7 @@ def test_the_ghost_is_gone_where_the_body_has_come_to_stand(scene):
     assert scene.content.ghosts == {}
 
 
-def test_paths_are_the_ways_of_the_tips_that_move(scene):
+def test_paths_are_those_of_the_tips_that_move(scene):
     scene.set_planned([{"left.z": 0.0}, {"left.z": 4000.0}, {"left.z": 4000.0, "left.x": 2000.0}])
     (way,) = scene.content.planned
     assert np.allclose(way[:, [0, 2]], [(-4.0, 2.25), (-4.0, 6.25), (-2.0, 6.25)])
@@ -238,7 +238,7 @@ def test_the_theme_can_change_while_it_is_shown(qapp, scene):
     assert picture(scene).mean() > dark + 40.0
 
 
-def test_another_model_takes_the_place_of_the_first(scene):
+def test_another_model_replaces_the_first(scene):
     scene.show_refused(TOUCH)
     scene.set_nearest(NEAR)
     scene.set_model(two_arms())
@@ -248,7 +248,7 @@ def test_another_model_takes_the_place_of_the_first(scene):
     assert not scene.view.isVisible()
 
 
-def test_a_3d_view_that_fails_gives_way_to_projections(scene, caplog):
+def test_a_3d_view_that_fails_is_replaced_by_projections(scene, caplog):
     scene.view.failed.emit("ignored: these are projections already")
     with caplog.at_level(logging.WARNING):
         QApplication.processEvents()

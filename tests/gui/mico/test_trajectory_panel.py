@@ -77,7 +77,7 @@ def test_a_file_with_mistakes_is_shown_with_each_at_its_line(
     assert not panel.rehearse_button.isEnabled()
 
 
-def test_a_rehearsal_tells_clearance_duration_and_end_and_gives_a_preview(
+def test_a_rehearsal_reports_clearance_duration_and_end_and_gives_a_preview(
     panel: TrajectoryPanel, mico: Mico, qtbot: QtBot, tmp_path: Path
 ) -> None:
     opened(panel, qtbot, tmp_path, HEAD + "left.z to 300 um\nwait 2 s\nleft.z to 0 um\n")
@@ -101,7 +101,7 @@ def test_a_rehearsal_that_is_refused_marks_the_line(
     assert list(panel.lines.lines.problems) == [4]
 
 
-def test_it_steps_pauses_runs_and_tells_how_far_it_is(
+def test_it_steps_pauses_runs_and_reports_how_far_it_is(
     panel: TrajectoryPanel, mico: Mico, qtbot: QtBot, tmp_path: Path
 ) -> None:
     opened(panel, qtbot, tmp_path, HEAD + "left.y to 200 um\nwait 1 s\nleft.y to 0 um\n")

@@ -31,7 +31,7 @@ def test_each_tool_calibrates_and_the_table_turns(button, camera):
     assert camera.calls[-1] == ("find_rotation_centre",)
 
 
-def test_while_one_is_under_way_it_can_only_be_cancelled(qtbot, button, camera):
+def test_while_one_runs_it_can_only_be_cancelled(qtbot, button, camera):
     messages = []
     button.message.connect(messages.append)
     actions(button)["Move left gripper"].trigger()
@@ -57,7 +57,7 @@ def test_what_is_calibrated_is_listed_with_its_age(button, camera):
     assert not actions(button)[line].isEnabled()
 
 
-def test_a_refusal_is_told(button, camera):
+def test_a_refusal_is_reported(button, camera):
     messages = []
     button.message.connect(messages.append)
     camera.refuse = "autofocus is running"

@@ -176,7 +176,7 @@ def test_a_background_is_taken_and_cleared(qtbot, shown, camera):
     assert camera.calls == [("set background",), ("clear background",)]
 
 
-def test_a_step_of_machine_vision_that_fails_is_told_on_the_image_until_it_works(shown, camera):
+def test_a_step_of_machine_vision_that_fails_is_reported_on_the_image_until_it_works(shown, camera):
     well = camera.algorithms
     camera.change(algorithms=(replace(well[0], on=True, failing=True, problem="finds: broken"),))
     shown.read_out()

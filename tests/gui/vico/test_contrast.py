@@ -88,7 +88,7 @@ def test_the_range_is_that_of_the_pixel_format(qtbot, panel, view, camera):
     assert view.view.levels == Levels(0.0, 4095.0)
 
 
-def test_the_share_of_lost_pixels_is_told(qtbot, panel, view, camera):
+def test_the_share_of_lost_pixels_is_reported(qtbot, panel, view, camera):
     data = dim()
     data[: HEIGHT // 4] = 255
     data[-HEIGHT // 8 :] = 0
@@ -103,7 +103,7 @@ def test_an_image_of_one_grey_is_not_stretched_to_noise():
     assert levels.high - levels.low >= 4
 
 
-def test_the_histogram_is_told_from_a_part_of_a_large_image():
+def test_the_histogram_is_made_from_a_part_of_a_large_image():
     data = np.zeros((1200, 1600), np.uint16)
     data[:, 800:] = 4095
     found = histogram(data, 4095)

@@ -24,7 +24,7 @@ def measured(view):
     return [each.text for each in view.tools.measures.measures]
 
 
-def test_a_distance_is_told_in_micrometres(qtbot, shown, mouse):
+def test_a_distance_is_given_in_micrometres(qtbot, shown, mouse):
     click(qtbot, shown.row.tools["distance"])
     mouse.drag((400, 300), (800, 600))
     (text,) = measured(shown)
@@ -144,7 +144,7 @@ def test_a_click_moves_what_was_chosen_and_says_so(qtbot, shown, mouse, camera):
     assert shown.message.text == "right gripper goes there"
 
 
-def test_a_refused_move_is_told_over_the_image(qtbot, shown, mouse, camera):
+def test_a_refused_move_is_reported_over_the_image(qtbot, shown, mouse, camera):
     camera.change(calibration_problem="")
     qtbot.waitUntil(shown.row.go.isEnabled)
     choose_target(qtbot, shown, "left gripper")

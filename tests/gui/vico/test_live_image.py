@@ -123,7 +123,7 @@ def test_dragging_pans_and_the_part_stays_for_the_next_image(qtbot, shown, mouse
     assert shown.view.pixel_at(QPointF(100, 100)) == pytest.approx(after)
 
 
-def test_the_wheel_zooms_about_the_place_below_the_mouse(qtbot, shown, camera):
+def test_the_wheel_zooms_about_the_point_below_the_mouse(qtbot, shown, camera):
     place = QPointF(300.0, 200.0)
     before, zoom = shown.view.pixel_at(place), shown.view.zoom
     turn = QWheelEvent(
@@ -221,7 +221,7 @@ def test_an_image_that_is_not_live_is_greyed_with_its_age(qtbot, shown, camera):
     assert colour_at(shown, (1400, 300)) == bright
 
 
-def test_a_camera_that_says_nothing_is_told_after_a_while(qtbot, shown, monkeypatch):
+def test_a_camera_that_says_nothing_is_reported_after_a_while(qtbot, shown, monkeypatch):
     monkeypatch.setattr("cosmic.vico.gui.camera_view.STALE_S", -1.0)
     monkeypatch.setattr(
         shown._camera,
@@ -260,7 +260,7 @@ def test_counters_are_shown_without_moving_anything(qtbot, shown, camera):
     assert [each.geometry() for each in shown.status.readings] == places
 
 
-def test_the_pixel_below_the_mouse_is_told_with_its_place_on_the_platform(shown, mouse, camera):
+def test_the_pixel_below_the_mouse_is_shown_with_its_position_on_the_platform(shown, mouse, camera):
     mouse.move((400, 200))
     assert shown.pointer.text == "400, 200 px = 100"
     camera.calibration_problem = ""

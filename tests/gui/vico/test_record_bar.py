@@ -36,7 +36,7 @@ def test_a_snap_goes_to_a_file_with_the_time_in_its_name(qtbot, bar, camera):
     qtbot.waitUntil(lambda: bar.tasks.text.text() == f"Snap {path.name}: done")
 
 
-def test_a_snap_that_fails_is_told(qtbot, bar, camera):
+def test_a_snap_that_fails_is_reported(qtbot, bar, camera):
     click(qtbot, bar.snap)
     camera.task.fail(OSError("disk full"))
     qtbot.waitUntil(lambda: "disk full" in bar.tasks.text.text())

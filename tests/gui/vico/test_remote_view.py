@@ -92,7 +92,7 @@ def test_what_is_set_in_the_window_is_set_there(qtbot, own, rig, window, tmp_pat
     soon(qtbot, lambda: rig.home.application.peripherals.state.light_percent == 33.0)
 
 
-def test_a_movement_that_is_refused_is_told_in_the_panel(qtbot, own, rig, window) -> None:
+def test_a_movement_that_is_refused_is_reported_in_the_panel(qtbot, own, rig, window) -> None:
     lens = made_gui(rig.remote, own).lens
     soon(qtbot, lambda: lens.home.isEnabled())
     lens.home.click()

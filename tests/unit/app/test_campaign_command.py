@@ -117,7 +117,7 @@ def test_another_seed_than_that_of_the_campaign_is_refused(
     assert re.search("twin with seed 7, and this one has seed 8", capsys.readouterr().err)
 
 
-def test_the_log_of_a_campaign_is_kept_in_its_folder_and_warnings_are_told_at_once(
+def test_the_log_of_a_campaign_is_kept_in_its_folder_and_warnings_are_reported_at_once(
     recipe: Path,
     tmp_path: Path,
     platforms: SimpleNamespace,

@@ -27,7 +27,7 @@ class Doing(WorkerThread):
 
 
 @pytest.mark.parametrize("hosted", ["daqco", "vico"])
-def test_a_change_in_a_thread_is_told_there_and_nothing_waits_for_one_who_is_gone(
+def test_a_change_in_a_thread_is_reported_there_and_nothing_waits_for_one_who_is_gone(
     hosted: str, qapp: QCoreApplication
 ) -> None:
     platform = build_platform(applications=(hosted,))

@@ -30,7 +30,7 @@ def complaints(capsys: pytest.CaptureFixture[str]) -> list[str]:
     return said
 
 
-def test_it_tells_its_version(capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_reports_its_version(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["--version"])
     assert ended.value.code == 0
@@ -211,7 +211,7 @@ def test_check_finds_what_keeps_a_platform_from_serving(
     assert f"{platform}: network: " in said[0]
 
 
-def test_a_window_serves_when_it_is_told_to_on_the_line_or_in_the_file(
+def test_a_window_serves_when_the_command_line_or_the_file_says_so(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """What it is told is impossible, so that it says so and never opens."""
@@ -223,7 +223,7 @@ def test_a_window_serves_when_it_is_told_to_on_the_line_or_in_the_file(
     assert "letters, digits" in complaints(capsys)[0]
 
 
-def test_whoever_wants_to_serve_other_computers_is_told_what_to_do(
+def test_whoever_wants_to_serve_other_computers_hears_what_to_do(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert main(["serve", "--listen", "tcp/192.168.1.5:7447"]) == 1

@@ -121,7 +121,9 @@ def test_packages_that_are_missing_are_named_with_what_installs_them(
     assert "cosmic[net]" in finding(said, "extra net")["advice"]
 
 
-def test_a_port_that_is_taken_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_port_that_is_taken_is_reported(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         number = other.getsockname()[1]
         listen = f'[network]\nlisten = "tcp/127.0.0.1:{number}"\n\n[mico]'
@@ -153,7 +155,7 @@ def test_a_folder_that_is_not_there_is_a_problem(
     assert "/nowhere/at/all" in finding(said, "recordings")["advice"]
 
 
-def test_waits_that_end_late_are_told(
+def test_waits_that_end_late_are_reported(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = SimpleNamespace(now_s=iter(number * 0.0156 for number in range(10**6)).__next__)

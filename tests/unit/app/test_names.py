@@ -127,7 +127,7 @@ def test_check_finds_poses_and_kept_profiles_of_axes_that_are_gone(
         assert "there is no positioner 'left.q'; there are left.x, left.y" in line
 
 
-def test_poses_and_kept_profiles_of_axes_that_are_gone_are_told_at_the_start(
+def test_poses_and_kept_profiles_of_axes_that_are_gone_are_reported_at_the_start(
     folder: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     (folder / "poses.toml").write_text('[home]\n"left.q" = 2.0\n', encoding="utf-8")

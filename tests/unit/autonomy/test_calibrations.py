@@ -82,7 +82,7 @@ def test_all_of_it_is_found_again_in_the_folder(known: Calibrations, tmp_path: P
         assert again.get("top", tool) == known.get("top", tool)
 
 
-def test_a_broken_file_is_told_and_not_passed_over(known: Calibrations, tmp_path: Path) -> None:
+def test_a_broken_file_is_reported_and_not_passed_over(known: Calibrations, tmp_path: Path) -> None:
     assert known.get("top", "left").planes
     (tmp_path / "kept" / "top-left.toml").write_text("planes = 3", encoding="utf-8")
     with pytest.raises(ConfigError, match="top-left"):

@@ -92,7 +92,7 @@ def test_the_speed_falls_in_proportion_between_the_soft_force_and_the_hard_one(
     assert felt.under(force_un, y=-10.0) == {"y": pytest.approx(-10.0 * share)}
 
 
-def test_the_way_back_is_free_at_once_and_other_ways_are_not(wall):
+def test_the_retreat_is_free_at_once_and_other_directions_are_not(wall):
     felt = Felt()
     felt.under(50.0, y=-10.0)
     assert felt.under(140.0, y=-10.0, x=10.0) == {"y": 0.0, "x": 0.0}
@@ -101,7 +101,7 @@ def test_the_way_back_is_free_at_once_and_other_ways_are_not(wall):
     assert felt.under(50.0, y=-10.0) == {"y": -10.0}
 
 
-def test_a_way_back_that_raises_the_force_is_slowed_down_after_a_moment(wall):
+def test_a_retreat_that_raises_the_force_is_slowed_down_after_a_moment(wall):
     felt = Felt()
     felt.under(50.0, y=-10.0)
     felt.under(100.0, y=-10.0)

@@ -146,7 +146,7 @@ def test_what_cannot_be_is_refused(recorded, tmp_path):
 
 
 @pytest.mark.parametrize("export_to", [export_csv, export_tdms])
-def test_a_full_disk_is_told_and_leaves_nothing(recorded, monkeypatch, export_to):
+def test_a_full_disk_is_reported_and_leaves_nothing(recorded, monkeypatch, export_to):
     path, _ = recorded
 
     def full(*_):

@@ -135,7 +135,7 @@ def test_it_says_how_the_recording_stands(tmp_path, writers, heard):
     assert stats.left_s == pytest.approx((free - RESERVE_BYTES) / 16_000.0, rel=0.2)
 
 
-def test_putting_returns_at_once_while_the_disk_hangs_and_the_end_is_told(
+def test_putting_returns_at_once_while_the_disk_hangs_and_the_end_is_reported(
     tmp_path, writers, heard, monkeypatch
 ):
     head = header()
@@ -240,7 +240,7 @@ def test_it_ends_in_order_before_the_disk_is_full(tmp_path, writers, heard, monk
     h5py.File(tmp_path / "run.h5", "r").close()
 
 
-def test_a_file_taken_away_while_recording_is_told(tmp_path, writers, heard):
+def test_a_file_taken_away_while_recording_is_reported(tmp_path, writers, heard):
     if sys.platform == "win32":
         pytest.skip("Windows does not delete an open file")
     writer = writers(tmp_path / "run.h5")

@@ -43,7 +43,7 @@ def made() -> tuple[There, LimitWatch, list[str], list[Crossing]]:
     return there, watch, stops, heard
 
 
-def test_a_crossing_stops_once_however_often_it_is_told() -> None:
+def test_a_crossing_stops_once_however_often_it_is_reported() -> None:
     there, watch, stops, heard = made()
     watch.on_state(first=True)
     watch.take_crossing(CROSSED)

@@ -35,7 +35,7 @@ class Rig:
         self.guard.set_limit(Limit("force", armed=True, **fields))
 
 
-def test_the_first_sample_beyond_stops_and_is_told_with_its_value() -> None:
+def test_the_first_sample_beyond_stops_and_is_reported_with_its_value() -> None:
     rig = Rig()
     rig.arm()
     rig.guard.look(chunk([2.5, 3.0, 3.6, 3.7], first=500, time_s=2.0))
@@ -185,7 +185,7 @@ def test_a_scale_is_a_polynomial_from_the_constant_upwards() -> None:
     assert VOLTS.apply(-3.5).tolist() == -3.5
 
 
-def test_a_crossing_is_told_until_it_is_acknowledged_which_needs_the_value_back() -> None:
+def test_a_crossing_is_reported_until_it_is_acknowledged_which_needs_the_value_back() -> None:
     rig = Rig()
     rig.arm()
     rig.guard.look(chunk([3.6]))
@@ -210,7 +210,7 @@ def test_a_simulation_that_runs_faster_may_be_silent_longer():
     assert not stops
 
 
-def test_who_asks_after_a_stop_is_told_of_the_crossing_that_made_it() -> None:
+def test_who_asks_after_a_stop_hears_of_the_crossing_that_made_it() -> None:
     rig = Rig()
     answers: list[tuple[Crossing, ...]] = []
     reader = Thread(target=lambda: answers.append(rig.guard.crossings))

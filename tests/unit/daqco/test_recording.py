@@ -239,7 +239,7 @@ def test_force_over_position_gives_the_stiffness_with_its_error(tmp_path):
         assert part.samples == 500
 
 
-def test_a_slope_without_a_way_is_refused(tmp_path):
+def test_a_slope_without_travel_is_refused(tmp_path):
     pushed_fibre(tmp_path / "run.h5")
     with open_recording(tmp_path / "run.h5") as found:
         with pytest.raises(RecordingError, match="all 500 samples lie at 0"):
@@ -445,7 +445,7 @@ def test_a_broken_file_is_refused_by_name(tmp_path, content):
         open_recording(path)
 
 
-def test_a_missing_file_and_a_foreign_one_are_told_apart(tmp_path):
+def test_a_missing_file_and_a_foreign_one_are_distinguished(tmp_path):
     with pytest.raises(RecordingError, match="no such file"):
         open_recording(tmp_path / "none.h5")
     with h5py.File(tmp_path / "other.h5", "w") as file:

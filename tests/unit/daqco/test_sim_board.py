@@ -236,7 +236,7 @@ def test_a_fast_clock_brings_the_samples_as_much_faster() -> None:
 # --- trouble ----------------------------------------------------------------------------------
 
 
-def test_a_hurried_clock_is_not_held_up_by_boards_that_begin_one_after_the_other() -> None:
+def test_an_accelerated_clock_is_not_held_up_by_boards_that_begin_one_after_the_other() -> None:
     clock = RatedClock(20.0)
     library = SimulatedLibrary(clock)
     boards = [library.open(name) for name in ("Dev1", "Dev2")]
@@ -257,7 +257,7 @@ def test_a_hurried_clock_is_not_held_up_by_boards_that_begin_one_after_the_other
             board.close()
 
 
-def test_a_receiver_that_is_too_late_is_told_how_much_was_lost() -> None:
+def test_a_receiver_that_is_too_late_hears_how_much_was_lost() -> None:
     clock = ManualClock()
     board = SimulatedLibrary(clock).open("Dev1")
     board.configure(inputs(16), 1000.0, 10)
@@ -341,7 +341,7 @@ def outcome_of_waiting(board: SimulatedBoard, meanwhile: Callable[[], None]) -> 
     return outcome[0]
 
 
-def test_a_board_that_is_unplugged_while_somebody_waits_is_told_at_once() -> None:
+def test_a_board_that_is_unplugged_while_somebody_waits_is_reported_at_once() -> None:
     library = SimulatedLibrary(RatedClock(1.0))
     board = waiting_board(library)
     raised = outcome_of_waiting(board, lambda: library.faults.inject("unplugged"))
@@ -354,7 +354,7 @@ def test_a_stop_ends_a_wait_in_real_time_at_once() -> None:
 
 
 @pytest.mark.timeout(20)
-def test_receiving_waits_no_longer_than_told_though_the_chunk_comes_later() -> None:
+def test_receiving_waits_no_longer_than_its_timeout_though_the_chunk_comes_later() -> None:
     assert waiting_board(SimulatedLibrary(RatedClock(1.0))).receive(0.01) is None
 
 
@@ -491,7 +491,7 @@ def test_a_board_that_is_silent_by_a_fault_does_not_stop_the_time(
     assert clock.now_s() == pytest.approx(3.0)
 
 
-def test_a_receiver_that_hangs_is_given_up_and_told_what_it_lost(
+def test_a_receiver_that_hangs_is_dropped_and_hears_what_it_lost(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     wall = Wall()

@@ -126,7 +126,7 @@ class Sink(QObject):
             self.done.emit()
 
 
-def test_a_consumer_is_told_in_its_own_thread_and_gets_everything_in_order(qtbot: QtBot) -> None:
+def test_a_consumer_is_called_in_its_own_thread_and_gets_everything_in_order(qtbot: QtBot) -> None:
     source, sink = Source(100), Sink(100)
     Connector(source, sink)
     with qtbot.waitSignal(sink.done):
@@ -173,7 +173,7 @@ def test_an_active_buffer_converts_and_notifies_by_itself(qapp: QObject) -> None
     connector.disconnect()
 
 
-def test_an_active_buffer_stores_and_tells_nothing_when_it_cannot_convert(qapp: QObject) -> None:
+def test_an_active_buffer_stores_and_reports_nothing_when_it_cannot_convert(qapp: QObject) -> None:
     lengths, received = Lengths(), []
     lengths.data_ready.connect(lambda: received.append(True))
     with pytest.raises(TypeError):

@@ -48,7 +48,7 @@ def test_a_good_file_becomes_a_frozen_model(file: Path) -> None:
         platform.title = "another"
 
 
-def test_all_errors_are_told_at_once_with_file_key_and_reason(file: Path) -> None:
+def test_all_errors_are_reported_at_once_with_file_key_and_reason(file: Path) -> None:
     file.write_text(
         'titel = "rig"\nchannels = "3"\n[[axis]]\nname = "left x"\nspeed_um_s = nan\n'
         '[[axis]]\nspeed_um_s = 0.0\nname = "b"\n',

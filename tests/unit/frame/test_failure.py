@@ -33,7 +33,7 @@ def witness(policy: FailurePolicy) -> Witness:
 
 
 @pytest.mark.defects
-def test_a_defect_stops_all_motion_and_then_tells_the_operator(
+def test_a_defect_stops_all_motion_and_then_notifies_the_operator(
     policy: FailurePolicy, witness: Witness
 ) -> None:
     failure = policy.report(ZeroDivisionError("oh"), "window")
@@ -53,7 +53,7 @@ def test_a_defect_is_logged_with_its_traceback(
     assert record.exc_info[0] is ZeroDivisionError
 
 
-def test_a_foreseen_failure_is_told_and_logged_without_traceback_and_stops_nothing(
+def test_a_foreseen_failure_is_reported_and_logged_without_traceback_and_stops_nothing(
     policy: FailurePolicy, witness: Witness, caplog: pytest.LogCaptureFixture
 ) -> None:
     failure = policy.report(DeviceError("left.x: end stop reached"), "thread 'device 0'")
@@ -112,7 +112,7 @@ def test_a_listener_that_fails_does_not_keep_the_others_from_hearing(
 
 
 @pytest.mark.defects
-def test_a_defect_met_while_telling_of_a_foreseen_failure_still_stops_all_motion(
+def test_a_defect_met_while_reporting_a_foreseen_failure_still_stops_all_motion(
     policy: FailurePolicy, witness: Witness, caplog: pytest.LogCaptureFixture
 ) -> None:
     policy.subscribe(lambda _failure: policy.report(ValueError("inner"), "window") and None)
@@ -145,7 +145,7 @@ def test_a_policy_works_again_after_a_failure_within_a_failure(
 
 
 @pytest.mark.defects
-def test_who_has_left_is_neither_stopped_nor_told(policy: FailurePolicy) -> None:
+def test_who_has_left_is_neither_stopped_nor_notified(policy: FailurePolicy) -> None:
     stopped: list[str] = []
     heard: list[Failure] = []
     policy.on_safe_stop(stopped.append)()
@@ -160,7 +160,7 @@ def test_a_guarded_callback_gives_back_what_the_function_gives(policy: FailurePo
 
 
 @pytest.mark.defects
-def test_a_guarded_callback_that_fails_gives_its_fallback_and_tells_the_policy(
+def test_a_guarded_callback_that_fails_gives_its_fallback_and_notifies_the_policy(
     policy: FailurePolicy, witness: Witness
 ) -> None:
     call = policy.guarded("driver callback", lambda count: 1 // count, -1)

@@ -41,7 +41,7 @@ def test_the_number_follows_the_highest_in_use(tmp_path):
     assert file_name("f(1)", NameOption.NUMBER, directory=tmp_path) == "f(1)_001.h5"
 
 
-def test_a_number_is_in_use_by_any_of_the_endings_told(tmp_path):
+def test_a_number_is_in_use_by_any_of_the_endings_given(tmp_path):
     for name in ("fibre_002.csv", "fibre_004.txt", "fibre_007"):
         (tmp_path / name).touch()
     wanted = {"suffix": ".mkv", "directory": tmp_path}
@@ -113,6 +113,6 @@ def test_the_time_left_follows_from_the_room(tmp_path, monkeypatch):
     assert space_left(tmp_path, 0.0).left_s == float("inf")
 
 
-def test_a_disk_that_is_gone_is_told(tmp_path):
+def test_a_disk_that_is_gone_is_reported(tmp_path):
     with pytest.raises(RecordingError, match="is the disk still there"):
         space_left(tmp_path / "gone", 1.0)

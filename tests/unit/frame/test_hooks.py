@@ -34,7 +34,7 @@ def test_an_uncaught_exception_is_reported(failures: list[Failure]) -> None:
     assert failures == [Failure(where="window", text="ValueError: x", defect=True)]
 
 
-def test_the_place_is_the_innermost_function_of_cosmic(failures: list[Failure]) -> None:
+def test_the_origin_is_the_innermost_function_of_cosmic(failures: list[Failure]) -> None:
     try:
         parse_quantity(5, "um")  # type: ignore[arg-type]
     except AttributeError as error:

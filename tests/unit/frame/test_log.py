@@ -139,7 +139,7 @@ def _flood(path: Path, clock: ManualClock, seconds: int, per_second: int) -> int
     return seconds * per_second
 
 
-def test_a_flood_of_refused_greetings_is_told_in_few_lines_with_the_right_count(
+def test_a_flood_of_refused_greetings_is_reported_in_few_lines_with_the_right_count(
     tmp_path: Path,
 ) -> None:
     path, clock = tmp_path / "cosmic.log", ManualClock()
@@ -155,7 +155,7 @@ def test_a_flood_of_refused_greetings_is_told_in_few_lines_with_the_right_count(
     assert single >= 50, "the first are kept as they are"
 
 
-def test_a_flood_that_has_ended_is_told_though_nothing_else_is_logged() -> None:
+def test_a_flood_that_has_ended_is_reported_though_nothing_else_is_logged() -> None:
     ring, clock = RingBufferHandler(), ManualClock()
     undo = set_up_logging(ring, clock=clock)
     for _ in range(862):

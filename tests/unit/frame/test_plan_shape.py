@@ -48,7 +48,7 @@ def test_only_the_first_end_counts(first: str) -> None:
     assert status.success is (first == "finish")
 
 
-def test_a_status_ended_by_many_threads_is_told_once() -> None:
+def test_a_status_ended_by_many_threads_is_reported_once() -> None:
     for _ in range(50):
         status, heard, ended = PlanStatus("a move"), list[object](), list[bool]()
         status.add_callback(heard.append)
@@ -78,7 +78,7 @@ def test_waiting_for_what_does_not_end_times_out() -> None:
         PlanStatus("a move").exception()
 
 
-def test_moments_of_our_clocks_are_told_as_time_of_the_day() -> None:
+def test_moments_of_our_clocks_are_reported_as_time_of_the_day() -> None:
     assert unix_now_s() == pytest.approx(datetime.now(UTC).timestamp(), abs=5.0)
     assert unix_of_wall_s(WALL.now_s() - 100.0) == pytest.approx(unix_now_s() - 100.0, abs=5.0)
     fast = RatedClock(50.0)

@@ -161,7 +161,9 @@ def test_a_process_that_has_ended_is_gone() -> None:
     assert mark.life is Life.GONE
 
 
-def test_windows_tells_a_process_from_a_later_one_of_its_number(windows: FakeWindows) -> None:
+def test_windows_distinguishes_a_process_from_a_later_one_of_its_number(
+    windows: FakeWindows,
+) -> None:
     mark = own_mark()
     assert mark.start
     assert mark.life is Life.LIVES
@@ -236,7 +238,7 @@ def test_the_clock_on_windows_has_no_coarse_steps(
     assert len(seen) > 50
 
 
-def test_a_thread_comes_first_on_windows_or_it_is_told_why_not(windows: FakeWindows) -> None:
+def test_a_thread_comes_first_on_windows_or_says_why_not(windows: FakeWindows) -> None:
     assert run_thread_first(10) == ""
     assert windows.priority == 15
     windows.refuses_priority = True

@@ -24,7 +24,7 @@ def test_a_task_says_how_far_it_is(task: Task) -> None:
     assert (heard[1].title, heard[1].text, heard[1].error) == ("Initialisation", "left.x", "")
 
 
-def test_the_time_left_is_told_only_once_something_can_be_said(task: Task) -> None:
+def test_the_time_left_is_reported_only_once_something_can_be_said(task: Task) -> None:
     assert task.progress.left_s is None
     task.report(0.5, "half")
     left_s = task.progress.left_s

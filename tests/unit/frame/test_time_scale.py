@@ -156,7 +156,7 @@ def test_who_waits_is_woken_when_the_time_goes_on_and_does_not_spin_before(bench
     assert woken == ["told"]
 
 
-def test_the_rate_reached_is_told(bench: Bench) -> None:
+def test_the_rate_reached_is_reported(bench: Bench) -> None:
     horizon = ScaledHorizon(bench.time_scale)
     for _ in range(20):
         bench.passes(0.2)
@@ -175,7 +175,7 @@ def test_a_clock_that_waits_runs_at_its_rate_below_that_of_the_wall_too(rate: fl
     assert time_scale.now_s() == pytest.approx(10.0 * rate)
 
 
-def test_only_a_clock_that_was_told_so_waits() -> None:
+def test_only_a_clock_that_was_set_so_waits() -> None:
     for rate in (1.0, 20.0):
         clock = RatedClock(rate)
         clock.horizon().move_to(clock.now_s())

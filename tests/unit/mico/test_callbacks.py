@@ -11,7 +11,7 @@ from unit.mico.rigs import mico, wait_until
 X = Channel(0, 0)
 
 
-def test_a_callback_that_waits_for_a_movement_is_told_not_to(caplog):
+def test_a_callback_that_waits_for_a_movement_is_refused(caplog):
     caught = []
     with mico() as (rig, controller):
         axis = rig["d0.c0"]

@@ -136,7 +136,7 @@ def test_a_refusal_says_what_where_how_close_and_what_to_do(manager: CollisionMa
     )
 
 
-def test_the_way_told_is_allowed(manager: CollisionManager) -> None:
+def test_the_travel_reported_is_allowed(manager: CollisionManager) -> None:
     limit = ask(manager, 0.0, 3000.0).limit
     assert limit is not None
     assert ask(manager, 0.0, limit).allowed
@@ -166,7 +166,7 @@ def test_a_pair_inside_its_margin_may_only_retreat(manager: CollisionManager) ->
     assert verdict.limit is None
 
 
-def test_a_turning_axis_is_told_in_degrees() -> None:
+def test_a_turning_axis_is_given_in_degrees() -> None:
     model = turntable()
     manager = CollisionManager(model, process=Inside(model))
     spans = resting(model, left_z=-300.0)
@@ -217,7 +217,7 @@ def test_an_interval_that_is_none_is_not_allowed(manager: CollisionManager, span
     assert not manager.check({**resting(), "left.x": span}).allowed
 
 
-def test_an_axis_unknown_to_the_scene_cannot_be_judged(manager: CollisionManager) -> None:
+def test_an_axis_unknown_to_the_scene_cannot_be_checked(manager: CollisionManager) -> None:
     verdict = manager.check({**resting(), "middle.x": way(0.0, 1.0)})
     assert verdict.reason is Reason.NO_ANSWER
     assert "middle.x" in str(verdict)
@@ -245,7 +245,7 @@ def test_the_nearest_pair_leaves_allowed_contacts_aside(manager: CollisionManage
 # --- axes taken out ---------------------------------------------------------------------------
 
 
-def test_an_axis_taken_out_is_not_checked_and_everybody_is_told(
+def test_an_axis_taken_out_is_not_checked_and_everybody_is_notified(
     manager: CollisionManager, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO)

@@ -122,7 +122,7 @@ def test_the_gate_looks_at_the_estimate_and_three_deviations_around_it(monkeypat
     st.lists(st.tuples(st.floats(-1300.0, 1300.0), st.floats(0.72, 1.28)), max_size=12),
     st.floats(-2.9, 2.9),
 )
-def test_the_true_place_stays_within_three_deviations_whatever_a_step_is_worth(
+def test_the_true_position_stays_within_three_deviations_whatever_a_step_is_worth(
     position, std, ways, off
 ):
     truth = min(max(position + off * std, 0.0), 1000.0)

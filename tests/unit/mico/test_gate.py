@@ -162,7 +162,7 @@ def test_an_axis_that_is_not_seen_to_stand_somewhere_may_be_anywhere(unsure):
     assert (span.low, span.high, span.now) == (-math.inf, math.inf, None)
 
 
-def test_a_counted_position_is_told_as_estimated():
+def test_a_counted_position_is_reported_as_estimated():
     checker = Records()
     gripper = linear(name="g", kind=PositionerKind.OPEN_LOOP, confidence=Confidence.ESTIMATED)
     ask(MoveTo(50.0, "um"), linear(), gripper, checker=checker)

@@ -116,7 +116,7 @@ def test_it_answers_as_the_pure_gate_does(gate: GateProcess) -> None:
     assert gate.check(BLOCKED, frozenset({("left_z", "right_z")})).clear
 
 
-def test_it_tells_the_nearest_pair(gate: GateProcess) -> None:
+def test_it_reports_the_nearest_pair(gate: GateProcess) -> None:
     nearest = gate.nearest({"left.x": 1500.0})
     assert nearest is not None
     assert nearest.distance_um == pytest.approx(500.0)
@@ -135,30 +135,30 @@ def test_a_number_that_is_none_gets_no_answer(gate: GateProcess, bad: float) -> 
     assert gate.restarts == 0
 
 
-def test_it_tells_how_far_a_refused_movement_may_go(gate: GateProcess) -> None:
+def test_it_reports_how_far_a_refused_movement_may_go(gate: GateProcess) -> None:
     assert gate.clear_travel(BLOCKED, "left.x") == pytest.approx(1995.0, abs=1.0)
     reached = gate.clear_travel(BLOCKED, "left.x") or 0.0
     assert gate.check(move(reached)).clear
 
 
-def test_there_is_no_free_way_for_a_body_inside_its_margin(gate: GateProcess) -> None:
+def test_there_is_no_free_travel_for_a_body_inside_its_margin(gate: GateProcess) -> None:
     inside = {**FREE, "left.x": AxisSpan(1997.0, 3000.0, 1997.0, moving=True)}
     assert gate.clear_travel(inside, "left.x") is None
 
 
-def test_there_is_no_free_way_where_nobody_knows_where_the_axis_stands(gate: GateProcess) -> None:
+def test_there_is_no_free_travel_where_the_position_is_unknown(gate: GateProcess) -> None:
     assert gate.clear_travel({**FREE, "left.x": AxisSpan(0.0, 3000.0)}, "left.x") is None
     both_ways = AxisSpan(-3000.0, 3000.0, 0.0, moving=True)
     assert gate.clear_travel({**FREE, "left.x": both_ways}, "left.x") is None
 
 
-def test_a_free_way_without_end_is_looked_for_up_to_the_hard_stop(gate: GateProcess) -> None:
+def test_free_travel_without_end_is_looked_for_up_to_the_hard_stop(gate: GateProcess) -> None:
     endless = AxisSpan(0.0, float("inf"), 0.0, moving=True)
     found = gate.clear_travel({**FREE, "left.x": endless}, "left.x")
     assert found == pytest.approx(1995.0, abs=1.0)
 
 
-def test_the_free_way_of_a_turning_axis_is_in_degrees() -> None:
+def test_the_free_travel_of_a_turning_axis_is_in_degrees() -> None:
     with running(turntable()) as gate:
         spans = {axis: AxisSpan(0.0, 0.0, 0.0) for axis in turntable().axes}
         spans["left.z"] = AxisSpan(-300.0, -300.0, -300.0)
@@ -343,7 +343,7 @@ def _is_down(gate: GateProcess) -> bool:
     return gate.pid is None
 
 
-def test_a_scene_that_cannot_be_loaded_is_told_at_the_start() -> None:
+def test_a_scene_that_cannot_be_loaded_is_reported_at_the_start() -> None:
     model = two_arms()
     broken = replace(model.pieces[0], vertices_um=model.pieces[0].vertices_um[:0])
     gate = GateProcess(replace(model, pieces=(broken, *model.pieces[1:])))

@@ -111,7 +111,7 @@ def test_a_stop_waits_for_no_answer_and_nothing_moves_when_it_comes(monkeypatch)
         assert not controller.of("move_to")
 
 
-def test_a_movement_that_is_being_judged_is_judged_again_for_a_new_holder(monkeypatch):
+def test_a_movement_that_is_being_checked_is_checked_again_for_a_new_holder(monkeypatch):
     with waiting(monkeypatch) as (rig, controller, checker, movement):
         station = StationLease()
         rig.application.manager.lease.join(station)
@@ -166,7 +166,7 @@ def test_an_answer_that_is_too_late_is_refused_in_words():
     )
 
 
-def test_what_is_watched_again_meanwhile_is_judged_again():
+def test_what_is_watched_again_meanwhile_is_checked_again():
     asked = []
 
     class Changes:
@@ -198,7 +198,7 @@ def going(**changes):
             checker.go.set()
 
 
-def test_positions_are_published_while_a_judgement_is_awaited():
+def test_positions_are_published_while_a_verdict_is_awaited():
     with going() as (rig, controller, checker):
         rig["d0.c1"].move_to(50.0, wait=False)
         wait_until(lambda: len(controller.of("move_to")) == 1)
@@ -216,7 +216,7 @@ def positions_in(heard):
     return [(each.name, each.position) for each in heard]
 
 
-def test_a_movement_lands_while_a_judgement_is_awaited():
+def test_a_movement_lands_while_a_verdict_is_awaited():
     with going() as (rig, controller, checker):
         first = rig["d0.c1"].move_to(50.0, wait=False)
         wait_until(lambda: len(controller.of("move_to")) == 1)
@@ -229,7 +229,7 @@ def test_a_movement_lands_while_a_judgement_is_awaited():
 
 
 @pytest.mark.parametrize("awaited", ["its own next packet", "the move of another axis"])
-def test_a_dead_man_s_movement_ends_while_a_judgement_is_awaited(awaited):
+def test_a_dead_man_s_movement_ends_while_a_verdict_is_awaited(awaited):
     with going() as (rig, controller, checker):
         jog = rig["d0.c1"].jog(1, speed=100.0)
         wait_until(lambda: len(controller.of("move_to")) == 1)
@@ -244,7 +244,7 @@ def test_a_dead_man_s_movement_ends_while_a_judgement_is_awaited(awaited):
         assert len([call for call in controller.of("move_to") if call[1] == Channel(0, 1)]) == 1
 
 
-def test_a_jog_that_is_held_goes_on_after_a_judgement_that_took_long():
+def test_a_jog_that_is_held_goes_on_after_a_verdict_that_took_long():
     with going() as (rig, controller, checker):
         jog = rig["d0.c1"].jog(1, speed=100.0)
         wait_until(lambda: len(controller.of("move_to")) == 1)
@@ -263,7 +263,7 @@ def test_a_jog_that_is_held_goes_on_after_a_judgement_that_took_long():
 
 
 @pytest.mark.parametrize("how", ["cancelled", "halted", "closed"])
-def test_what_is_ended_before_it_was_judged_ends_at_once_and_never_begins(how):
+def test_what_is_ended_before_it_was_checked_ends_at_once_and_never_begins(how):
     with going() as (rig, controller, checker):
         checker.go.clear()
         movement = rig["d0.c0"].move_to(20.0, wait=False)
@@ -304,7 +304,7 @@ def test_a_question_that_is_taken_back_holds_nothing(when):
         assert answers[0][0].allowed
 
 
-def test_a_device_that_is_lost_while_a_judgement_is_awaited_stops_everything():
+def test_a_device_that_is_lost_while_a_verdict_is_awaited_stops_everything():
     with going() as (rig, controller, checker):
         lost = listen(rig.application.manager.device_lost)
         checker.go.clear()

@@ -111,7 +111,7 @@ def test_a_call_at_a_station_that_was_not_joined_moves_nothing() -> None:
     assert guard.expired
 
 
-def test_a_hosted_application_is_told_of_its_station() -> None:
+def test_a_hosted_application_knows_its_station() -> None:
     class Application:
         station: Station | None = None
 

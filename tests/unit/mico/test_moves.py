@@ -49,7 +49,7 @@ def test_a_replaced_movement_says_so():
             first.wait(2)
 
 
-def test_a_movement_is_sent_before_anybody_is_told_that_it_replaces_another():
+def test_a_movement_is_sent_before_anybody_hears_that_it_replaces_another():
     with mico(instant=False) as (rig, controller):
         first = rig["d0.c0"].move_to(100.0, wait=False)
         sent: list[int] = []

@@ -26,7 +26,7 @@ print(type(plan_path(Sweep(arms()), problem)).__name__)
 
 
 @pytest.mark.parametrize("six", [False, True])
-def test_blocked_problems_are_solved_by_short_ways_that_are_exactly_safe(six: bool) -> None:
+def test_blocked_problems_are_solved_by_short_paths_that_are_exactly_safe(six: bool) -> None:
     model, rng = load_scene(SCENE), random.Random(1)
     runs = solve(model, 4, six=six)
     for run in runs:

@@ -31,7 +31,7 @@ BEHIND = Problem(
 """The other side of the right arm."""
 
 
-def test_a_free_way_is_one_leg_of_all_axes_at_once() -> None:
+def test_a_free_path_is_one_leg_of_all_axes_at_once() -> None:
     found = solved(Sweep(arms()), Problem(at(), {"left.x": 1000.0, "left.y": 500.0}, LIMITS))
     assert found.method == "straight"
     assert [dict(leg.targets) for leg in found.segments] == [{"left.x": 1000.0, "left.y": 500.0}]
@@ -77,7 +77,7 @@ def test_a_lifting_axis_leads_over_what_is_in_the_way() -> None:
 
 
 @pytest.mark.parametrize("lift", [None, 2000.0])
-def test_a_way_round_the_other_arm_is_short_and_every_leg_is_clear(lift: float | None) -> None:
+def test_a_detour_around_the_other_arm_is_short_and_every_leg_is_clear(lift: float | None) -> None:
     model = arms(lift=lift)
     found = solved(Sweep(model), BEHIND)
     assert corners(found)[-1] == {**BEHIND.start, **BEHIND.goal}
@@ -117,7 +117,7 @@ def test_a_turning_axis_takes_part() -> None:
     assert least_gap(model, found) > 5.0
 
 
-def test_a_degree_counts_as_the_way_of_the_farthest_point_that_turns() -> None:
+def test_a_degree_counts_as_the_travel_of_the_farthest_point_that_turns() -> None:
     model = table_and_arm()
     start = {"left.x": -2000.0, "left.y": 0.0, "left.z": 1000.0, "table.rotation": 0.0}
     found = solved(Sweep(model), Problem(start, {"table.rotation": 1.0}))
@@ -150,12 +150,12 @@ def test_axes_that_may_be_anywhere_are_kept_clear_of_wherever_they_are() -> None
     assert isinstance(plan_path(Sweep(arms()), Problem(start, {"left.x": 2100.0}, LIMITS)), NoPath)
 
 
-def test_a_plan_tells_the_least_distance_at_its_corners() -> None:
+def test_a_plan_reports_the_least_distance_at_its_corners() -> None:
     found = solved(Sweep(arms()), Problem(at(), {"left.x": 1900.0}, LIMITS))
     assert found.clearance_um == pytest.approx(100.0)
 
 
-def test_looking_on_makes_the_way_no_longer() -> None:
+def test_looking_on_makes_the_path_no_longer() -> None:
     model = arms(lift=None)
     quick = solved(Sweep(model), BEHIND)
     better = solved(Sweep(model), replace(BEHIND, optimise=True, budget_s=2.0))

@@ -26,7 +26,7 @@ def refused(problem: Problem, model: SceneModel | None = None) -> NoPath:
     return answer
 
 
-def test_where_there_is_no_way_it_says_what_blocks_and_how_far_the_straight_way_goes() -> None:
+def test_where_there_is_no_path_it_says_what_blocks_and_how_far_the_straight_one_goes() -> None:
     answer = refused(SIDE_TO_SIDE)
     assert answer.blocking is not None
     assert answer.blocking.bodies == ("left_z", "right_z")
@@ -175,7 +175,7 @@ class Forgetful(Sweep):
         return answer
 
 
-def test_every_leg_of_a_plan_is_asked_about_once_more_before_it_is_told() -> None:
+def test_every_leg_of_a_plan_is_asked_about_once_more_before_it_is_reported() -> None:
     problem = Problem(at(), {"left.x": 1000.0, "left.y": 500.0}, LIMITS)
     assert isinstance(plan_path(Forgetful(arms()), problem), NoPath)
 

@@ -54,7 +54,7 @@ def test_a_file_that_cannot_be_written_costs_nothing_but_the_file(tmp_path):
     assert book.path is None
 
 
-def test_a_broken_file_is_told_with_the_key_that_is_wrong(tmp_path):
+def test_a_broken_file_is_reported_with_the_key_that_is_wrong(tmp_path):
     path = tmp_path / "profiles.toml"
     path.write_text('[[profile]]\nname = "a"\naxis = [{input = "x", positioner = "p", scale = 0}]')
     with pytest.raises(ConfigError, match=r"profiles\.toml: profile\[0\]\.axis\[0\]\.scale"):

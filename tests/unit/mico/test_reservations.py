@@ -117,7 +117,7 @@ def test_a_release_and_a_rescan_end_a_reservation():
         assert manager.gate.held() == {}
 
 
-def test_orders_cannot_give_back_what_a_movement_under_way_holds():
+def test_orders_cannot_release_what_a_running_movement_holds():
     with platform(instant=False) as (manager, controller):
         motion = MoveTo(500.0, "um")
         orders = manager.order_together({NAME: motion}, source="test")
@@ -156,7 +156,7 @@ def test_of_many_threads_with_one_reservation_one_is_heard():
             gate.release(reservation)
 
 
-def test_an_axis_that_was_elsewhere_meanwhile_is_judged_again():
+def test_an_axis_that_moved_meanwhile_is_checked_again():
     with platform() as (manager, _):
         gate, motion = manager.gate, MoveTo(10.0, "um")
         late = reserved(manager, motion)

@@ -22,7 +22,7 @@ def under_way(rig, controller, target=4000.0):
 
 
 @pytest.mark.parametrize("how", ["halt", "stop"])
-def test_a_relative_move_never_goes_on_from_a_target_that_was_given_up(how):
+def test_a_relative_move_never_goes_on_from_a_target_that_was_abandoned(how):
     with mico(instant=False) as (rig, controller):
         movement = under_way(rig, controller)
         controller.position[X] = 450.0

@@ -52,7 +52,7 @@ def test_a_scene_takes_the_pieces(tmp_path: Path) -> None:
     assert check_scene(path) == ([], [])
 
 
-def test_the_command_tells_files_and_volume_error(tmp_path: Path) -> None:
+def test_the_command_reports_files_and_volume_error(tmp_path: Path) -> None:
     write_part(tmp_path, bracket())
     lines = decompose(tmp_path / "part.stl", tmp_path / "pieces")
     assert lines[0] == str(tmp_path / "pieces" / "part_1.stl")

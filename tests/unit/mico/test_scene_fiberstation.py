@@ -212,7 +212,7 @@ def test_over_all_travel_only_the_dangers_that_are_meant_can_meet() -> None:
         assert opposite or thing in dangers, (one, other)
 
 
-def test_only_hands_reach_over_the_plate() -> None:
+def test_only_arms_reach_over_the_plate() -> None:
     for side, sign in (("left", -1.0), ("right", 1.0)):
         for part in ("base", "x_carriage", "y_carriage", "z_carriage"):
             body = f"{side}_{part}"

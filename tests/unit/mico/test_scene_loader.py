@@ -62,7 +62,7 @@ def test_a_drive_of_a_joint_that_turns_is_in_degrees(tmp_path: Path) -> None:
     assert (drive.overshoot, drive.uncertainty) == (0.5, 3.0)
 
 
-def test_a_drive_may_be_anywhere_in_its_travel_unless_told(tmp_path: Path) -> None:
+def test_a_drive_may_be_anywhere_in_its_travel_unless_given(tmp_path: Path) -> None:
     lift = load_scene(write_scene(tmp_path)).drives[0]
     assert (lift.factor, lift.offset, lift.overshoot) == (1.0, 0.0, 0.0)
     assert lift.uncertainty == math.inf
@@ -142,7 +142,7 @@ lift = 4000.0
     assert scene.detour_height == {"lift": 4000.0}
 
 
-def test_another_body_takes_the_place_of_a_link(tmp_path: Path) -> None:
+def test_another_body_replaces_a_link(tmp_path: Path) -> None:
     folder = tmp_path / "bodies"
     folder.mkdir()
     write_part(folder, block(1.0, 1.0, 1.0))

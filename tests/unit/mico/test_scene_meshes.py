@@ -164,7 +164,9 @@ def test_a_file_that_is_no_mesh_is_refused(tmp_path: Path, content: bytes) -> No
 
 
 @pytest.mark.parametrize("name", ["part.dae", "http://example.org/part.stl", "part"])
-def test_a_mesh_in_another_format_or_from_elsewhere_is_refused(tmp_path: Path, name: str) -> None:
+def test_a_mesh_in_another_format_or_of_another_folder_is_refused(
+    tmp_path: Path, name: str
+) -> None:
     urdf = {SLIDER_BOX: SLIDER_MESH.replace("part.stl", name)}
     assert "name an .stl or .obj file" in mistakes(write_scene(tmp_path, urdf=urdf))
 

@@ -74,7 +74,7 @@ def test_a_urdf_is_refused_with(tmp_path: Path, name: str) -> None:
     assert "small.urdf" in text
 
 
-def test_the_line_of_a_mistake_is_told(tmp_path: Path) -> None:
+def test_the_line_of_a_mistake_is_reported(tmp_path: Path) -> None:
     text = mistakes(write_scene(tmp_path, urdf={ORIGIN: '<origin xyz="0 nan 0"/>'}))
     assert "small.urdf:10: link 'slider'" in text
 
@@ -100,7 +100,7 @@ def test_two_roots_are_refused(tmp_path: Path) -> None:
     assert "2 roots: base, alone" in text
 
 
-def test_several_mistakes_are_told_at_once(tmp_path: Path) -> None:
+def test_several_mistakes_are_reported_at_once(tmp_path: Path) -> None:
     path = write_scene(
         tmp_path,
         urdf={ORIGIN: '<origin xyz="0 nan 0"/>', 'type="revolute"': 'type="planar"'},

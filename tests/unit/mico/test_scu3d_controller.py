@@ -70,7 +70,7 @@ def test_a_refused_value_never_reaches_the_library(
     assert library.calls == []
 
 
-def test_a_status_becomes_an_exception_with_place_and_call(
+def test_a_status_becomes_an_exception_with_device_and_call(
     library: FakeScu3d, controller: Scu3dController
 ) -> None:
     library.statuses["SA_MovePositionAbsolute_A"] = 9
@@ -159,7 +159,7 @@ def test_no_device_at_all_says_what_to_check(status: int | None) -> None:
         Scu3dController(library).open()
 
 
-def test_a_library_that_opens_nothing_is_told_as_no_device(library: FakeScu3d) -> None:
+def test_a_library_that_opens_nothing_is_reported_as_no_device(library: FakeScu3d) -> None:
     library.statuses["SA_InitDevices"] = 0
     with pytest.raises(NotConnectedError, match="USB cable"):
         Scu3dController(library).open()
@@ -210,7 +210,7 @@ def test_an_old_library_reports_what_it_lacks_as_unsupported() -> None:
     controller.move_to(LINEAR, 1.0, "um", hold_s=0.0)
 
 
-def test_a_library_that_does_not_tell_its_version_still_has_a_name(library: FakeScu3d) -> None:
+def test_a_library_that_does_not_report_its_version_still_has_a_name(library: FakeScu3d) -> None:
     assert Scu3dController(library, simulated=True).name == "SCU3DControl 1.5.16 (simulated)"
     library.statuses["SA_GetDLLVersion"] = 12
     assert Scu3dController(library).name == "SCU3DControl of unknown version"

@@ -138,6 +138,6 @@ def test_a_bare_name_is_looked_for_along_path_on_windows(monkeypatch: pytest.Mon
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="loads a library of Linux")
-def test_another_library_is_told_from_smaracts() -> None:
+def test_another_library_is_distinguished_from_smaracts() -> None:
     with pytest.raises(NotConnectedError, match="no function SA_InitDevices"):
         load.load_library(ctypes.util.find_library("c") or "libc.so.6")

@@ -138,7 +138,7 @@ def test_hold_for_ever_holds_and_only_a_stage_not_held_creeps() -> None:
     assert client.skipped + client.drain(timeout_ms=10) == [], "a hold is no move to interrupt"
 
 
-def test_steps_go_their_way_and_read_back_in_counts() -> None:
+def test_steps_move_and_read_back_in_counts() -> None:
     client = in_the_middle()
     client.ok("MoveStep_A", 0, 0, 400, 1000, 1000)
     assert client.status() == MOVING

@@ -176,7 +176,7 @@ def test_one_axis_that_is_stopped_stops_the_other(axis):
         assert not here.touched()
 
 
-def test_one_axis_that_is_sent_elsewhere_stops_the_other():
+def test_one_axis_that_gets_another_target_stops_the_other():
     with plane() as here:
         moving = here.start()
         here.wait_until_under_way()

@@ -46,7 +46,7 @@ def test_a_move_through_a_thin_body_is_seen_though_its_end_is_free() -> None:
     assert not answer.clear
 
 
-def test_two_arms_that_swap_places_are_not_clear_though_each_alone_would_be() -> None:
+def test_two_arms_that_swap_positions_are_not_clear_though_each_alone_would_be() -> None:
     sweep = Sweep(two_arms())
     start = resting(left_x=500.0, right_x=0.0)
     assert sweep.check(with_moves(start, left_x=moving(500.0, 1400.0))).clear
@@ -67,7 +67,7 @@ def test_a_body_inside_its_margin_may_only_retreat() -> None:
     assert "already" in closer.reason
 
 
-def test_a_body_that_overlaps_another_may_leave_the_shorter_way_but_not_go_on() -> None:
+def test_a_body_that_overlaps_another_may_leave_on_the_shorter_side_but_not_go_on() -> None:
     sweep = Sweep(two_arms())
     overlapping = resting(left_x=2010.0)
     assert sweep.check(with_moves(overlapping, left_x=moving(2010.0, 0.0))).clear
@@ -98,7 +98,7 @@ def test_an_estimated_position_may_be_anywhere_within_its_uncertainty() -> None:
     assert not sweep.check(spans).clear
 
 
-def test_axes_that_nobody_told_of_may_be_anywhere() -> None:
+def test_axes_of_unknown_position_may_be_anywhere() -> None:
     assert not Sweep(two_arms()).check({"left.x": moving(0.0, 10.0)}).clear
 
 
@@ -110,7 +110,7 @@ def test_numbers_that_are_none_are_no_answer(bad: float) -> None:
     assert "left.x" in answer.reason
 
 
-def test_an_axis_that_is_not_in_the_scene_cannot_be_judged() -> None:
+def test_an_axis_that_is_not_in_the_scene_cannot_be_checked() -> None:
     answer = Sweep(two_arms()).check({**resting(), "middle.x": moving(0.0, 1.0)})
     assert not answer.clear
     assert "middle.x" in answer.reason
@@ -139,7 +139,7 @@ def test_turning_up_to_the_arm_is_clear() -> None:
     assert not sweep.check(with_moves(lowered, table_rotation=moving(90.0, 1.0))).clear
 
 
-def test_the_nearest_pair_is_told_with_its_distance_and_place() -> None:
+def test_the_nearest_pair_is_reported_with_its_distance_and_position() -> None:
     nearest = Sweep(two_arms()).nearest({"left.x": 500.0})
     assert nearest is not None
     assert nearest.distance_um == pytest.approx(1000.0)

@@ -275,7 +275,7 @@ def test_a_refusal_is_shown_and_steering_goes_on_elsewhere():
         assert it.phase is Phase.STEERING
 
 
-def test_a_command_from_elsewhere_ends_the_steering_of_that_positioner_until_it_is_let_go():
+def test_another_command_ends_the_steering_of_that_positioner_until_it_is_let_go():
     with rig() as it:
         it.start()
         it.push()

@@ -97,7 +97,7 @@ def test_a_positioner_follows_a_position_from_where_it_stood():
     assert steer.convert(inputs(x=0.5), fine=False) == {"a": 0.0}, "from where it stands now"
 
 
-def test_a_positioner_that_nobody_knows_the_place_of_does_not_follow():
+def test_a_positioner_of_unknown_position_does_not_follow():
     row = {"input": "x", "positioner": "a", "mode": "position", "travel_um": 100.0}
     assert mapping(row, place=None).convert(inputs(x=1.0), fine=False) == {"a": 0.0}
 

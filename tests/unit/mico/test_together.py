@@ -194,7 +194,7 @@ def test_matched_speeds_are_within_what_was_set_and_end_together(legs):
         assert hertz == 1 or leg.steps / (hertz - 1) >= longest_s * (1 - 1e-6)
 
 
-def test_matching_slows_the_shorter_way_down_and_gives_the_speed_back():
+def test_matching_slows_the_shorter_move_down_and_restores_the_speed():
     with mico(TWO) as (rig, controller):
         controller.calls.clear()
         rig.move({LEFT: 980.0, RIGHT: 480.0}, match_arrival=True)
@@ -323,7 +323,7 @@ def test_an_axis_started_for_another_thread_stops_at_once_when_a_stop_overtook_i
             assert isinstance(order.movement.exception(10), cosmic.StoppedError)
 
 
-def test_an_axis_that_is_wanted_elsewhere_while_it_waits_goes_there_only():
+def test_an_axis_that_gets_another_target_while_it_waits_goes_there_only():
     with mico(TWO, instant=False) as (rig, controller):
         real, free = controller.move_to, threading.Event()
 

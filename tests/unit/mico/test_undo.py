@@ -78,7 +78,7 @@ def test_a_refused_undo_says_why_and_keeps_its_entry():
         assert rig.undo() == {"d0.c0": 0.0}
 
 
-def test_an_undo_that_fails_on_its_way_can_be_tried_again():
+def test_an_undo_that_fails_can_be_tried_again():
     with mico(TWO, instant=False, **GROUPS) as (rig, controller):
         movement = rig["d0.c0"].move_to(100.0, wait=False)
         wait_until(lambda: controller.of("move_to"))
@@ -95,7 +95,7 @@ def test_an_undo_that_fails_on_its_way_can_be_tried_again():
         assert len(rig.undo_entries) == 1
 
 
-def test_there_is_no_way_back_to_before_an_axis_was_initialised():
+def test_there_is_no_undo_to_before_an_axis_was_initialised():
     with mico(TWO, **GROUPS) as (rig, _):
         rig["d0.c0"].move_to(100.0)
         wait_until(lambda: len(rig.undo_entries) == 1)
@@ -137,7 +137,7 @@ def test_what_moved_is_still_known_after_a_rescan():
 # What was felt, and how fast it goes back
 
 
-def test_the_way_back_is_gone_at_the_speed_of_the_configuration():
+def test_an_undo_moves_at_the_speed_of_the_configuration():
     with mico(TWO, **GROUPS, undo={"speed_um_s": 30.0}) as (rig, controller):
         rig["d0.c0"].move_to(100.0)
         wait_until(lambda: rig.undo_entries)
@@ -196,7 +196,7 @@ def test_a_touch_between_two_movements_counts_for_all_that_lead_back_over_it():
         assert where(rig, "d0.c0", "d1.c0") == [100.0, 7.0]
 
 
-def test_a_touch_on_the_way_back_is_remembered_with_what_was_before():
+def test_a_touch_during_undo_is_remembered_with_what_was_before():
     with mico(TWO, instant=False, **GROUPS) as (rig, controller):
         for number, target in enumerate((100.0, 200.0), start=1):
             movement = rig["d0.c0"].move_to(target, wait=False)

@@ -111,7 +111,7 @@ def test_jaws_that_give_way_take_their_part() -> None:
     assert turning.force_un(2.0) == pytest.approx(2.0 / (1.0 / stiff + 1e-6 * span**2), rel=3e-3)
 
 
-def test_friction_pushes_back_more_on_the_way_out_than_on_the_way_back() -> None:
+def test_friction_pushes_back_more_while_loading_than_while_unloading() -> None:
     out, free, back = (curve(friction=mu).force_un(60.0) for mu in (0.3, 0.0, -0.3))
     assert out > 1.05 * free > 1.1 * back
 

@@ -90,13 +90,13 @@ def test_a_tool_that_slides_is_a_point_and_a_vector_for_each_stage(robot: Path) 
         ('<child link="tip"/>', '<child link="top"/>', "no link 'tip'"),
     ],
 )
-def test_a_wrong_file_is_told_with_what_is_wrong(
+def test_a_wrong_file_is_reported_with_what_is_wrong(
     robot: Path, old: str, new: str, words: str
 ) -> None:
     with pytest.raises(ConfigError, match=words):
         Skeleton(changed(robot, old, new), DRIVES).slide("tip")
 
 
-def test_a_missing_file_is_told(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"gone\.urdf"):
         Skeleton(tmp_path / "gone.urdf", {})

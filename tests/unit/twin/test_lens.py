@@ -33,7 +33,7 @@ def test_a_ramp_leads_as_far_as_asked_and_never_beyond_its_speed(way: float) -> 
     assert speed == pytest.approx(ramp.speed((steps[250] + steps[251]) / 2)[0], rel=1e-3)
 
 
-def test_no_way_takes_no_time_and_slow_motors_stop_at_once() -> None:
+def test_no_travel_takes_no_time_and_slow_motors_stop_at_once() -> None:
     assert ramp_over(0.0, SETTINGS.zoom).duration_s == 0.0
     assert ramp_down(100.0, SETTINGS.zoom).way_counts == 0.0
 
@@ -46,7 +46,7 @@ def test_a_warm_lens_is_homed_at_the_lowest_zoom_and_focused_on_the_plate(lens: 
     assert lens.focus_range_counts == (0.0, 8000.0)
 
 
-def test_a_cold_lens_stands_somewhere_that_its_seed_tells() -> None:
+def test_a_cold_lens_stands_somewhere_that_its_seed_gives() -> None:
     cold = [TwinLens(SETTINGS, seed, cold=True) for seed in (1, 1, 2)]
     zooms = [each.position_counts("zoom", 0.0) for each in cold]
     assert zooms[0] == zooms[1] != zooms[2]
@@ -65,7 +65,7 @@ def test_a_movement_can_be_looked_at_at_any_time_past_or_future(lens: TwinLens) 
     assert lens.position_counts("zoom", (1.0 + end_s) / 2.0) == middle, "the past stays"
 
 
-def test_phases_are_told_with_direction_and_slowing(lens: TwinLens) -> None:
+def test_phases_are_reported_with_direction_and_slowing(lens: TwinLens) -> None:
     lens.seek("zoom", 6000, 0.0)
     assert lens.phase("zoom", 0.1) == (LensPhase.SEEK, 1, False)
     end_s = ramp_over(6000, SETTINGS.zoom).duration_s
@@ -75,7 +75,7 @@ def test_phases_are_told_with_direction_and_slowing(lens: TwinLens) -> None:
     assert lens.phase("zoom", LONG_S + 0.1) == (LensPhase.SEEK, -1, False)
 
 
-def test_play_is_taken_up_at_the_end_of_a_way_back(lens: TwinLens) -> None:
+def test_play_is_taken_up_at_the_end_of_a_retreat(lens: TwinLens) -> None:
     play = SETTINGS.zoom.backlash_counts
     lens.seek("zoom", 6000, 0.0)
     lens.seek("zoom", 3000, 10.0)

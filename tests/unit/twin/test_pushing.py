@@ -147,7 +147,7 @@ def test_no_clamp_lies_in_front_of_the_jaws() -> None:
     assert max(forces) == pytest.approx(3.0 * EI * 10.0 / 400.0**3, rel=0.01)
 
 
-def test_friction_shows_between_the_way_out_and_the_way_back() -> None:
+def test_friction_shows_between_loading_and_unloading() -> None:
     bench = before_the_fibre(Bench(settings(probe_friction=0.4, friction_turn_um=0.3)))
     out = pushed(bench, 60.0).force_un
     pushed(bench, 80.0)
@@ -168,7 +168,7 @@ def test_jaws_that_give_way_make_a_fibre_seem_softer() -> None:
     )
 
 
-def test_a_stiffness_that_varies_along_the_fibre_is_told_by_the_span() -> None:
+def test_a_stiffness_that_varies_along_the_fibre_is_that_of_the_span() -> None:
     varied = FIBRE.model_copy(update={"ei_variation": 0.25})
     apart = []
     for seed in range(5):

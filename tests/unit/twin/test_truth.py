@@ -54,7 +54,7 @@ def test_what_is_no_truth_is_refused(tmp_path: Path) -> None:
         TruthFile(tmp_path / "nowhere" / "truth.jsonl")
 
 
-def test_the_highest_force_is_told_when_the_probe_has_left() -> None:
+def test_the_highest_force_is_reported_when_the_probe_has_left() -> None:
     heard = Heard()
     bench = before_the_fibre(Bench(truth=heard)).go(20.0, probe_y=-5005.0)
     highest = bench.force_un
@@ -80,7 +80,7 @@ def test_jaws_may_land_on_the_plate_softly() -> None:
     assert "contact" not in landed(-5.0).names
 
 
-def test_jaws_that_run_into_each_other_are_told_with_their_depth() -> None:
+def test_jaws_that_run_into_each_other_are_reported_with_their_depth() -> None:
     heard = Heard()
     bench = Bench(settings(LYING, start={"left.gripper": 100.0}), truth=heard)
     bench.go(left_x=3600.0).go(right_gripper=100.0)

@@ -57,7 +57,7 @@ def plane(zoom: float, height_um: float, noise_px: float = 0.0, **view: float) -
 # --- fit --------------------------------------------------------------------------------------
 
 
-def test_a_grid_of_places_gives_scale_rotation_and_mirror() -> None:
+def test_a_grid_of_points_gives_scale_rotation_and_mirror() -> None:
     fit = fit_map(look(grid(), scale_um_px=2.2, turn_deg=3.0))
     assert fit.map.scale_um_px == pytest.approx(2.2, rel=1e-3)
     assert fit.map.rotation_rad == pytest.approx(math.radians(3.0), abs=1e-3)
@@ -76,7 +76,7 @@ def test_there_and_back_again_is_the_same_place() -> None:
 
 
 @pytest.mark.slow
-def test_the_uncertainty_told_is_the_error_made() -> None:
+def test_the_uncertainty_reported_is_the_error_made() -> None:
     """Over many calibrations the errors scatter as the map says, in the middle and outside."""
     points_px = np.array([AXIS_PX, AXIS_PX + np.array([900.0, 500.0])])
     truth_um = (points_px - AXIS_PX) @ np.linalg.inv(matrix()).T + AXIS_UM
@@ -87,7 +87,7 @@ def test_the_uncertainty_told_is_the_error_made() -> None:
     assert stds_um[1] > 3.0 * stds_um[0]
 
 
-def test_a_place_that_was_tracked_wrongly_is_left_out_and_named() -> None:
+def test_a_position_that_was_tracked_wrongly_is_left_out_and_named() -> None:
     sightings = look(grid())
     x_px, y_px = sightings[4].image_px
     sightings[4] = replace(sightings[4], image_px=(x_px + 40.0, y_px), label="left.x 320 um")
@@ -98,7 +98,7 @@ def test_a_place_that_was_tracked_wrongly_is_left_out_and_named() -> None:
     assert fit.map.scale_um_px == pytest.approx(2.2, rel=1e-3)
 
 
-def test_too_many_wrong_places_are_refused() -> None:
+def test_too_many_wrong_positions_are_refused() -> None:
     sightings = look(grid())
     for index in (0, 4, 7):
         x_px, y_px = sightings[index].image_px
@@ -107,7 +107,7 @@ def test_too_many_wrong_places_are_refused() -> None:
         fit_map(sightings)
 
 
-def test_an_outlier_among_thirty_places_is_found_without_trying_every_triple() -> None:
+def test_an_outlier_among_thirty_positions_is_found_without_trying_every_triple() -> None:
     sightings = look(grid(step_um=100.0, count=6))
     x_px, y_px = sightings[30].image_px
     sightings[30] = replace(sightings[30], image_px=(x_px, y_px - 6.0))
@@ -123,7 +123,7 @@ def test_an_outlier_among_thirty_places_is_found_without_trying_every_triple() -
         (grid(step_um=10.0), "move further"),
     ],
 )
-def test_moves_that_tell_too_little_are_refused(places: np.ndarray, reason: str) -> None:
+def test_moves_that_say_too_little_are_refused(places: np.ndarray, reason: str) -> None:
     with pytest.raises(CalibrationRefused, match=reason):
         fit_map(look(places, noise_px=0.01))
 
@@ -139,7 +139,7 @@ def test_a_poor_fit_is_refused_with_its_residual() -> None:
         fit_map(look(grid(count=5, step_um=150.0), noise_px=0.55))
 
 
-def test_an_axis_that_did_not_go_the_whole_way_is_refused() -> None:
+def test_an_axis_that_did_not_travel_the_whole_distance_is_refused() -> None:
     short = [
         replace(each, platform_um=(each.platform_um[0], 1.2 * each.platform_um[1]))
         for each in look(grid())

@@ -123,7 +123,7 @@ def test_the_peak_is_found_between_the_positions_measured(at: float) -> None:
     assert answer.position == pytest.approx(at, abs=0.5)
 
 
-def test_the_uncertainty_told_is_the_error_made() -> None:
+def test_the_uncertainty_reported_is_the_error_made() -> None:
     rng = np.random.default_rng(5)
     errors, stds = [], []
     for _ in range(150):

@@ -14,7 +14,7 @@ def sweep(peak: float, *, contrast: float = 1.0, noise: float = 0.0) -> list[tup
 
 
 @pytest.mark.parametrize("peak", [-70.0, -13.0, 0.0, 41.0])
-def test_the_peak_is_found_between_the_places_and_how_sure_it_is(peak: float) -> None:
+def test_the_peak_is_found_between_the_positions_and_how_sure_it_is(peak: float) -> None:
     found = peak_of(sweep(peak))
     assert found.position == pytest.approx(peak, abs=3.0)
     assert found.std is not None

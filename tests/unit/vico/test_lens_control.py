@@ -89,7 +89,7 @@ def test_it_publishes_what_lens_and_light_say(make: Make) -> None:
     assert "BrightLight" in bench.thread.light_name
 
 
-def test_a_seek_ends_when_the_motor_is_there_and_tells_how_far_it_is(make: Make) -> None:
+def test_a_seek_ends_when_the_motor_is_there_and_reports_how_far_it_is(make: Make) -> None:
     bench = make().start()
     fractions: list[float] = []
     task = bench.thread.seek(ZOOM, 12000)
@@ -102,7 +102,7 @@ def test_a_seek_ends_when_the_motor_is_there_and_tells_how_far_it_is(make: Make)
     assert fractions == sorted(fractions)
 
 
-def test_movement_is_told_at_most_twenty_times_a_second(make: Make) -> None:
+def test_movement_is_reported_at_most_twenty_times_a_second(make: Make) -> None:
     bench = make(rate=5.0).start()
     received: list[object] = []
     bench.thread.state_changed.connect(received.append, Qt.ConnectionType.DirectConnection)
@@ -212,7 +212,7 @@ def test_a_silent_light_leaves_the_lens_alone(make: Make) -> None:
     bench.thread.seek(ZOOM, 50).wait(5.0)
 
 
-def test_a_device_missing_at_the_start_is_told_and_kept_apart() -> None:
+def test_a_device_missing_at_the_start_is_reported_and_kept_apart() -> None:
     rig = PeripheralRig()
 
     def missing() -> None:
@@ -292,7 +292,7 @@ def test_homing_that_somebody_stops_is_said(make: Make) -> None:
     assert bench.thread.state.focus is not None and not bench.thread.state.focus.homed
 
 
-def test_a_movement_from_elsewhere_stops_when_whoever_commanded_it_is_gone(make: Make) -> None:
+def test_a_remote_movement_stops_when_whoever_commanded_it_is_gone(make: Make) -> None:
     bench = make(rate=1.0).start()
     pulse = Pulse("vision", limit_s=5.0, clock=WALL)
     with carrying_out(Call(Caller("vision", "secret"), DeadMan(pulse, 5.0))):

@@ -34,7 +34,7 @@ def test_percentiles_are_those_of_all_pixels_at_every_depth(pixel_format: PixelF
 
 
 @pytest.mark.parametrize("pixel_format", MONO)
-def test_the_share_of_pixels_at_both_ends_is_told(pixel_format: PixelFormat) -> None:
+def test_the_share_of_pixels_at_both_ends_is_reported(pixel_format: PixelFormat) -> None:
     data = normal(pixel_format)
     data[:60] = 0
     data[:, :200] = FULL_SCALE[pixel_format]

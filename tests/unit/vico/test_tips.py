@@ -67,7 +67,7 @@ def test_the_first_jaw_is_the_one_to_the_left_of_where_the_gripper_points() -> N
     assert np.dot(second - first, (-y, x)) > 0.0
 
 
-def test_the_uncertainty_told_is_about_the_error_made() -> None:
+def test_the_uncertainty_reported_is_about_the_error_made() -> None:
     images = [tool_image(seed, blur=2.0, noise=8.0) for seed in range(12)]
     found = [probe(image) for image in images]
     errors = np.array([np.array(f.tip_px) - p.hold for f, p in zip(found, images, strict=True)])
@@ -110,7 +110,7 @@ def test_an_empty_image_and_a_fibre_alone_are_no_tool() -> None:
     assert isinstance(find_gripper(empty, image.expected), NotSeen)
 
 
-def test_closed_jaws_and_a_single_jaw_are_told() -> None:
+def test_closed_jaws_and_a_single_jaw_are_reported() -> None:
     closed = find_gripper(tool_image(3, width=90.0).image, tool_image(3, gap=1.0).expected)
     assert closed == NotSeen("its jaws cannot be told apart: they are closed, or not in focus")
     single = find_gripper(tool_image(3).image, tool_image(3, gap=40.0).expected)

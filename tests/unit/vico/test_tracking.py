@@ -96,7 +96,7 @@ def test_a_region_that_cannot_be_followed_is_refused(region: Roi, reason: str) -
 START = (200.3, 150.6)
 
 
-def test_a_moving_place_is_followed_with_its_prediction() -> None:
+def test_a_moving_point_is_followed_with_its_prediction() -> None:
     tracker = TemplateTracker(size_px=80, reach_px=12.0)
     tracker.start(scene(), START)
     for step in range(1, 8):
@@ -138,7 +138,7 @@ def test_what_leaves_the_image_is_lost() -> None:
     assert tracker.follow(scene(), expected_px=(395.0, 150.0)).reason == "it left the image"
 
 
-def test_two_places_that_look_alike_are_not_told_apart() -> None:
+def test_two_points_that_look_alike_are_not_distinguished() -> None:
     image = np.full(SIZE, 150, np.uint8)
     for x in range(40, 400, 40):
         cv2.circle(image, (x, 150), 8, 70, -1, cv2.LINE_AA)
@@ -285,7 +285,7 @@ def test_the_stages_say_where_a_turned_fibre_is() -> None:
     assert track.state is TrackState.FOUND
 
 
-def test_a_doubtful_fibre_is_followed_and_its_doubts_are_told() -> None:
+def test_a_doubtful_fibre_is_followed_and_its_doubts_are_reported() -> None:
     track = following(fibre()).follow([fibre(3.0, 0.0, doubts=("an end is hidden",))])
     assert track.state is TrackState.UNSURE
     assert track.reason == "an end is hidden"

@@ -232,7 +232,7 @@ def test_a_fibre_that_was_found_is_followed_until_it_is_ended() -> None:
     assert ended == Unavailable("no fibre is followed")
 
 
-def test_a_place_is_followed_or_refused_without_a_failure() -> None:
+def test_a_point_is_followed_or_refused_without_a_failure() -> None:
     chain = only("place track")
     tracker = chain.algorithm("place track")
     assert isinstance(tracker, TrackPoint)

@@ -89,7 +89,7 @@ def test_the_slope_does_not_care_about_an_offset_of_the_nominal_places() -> None
 
 
 @pytest.mark.parametrize("towards", [1.0, -1.0])
-def test_places_follow_the_encoders_whichever_way_the_fibre_points(towards: float) -> None:
+def test_positions_follow_the_encoders_whichever_way_the_fibre_points(towards: float) -> None:
     spans = pushed(rig(towards=towards))
     wrong = [dataclasses.replace(spans[0], nominal_um=spans[0].nominal_um + 9.0), *spans[1:]]
     positions = positions_um(wrong)
@@ -135,7 +135,7 @@ def test_what_is_known_of_the_offset_beforehand_counts_by_its_certainty() -> Non
     assert not wrong.trusted
 
 
-def test_one_span_is_as_uncertain_as_its_place_and_the_clamp_together() -> None:
+def test_one_span_is_as_uncertain_as_its_position_and_the_clamp_together() -> None:
     span = rig().push(300.0, 12.0)
     widths = [
         width_percent(fit_bending([span], settings=FitSettings(offset_std_um=6.0, **more)))
@@ -217,7 +217,7 @@ def test_a_fibre_that_breaks_is_seen() -> None:
     assert not found.trusted
 
 
-def test_loading_and_unloading_that_differ_are_told_apart() -> None:
+def test_loading_and_unloading_that_differ_are_distinguished() -> None:
     spans = []
     for span in pushed(rig()):
         force = np.where(span.loading, span.force_un, 0.4 + 0.85 * (span.force_un - 0.4))
@@ -230,7 +230,7 @@ def test_loading_and_unloading_that_differ_are_told_apart() -> None:
     assert not found.trusted
 
 
-def test_a_saturated_sensor_is_told() -> None:
+def test_a_saturated_sensor_is_reported() -> None:
     spans = [
         dataclasses.replace(each, force_un=np.minimum(each.force_un, 20.0))
         for each in pushed(rig())
@@ -289,7 +289,7 @@ def part(span: Span, kept: np.ndarray) -> Span:
     [[], [30, 40], [44, 45, 46, 47], [41, 42, 43, 44, 45]],
     ids=["none", "two", "free", "kink"],
 )
-def test_a_way_back_with_few_points_does_no_harm(back: list[int]) -> None:
+def test_unloading_with_few_points_does_no_harm(back: list[int]) -> None:
     spans = pushed(rig())
     kept = np.array([*range(24), *back])
     found = fit_bending([part(span, kept) for span in spans])

@@ -80,7 +80,7 @@ def test_a_poor_one_is_listed_with_its_reason_and_never_in_force(
     assert "30 um" in listed.problem
 
 
-def test_one_is_forgotten_and_listeners_are_told(registry: CalibrationRegistry) -> None:
+def test_one_is_forgotten_and_listeners_are_notified(registry: CalibrationRegistry) -> None:
     counts: list[int] = []
     forget = registry.on_change(lambda: counts.append(len(registry.entries)))
     registry.put(entry(registry))

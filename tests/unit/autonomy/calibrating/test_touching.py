@@ -118,7 +118,7 @@ def carried_out(bench: Bench) -> None:
         pass
 
 
-def test_touch_tells_where_the_probe_is_and_presses_lightly() -> None:
+def test_touch_finds_where_the_probe_is_and_presses_lightly() -> None:
     bench = Bench()
     carried_out(bench)
     off_x, off_y = bench.calibration.probe_off_um

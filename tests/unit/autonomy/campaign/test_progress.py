@@ -94,7 +94,7 @@ def test_the_time_to_a_precision_grows_with_the_spread() -> None:
     assert 0.0 < rule.left_s(spread(0.2)) < rule.left_s(spread(0.6))
 
 
-def test_nothing_is_told_before_the_first_fibre() -> None:
+def test_nothing_is_reported_before_the_first_fibre() -> None:
     assert math.isnan(StopRule(StopSettings(count=5)).left_s(progress([], 10.0)))
 
 

@@ -84,7 +84,7 @@ def test_the_page_needs_no_other_file(page: str) -> None:
         "µm behind the tip of the jaws",
     ],
 )
-def test_the_page_tells(page: str, words: str) -> None:
+def test_the_page_says(page: str, words: str) -> None:
     assert words in page
 
 

@@ -35,7 +35,9 @@ def left_behind(store: CampaignStore) -> None:
     store.finish_fibre(replace(record, found=LEFT_THERE))
 
 
-def test_what_was_in_treatment_is_marked_and_the_last_steps_are_told(store: CampaignStore) -> None:
+def test_what_was_in_treatment_is_marked_and_the_last_steps_are_reported(
+    store: CampaignStore,
+) -> None:
     left_behind(store)
     number = store.begin_fibre(Pose(0.0, 0.0, 0.0), time_s=30.0)
     store.note("lift", "move", {"left_z_um": -500.0}, time_s=33.0, fibre=number)
@@ -60,7 +62,7 @@ def test_what_was_in_treatment_is_marked_and_the_last_steps_are_told(store: Camp
         (Pose(1000.0, -500.0, 80.0), 1500.0, False),
     ],
 )
-def test_a_treated_fibre_is_known_again_by_place_and_length(
+def test_a_treated_fibre_is_known_again_by_position_and_length(
     store: CampaignStore, pose: Pose, length_um: float, done: bool
 ) -> None:
     left_behind(store)
@@ -84,7 +86,7 @@ def test_an_interrupted_fibre_is_tried_once_more_only(store: CampaignStore) -> N
     assert resume(store).is_done(LEFT_THERE, 1500.0)
 
 
-def test_another_fibre_at_the_place_of_an_interrupted_one_is_not_taken_for_it(
+def test_another_fibre_at_the_position_of_an_interrupted_one_is_not_taken_for_it(
     store: CampaignStore,
 ) -> None:
     for _ in range(2):
@@ -113,7 +115,7 @@ def test_one_that_fell_before_its_record_was_written_may_be_measured_again(
     assert resume(store).fallen == ()
 
 
-def test_a_run_that_ended_without_a_word_is_told_from_one_that_said_why(tmp_path: Path) -> None:
+def test_a_run_that_ended_without_a_word_differs_from_one_that_said_why(tmp_path: Path) -> None:
     with CampaignStore.create(tmp_path, INFO) as begun:
         assert not resume(begun).cut_off, "it is the first"
     with CampaignStore.open(tmp_path) as after_kill:

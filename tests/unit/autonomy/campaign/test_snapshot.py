@@ -31,7 +31,7 @@ def test_a_board_of_nothing_is_empty() -> None:
     assert math.isnan(board.good_per_hour)
 
 
-def test_a_row_tells_the_interval_and_why_a_result_is_not_trusted() -> None:
+def test_a_row_reports_the_interval_and_why_a_result_is_not_trusted() -> None:
     record = good(1)
     assert record.bending is not None
     row = row_of(record)
@@ -93,7 +93,7 @@ def test_a_span_that_was_not_fitted_is_shown_all_the_same() -> None:
         assert not curve.used
 
 
-def test_a_card_of_a_failed_fibre_tells_what_failed_on_the_way() -> None:
+def test_a_card_of_a_failed_fibre_shows_what_failed_before() -> None:
     card = card_of(failed(7))
     assert card.curves == ()
     assert card.failures == (("close", "missed grasp"),) * 2

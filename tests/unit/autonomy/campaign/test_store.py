@@ -101,7 +101,7 @@ def test_time_counts_from_run_to_run(tmp_path: Path) -> None:
         assert store.reader.elapsed_s() == pytest.approx(24.0 + 19.0)
 
 
-def test_the_journal_tells_what_was_about_to_happen(store: CampaignStore) -> None:
+def test_the_journal_reports_what_was_about_to_happen(store: CampaignStore) -> None:
     journal = Journal(store, lambda: 12.5)
     journal.note("survey", "begin")
     journal.fibre = store.begin_fibre(time_s=12.0)
@@ -117,7 +117,7 @@ def test_no_campaign_is_begun_over_another(store: CampaignStore) -> None:
         CampaignStore.create(store.folder, INFO)
 
 
-def test_a_folder_without_a_campaign_is_told(tmp_path: Path) -> None:
+def test_a_folder_without_a_campaign_is_reported(tmp_path: Path) -> None:
     with pytest.raises(CampaignError, match="holds no campaign"):
         CampaignStore.open(tmp_path)
     (tmp_path / "campaign.sqlite").write_bytes(b"this is no database, but long enough" * 10)
@@ -176,7 +176,7 @@ def test_a_closed_campaign_says_so(tmp_path: Path) -> None:
 # ---------------------------------------------------------------------- full disks
 
 
-def test_a_full_disk_is_told_and_the_fibre_can_be_written_later(
+def test_a_full_disk_is_reported_and_the_fibre_can_be_written_later(
     store: CampaignStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = store.begin_fibre(time_s=0.0)
@@ -196,7 +196,9 @@ def test_a_full_disk_is_told_and_the_fibre_can_be_written_later(
     assert len(store.reader.finished()) == 2
 
 
-def test_a_database_that_cannot_grow_is_told_and_keeps_what_it_has(store: CampaignStore) -> None:
+def test_a_database_that_cannot_grow_is_reported_and_keeps_what_it_has(
+    store: CampaignStore,
+) -> None:
     store.finish_fibre(good(store.begin_fibre(time_s=0.0)))
     number = store.begin_fibre(time_s=30.0)
     largest = max(each.stat().st_size for each in store.folder.iterdir() if each.is_file())

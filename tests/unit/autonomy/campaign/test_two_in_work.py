@@ -88,7 +88,7 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
     made.store.close()
 
 
-def test_each_fibre_has_the_operations_of_its_hand_and_no_others(desk: Desk) -> None:
+def test_each_fibre_has_the_operations_of_its_arm_and_no_others(desk: Desk) -> None:
     first = desk.take("left", 1)
     desk.does("left", "close the gripper")
     second = desk.take("right", 2)
@@ -114,7 +114,7 @@ def test_each_fibre_has_the_operations_of_its_hand_and_no_others(desk: Desk) -> 
     ]
 
 
-def test_the_force_of_a_fibre_is_that_of_the_time_when_its_hand_had_the_probe(desk: Desk) -> None:
+def test_the_force_of_a_fibre_is_that_of_the_time_when_its_arm_had_the_probe(desk: Desk) -> None:
     first, second = desk.take("left", 1), desk.take("right", 2)
     desk.does("left", "close the gripper")
     desk.does("right", "close the gripper")

@@ -61,7 +61,7 @@ def test_an_end_wakes_it() -> None:
     assert timer.wait() == 0.0
 
 
-def test_refused_priority_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refused_priority_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_args: object) -> None:
         raise PermissionError(1, "Operation not permitted")
 

@@ -97,7 +97,7 @@ def end_round(arm: Arm) -> None:
         pass
 
 
-def test_each_hand_stays_on_its_own_side_and_both_are_mirrored() -> None:
+def test_each_arm_stays_on_its_own_side_and_both_are_mirrored() -> None:
     for x_um in (-2500.0, -900.0, 0.0, 700.0, 2500.0):
         left, right = arms(straight(x_um, -800.0))
         ways = {arm: ways_of(arm, arm.shared.candidates[0], 0.0) for arm in (left, right)}
@@ -112,7 +112,7 @@ def test_each_hand_stays_on_its_own_side_and_both_are_mirrored() -> None:
             assert np.all(np.diff(way.line_um[:, 0]) < 0.0)
 
 
-def test_before_the_probe_the_hands_are_apart_and_let_go_from_where_they_travel() -> None:
+def test_before_the_probe_the_arms_are_apart_and_let_go_from_where_they_travel() -> None:
     left, right = arms()
     places = [arm.settings.places.hold_x_um * arm.jaws.forward for arm in (left, right)]
     assert places == [-250.0, 250.0]
@@ -145,7 +145,7 @@ def test_what_lies_on_the_plate_is_shared_and_what_is_held_is_not() -> None:
 
 
 @pytest.mark.parametrize("name", ["left", "right"])
-def test_a_fibre_that_the_other_hand_may_hide_is_chosen_last(name: str) -> None:
+def test_a_fibre_that_the_other_arm_may_hide_is_chosen_last(name: str) -> None:
     side = -1.0 if name == "left" else 1.0
     # Along the jaws of both already, so that there is one way only.
     near, far = straight(side * 1800.0, 500.0, 0.0), straight(side * 1800.0, -3000.0, 150.0)
@@ -159,7 +159,7 @@ def test_a_fibre_that_the_other_hand_may_hide_is_chosen_last(name: str) -> None:
     assert chosen(arm).reach.candidate is near
 
 
-def test_a_hand_begins_no_further_fibre_once_it_is_enough_or_the_plate_must_be_seen_again() -> None:
+def test_an_arm_begins_no_further_fibre_once_it_is_enough_or_the_plate_must_be_seen_again() -> None:
     left, right = arms(straight(-2000.0, -900.0))
     assert not over(left)
     assert not over(right)
@@ -175,7 +175,7 @@ def test_a_hand_begins_no_further_fibre_once_it_is_enough_or_the_plate_must_be_s
         chosen(left)
 
 
-def test_a_hand_that_cannot_put_away_three_in_a_row_stands_aside_and_the_other_goes_on() -> None:
+def test_an_arm_that_cannot_put_away_three_in_a_row_stands_aside_and_the_other_goes_on() -> None:
     left, right = arms(*(straight(-2000.0, y_um) for y_um in (-900.0, -1800.0, -2700.0)))
     for _ in range(SETTINGS.pair.stuck):
         assert not stands_aside(left)

@@ -59,7 +59,7 @@ def test_a_mean_holds_the_samples_of_its_time_and_no_others(
     assert mean.samples == pytest.approx(50, abs=1)
 
 
-def test_whoever_waits_is_told_when_the_samples_are_there(
+def test_whoever_waits_hears_when_the_samples_are_there(
     watched: tuple[Daqco, ManualClock, ForceWatch],
 ):
     daqco, _, watch = watched

@@ -96,7 +96,7 @@ def test_from_a_sensor_at_its_end_the_probe_is_taken_away_and_it_may_come_back()
 
 
 @pytest.mark.parametrize("reading_un", [179.0, -179.0, float("nan")])
-def test_one_that_stays_there_is_told_with_what_to_look_at(reading_un: float):
+def test_one_that_stays_there_is_reported_with_what_to_look_at(reading_un: float):
     work = Work(reading_un)
     with pytest.raises(OperationFailed, match=r"reads .* uN with nothing at the probe.*cable"):
         carry_out(work)
@@ -104,7 +104,7 @@ def test_one_that_stays_there_is_told_with_what_to_look_at(reading_un: float):
     assert work.failures[-1][1].cause == "force sensor"
 
 
-def test_one_that_has_no_noise_is_told_to_be_dead():
+def test_one_that_has_no_noise_is_reported_as_dead():
     work = Work(ForceMean(0.3, 0.002, 0.0, 20))
     with pytest.raises(OperationFailed, match=r"reads 0\.3 uN without any noise.*cable"):
         carry_out(work)
@@ -118,7 +118,7 @@ def test_acquisition_that_has_ended_is_begun_again():
     assert work.daqco.starts == 3
 
 
-def test_a_board_that_stays_away_is_told():
+def test_a_board_that_stays_away_is_reported():
     work = Work(NotAvailable("no samples of the force came: the board is gone"))
     with pytest.raises(OperationFailed, match="the board is gone"):
         carry_out(work)

@@ -99,7 +99,7 @@ def test_a_frozen_camera_is_begun_anew_and_gives_a_new_image(
     assert not np.array_equal(before.data, after.data)
 
 
-def test_one_that_stays_frozen_is_given_up_and_says_what_to_look_at(
+def test_one_that_stays_frozen_is_abandoned_and_says_what_to_look_at(
     camera: FakeCamera, clock: ManualClock
 ):
     last = LastSeen()

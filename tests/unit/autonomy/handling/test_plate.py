@@ -66,7 +66,7 @@ def test_the_smaller_turn_comes_first():
         assert abs(second.angle_deg - first.angle_deg) == pytest.approx(180.0)
 
 
-def test_no_way_leads_where_the_gripper_or_the_table_cannot_go():
+def test_no_path_leads_where_the_gripper_or_the_table_cannot_go():
     both = found(straight(3000.0, 0.0, 0.0))
     assert [each.tip_um[0] < 0.0 for each in both] == [], "180 degrees are too far for the table"
     assert len(found(straight(3000.0, 0.0, 40.0))) == 1, "as it lies its end is out of reach"

@@ -170,7 +170,7 @@ def test_a_fibre_nearer_than_foreseen_is_come_up_to_again_from_further_back():
         assert span.force_un[0] == pytest.approx(ZERO_UN, abs=0.6), "each begins without contact"
 
 
-def test_a_fibre_that_is_not_there_is_told_with_the_place():
+def test_a_fibre_that_is_not_there_is_reported_with_the_position():
     bench = Bench(5e-11, there=False)
     with pytest.raises(OperationFailed, match="600 um from the jaws") as failed:
         carried_out(PushSpans().run(bench))

@@ -67,7 +67,7 @@ def test_a_no_is_a_no():
     assert len(orders) == 1
 
 
-def test_patience_ends():
+def test_retries_end():
     order, orders = refusing(Reason.NO_ANSWER, 100)
     with pytest.raises(MoveRefused):
         RetryingMove(order).wait(20.0)
@@ -92,7 +92,7 @@ def test_a_cancelled_movement_is_not_ordered_again():
     assert len(orders) == 1
 
 
-def test_a_way_to_a_place_is_ordered_again_where_an_axis_did_not_come_on():
+def test_a_move_to_a_position_is_ordered_again_where_an_axis_did_not_come_on():
     moves = [Moved(DeviceTimeout("no progress")), Moved()]
     assert RetryingMove(lambda: moves.pop(0), to_a_position=True).wait(20.0) == "there"
 
@@ -104,7 +104,7 @@ def test_steps_are_not_for_some_of_them_may_have_been_made():
     assert len(moves) == 1
 
 
-def test_an_axis_that_never_comes_on_is_told_in_the_end():
+def test_an_axis_that_never_comes_on_is_reported_in_the_end():
     orders: list[int] = []
 
     def order() -> Moved:
@@ -138,7 +138,7 @@ def test_an_axis_that_runs_into_something_goes_back_a_little_and_tries_again():
     assert trace == ["on", "back", "on", "back", "on"]
 
 
-def test_an_obstacle_that_stays_is_told_after_some_tries():
+def test_an_obstacle_that_stays_is_reported_after_some_tries():
     order, back, trace = bumping(100)
     with pytest.raises(DeviceError, match="ran into it"):
         RetryingMove(order, to_a_position=True, back=back).wait(20.0)
@@ -146,7 +146,7 @@ def test_an_obstacle_that_stays_is_told_after_some_tries():
     assert trace.count("on") == BUMPS + 1
 
 
-def test_a_way_back_that_is_refused_is_not_gone():
+def test_an_undo_that_is_refused_does_not_move():
     order, _, trace = bumping(1)
 
     def refused() -> Moved:
@@ -156,7 +156,7 @@ def test_a_way_back_that_is_refused_is_not_gone():
     assert trace == ["on", "on"]
 
 
-def test_a_way_on_which_nothing_leads_back_ends_at_an_obstacle():
+def test_a_path_without_a_way_back_ends_at_an_obstacle():
     order, _, trace = bumping(1)
     with pytest.raises(DeviceError, match="ran into it"):
         RetryingMove(order, to_a_position=True).wait(20.0)

@@ -96,7 +96,7 @@ def test_two_that_lie_close_together_are_both_left():
     assert bench.shared.skip_reasons == {survey.TOO_NEAR: 2}
 
 
-def test_one_that_was_given_up_is_not_chosen_again():
+def test_one_that_was_skipped_is_not_chosen_again():
     bench = looked(Seen(0.0, 0.0))
     bench.shared.skipped = list(bench.shared.candidates)
     look(bench, [Seen(20.0, -15.0), Seen(-1500.0, 900.0)])  # type: ignore[list-item]

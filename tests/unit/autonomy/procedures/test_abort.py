@@ -142,7 +142,7 @@ def test_the_making_safe_has_a_limit_of_time() -> None:
     assert run.work.clock.now_s() == pytest.approx(8.0, abs=0.1)
 
 
-def test_a_failure_of_the_making_safe_is_told() -> None:
+def test_a_failure_of_the_making_safe_is_reported() -> None:
     def make_safe(work: Work) -> Steps:
         yield 1.0
         raise NotAvailable("no way up")

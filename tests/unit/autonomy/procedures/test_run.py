@@ -268,7 +268,7 @@ def test_a_rate_of_100_is_a_hundred_times_faster() -> None:
     assert 14.9 < run.tree.duration_s < 500.0
 
 
-def test_a_movement_that_tells_of_its_end_is_not_waited_for_longer() -> None:
+def test_a_movement_that_reports_its_end_is_not_waited_for_longer() -> None:
     callbacks: list[Callable[[object], None]] = []
 
     class Telling(FakeMove):

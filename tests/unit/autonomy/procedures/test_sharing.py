@@ -32,7 +32,7 @@ def times(run: ProcedureRun[Work]) -> dict[str, tuple[float, float]]:
     }
 
 
-def test_two_branches_use_a_place_one_after_the_other_and_do_the_rest_side_by_side() -> None:
+def test_two_branches_use_a_position_one_after_the_other_and_do_the_rest_side_by_side() -> None:
     probe = Resource("the probe")
     hands = [
         Sequence(f"hand {name}", Op(f"fetch {name}"), Holding(Op(name), of(probe), name="measure"))
@@ -93,7 +93,7 @@ def test_who_came_first_gets_it_first_however_often_others_come_again() -> None:
 
 
 @pytest.mark.parametrize("phase", ["run", "verify", "move"])
-def test_a_place_is_left_and_given_back_where_the_part_failed(phase: str) -> None:
+def test_a_position_is_left_and_released_where_the_part_failed(phase: str) -> None:
     probe = Resource("the probe")
     bad = Holding(
         Op("push", steps=(MOVE,), fails_in=phase), of(probe), leaving=Op("back"), name="measure"
@@ -110,7 +110,7 @@ def test_a_place_is_left_and_given_back_where_the_part_failed(phase: str) -> Non
     ]
 
 
-def test_a_part_fails_as_it_failed_even_where_the_place_could_not_be_left() -> None:
+def test_a_part_fails_as_it_failed_even_where_the_position_could_not_be_left() -> None:
     probe = Resource("the probe")
     bad = Op("push", fails_in="run")
     stuck = Op("back", fails_in="run", error=lambda: OperationFailed("stuck", "it does not move"))
@@ -169,7 +169,7 @@ def test_several_are_taken_in_the_order_of_their_ranks() -> None:
 
 
 @pytest.mark.defects
-def test_taking_things_the_wrong_way_round_is_a_defect_and_not_a_wait_for_ever() -> None:
+def test_taking_things_in_the_wrong_order_is_a_defect_and_not_a_wait_for_ever() -> None:
     plate, probe = Resource("the plate", 0), Resource("the probe", 1)
     inner = Holding(Op("a"), of(plate), name="in")
     run = run_of(Holding(inner, of(probe), name="out"))

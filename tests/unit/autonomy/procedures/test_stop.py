@@ -140,7 +140,7 @@ def test_an_operation_may_deal_with_what_a_movement_fails_with() -> None:
 
 
 @pytest.mark.defects
-def test_a_defect_stops_all_motion_and_is_told_to_whoever_waits() -> None:
+def test_a_defect_stops_all_motion_and_is_reported_to_whoever_waits() -> None:
     def defect() -> Exception:
         return KeyError("no such thing")
 
@@ -170,7 +170,7 @@ def test_a_defect_stops_all_motion_and_is_told_to_whoever_waits() -> None:
     ("wish", "text"),
     [(None, "yielded None"), (True, "yielded True"), (-1.0, "0 s or more"), (float("nan"), "nan")],
 )
-def test_a_wish_that_means_nothing_is_a_defect_where_it_was_yielded(
+def test_a_request_that_means_nothing_is_a_defect_where_it_was_yielded(
     wish: float | None, text: str
 ) -> None:
     class Odd(Op):

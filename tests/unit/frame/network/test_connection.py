@@ -185,7 +185,7 @@ def test_a_gap_in_what_should_be_complete_is_counted(bench: Bench) -> None:
     assert "lost" not in received
 
 
-def test_who_is_not_on_the_list_is_told_so(bench: Bench) -> None:
+def test_who_is_not_on_the_list_is_refused_with_the_reason(bench: Bench) -> None:
     stranger = ClientSideConnection(
         "fibres", "stranger", lambda: MemoryWire(bench.hub), FailurePolicy()
     )
@@ -216,7 +216,7 @@ def test_a_viewer_looks_and_stops_only(bench: Bench) -> None:
         viewer.close()
 
 
-def test_the_station_tells_who_is_here(bench: Bench) -> None:
+def test_the_station_reports_who_is_here(bench: Bench) -> None:
     seen: list[Presence] = []
     bench.station.presence(seen.append)
     assert [(each.name, each.here) for each in seen] == [("vision", True)]

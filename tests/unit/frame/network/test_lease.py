@@ -129,7 +129,7 @@ def test_a_session_of_this_process_needs_no_signs_of_life(
     assert not lease.dead_man("a", 0.3).expired
 
 
-def test_every_change_is_told(lease: StationLease, clock: ManualClock) -> None:
+def test_every_change_is_reported(lease: StationLease, clock: ManualClock) -> None:
     seen: list[LeaseState] = []
     remove = lease.subscribe(seen.append)
     lease.take("vision", "a")

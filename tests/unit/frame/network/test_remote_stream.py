@@ -105,7 +105,7 @@ def made(transport: ByHand, name: str = "pieces") -> tuple[RemoteStream, list[ob
     return result, got, received
 
 
-def test_a_gap_is_told_with_its_size_and_what_follows_is_handed_on(
+def test_a_gap_is_reported_with_its_size_and_what_follows_is_handed_on(
     transport: ByHand, caplog: pytest.LogCaptureFixture
 ) -> None:
     pieces, got, received = made(transport)

@@ -74,7 +74,9 @@ def motions(found: Bound) -> list[object]:
         ("relative to pose nowhere", "known poses: fibre"),
     ],
 )
-def test_what_does_not_fit_the_platform_is_told_with_its_line(statement: str, words: str) -> None:
+def test_what_does_not_fit_the_platform_is_reported_with_its_line(
+    statement: str, words: str
+) -> None:
     with pytest.raises(TrajectoryError) as caught:
         bound(f"{statement}\n")
     assert [(each.line, words in each.text) for each in caught.value.problems] == [(3, True)]

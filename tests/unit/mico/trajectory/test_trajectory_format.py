@@ -113,7 +113,7 @@ def test_what_is_written_reads_the_same_again() -> None:
         ("left.x to 5 um" + " " * 600, "more than 500"),
     ],
 )
-def test_a_line_that_is_wrong_is_told_with_its_number(statement: str, words: str) -> None:
+def test_a_line_that_is_wrong_is_reported_with_its_number(statement: str, words: str) -> None:
     assert words in only_problem(statement)
 
 
@@ -144,12 +144,12 @@ def test_a_file_that_is_wrong_is_refused_at_its_line(
     assert (line, True) in [(at, words in said) for at, said in problems(text)]
 
 
-def test_all_mistakes_are_told_at_once() -> None:
+def test_all_mistakes_are_reported_at_once() -> None:
     found = problems(HEAD + "left.x to 5\nleft.y to 1 um\nwait\n")
     assert [line for line, _ in found] == [3, 5]
 
 
-def test_a_foreign_file_of_many_lines_is_told_in_one() -> None:
+def test_a_foreign_file_of_many_lines_is_reported_in_one() -> None:
     assert len(problems("nonsense\n" * 10_000)) == 1
     assert len(problems(HEAD + "nonsense\n" * 10_000)) < 300
 
@@ -183,7 +183,7 @@ def test_a_file_that_is_missing_or_huge_is_refused(
         parser.load(tmp_path / "long")
 
 
-def test_reading_tells_how_far_it_is() -> None:
+def test_reading_reports_how_far_it_is() -> None:
     fractions: list[float] = []
     parse(HEAD + "left.x to 1 um\n" * 2000, progress=fractions.append)
     assert fractions == sorted(fractions)

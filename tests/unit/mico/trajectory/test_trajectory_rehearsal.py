@@ -109,7 +109,7 @@ def test_it_begins_where_the_trajectory_says() -> None:
     assert found.clearance_um == pytest.approx(900.0, abs=10.0)
 
 
-def test_what_is_left_is_told_for_each_line() -> None:
+def test_what_is_left_is_reported_for_each_line() -> None:
     found = played("wait 1 s\nwait 2 s\nwait 3 s\n")
     assert found.left_s == ((3, 6.0), (4, 5.0), (5, 3.0))
 

@@ -87,7 +87,7 @@ def test_movements_begun_at_once_are_a_block() -> None:
     assert record.close(14.0)[-4:] == ["t=1 s together", "    x to 100 um", "    y to 50 um", "end"]
 
 
-def test_a_movement_begun_while_another_is_under_way_cuts_it_there() -> None:
+def test_a_movement_begun_while_another_runs_cuts_it_there() -> None:
     record = Recording()
     record.go("x", 1000.0, 11.0)
     record.at["x"] = 400.0
@@ -158,7 +158,7 @@ def test_gripper_steps_are_steps_and_those_cut_short_are_those_made() -> None:
     ]  # fmt: skip
 
 
-def test_a_reference_run_is_told_and_where_it_ended() -> None:
+def test_a_reference_run_is_reported_and_where_it_ended() -> None:
     record = Recording()
     record.begin("x", Reference(), 11.0)
     record.end("x", 512.0, 12.0)
@@ -182,7 +182,7 @@ def test_what_still_moves_at_the_end_is_written_as_far_as_it_got() -> None:
     assert record.close(12.0) == ["start x 0", "x to 640 um"]
 
 
-def test_an_end_that_is_told_late_cuts_nothing() -> None:
+def test_an_end_that_is_reported_late_cuts_nothing() -> None:
     record = Recording()
     record.go("x", 100.0, 11.0)
     record.at["x"] = 99.9

@@ -125,7 +125,7 @@ def test_threads_that_ask_at_once_get_each_its_own_image(
     assert found == {at_s: [image] * 5 for at_s, image in expected.items()}
 
 
-def test_views_that_nobody_needs_are_given_up_there_too(process: DrawingProcess) -> None:
+def test_views_that_nobody_needs_are_dropped_there_too(process: DrawingProcess) -> None:
     settings = shipped_settings().optics
     drawer = RemoteDrawer(process, settings, 0)
     assert not process.dropped

@@ -75,7 +75,7 @@ def test_sharpness_falls_off_around_the_focus_and_faster_at_high_zoom() -> None:
     assert widths[1] > 3.0
 
 
-def test_several_points_are_told_at_once() -> None:
+def test_several_points_are_reported_at_once() -> None:
     bench = ImageBench()
     points = np.array([[0.0, 0.0, 0.0], [10.0, 20.0, 30.0]])
     found = bench.optics.world_to_image_px(points, bench.now_s)

@@ -168,7 +168,7 @@ def test_a_failure_is_raised_again_until_the_camera_is_closed(camera: ScriptedCa
     assert camera.calls == ["begin", "end", "release"]
 
 
-def test_a_quiet_camera_is_asked_and_given_up_when_it_is_gone(camera: ScriptedCamera) -> None:
+def test_a_quiet_camera_is_asked_and_closed_when_it_is_gone(camera: ScriptedCamera) -> None:
     camera.start()
     assert camera.receive(0.1) is None
     camera.gone = "it was unplugged"

@@ -75,7 +75,7 @@ def test_a_clock_that_was_set_is_no_long_wait() -> None:
     assert times.complete_s(10.1, 3600.0, 1.0) >= 5.0
 
 
-def test_a_first_packet_seen_late_is_told_by_the_cameras_clock() -> None:
+def test_a_first_packet_seen_late_is_recognised_by_the_cameras_clock() -> None:
     times = FrameTimes()
     ms = 1_000_000
     assert times.delay_s(1000 * ms, 7 * ms) == 0.0

@@ -80,7 +80,7 @@ def test_a_status_says_who_what_and_why(fake: FakeDc1394) -> None:
 
 
 @needs_compiler
-def test_cameras_are_told_apart_by_their_guid(library: Dc1394Library) -> None:
+def test_cameras_are_distinguished_by_their_guid(library: Dc1394Library) -> None:
     found = {info.key: info.model for info in library.cameras()}
     assert found == {SCALABLE: "XCD-U100 (stand-in)", FIXED: "Fixed (stand-in)"}
 
@@ -142,7 +142,7 @@ def test_a_fixed_rate_is_the_next_one_below_what_is_asked(library: Dc1394Library
 
 
 @needs_compiler
-def test_a_shutter_in_counts_needs_its_unit_told(fake: FakeDc1394) -> None:
+def test_a_shutter_in_counts_needs_its_unit_given(fake: FakeDc1394) -> None:
     for unit_s, known in ((0.0, False), (2e-5, True)):
         library = Dc1394Library(library=fake.library, shutter_unit_s=unit_s)
         camera = library.open(FIXED)
@@ -171,7 +171,9 @@ def test_a_corrupt_frame_is_counted_and_never_good(fake: FakeDc1394, camera: Cam
 
 
 @needs_compiler
-def test_a_frame_lost_on_the_bus_is_told_by_the_time(fake: FakeDc1394, camera: Camera) -> None:
+def test_a_frame_lost_on_the_bus_is_recognised_by_the_time(
+    fake: FakeDc1394, camera: Camera
+) -> None:
     camera.start()
     some(camera, 1)
     fake.library.fake_skip(0, 10)
@@ -199,7 +201,7 @@ def test_a_stop_on_purpose_loses_nothing() -> None:
 
 
 @needs_compiler
-def test_a_rate_changed_on_the_way_loses_no_number(camera: Camera) -> None:
+def test_a_rate_changed_meanwhile_loses_no_number(camera: Camera) -> None:
     camera.start()
     some(camera, 2)
     camera.configure(replace(camera.settings, rate_hz=30.0))

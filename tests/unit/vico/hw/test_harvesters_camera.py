@@ -59,9 +59,7 @@ def test_values_are_in_seconds_and_decibels(camera: HarvestersCamera, device: Fa
     assert device.node_map.ExposureTime.value == pytest.approx(20_000.0)
 
 
-def test_a_camera_is_told_not_to_choose_its_exposure(
-    camera: HarvestersCamera, device: FakeGenTL
-) -> None:
+def test_a_camera_does_not_choose_its_exposure(camera: HarvestersCamera, device: FakeGenTL) -> None:
     assert device.node_map.ExposureAuto.value == "Off"
 
 

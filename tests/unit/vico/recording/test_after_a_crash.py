@@ -121,7 +121,7 @@ def recorded(path, image_format, count=10):
 
 
 @pytest.mark.parametrize("image_format", [ImageFormat.FFV1, ImageFormat.TIFF])
-def test_a_damaged_image_is_told_and_never_shown_as_good(tmp_path, image_format):
+def test_a_damaged_image_is_reported_and_never_shown_as_good(tmp_path, image_format):
     path = recorded(tmp_path / "run", image_format)
     target = path / "run_000005.tif" if path.is_dir() else path
     content = bytearray(target.read_bytes())
@@ -164,12 +164,12 @@ def test_images_without_a_side_file_can_still_be_read(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["none.mkv", "none", "none.csv"])
-def test_a_recording_that_is_not_there_is_told(tmp_path, name):
+def test_a_recording_that_is_not_there_is_reported(tmp_path, name):
     with pytest.raises(RecordingError, match="there is no such recording"):
         open_image_recording(tmp_path / name)
 
 
-def test_files_that_are_something_else_are_told(tmp_path):
+def test_files_that_are_something_else_are_reported(tmp_path):
     (tmp_path / "a.mkv").write_bytes(b"no video")
     with pytest.raises(RecordingError, match="damaged"):
         open_image_recording(tmp_path / "a.mkv")

@@ -80,7 +80,7 @@ def test_files_of_others_are_never_replaced(tmp_path, make):
         assert len(found) == 6
 
 
-def test_formats_that_do_not_fit_are_told(make):
+def test_formats_that_do_not_fit_are_reported(make):
     path = make(pixel_format=PixelFormat.MONO12)
     with pytest.raises(RecordingError, match="small cannot keep Mono12"):
         export_images(path, "small")

@@ -114,7 +114,7 @@ def test_everything_put_before_the_end_is_in_the_file(recorders, heard, image_fo
         assert [each.row.frame_id for each in found] == list(range(40))
 
 
-def test_a_full_queue_drops_images_and_tells_which(recorders, heard, monkeypatch, caplog):
+def test_a_full_queue_drops_images_and_reports_which(recorders, heard, monkeypatch, caplog):
     gate = Gate(monkeypatch)
     data = noise()
     recorder = recorders(queue_bytes=3 * data.nbytes)
@@ -225,7 +225,7 @@ def test_a_disk_that_fills_ends_the_recording_in_good_order(
         assert len(found) == 5
 
 
-def test_what_waits_when_writing_fails_is_told_as_dropped(recorders, heard, monkeypatch):
+def test_what_waits_when_writing_fails_is_reported_as_dropped(recorders, heard, monkeypatch):
     gate = Gate(monkeypatch)
     recorder = recorders()
     for each in images(5):
@@ -254,7 +254,7 @@ def test_what_waits_when_writing_fails_is_told_as_dropped(recorders, heard, monk
         (ImageFormat.PNG, "run"),
     ],
 )
-def test_a_file_that_is_taken_away_is_told(tmp_path, recorders, heard, image_format, taken):
+def test_a_file_that_is_taken_away_is_reported(tmp_path, recorders, heard, image_format, taken):
     recorder = recorders("run", image_format)
     recorder.put(image(0))
     wait_until(lambda: recorder.stats.written == 1)

@@ -67,7 +67,7 @@ def test_a_name_that_cannot_be_is_refused(tmp_path, name, image_format, said):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_directory_that_is_missing_or_read_only_is_told(tmp_path, monkeypatch):
+def test_a_directory_that_is_missing_or_read_only_is_reported(tmp_path, monkeypatch):
     with pytest.raises(RecordingError, match="does not exist; create it"):
         ImageFile(tmp_path / "none" / "run", ImageFormat.FFV1)
     if sys.platform == "win32" or os.geteuid() == 0:
@@ -114,7 +114,7 @@ def test_a_recording_in_another_format_keeps_its_side_file(tmp_path, first, seco
     file.close(complete=True)
 
 
-def test_a_missing_codec_is_told_before_anything_is_written(tmp_path, monkeypatch):
+def test_a_missing_codec_is_reported_before_anything_is_written(tmp_path, monkeypatch):
     import av
 
     def unknown(name, mode):
@@ -127,7 +127,7 @@ def test_a_missing_codec_is_told_before_anything_is_written(tmp_path, monkeypatc
     ImageFile(tmp_path / "run", ImageFormat.TIFF).close(complete=True)
 
 
-def test_a_missing_library_is_told_before_anything_is_written(tmp_path, monkeypatch):
+def test_a_missing_library_is_reported_before_anything_is_written(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(RecordingError, match="PyAV cannot be loaded"):
         ImageFile(tmp_path / "run", ImageFormat.FAST)

@@ -132,7 +132,7 @@ def test_the_side_file_names_the_unit_of_every_axis(tmp_path):
     assert first["scale_um_px"] == "0.8"
 
 
-def test_an_axis_whose_unit_nobody_told_is_recorded_without_one(tmp_path):
+def test_an_axis_of_unknown_unit_is_recorded_without_one(tmp_path):
     file = ImageFile(tmp_path / "run", ImageFormat.FFV1, axes={"probe.z": "um"})
     file.append(noise(), row_of(image(), None))
     file.close(complete=True)

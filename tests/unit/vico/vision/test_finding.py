@@ -80,7 +80,7 @@ def test_a_fibre_that_crosses_itself_is_followed_through() -> None:
     assert ends_error_px(fibre, LOOP) < 1.5
 
 
-def test_two_fibres_that_cross_are_told_apart() -> None:
+def test_two_fibres_that_cross_are_distinguished() -> None:
     down = arc((150.0, 80.0), 0.7, 420.0, 0.2)
     up = arc((150.0, 400.0), -0.7, 420.0, -0.2)
     fibres = find_fibres(drawn_image([down, up], [8.0, 11.0]))
@@ -257,7 +257,7 @@ def test_points_of_which_too_few_count_determine_no_curve() -> None:
     np.testing.assert_allclose(smooth(line, np.ones(120), 60.0), line, atol=1e-3)
 
 
-def test_what_nobody_foresaw_of_an_image_is_told_and_no_error_of_numpy(
+def test_what_nobody_foresaw_of_an_image_is_reported_and_no_error_of_numpy(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def broken(*_: object) -> None:

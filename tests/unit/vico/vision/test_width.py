@@ -62,7 +62,7 @@ def test_a_width_that_the_image_does_not_show_is_known_to_be_so() -> None:
         assert abs(fibre.width_px - 1.98) < 2.0 * fibre.width_std_px
 
 
-def test_fibres_on_one_image_tell_each_other_how_blurred_it_is() -> None:
+def test_fibres_on_one_image_show_together_how_blurred_it_is() -> None:
     alone = seen(4.22, 0.85, HOLLOW, 0)
     layer = np.full((220, 440), round(GREY * 64), np.uint16)
     for x, width_px in ((60.0, 4.22), (150.0, 8.0), (240.0, 9.0), (330.0, 7.0)):
