@@ -1,9 +1,11 @@
 """What everybody may rely on who is handed something that takes a while: `Operation`."""
 
 import asyncio
+import gc
 import logging
 import threading
 import time
+import weakref
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
@@ -277,3 +279,38 @@ def test_several_await_it(operation: Operation[None]) -> None:
         await asyncio.gather(*waiting)
 
     asyncio.run(main())
+
+
+class Owner:
+    """Holds its operation, and is held by what is called at the end of it."""
+
+    def __init__(self) -> None:
+        self.operation: Operation[None] = Operation("the work")
+        self.operation.on_cancel(self.nothing)
+        self.operation.add_callback(self.nothing)
+
+    def nothing(self, _ended: object = None) -> None:
+        """Do nothing."""
+
+
+@pytest.mark.parametrize("error", [None, BROKEN])
+def test_who_followed_what_has_ended_is_freed_without_the_collector(
+    error: DeviceError | None,
+) -> None:
+    owner = Owner()
+    gone = weakref.ref(owner)
+    gc.disable()
+    try:
+        if error is None:
+            owner.operation.finish(None)
+        else:
+            owner.operation.fail(error)
+        del owner
+        assert gone() is None
+    finally:
+        gc.enable()
+
+
+def test_progress_that_is_no_number_is_named(operation: Operation[None]) -> None:
+    with pytest.raises(TypeError, match="fraction"):
+        operation.report("half", "somewhere")  # type: ignore[arg-type]

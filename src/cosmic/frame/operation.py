@@ -4,11 +4,13 @@ from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from threading import Condition, Lock, RLock
 from typing import Any, ClassVar, Final, Generic, Self, TypeVar
 
 from typing_extensions import override
 
+from cosmic.frame.arguments import checked
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, DeviceTimeout
 from cosmic.frame.events import Event, Unsubscribe, notify
@@ -55,6 +57,20 @@ class _Listeners:
     def __init__(self) -> None:
         self.order = RLock()
         self.progressed: Event[Progress] = Event()
+
+
+class _Once:
+    """What a future calls at its end, and then holds no longer: it keeps its callbacks for ever."""
+
+    __slots__ = ("_action",)
+
+    def __init__(self, action: Callable[[], object]) -> None:
+        self._action: Callable[[], object] | None = action
+
+    def __call__(self, _future: object) -> None:
+        action, self._action = self._action, None
+        if action is not None:
+            action()
 
 
 class Operation(Generic[T]):
@@ -213,7 +229,7 @@ class Operation(Generic[T]):
 
         It must return at once.
         """
-        self._end.add_done_callback(lambda _future: notify(callback, self))
+        self._end.add_done_callback(_Once(partial(notify, callback, self)))
 
     def when_failed(self, callback: Callable[[CosmicError], object]) -> None:
         """Call `callback(error)` once it fails by what is foreseen; a defect is told elsewhere."""
@@ -257,11 +273,13 @@ class Operation(Generic[T]):
     def on_cancel(self, action: Callable[[], object]) -> None:
         """Call `action` when it is cancelled, or now if it was."""
         with self._lock:
-            self._on_cancel = (*self._on_cancel, action)
+            if not self._done:
+                self._on_cancel = (*self._on_cancel, action)
             cancelled = self._cancel_requested
         if cancelled:
             action()
 
+    @checked
     def report(self, fraction: float, text: str) -> None:
         """Say how far it is."""
         self._fraction, self._text = min(max(fraction, 0.0), 1.0), text
@@ -295,6 +313,7 @@ class Operation(Generic[T]):
     def _may_end(self) -> bool:
         with self._lock:
             first, self._done = not self._done, True
+            self._on_cancel = ()  # they often hold what holds this, which only the collector frees
         return first
 
     def _publish(self) -> None:
