@@ -32,7 +32,7 @@ _MOST_LOOKED_AT: Final = 1000
 _LARGEST: Final = 1e300
 _TIMES: Final = ("timeout_s", "budget_s", "since_s", "start_s", "end_s", "interval_s")
 """What is waited for, or looked up: the system takes no others."""
-_JUDGED_FURTHER_IN: Final = ("position", "distance", "value")
+_CHECKED_FURTHER_IN: Final = ("position", "distance", "value")
 """Targets: the gate refuses what is none, with its reason."""
 _NEVER_REFUSED: Final = ("stop", "abort", "cancel")
 """What ends a movement does so whatever reason it is given."""
@@ -137,7 +137,7 @@ def _checks_of(function: Callable[..., object], signature: inspect.Signature) ->
     for name, parameter in signature.parameters.items():
         hint = _resolved(parameter.annotation, known)
         check = None if isinstance(hint, str) else _check_for(hint)
-        if name in _JUDGED_FURTHER_IN:
+        if name in _CHECKED_FURTHER_IN:
             check = _no_bytes
         if name in _TIMES and check is not None:
             check = _time(check)

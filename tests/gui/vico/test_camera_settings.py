@@ -126,7 +126,7 @@ def test_what_a_camera_lacks_says_so(qtbot, form, camera):
     assert form.exposure.field.toolTip() == "unplugged"
 
 
-def test_settings_changed_elsewhere_are_shown(qtbot, form, camera):
+def test_settings_changed_by_others_are_shown(qtbot, form, camera):
     camera.change(settings=replace(SETTINGS, exposure_s=0.5))
     qtbot.waitUntil(lambda: form.exposure.field.text() == "500")
 

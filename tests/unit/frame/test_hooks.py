@@ -48,7 +48,7 @@ def test_a_foreseen_failure_stays_foreseen(failures: list[Failure]) -> None:
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), SystemExit(2)])
-def test_a_wish_to_end_the_program_is_no_failure(
+def test_a_request_to_end_the_program_is_no_failure(
     error: BaseException, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[BaseException] = []

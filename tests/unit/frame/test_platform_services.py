@@ -225,7 +225,7 @@ def test_waits_are_made_fine_on_windows(windows: FakeWindows) -> None:
     assert windows.throttled == 0, "also while the window is hidden"
 
 
-def test_waits_are_fine_elsewhere() -> None:
+def test_waits_are_fine_in_other_threads() -> None:
     assert tick_finely()
 
 

@@ -262,7 +262,7 @@ def test_a_device_at_rest_may_be_silent():
         assert it.phase is Phase.ARMED
 
 
-def test_a_refusal_is_shown_and_steering_goes_on_elsewhere():
+def test_a_refusal_is_shown_and_steering_goes_on_with_other_axes():
     with rig() as it:
         it.api["d0.c0"].move_to(4990.0)
         it.start()

@@ -248,7 +248,7 @@ def test_the_probe_passes_a_fibre_that_points_out_of_the_plane() -> None:
     assert abs(ends[1][2] - ends[0][2]) > 100.0
 
 
-def test_a_bent_tip_is_elsewhere_than_its_stages_say() -> None:
+def test_a_bent_tip_is_not_where_its_stages_say() -> None:
     hand = Hand()
     before = hand.bench.moment.tips_um
     hand.bench.scene.faults.inject("tip_bent", tool="left", amount=30.0)

@@ -128,7 +128,7 @@ def test_a_jaw_is_as_stiff_as_the_sensor() -> None:
     assert bench.go(probe_y=face + 1.0).force_un == 0.0
 
 
-def test_the_clamp_lies_somewhat_inside_the_jaws_and_elsewhere_for_each_seed() -> None:
+def test_the_clamp_lies_somewhat_inside_the_jaws_and_differs_for_each_seed() -> None:
     spread = {"clamp_depth_um": 8.0, "clamp_depth_spread_um": 4.0}
     forces = [
         pushed(before_the_fibre(Bench(settings(**spread), seed)), 10.0).force_un

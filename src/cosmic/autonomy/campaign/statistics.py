@@ -98,7 +98,7 @@ def progress(fibres: Sequence[FibreRecord], elapsed_s: float) -> CampaignProgres
     finished = [each for each in fibres if each.outcome in FINISHED]
     counts = Counter(each.outcome for each in fibres)
     good = [each for each in finished if each.outcome is Outcome.GOOD]
-    causes = Counter(each.cause or "not told" for each in finished if each not in good)
+    causes = Counter(each.cause or "unknown" for each in finished if each not in good)
     return CampaignProgress(
         done=len(finished),
         good=len(good),

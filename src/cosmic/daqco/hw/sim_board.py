@@ -62,7 +62,7 @@ class _Run:
         """Return when a sample is truly taken."""
         return self.start_s + sample / self.setup.true_hz
 
-    def told_s(self, sample: int) -> float:
+    def reported_s(self, sample: int) -> float:
         """Return when it is, as far as the board's clock knows."""
         return self.start_s + sample / self.setup.rate_hz
 
@@ -164,7 +164,7 @@ class SimulatedBoard(Board):
         run.next_sample = first + setup.chunk_samples
         if self._run is not run:
             return None
-        return BoardChunk(first, run.told_s(first), volts)
+        return BoardChunk(first, run.reported_s(first), volts)
 
     @override
     def stop(self) -> None:

@@ -116,7 +116,7 @@ class HoldKeys(QObject):
             self._up_since_s[event.key()] = WALL.now_s()
             return False
         name = self._names.get(_Combination(Qt.Key(event.key()), event.modifiers() & _MODIFIERS))
-        if name is None or not self._enabled or _input_is_elsewhere():
+        if name is None or not self._enabled or _input_is_outside():
             return False
         event.accept()
         if kind == QEvent.Type.KeyPress and not self._is_repeat(event):
@@ -162,12 +162,12 @@ class HoldKeys(QObject):
     def _on_guard(self) -> None:
         """End what is held where no event tells that the keyboard was taken away."""
         active = QApplication.applicationState() == Qt.ApplicationState.ApplicationActive
-        why = _input_is_elsewhere() if active else WINDOW_LOST
+        why = _input_is_outside() if active else WINDOW_LOST
         if self._held and why:
             self.release_all(why)
 
 
-def _input_is_elsewhere() -> str:
+def _input_is_outside() -> str:
     """Return what has the keyboard instead of the program's keys; empty when nothing has."""
     if takes_text(QApplication.focusWidget()):
         return _TEXT

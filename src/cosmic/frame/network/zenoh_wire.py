@@ -76,7 +76,7 @@ class ZenohWire(Wire):
         except zenoh.ZError as exc:
             raise StationAway(f"the line is closed: {exc}") from exc
         if reply is None:
-            raise StationAway("nobody answers there: the station is not running or not reachable")
+            raise StationAway("no answer: the station is not running or not reachable")
         if reply.ok is None:
             raise StationTimeout(f"no answer came within {timeout_s:g} s")
         return bytes(reply.ok.payload.to_bytes())

@@ -431,9 +431,9 @@ def _waited_for(
 ) -> Rehearsal:
     """Return the result of a rehearsal; whoever waits is told how far it is, and may end it."""
 
-    def on_progress(told: Progress) -> None:
-        if progress is not None and not told.done:
-            progress(told.fraction, told.text)
+    def on_progress(changed: Progress) -> None:
+        if progress is not None and not changed.done:
+            progress(changed.fraction, changed.text)
 
     begun.subscribe(on_progress)
     try:

@@ -259,7 +259,7 @@ class CameraView(QWidget):
         elif settings is not None and settings.trigger is not Trigger.FREE_RUN:
             self._show_old("")
             self.status.show_state(State.OK, f"waits for its trigger; {since}")
-        elif WALL.now_s() - self._came_s > self._patience_s:
+        elif WALL.now_s() - self._came_s > self._overdue_s:
             self._show_old(since)
             self.status.show_state(State.ERROR, since)
         else:
@@ -272,7 +272,7 @@ class CameraView(QWidget):
         return f"image of {self._came}, {WALL.now_s() - self._came_s:.0f} s ago"
 
     @property
-    def _patience_s(self) -> float:
+    def _overdue_s(self) -> float:
         settings = self._camera.settings
         return STALE_S if settings is None else max(STALE_S, 3.0 / max(settings.rate_hz, 1e-3))
 

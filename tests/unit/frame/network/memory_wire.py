@@ -87,7 +87,7 @@ class MemoryWire:
         for each in handed_on:
             inbox = self._hub.find(each.key)
             if inbox is None:
-                raise StationAway("nobody answers there")
+                raise StationAway("no answer")
             inbox.put(each)
         if question not in handed_on:
             raise StationTimeout(f"no answer came within {timeout_s:g} s")

@@ -22,7 +22,7 @@ logger = logging.getLogger(__name__)
 _NOBODY: Final[frozenset[BodyPair]] = frozenset()
 
 
-MOST_JUDGED: Final = 3
+MOST_CHECKED: Final = 3
 """How often a question is put again because what is left out of it changed meanwhile."""
 JUST_BEHIND: Final = 2.0
 """How far behind the free part of a way its end is looked at, um or degrees."""
@@ -109,7 +109,7 @@ class CollisionManager(Exemptions, CollisionChecker):
     @override
     def check(self, spans: Spans, *, advice: bool = True) -> MoveVerdict:
         try:
-            for _ in range(MOST_JUDGED):
+            for _ in range(MOST_CHECKED):
                 before = self.taken_out, self.ignored_pairs
                 verdict = self._decide(self._with_freed(spans), advice=advice)
                 if not verdict.allowed or before == (self.taken_out, self.ignored_pairs):
