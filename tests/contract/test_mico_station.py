@@ -346,7 +346,7 @@ def test_what_another_program_plays_is_seen_and_can_be_paused(hosted: HostedMico
 
 
 def test_a_long_trajectory_travels_in_pieces(hosted: HostedMico, how: str) -> None:
-    lines = [f"left.x to {each % 50} um" for each in range(8000)]
+    lines = [f"left.x to {each % 50} um" for each in range(2500)]
     text = HEAD + "\n".join(lines) + "\n"
     with remote_mico(hosted, how) as (mico, _, _):
         player = mico.trajectories.prepare(mico.trajectories.parse(text))

@@ -311,7 +311,7 @@ class PathController(QObject):
             self.plan(request)
             return
         try:
-            task = self._application.follow_way(path, self._mico[request.axis].commander.source)
+            task = self._application.follow_way(path, self._mico.source)
         except NotAvailable as exc:
             self._preview.set_words(f"Not yet: {exc}. Then press Go again.")
             return

@@ -12,12 +12,13 @@ from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.build import named
 from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import STEP_PX, State, state_look
 from cosmic.frame.overrides import override
 from cosmic.frame.verdict import MoveVerdict, Reason
+from cosmic.mico.api.news import AxisRefused, MovementNews
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.model import SceneModel, pair_of
-from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.mico.gui.state_feed import StateFeed
@@ -101,7 +102,7 @@ class ScenePanel(QWidget):
         self._stood: dict[str, float | None] = {}
         self._planned: Path | None = None
         self._replayed = False
-        self._commanders: set[DeviceCommander] = set()
+        self._movements = Relay(self._on_movement).follow(self._mico.follow_movements)
         self._feed = StateFeed(self._mico, self, period_ms=PERIOD_MS)
         self._feed.set_paused(True)
         self._wait = named(QLabel("The scene is about to appear"), "sceneWait")
@@ -121,7 +122,6 @@ class ScenePanel(QWidget):
     def _connect(self) -> None:
         self._panel.refreshed.connect(self._follow_axes)
         self._panel.verdict_given.connect(self._on_refused)
-        self._mico.application.manager.group_refused.connect(self._on_refused)
         self._panel.collision.changed.connect(self._on_collision_changed)
         self._feed.flushed.connect(self._on_flushed)
         watch = self._mico.application.clearance_watch
@@ -203,9 +203,6 @@ class ScenePanel(QWidget):
         self._unknown.clear()
         try:
             for axis in self._mico:
-                if axis.commander not in self._commanders:
-                    self._commanders.add(axis.commander)
-                    axis.commander.movement_refused.connect(self._on_refused)
                 self._feed.add(axis.name, self)
         except CosmicError as exc:
             logger.debug("the scene is shown after the rescan: %s", exc)
@@ -240,6 +237,10 @@ class ScenePanel(QWidget):
             self._scene.set_unwatched(bodies_moved_by(self._model, axes))
 
     # What was refused
+
+    def _on_movement(self, news: MovementNews) -> None:
+        if isinstance(news, AxisRefused):
+            self._on_refused(news.verdict)
 
     def _on_refused(self, verdict: MoveVerdict) -> None:
         if verdict.reason is not Reason.COLLISION or not verdict.bodies:

@@ -57,10 +57,10 @@ class CollisionBar(QObject):
         self._bar.set_clearance(reading)
 
     def _why_unknown(self) -> str:
-        manager = self._application.manager
-        if not manager.ready:
+        mico = self._panel.mico
+        if not mico.ready:
             return "MiCo is not ready"
-        if manager.positions() is None:
+        if mico.positions() is None:
             return NOT_REFERENCED
         return "no answer yet, or no body is watched"
 

@@ -44,7 +44,7 @@ class AxisSink:
         self, mico: Mico, axis: str, *, speed: float, travel: float, interval_s: float
     ) -> None:
         self._axis = mico[axis]
-        self._manager = mico.application.manager
+        self._mico = mico
         state = self._axis.details
         if not class_for(state.kind, state.positioner).has_sensor:
             raise NotAvailable(f"{axis}: it has no sensor; a loop needs a measured position")
@@ -52,7 +52,6 @@ class AxisSink:
             text = f"{axis}: speed and travel of a loop must be numbers above 0"
             raise refusal(refuse(Reason.NOT_FINITE, text, axis=axis))
         self._speed, self._travel, self._interval_s = speed, travel, interval_s
-        self._channel = self._manager.address(axis).channel
         self._lock = Lock()
         self._closed = False
         self._epoch = 0
@@ -94,7 +93,7 @@ class AxisSink:
         StoppedError
             Motion is stopped.
         """
-        stop = self._manager.latch.state
+        stop = self._mico.stop_state
         self._epoch = stop.epoch
         if stop.latched:
             text = f"{self.name}: motion is stopped ({stop.reason}); reset the stop first"
@@ -104,7 +103,7 @@ class AxisSink:
             raise NotAvailable(f"{self.name} is moving; wait until it is stationary")
         if state.position is None:
             raise NotAvailable(f"{self.name}: no position has been read yet")
-        verdict = self._manager.check({self.name: MoveTo(state.position, state.unit)})
+        verdict = self._mico.judge({self.name: MoveTo(state.position, state.unit)})
         if not verdict.allowed:
             raise refusal(verdict)
         self._home = self._target = self._wanted = state.position
@@ -155,7 +154,7 @@ class AxisSink:
             self._braked = True
 
     def _look(self) -> None:
-        stop = self._manager.latch.state
+        stop = self._mico.stop_state
         if stop.latched or stop.epoch != self._epoch:
             text = f"{self.name}: motion was stopped ({stop.reason or 'and reset since'})"
             raise StoppedError(refuse(Reason.STOPPED, text, axis=self.name))
@@ -179,9 +178,8 @@ class AxisSink:
         with self._lock:
             if self._closed:
                 return
-            movement = self._axis.commander.send(
-                self._channel, MoveTo(target, self._axis.unit), follows=self._sent
-            )
+            motion = MoveTo(target, self._axis.unit)
+            movement = self._axis.send(motion, follows=self._sent, alone=True)
         self._before, self._sent = self._sent, movement
         self._target, self._since_s, self._braked = target, 0.0, False
         self.packets += 1
@@ -207,4 +205,4 @@ class AxisSink:
                 return
             self._closed = True
         if not isinstance(error, MoveCancelled):
-            self._axis.commander.stop(self._channel, "its control loop ended")
+            self._axis.halt("its control loop ended")

@@ -167,7 +167,7 @@ class PositionSource(Source):
 
     def __init__(self, mico: Mico, axis: str, *, stale_s: float) -> None:
         self._axis = mico[axis]
-        settings = mico.application.manager.settings.watch
+        settings = mico.settings.watch
         self._stale_s = max(stale_s, IDLE_POLLS * settings.idle_poll_s)
 
     @property

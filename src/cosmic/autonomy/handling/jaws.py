@@ -67,7 +67,7 @@ def move_jaws(work: HandlingContext, by_um: float) -> Steps:
     step_um = next(
         (
             each.step_um
-            for each in work.mico.application.manager.settings.positioner
+            for each in work.mico.settings.positioner
             if each.name == work.gripper.gap_axis and each.step_um
         ),
         1.0,

@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from PySide6.QtCore import QObject, Signal
 
@@ -12,7 +12,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Task
 from cosmic.frame.task_application import TaskApplication
 from cosmic.mico.api.initialisation import Confirm
-from cosmic.mico.api.ports import CollisionPort, UndoPort
+from cosmic.mico.api.ports import CollisionPort
 from cosmic.mico.api.trajectory_recording import Recordings
 from cosmic.mico.api.ways import Way
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
@@ -20,9 +20,6 @@ from cosmic.mico.core.motion.undo import Cautions
 from cosmic.mico.core.ports import ManagerPort
 from cosmic.mico.core.sequence.report import SequenceReport
 from cosmic.mico.core.teleoperation.teleoperation import Teleoperation
-
-if TYPE_CHECKING:
-    from cosmic.mico.api.mico import Mico
 
 WAY_BUDGET_S: Final = 1.0
 """How long a way is looked for, in wall time."""
@@ -49,7 +46,6 @@ class MicoApplicationBase(TaskApplication):
     manager: ManagerPort
     collision: CollisionPort | None
     clearance_watch: ClearanceWatch | None
-    undo: UndoPort
     cautions: Cautions
     teleoperation: Teleoperation
 
@@ -128,10 +124,6 @@ class MicoApplicationBase(TaskApplication):
     @abstractmethod
     def initialisation(self) -> SequenceReport:
         """How far the initialisation sequence is, or was."""
-
-    def mico(self, source: str) -> "Mico":
-        """Return what it offers, for whoever commands by the name of `source`."""
-        raise NotImplementedError(f"{self!r} does not say what it offers to {source}")
 
     def search_way(self, targets: Mapping[str, float], budget_s: float = WAY_BUDGET_S) -> Task:
         """Look for a way in the application's thread; `way_found` or `way_missing` tells."""

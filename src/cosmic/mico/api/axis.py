@@ -429,7 +429,7 @@ class Axis(AxisShape, Declared):
             raise NotAvailable(f"{self._name} is a {state.kind} axis: use {other}")
         return state.shown_position
 
-    def subscribe(self, callback: Callable[[PositionerState], None]) -> Callable[[], None]:
+    def subscribe(self, callback: Callable[[PositionerState], object]) -> Callable[[], None]:
         """Call `callback(state)` after each change; returns the function that ends it.
 
         It is called in the device's thread and must return at once; a position in motion is read
@@ -529,7 +529,7 @@ class Axis(AxisShape, Declared):
             It was cancelled or replaced.
         """
         target = self._number(position) + self.details.zero
-        movement = self._send(MoveTo(target, self.unit), consent=consent)
+        movement = self.send(MoveTo(target, self.unit), consent=consent)
         return self._result(movement, wait=wait)
 
     def continue_to(self, position: Number, after: Movement, *, consent: bool = False) -> Movement:
@@ -539,18 +539,37 @@ class Axis(AxisShape, Declared):
         movement fails with `MoveCancelled`.
         """
         target = self._number(position) + self.details.zero
-        return self._send(MoveTo(target, self.unit), consent=consent, follows=after)
+        return self.send(MoveTo(target, self.unit), consent=consent, follows=after)
 
-    def _send(
-        self, motion: SentMotion, *, consent: bool, follows: Movement | None = None
+    def send(
+        self,
+        motion: SentMotion,
+        *,
+        consent: bool = False,
+        follows: Movement | None = None,
+        alone: bool = False,
     ) -> Movement:
+        """Begin a motion in gate coordinates; a refusal is how it ends.
+
+        Parameters
+        ----------
+        follows : Movement
+            It is void unless that is still the newest of this axis, and nothing was halted since.
+        alone : bool
+            Axes linked to it are not moved along: the gate refuses it while there are any.
+        """
         far = self._far
         if far is None:
-            return self._begin(motion, consent=consent, follows=follows)
+            return self._begin(motion, consent=consent, follows=follows, alone=alone)
         key = secrets.token_hex(8)
         before = "" if follows is None else far.keys.get(follows, "forgotten")
         begun = self.begin(
-            motion, consent=consent, key=key, follows=before, source=self.commander.source
+            motion,
+            consent=consent,
+            key=key,
+            follows=before,
+            alone=alone,
+            source=self.commander.source,
         )
         far.keys[begun] = key
         return begun
@@ -563,6 +582,7 @@ class Axis(AxisShape, Declared):
         consent: bool = False,
         key: str = "",
         follows: str = "",
+        alone: bool = False,
         source: str = "script",
     ) -> Movement:
         """Begin a motion in gate coordinates; a refusal is how it ends.
@@ -573,9 +593,11 @@ class Axis(AxisShape, Declared):
             How whoever commands it will name it.
         follows : str
             Key of the movement that must still be the newest of this axis.
+        alone : bool
+            As `send`.
         """
         before = self._orders.movement(follows) if follows else None
-        begun = self._begin(motion, consent=consent, follows=before, source=source)
+        begun = self._begin(motion, consent=consent, follows=before, alone=alone, source=source)
         if key:
             self._orders.keep(key, begun)
         return begun
@@ -586,9 +608,10 @@ class Axis(AxisShape, Declared):
         *,
         consent: bool,
         follows: Movement | None = None,
+        alone: bool = False,
         source: str = "",
     ) -> Movement:
-        if isinstance(motion, MoveTo | MoveBy) and self.linked_to:
+        if not alone and isinstance(motion, MoveTo | MoveBy) and self.linked_to:
             return self._begin_linked(motion, consent=consent, follows=follows, source=source)
         return self._order(motion, consent=consent, follows=follows, source=source).movement
 
@@ -648,7 +671,7 @@ class Axis(AxisShape, Declared):
     ) -> float | Movement | None:
         """Move by `distance` from where it stands or is going; otherwise as `move_to`."""
         motion = MoveBy(self._number(distance), self.unit)
-        return self._result(self._send(motion, consent=consent), wait=wait)
+        return self._result(self.send(motion, consent=consent), wait=wait)
 
     @overload
     def steps(
@@ -809,7 +832,7 @@ class Axis(AxisShape, Declared):
         """Begin what an axis does alone; the gate refuses it while the axis is linked."""
         if self._far is None:
             return self._order(motion, consent=consent).movement
-        return self._send(motion, consent=consent)
+        return self.send(motion, consent=consent)
 
     @command(at_once=True)
     def halt(self, why: str = "stopped") -> None:

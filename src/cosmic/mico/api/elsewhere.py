@@ -76,14 +76,13 @@ class MicoElsewhere(MicoApplicationBase):
         self.api.belong_to(self)
         self.collision = self.manager.collision
         self.clearance_watch = ClearanceWatch(self.collision, self.manager.positions, policy)
-        self.undo = self.manager.undo
         self.cautions = Cautions()  # what the station felt stands in the entries it tells
         self.teleoperation = Teleoperation(self.manager, policy)
         self.manager.changed.connect(self.status_changed, Qt.ConnectionType.DirectConnection)
         self.api.on_change(self._on_change)
 
-    @override
     def mico(self, source: str) -> Mico:
+        """Return what it offers, for whoever commands by the name of `source`."""
         found = self._micos.get(source)
         if found is None:
             found = self._micos[source] = proxy_of(self._kind, self._link)

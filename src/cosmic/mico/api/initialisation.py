@@ -91,7 +91,8 @@ class InitialisationRun:
             task.fail(exc)
 
     def _plan(self) -> tuple[PlannedStep, ...]:
-        steps = plan(self._manager, skip_known=self._skip_known)
+        manager = self._manager
+        steps = plan_sequence(manager.settings, manager.states(), skip_known=self._skip_known)
         reports = tuple(StepReport(step.title, StepState.WAITING) for step in steps)
         self._publish(SequenceReport(reports))
         return steps
@@ -177,11 +178,6 @@ class InitialisationRun:
         self._report = report
         if self._on_report is not None:
             self._on_report(report)
-
-
-def plan(manager: ManagerPort, *, skip_known: bool = False) -> tuple[PlannedStep, ...]:
-    """Return the steps as they would be made now."""
-    return plan_sequence(manager.settings, manager.states(), skip_known=skip_known)
 
 
 class Asker:

@@ -21,7 +21,6 @@ from cosmic.mico.api.mirrors import (
     ControllerElsewhere,
     LatchElsewhere,
     LinksElsewhere,
-    UndoElsewhere,
 )
 from cosmic.mico.api.news import (
     AxesStarted,
@@ -260,7 +259,6 @@ class ManagerElsewhere(QObject):
         self.links = LinksElsewhere(mico)
         self.links.subscribe(self.links_changed.emit)
         self.collision = CollisionElsewhere(mico)
-        self.undo = UndoElsewhere()
 
     # What there is
 
@@ -369,7 +367,6 @@ class ManagerElsewhere(QObject):
                 self._on_axis(axis, axis.details)
         self.latch.show(mico.stop_state)
         self.links.show(mico.links)
-        self.undo.show(mico.undo_entries)
         self.collision.show(mico.taken_out, mico.allowed_contacts)
         outline = (mico.ready, mico.failure, tuple(mico.axes), mico.missing)
         if outline != self._outline:

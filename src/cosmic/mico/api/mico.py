@@ -1,9 +1,10 @@
 """The one interface of MiCo: ``rig.mico``, its windows, plans and stations use nothing else."""
 
+from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from threading import Lock
-from typing import Final, Literal, overload
+from typing import Final, Literal, Protocol, overload, runtime_checkable
 
 from PySide6.QtCore import Qt
 from typing_extensions import override
@@ -56,7 +57,7 @@ from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.motion.links import Link
 from cosmic.mico.core.motion.orders import Motion, MoveBy, MoveTo
-from cosmic.mico.core.motion.positioner import PositionerState, class_for
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState, class_for
 from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.mico.core.motion.undo import UndoEntry, undo_text
 from cosmic.mico.core.ports import DevicePort, ManagerPort
@@ -98,6 +99,8 @@ class Mico(Declared):
         direct = Qt.ConnectionType.DirectConnection
         manager, changed = application.manager, weakly(self.note_change)
         manager.links_changed.connect(changed, direct)
+        manager.changed.connect(changed, direct)
+        manager.device_lost.connect(changed, direct)
         application.undo.changed.connect(changed, direct)
         application.status_changed.connect(changed, direct)
         application.initialisation_changed.connect(changed, direct)
@@ -271,6 +274,15 @@ class Mico(Declared):
     def states(self) -> dict[str, PositionerState]:
         """Return the state of every axis by name, in gate coordinates."""
         return {name: axis.details for name, axis in self.axes.items()}
+
+    def positions(self) -> dict[str, float] | None:
+        """Return where every axis is, in gate coordinates; None while one is not known."""
+        found: dict[str, float] = {}
+        for name, each in self.states().items():
+            if each.position is None or each.confidence is Confidence.UNKNOWN or not each.present:
+                return None
+            found[name] = each.position
+        return found or None
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -839,8 +851,7 @@ class Mico(Declared):
         DeviceError, MoveCancelled
             It did not get there; it can be tried again.
         """
-        history = self._application.undo
-        entry = history.newest(group)
+        entry = self.undo_entry(group)
         doubts = () if confirm else self.undo_doubts(entry)
         if doubts:
             raise NotAvailable(
@@ -867,6 +878,15 @@ class Mico(Declared):
         movement = GroupMovement.of(history.order(entry))
         movement.add_callback(lambda ended: history.drop(entry) if ended.success else None)
         return movement
+
+    def undo_entry(self, group: str | None = None) -> UndoEntry:
+        """Return what `undo` would take back now; raises `NotAvailable` where there is nothing."""
+        if not self.remote:
+            return self._home.undo.newest(group)
+        for entry in self.undo_entries:
+            if group in (None, entry.group):
+                return entry
+        raise NotAvailable(f"there is nothing to undo{f' of {group}' if group else ''}")
 
     def undo_doubts(self, entry: UndoEntry) -> tuple[str, ...]:
         """Return what speaks against taking `entry` back: felt since, or so now."""
@@ -954,6 +974,15 @@ class _MicoCompanion(Companion):
                 axis.far.changed.emit(axis.details)
 
 
+@runtime_checkable
+class RemoteMico(Protocol):
+    """A MiCo whose axes are at a station."""
+
+    @abstractmethod
+    def mico(self, source: str) -> Mico:
+        """Return what it offers, for whoever commands by the name of `source`."""
+
+
 def mico_of(application: CosmicApplicationBase, source: str = "script") -> Mico:
     """Return what an application offers, whether its axes are here or at another station.
 
@@ -964,6 +993,6 @@ def mico_of(application: CosmicApplicationBase, source: str = "script") -> Mico:
     """
     if isinstance(application, MicoApplication):
         return Mico(application, source)
-    if isinstance(application, MicoApplicationBase):
+    if isinstance(application, RemoteMico):
         return application.mico(source)
     raise TypeError(f"{application!r} is no MiCo")

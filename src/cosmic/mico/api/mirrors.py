@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from PySide6.QtCore import QObject, Signal
 from typing_extensions import override
 
 from cosmic.frame.errors import NotAvailable
@@ -16,7 +15,6 @@ from cosmic.mico.core.collision.exemptions import Exemptions
 from cosmic.mico.core.collision.model import BodyPair, SceneModel, pair_of
 from cosmic.mico.core.motion.links import Link, LinkTable
 from cosmic.mico.core.motion.stop_latch import StopLatch, StopState
-from cosmic.mico.core.motion.undo import UndoEntry
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,37 +147,3 @@ class CollisionElsewhere(Exemptions):
             self._note_ignored()
         if changed:
             self._changed.emit()
-
-
-class UndoElsewhere(QObject):
-    """What can be taken back at a station.
-
-    Signals
-    -------
-    changed()
-        There is more or less to be taken back; in any thread.
-    """
-
-    changed = Signal()
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._entries: tuple[UndoEntry, ...] = ()
-
-    @property
-    def entries(self) -> tuple[UndoEntry, ...]:
-        """What can be taken back, the newest first."""
-        return self._entries
-
-    def newest(self, group: str | None = None) -> UndoEntry:
-        """Return what is to be taken back first; raises `NotAvailable`."""
-        for entry in self._entries:
-            if group in (None, entry.group):
-                return entry
-        raise NotAvailable(f"there is nothing to undo{f' of {group}' if group else ''}")
-
-    def show(self, entries: tuple[UndoEntry, ...]) -> None:
-        """Take what was told."""
-        if entries != self._entries:
-            self._entries = entries
-            self.changed.emit()

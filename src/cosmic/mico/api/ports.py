@@ -5,12 +5,9 @@ from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from typing import Protocol
 
-from PySide6.QtCore import SignalInstance
-
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.callback import CollisionCallbackBase
 from cosmic.mico.core.collision.model import BodyPair, SceneModel
-from cosmic.mico.core.motion.undo import UndoEntry
 
 
 class CollisionPort(Protocol):
@@ -64,21 +61,3 @@ class CollisionPort(Protocol):
     @abstractmethod
     def subscribe(self, callback: Callable[[], object]) -> Callable[[], None]:
         """Call `callback` when something was taken out or in, or a contact changed."""
-
-
-class UndoPort(Protocol):
-    """What can be taken back: an `UndoHistory` here, or what is told of one at a station."""
-
-    @property
-    @abstractmethod
-    def changed(self) -> SignalInstance:
-        """There is more or less to be taken back."""
-
-    @property
-    @abstractmethod
-    def entries(self) -> tuple[UndoEntry, ...]:
-        """What can be taken back, the newest first."""
-
-    @abstractmethod
-    def newest(self, group: str | None = None) -> UndoEntry:
-        """Return what is to be taken back first; raises `NotAvailable`."""

@@ -345,7 +345,7 @@ class Trajectories(Declared):
         player.keep_trajectory(trajectory)
         return player
 
-    @command(moves=True, timeout_s=_SLOW_S)
+    @command(timeout_s=_SLOW_S)
     def begin_player(
         self,
         given: str,

@@ -3,7 +3,7 @@
 from PySide6.QtCore import QObject, Signal
 
 from cosmic.frame.gui.relay import Relay
-from cosmic.mico.api.ports import CollisionPort
+from cosmic.mico.api.mico import Mico
 
 
 class CollisionStatus(QObject):
@@ -17,27 +17,32 @@ class CollisionStatus(QObject):
 
     changed = Signal()
 
-    def __init__(self, model: CollisionPort | None) -> None:
+    def __init__(self, mico: Mico) -> None:
         super().__init__()
-        self._model = model
-        self._relay = Relay(self._on_changed)
-        if model is not None:
-            self._relay.follow(model.subscribe)
+        self._mico = mico
+        self._shown = self._now()
+        self._relay = Relay(self._on_changed).follow(mico.on_change)
+
+    def _now(self) -> tuple[object, ...]:
+        return self.has_model, self.unwatched, self.contacts
 
     @property
     def has_model(self) -> bool:
         """Whether movements are checked for collisions at all."""
-        return self._model is not None and self._model.available
+        return self._mico.checks_collisions
 
     @property
     def unwatched(self) -> tuple[str, ...]:
         """Axes that are taken out of collision detection, sorted."""
-        return () if self._model is None else tuple(sorted(self._model.taken_out))
+        return tuple(sorted(self._mico.taken_out))
 
     @property
     def contacts(self) -> tuple[str, ...]:
         """Contacts that are allowed at the moment, sorted."""
-        return () if self._model is None else tuple(sorted(self._model.allowed_contacts))
+        return tuple(sorted(self._mico.allowed_contacts))
 
     def _on_changed(self) -> None:
-        self.changed.emit()
+        now = self._now()
+        if now != self._shown:
+            self._shown = now
+            self.changed.emit()

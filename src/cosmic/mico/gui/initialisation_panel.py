@@ -18,9 +18,10 @@ from cosmic.frame.gui.build import named, push_button, tight_row, tipped
 from cosmic.frame.gui.theme import STEP_PX, State, state_look, ui_font
 from cosmic.frame.operation import Task
 from cosmic.frame.units import format_quantity
-from cosmic.mico.api.initialisation import Asker, plan
+from cosmic.mico.api.initialisation import Asker
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState
+from cosmic.mico.core.sequence.plan import plan_sequence
 from cosmic.mico.core.sequence.report import SequenceReport, StepReport, StepState
 from cosmic.mico.hw.interface import PositionerKind
 
@@ -126,7 +127,8 @@ class InitialisationPanel(QWidget):
         if self.running:
             return
         try:
-            steps = plan(self._application.manager, skip_known=self._skip.isChecked())
+            skip_known = self._skip.isChecked()
+            steps = plan_sequence(self._mico.settings, self._mico.states(), skip_known=skip_known)
         except CosmicError as exc:  # a rescan takes the devices apart in its own thread
             self._show(SequenceReport((StepReport(str(exc), StepState.WAITING),)))
             return
@@ -145,7 +147,7 @@ class InitialisationPanel(QWidget):
 
     def start(self) -> None:
         """Begin the sequence, unless something may be held: `doubted` tells that."""
-        states = self._application.manager.states().values()
+        states = self._mico.states().values()
         grippers = (_may_hold(each) for each in states if each.present)
         reasons = self._application.cautions.reasons()
         doubts = (*reasons, *(text for text in grippers if text))
@@ -168,7 +170,7 @@ class InitialisationPanel(QWidget):
 
     def _is_over(self) -> bool:
         task = self._application.running_task
-        stopped = self._application.manager.latch.state.latched
+        stopped = self._mico.stop_state.latched
         return stopped or task is None or task.cancel_requested
 
     def _on_changed(self, report: SequenceReport) -> None:

@@ -7,11 +7,13 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.errors import CosmicError, NotAvailable
+from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import State
 from cosmic.frame.operation import Task
 from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.mico import Mico, mico_of
-from cosmic.mico.core.motion.group_start import GroupStarted
+from cosmic.mico.api.news import AxesStarted, MovementNews
+from cosmic.mico.core.motion.links import Link
 from cosmic.mico.core.settings import GroupSettings, MicoSettings, PositionerSettings
 from cosmic.mico.gui.arrangement import arranged_groups
 from cosmic.mico.gui.axis_commands import ConsentRequest
@@ -68,14 +70,17 @@ class MicoWidget(QWidget):
         self.setObjectName("MicoWidget")
         self._mico = mico
         self._application = mico.application
-        self._manager = mico.application.manager
         self._cards: dict[str, PositionerBaseGUI] = {}
         self._shape: list[tuple[str, str]] = []
         self._dialog: ConsentDialog | None = None
         self._caution: CautionDialog | None = None
         self._seeks_ways = False
         self._stopped: str | None = None
-        self._collision = CollisionStatus(self._application.collision)
+        self._collision = CollisionStatus(mico)
+        self._outline: tuple[object, ...] = ()
+        self._links: tuple[Link, ...] = ()
+        self._changes = Relay(self._on_change)
+        self._movements = Relay(self._on_movement)
         self._header = MicoHeader(self._settings.jog)
         self._steps = make_initialisation_panel(mico)
         self._steps.hide()
@@ -108,13 +113,12 @@ class MicoWidget(QWidget):
         application.task_started.connect(self._on_task_started)
         application.status_changed.connect(self._on_status_changed)
         application.rescanned.connect(self._on_status_changed)
-        self._manager.device_lost.connect(self._on_status_changed)
-        self._manager.links_changed.connect(self._on_links_changed)
-        self._manager.group_started.connect(self._on_group_started)
+        self._changes.follow(self._mico.on_change)
+        self._movements.follow(self._mico.follow_movements)
 
     @property
     def _settings(self) -> MicoSettings:
-        return self._manager.settings  # of a station that is away they come later
+        return self._mico.settings  # of a station that is away they come later
 
     @property
     def mico(self) -> Mico:
@@ -211,7 +215,7 @@ class MicoWidget(QWidget):
         if self._dialog is not None:
             self._dialog.close()  # its question is about a card that goes
         self._cards = {}
-        groups = [self._make_group(each) for each in arranged_groups(self._manager)]
+        groups = [self._make_group(each) for each in arranged_groups(self._mico)]
         self._columns.set_groups(groups)
         self._keys.set_keys(self._jog_keys())
         self._on_collision_changed()
@@ -253,19 +257,35 @@ class MicoWidget(QWidget):
     def _on_status_changed(self) -> None:
         self.refresh()
 
+    def _on_change(self) -> None:
+        mico = self._mico
+        try:
+            outline = (mico.names, mico.missing, mico.failure, mico.ready)
+            links = mico.links
+        except CosmicError as exc:
+            logger.debug("the panel waits for the end of a rescan: %s", exc)
+            return
+        if outline != self._outline:
+            self._outline = outline
+            self.refresh()
+        elif links != self._links:
+            self._on_links_changed()
+
     def _on_collision_changed(self) -> None:
         unwatched, model = self._collision.unwatched, self._collision.has_model
         for name, card in self._cards.items():
             card.show_detection(model=model, watched=name not in unwatched)
 
     def _on_links_changed(self) -> None:
+        self._links = self._mico.links
         for card in self._cards.values():
             if isinstance(card, ClosedLoopGUI):
                 show_links(card, self._mico)
 
-    def _on_group_started(self, started: GroupStarted) -> None:
-        count, skew_ms = len(started.names), started.skew_ms
-        self._header.set_message(f"{count} axes started within {skew_ms:.1f} ms")
+    def _on_movement(self, news: MovementNews) -> None:
+        if isinstance(news, AxesStarted):
+            count, skew_ms = len(news.names), news.skew_ms
+            self._header.set_message(f"{count} axes started within {skew_ms:.1f} ms")
 
     def _on_refused(self, why: str) -> None:
         self._header.set_message(why, State.REFUSED)

@@ -4,8 +4,9 @@ from typing import Final, Protocol
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from cosmic.frame.gui.relay import Relay
+from cosmic.mico.api.axis import Axis
 from cosmic.mico.api.mico import Mico
-from cosmic.mico.core.motion.device_commander import DeviceCommander
 from cosmic.mico.core.motion.positioner import PositionerState
 
 PERIOD_MS: Final = 33
@@ -21,8 +22,8 @@ class StateView(Protocol):
 class StateFeed(QObject):
     """Collects states as they come and shows only the newest of each axis; GUI thread.
 
-    The commanders emit in the device threads; the slot is a method of this object, so Qt queues
-    the call into the GUI thread, where it costs one entry in a dictionary.
+    Axes publish in the threads that hear of them; the relay queues the call into the GUI thread,
+    where it costs one entry in a dictionary.
 
     Parameters
     ----------
@@ -44,7 +45,8 @@ class StateFeed(QObject):
         self._mico = mico
         self._views: dict[str, list[StateView]] = {}
         self._newest: dict[str, PositionerState] = {}
-        self._commanders: set[DeviceCommander] = set()
+        self._followed: dict[str, Axis] = {}
+        self._relay = Relay(self._on_state_changed)
         self._paused = False
         self._timer = QTimer(self, interval=period_ms, singleShot=True)
         self._timer.timeout.connect(self.flush)
@@ -59,9 +61,9 @@ class StateFeed(QObject):
         """Show the states of the axis `name` in `view`, beginning now."""
         self._views.setdefault(name, []).append(view)
         axis = self._mico[name]
-        if axis.commander not in self._commanders:
-            self._commanders.add(axis.commander)
-            axis.commander.state_changed.connect(self._on_state_changed)
+        if self._followed.get(name) is not axis:
+            self._followed[name] = axis
+            self._relay.follow(axis.subscribe)
         view.show_state(axis.details)
 
     def _on_state_changed(self, state: PositionerState) -> None:

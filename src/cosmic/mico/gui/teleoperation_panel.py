@@ -162,7 +162,7 @@ class TeleoperationPanel(QWidget):
         self.setObjectName("TeleoperationPanel")
         self._teleoperation = mico.teleoperation
         self._app = qt_application()
-        settings = mico.application.manager.settings
+        settings = mico.settings
         self.devices = named(QComboBox(), "teleoperationDevice")
         self.profiles = named(QComboBox(), "teleoperationProfile")
         self.start = named(push_button("Start", ""), "teleoperationStart")

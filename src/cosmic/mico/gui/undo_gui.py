@@ -44,7 +44,14 @@ class UndoGui(QObject):
         self._relay = Relay(self._on_ended, queued=True)
         shortcut = QShortcut(QKeySequence(UNDO_KEY), parent)
         shortcut.activated.connect(self.undo)
-        mico.application.undo.changed.connect(self.show_available)
+        self._entries: tuple[UndoEntry, ...] = ()
+        self._changes = Relay(self._on_change).follow(mico.on_change)
+
+    def _on_change(self) -> None:
+        entries = self._mico.undo_entries
+        if entries != self._entries:
+            self._entries = entries
+            self.show_available()
 
     def show_available(self) -> None:
         """Say what would be taken back now."""
@@ -65,7 +72,7 @@ class UndoGui(QObject):
             self._question.raise_()
             return
         try:
-            entry = self._mico.application.undo.newest()
+            entry = self._mico.undo_entry()
         except CosmicError as exc:
             self.said.emit(f"Undo: {exc}", State.REFUSED)
             return
@@ -77,7 +84,7 @@ class UndoGui(QObject):
             self._go(entry, confirm=False)
 
     def _ask(self, entry: UndoEntry, doubts: tuple[str, ...]) -> None:
-        where = undo_text(entry, self._mico.application.manager.states())
+        where = undo_text(entry, self._mico.states())
         question = CautionDialog(
             "Undo",
             f"Undo moves {where}.",
@@ -96,10 +103,10 @@ class UndoGui(QObject):
             self.planned.emit(None)
 
     def _go(self, entry: UndoEntry, *, confirm: bool) -> None:
-        states = self._mico.application.manager.states()
+        states = self._mico.states()
         where = undo_text(entry, states)
         try:
-            if self._mico.application.undo.newest() != entry:
+            if self._mico.undo_entry() != entry:
                 raise NotAvailable("something moved meanwhile; look again where it leads")
             movement = self._mico.undo(entry.group, wait=False, confirm=confirm)
         except CosmicError as exc:
@@ -110,12 +117,12 @@ class UndoGui(QObject):
         movement.add_callback(self._relay)
 
     def _poses(self, entry: UndoEntry) -> list[dict[str, float]]:
-        states = self._mico.application.manager.states().values()
+        states = self._mico.states().values()
         now = {each.name: each.position for each in states if each.position is not None}
         return [now, {**now, **entry.before}]
 
     def _what(self, entry: UndoEntry) -> str:
-        where = undo_text(entry, self._mico.application.manager.states())
+        where = undo_text(entry, self._mico.states())
         return f"move {where} ({entry.group})"
 
     def _on_ended(self, movement: GroupMovement) -> None:
