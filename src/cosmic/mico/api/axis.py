@@ -30,7 +30,15 @@ from cosmic.frame.threads import may_wait_here
 from cosmic.frame.units import AxisUnit
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.api.axis_shape import AxisMovable, AxisShape, PlanAxis
-from cosmic.mico.api.entry import Number, as_number, as_whole, finite, one_line, source_of
+from cosmic.mico.api.entry import (
+    Number,
+    as_number,
+    as_whole,
+    caller_token,
+    finite,
+    one_line,
+    source_of,
+)
 from cosmic.mico.api.group import GroupMovement
 from cosmic.mico.api.news import SentMotion
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
@@ -141,13 +149,13 @@ class OrderBook:
     def keep(self, key: str, order: Order | Movement) -> None:
         """Remember an order under the key that its caller gave it."""
         with self._lock:
-            self._orders[_token(), key] = order
+            self._orders[caller_token(), key] = order
             while len(self._orders) > _KEPT:
                 self._orders.popitem(last=False)
 
     def jog(self, key: str) -> Order | None:
         """Return a jog; None where it was forgotten, or never came."""
-        found = self._orders.get((_token(), key))
+        found = self._orders.get((caller_token(), key))
         return found if isinstance(found, Order) else None
 
     def movement(self, key: str) -> Movement:
@@ -158,15 +166,10 @@ class OrderBook:
         MoveCancelled
             It was forgotten long ago: something else came since.
         """
-        found = self._orders.get((_token(), key))
+        found = self._orders.get((caller_token(), key))
         if found is None:
             raise MoveCancelled("a newer command came first")
         return found.movement if isinstance(found, Order) else found
-
-
-def _token() -> str:
-    call = current_call()
-    return "" if call is None else call.caller.token
 
 
 def _unforeseen(_motions: Mapping[str, Motion], _consent: bool) -> MoveVerdict:

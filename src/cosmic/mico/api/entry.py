@@ -33,6 +33,12 @@ def source_of(source: str) -> str:
     return source if call is None else f"{call.caller.name} {one_line(source)}".strip()
 
 
+def caller_token() -> str:
+    """Return the token of the client whose call this thread carries out; empty for none."""
+    call = current_call()
+    return "" if call is None else call.caller.token
+
+
 def as_number(value: object, unit: str, axis: str) -> float:
     """Return `value` in `unit`.
 

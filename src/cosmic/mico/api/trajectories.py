@@ -17,7 +17,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.transfer import transferable
 from cosmic.frame.operation import Operation, Progress
 from cosmic.frame.weakly import weakly
-from cosmic.mico.api.entry import source_of
+from cosmic.mico.api.entry import caller_token, source_of
 from cosmic.mico.api.trajectory_player import SPEEDS, Players, TrajectoryPlayer, text_of
 from cosmic.mico.api.trajectory_recording import Recordings, TrajectoryRecording
 from cosmic.mico.api.trajectory_site import TrajectorySite
@@ -84,7 +84,7 @@ class Trajectories(Declared):
         self._site = site
         self._players = players
         self._lock = Lock()
-        self._texts: OrderedDict[str, str] = OrderedDict()
+        self._texts: OrderedDict[tuple[str, str], str] = OrderedDict()
         players.changed.subscribe(weakly(self.note_change))
 
     @override
@@ -279,12 +279,13 @@ class Trajectories(Declared):
         NotAvailable
             It is longer than any file may be.
         """
+        whose = caller_token(), key
         with self._lock:
-            whole = self._texts.get(key, "") + text
+            whole = self._texts.get(whose, "") + text
             if len(whole) > parser.LARGEST_BYTES:
-                del self._texts[key]
+                self._texts.pop(whose, None)
                 raise NotAvailable("the trajectory is longer than any file may be; split it")
-            self._texts[key] = whole
+            self._texts[whose] = whole
             while len(self._texts) > _MOST_TEXTS:
                 self._texts.popitem(last=False)
 
@@ -297,7 +298,7 @@ class Trajectories(Declared):
 
     def _read(self, given: str, path: Path | None) -> Trajectory:
         with self._lock:
-            text = self._texts.pop(given, None)
+            text = self._texts.pop((caller_token(), given), None)
         if text is None:
             raise NotAvailable("the text of the trajectory did not come; try again")
         return parser.parse(text, path=path, cut_off=True)
