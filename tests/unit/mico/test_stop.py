@@ -83,8 +83,8 @@ def test_a_stop_between_grant_and_start_still_counts():
         orders = {}
         real = manager.gate.decide
 
-        def decide(requests):
-            answer = real(requests)
+        def decide(requests, **options):
+            answer = real(requests, **options)
             manager.stop("in between")
             manager.reset_stop()
             return answer
