@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from contract.fake_scu3d import LINEAR_TYPE, NO_TYPE, ROTARY_TYPE, FakeScu3d
+from contract.fake_scu_serial import FakeScuLines
 from contract.fake_smaractctl import FakeSmaractctl
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.units import AxisUnit
@@ -16,7 +17,9 @@ from cosmic.mico.hw.interface import (
     PositionRead,
 )
 from cosmic.mico.hw.scu3d import Scu3dController
+from cosmic.mico.hw.scu_serial import ScuSerialController
 from cosmic.mico.hw.sim_scu3d import load_simulated_library
+from cosmic.mico.hw.sim_scu_serial import SimulatedScus
 from cosmic.mico.hw.sim_smaractctl import load_simulated_library as load_simulated_smaractctl
 from cosmic.mico.hw.smaractctl import SmaractCtlController
 
@@ -79,6 +82,15 @@ def over_fake() -> Controller:
 def simulated_mcs2() -> Controller:
     library = load_simulated_smaractctl(clock=ManualClock(auto_advance=True))
     return SmaractCtlController(library, simulated=True)
+
+
+def simulated_serial() -> Controller:
+    scus = SimulatedScus(clock=ManualClock(auto_advance=True))
+    return ScuSerialController("0123", scus.open_port, keep_alive_s=0.0, simulated=True)
+
+
+def serial_over_fake() -> Controller:
+    return ScuSerialController("0123", FakeScuLines().open_port, answer_s=0.2)
 
 
 def mcs2_over_fake() -> Controller:

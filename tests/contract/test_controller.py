@@ -6,7 +6,15 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from contract.controller_rig import Rig, mcs2_over_fake, over_fake, simulated, simulated_mcs2
+from contract.controller_rig import (
+    Rig,
+    mcs2_over_fake,
+    over_fake,
+    serial_over_fake,
+    simulated,
+    simulated_mcs2,
+    simulated_serial,
+)
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
 from cosmic.frame.units import AxisUnit
 from cosmic.mico.hw.interface import (
@@ -32,8 +40,15 @@ FOR_EVER = math.inf
 
 
 @pytest.fixture(
-    params=[simulated, over_fake, simulated_mcs2, mcs2_over_fake],
-    ids=["simulated", "fake", "simulated_mcs2", "fake_mcs2"],
+    params=[
+        simulated,
+        over_fake,
+        simulated_mcs2,
+        mcs2_over_fake,
+        simulated_serial,
+        serial_over_fake,
+    ],
+    ids=["simulated", "fake", "simulated_mcs2", "fake_mcs2", "simulated_serial", "fake_serial"],
 )
 def controller(request: pytest.FixtureRequest) -> Iterator[Controller]:
     make: Callable[[], Controller] = request.param
@@ -112,7 +127,7 @@ def test_commands_and_waiting_need_an_open_controller(controller: Controller) ->
 
 
 def test_the_name_says_what_drives_it(controller: Controller) -> None:
-    assert re.match(r"(SCU3DControl|SmarActCTL) \d+\.\d+\.\d+", controller.name)
+    assert re.match(r"(SCU3DControl|SmarActCTL) \d+\.\d+\.\d+|SCU over RS-232", controller.name)
     assert ("simulated" in controller.name) == controller.simulated
 
 
@@ -310,7 +325,7 @@ def test_a_hold_time_that_would_not_be_kept_is_refused(rig: Rig, hold_s: float) 
         assert caught.value.fault is DeviceFault.PARAMETER
 
 
-@pytest.mark.parametrize("make", [simulated, over_fake])
+@pytest.mark.parametrize("make", [simulated, over_fake, simulated_serial, serial_over_fake])
 @pytest.mark.parametrize("hold_s", [59.9996, 60.0])
 def test_an_scu_refuses_a_hold_time_that_it_would_take_for_endless(
     make: Callable[[], Controller], hold_s: float

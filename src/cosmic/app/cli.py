@@ -74,6 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     commands.add_parser("daqco", help="the window of DAQCo alone", parents=[window])
     commands.add_parser("vico", help="the window of ViCo alone", parents=[window])
     _add_file_commands(commands)
+    _add_simulate(commands)
     _add_station_commands(commands, platform)
     _add_procedure_commands(commands, platform)
     return parser
@@ -111,6 +112,40 @@ def _add_file_commands(
     repair = commands.add_parser("repair", help="close recordings that a killed process left open")
     repair.add_argument("recordings", type=Path, nargs="+", metavar="FILE")
     repair.add_argument("--ended", action="store_true", help="no program writes them any more")
+
+
+def _add_simulate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    simulate = commands.add_parser(
+        "simulate", help="a simulated device that programs of other people can talk to"
+    )
+    kinds = simulate.add_subparsers(dest="device", metavar="DEVICE", required=True)
+    scu = kinds.add_parser("scu-serial", help="SCUs with RS-232 firmware and their ASCII protocol")
+    scu.add_argument(
+        "--link",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="PATH",
+        help="make a pseudo terminal and link it here (Linux, macOS); once for each unit",
+    )
+    scu.add_argument(
+        "--port",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="speak at a serial port, such as COM5, joined to another one; once for each unit",
+    )
+    scu.add_argument(
+        "--layout",
+        default="",
+        metavar="LETTERS",
+        help='three letters a unit, such as "LLL,RNN": L linear, R rotary, N no sensor',
+    )
+    scu.add_argument("--rate", type=float, default=1.0, help="simulated seconds a second")
+    scu.add_argument("--seed", type=int, default=0, help="seed of the simulation")
+    scu.add_argument("--baud", type=int, default=9600, help="speed of the line")
+    scu.add_argument("--cold", action="store_true", help="just switched on: nothing is referenced")
+    scu.add_argument("--seconds", type=float, default=None, help="end after so long")
 
 
 def _add_station_commands(
