@@ -62,10 +62,10 @@ class Contacts:
         self._read(folder / settings.geometry.urdf)
         self._low = np.array([each.min(axis=0) for each in self._corners])
         self._high = np.array([each.max(axis=0) for each in self._corners])
-        self._stages = sorted({name for slide in self._slides for name, _ in slide.ways})
+        self._stages = sorted({name for slide in self._slides for name, _ in slide.directions})
         self._origins = np.array([slide.origin for slide in self._slides])
         self._ways = np.array([self._way(slide) for slide in self._slides])
-        self._moving = [n for n, slide in enumerate(self._slides) if slide.ways]
+        self._moving = [n for n, slide in enumerate(self._slides) if slide.directions]
         self._of_tool: dict[str, list[int]] = {}
         for number in self._moving:
             self._of_tool.setdefault(self._links[number].partition("_")[0], []).append(number)
@@ -155,8 +155,8 @@ class Contacts:
         return pairs[:, 0], pairs[:, 1]
 
     def _apart(self, one: int, two: int) -> bool:
-        ways = [{stage for stage, _ in self._slides[each].ways} for each in (one, two)]
-        if not (ways[0] or ways[1]):
+        directions = [{stage for stage, _ in self._slides[each].directions} for each in (one, two)]
+        if not (directions[0] or directions[1]):
             return False
         names = [self._links[each].partition("_")[0] for each in (one, two)]
         if names[0] == names[1]:
@@ -166,10 +166,10 @@ class Contacts:
 
     def _way(self, slide: Slide) -> Floats:
         """Return how a body goes with each stage, shape (3, stages)."""
-        way = np.zeros((3, len(self._stages)))
-        for name, each in slide.ways:
-            way[:, self._stages.index(name)] += each
-        return way
+        direction = np.zeros((3, len(self._stages)))
+        for name, each in slide.directions:
+            direction[:, self._stages.index(name)] += each
+        return direction
 
     # ------------------------------------------------------------------ depth
 
@@ -201,8 +201,8 @@ class Contacts:
             # Imported here: it takes time, and only who scores a run needs it.
             from scipy.spatial import ConvexHull
 
-            ways = self._corners[one][:, None, :] - self._corners[two][None, :, :]
-            faces = np.unique(ConvexHull(ways.reshape(-1, 3)).equations.round(9), axis=0)
+            directions = self._corners[one][:, None, :] - self._corners[two][None, :, :]
+            faces = np.unique(ConvexHull(directions.reshape(-1, 3)).equations.round(9), axis=0)
             self._faces[one, two] = faces[:, :3], -faces[:, 3]
         return self._faces[one, two]
 

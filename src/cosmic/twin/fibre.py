@@ -197,8 +197,8 @@ class Fibre:
         excess = self.tension_un(distance_um) - self._contact.grip_limit_un
         if excess > 0.0:
             first, second = self.holds.values()
-            way = excess * self._axial_um_un(distance_um)
-            second.at_um += math.copysign(way, second.at_um - first.at_um)
+            shift = excess * self._axial_um_un(distance_um)
+            second.at_um += math.copysign(shift, second.at_um - first.at_um)
 
     def _axial_um_un(self, distance_um: float) -> float:
         ea_un = self.settings.ea_n * UN_PER_N

@@ -56,12 +56,12 @@ class Joint:
         """Return where the child is, shape (4, 4), um, with the stages at `values`."""
         if self.drive is None:
             return self.offset
-        way = self.drive.factor * values[self.drive.stage]
+        travel = self.drive.factor * values[self.drive.stage]
         motion = np.eye(4)
         if self.kind == "prismatic":
-            motion[:3, 3] = way * self.axis
+            motion[:3, 3] = travel * self.axis
         else:
-            motion[:3, :3] = _turn(self.axis, math.radians(way))
+            motion[:3, :3] = _turn(self.axis, math.radians(travel))
         return np.asarray(self.offset @ motion)
 
 
@@ -70,14 +70,14 @@ class Slide:
     """A point that linear stages carry about: `origin` and a vector for each unit of each stage."""
 
     origin: Point
-    ways: tuple[tuple[str, Point], ...]
+    directions: tuple[tuple[str, Point], ...]
 
     def at(self, values: Mapping[str, float]) -> Point:
         """Return where the point is in the world, um, with the stages at `values`."""
         x, y, z = self.origin
-        for stage, (dx, dy, dz) in self.ways:
-            way = values[stage]
-            x, y, z = x + way * dx, y + way * dy, z + way * dz
+        for stage, (dx, dy, dz) in self.directions:
+            value = values[stage]
+            x, y, z = x + value * dx, y + value * dy, z + value * dz
         return x, y, z
 
 
@@ -134,16 +134,16 @@ class Skeleton:
             A stage turns the link; only what slides can be a tool here.
         """
         pose = np.eye(4)
-        ways: list[tuple[str, Point]] = []
+        directions: list[tuple[str, Point]] = []
         for joint in self._chain(link):
             pose = pose @ joint.offset
             if joint.drive is None:
                 continue
             if joint.kind != "prismatic":
                 raise ConfigError(f"{self._path}: joint {joint.name} turns {link}, a tool")
-            way = joint.drive.factor * (pose[:3, :3] @ joint.axis)
-            ways.append((joint.drive.stage, _point(way)))
-        return Slide(_point(pose @ np.array([*point_um, 1.0])), tuple(ways))
+            carried = joint.drive.factor * (pose[:3, :3] @ joint.axis)
+            directions.append((joint.drive.stage, _point(carried)))
+        return Slide(_point(pose @ np.array([*point_um, 1.0])), tuple(directions))
 
     def turn(self, link: str) -> Floats:
         """Return how a sliding link is turned in the world, shape (3, 3)."""

@@ -50,8 +50,8 @@ class LastingFaults:
             self._lose_steps(fault, begins=begins)
         elif fault.name == "zoom_lost_steps":
             if begins:
-                way = LOST_COUNTS if fault.amount is None else fault.amount
-                self._lens.turn_by_hand("zoom", -way, self._clock.now_s())
+                travel = LOST_COUNTS if fault.amount is None else fault.amount
+                self._lens.turn_by_hand("zoom", -travel, self._clock.now_s())
         else:
             self._disturb(fault, begins=begins)
 

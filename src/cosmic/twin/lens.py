@@ -71,12 +71,12 @@ class TwinLens:
     def seek(self, axis: LensAxisName, target_counts: int, now_s: float) -> None:
         """Go to a count; on the way back beyond it first, so that the play lies on one side."""
         motor = self._motors[axis]
-        way = target_counts - motor.leg(now_s).counter_at(now_s)
+        distance = target_counts - motor.leg(now_s).counter_at(now_s)
         play = float(motor.settings.backlash_counts)
-        if way < 0.0 < play:
-            motor.begin(now_s, ((LensPhase.SEEK, way - play), (LensPhase.BACKLASH, play)))
-        elif way != 0.0:
-            motor.begin(now_s, ((LensPhase.SEEK, way),))
+        if distance < 0.0 < play:
+            motor.begin(now_s, ((LensPhase.SEEK, distance - play), (LensPhase.BACKLASH, play)))
+        elif distance != 0.0:
+            motor.begin(now_s, ((LensPhase.SEEK, distance),))
 
     def home(self, axis: LensAxisName, now_s: float) -> None:
         """Run against the near stop, further than the travel is long, and count from there."""
@@ -90,8 +90,8 @@ class TwinLens:
     def limit(self, axis: LensAxisName, now_s: float) -> None:
         """Go to the far limit as the controller counts it."""
         motor = self._motors[axis]
-        way = motor.settings.limit_counts - motor.leg(now_s).counter_at(now_s)
-        motor.begin(now_s, ((LensPhase.TO_LIMIT, way),))
+        distance = motor.settings.limit_counts - motor.leg(now_s).counter_at(now_s)
+        motor.begin(now_s, ((LensPhase.TO_LIMIT, distance),))
 
     def abort(self, axis: LensAxisName, now_s: float) -> None:
         """Slow down and stand."""
@@ -103,6 +103,6 @@ class TwinLens:
             raise ValueError(f"a part of the steps lies between 0 and 1, got {share!r}")
         self._motors[axis].lost_share = share
 
-    def turn_by_hand(self, axis: LensAxisName, way_counts: float, now_s: float) -> None:
+    def turn_by_hand(self, axis: LensAxisName, travel_counts: float, now_s: float) -> None:
         """Turn the ring; the controller does not notice."""
-        self._motors[axis].turn(now_s, way_counts)
+        self._motors[axis].turn(now_s, travel_counts)

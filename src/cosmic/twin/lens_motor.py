@@ -26,20 +26,20 @@ class Ramp:
         return sum(duration_s for duration_s, _, _ in self.stretches)
 
     @property
-    def way_counts(self) -> float:
+    def travel_counts(self) -> float:
         """How far it leads."""
         return sum(duration_s * (v0 + v1) / 2.0 for duration_s, v0, v1 in self.stretches)
 
     def gone(self, time_s: float) -> float:
         """Return the way gone `time_s` after the beginning, counts."""
-        way = 0.0
+        distance = 0.0
         for duration_s, v0, v1 in self.stretches:
             if time_s < duration_s:
                 part_s = max(time_s, 0.0)
-                return way + part_s * (v0 + (v1 - v0) * part_s / duration_s / 2.0)
-            way += duration_s * (v0 + v1) / 2.0
+                return distance + part_s * (v0 + (v1 - v0) * part_s / duration_s / 2.0)
+            distance += duration_s * (v0 + v1) / 2.0
             time_s -= duration_s
-        return way
+        return distance
 
     def speed(self, time_s: float) -> tuple[float, bool]:
         """Return the speed at `time_s`, counts per second, and whether it is falling."""
@@ -50,15 +50,15 @@ class Ramp:
         return 0.0, False
 
 
-def ramp_over(way_counts: float, motor: LensMotorSettings) -> Ramp:
-    """Return the ramp that leads `way_counts` far, which is not negative."""
-    if way_counts <= 0.0:
+def ramp_over(travel_counts: float, motor: LensMotorSettings) -> Ramp:
+    """Return the ramp that leads `travel_counts` far, which is not negative."""
+    if travel_counts <= 0.0:
         return Ramp()
     slow, fast = motor.initial_speed_counts_s, motor.top_speed_counts_s
     rate = motor.acceleration_counts_s2
-    peak = min(fast, math.sqrt(slow * slow + rate * way_counts))
+    peak = min(fast, math.sqrt(slow * slow + rate * travel_counts))
     rise_s = (peak - slow) / rate
-    cruise_s = max(way_counts - rise_s * (slow + peak), 0.0) / peak
+    cruise_s = max(travel_counts - rise_s * (slow + peak), 0.0) / peak
     return Ramp(((rise_s, slow, peak), (cruise_s, peak, peak), (rise_s, peak, slow)))
 
 
@@ -171,12 +171,12 @@ class LensMotor:
                 return leg
         return self._legs[0]
 
-    def begin(self, time_s: float, ways: tuple[tuple[LensPhase, float], ...]) -> None:
+    def begin(self, time_s: float, distances: tuple[tuple[LensPhase, float], ...]) -> None:
         """Go signed ways one after the other from `time_s` on; what was planned is dropped."""
         leg = self._standing(time_s)
         legs = []
-        for phase, way in ways:
-            leg = self._next(leg, phase, way)
+        for phase, distance in distances:
+            leg = self._next(leg, phase, distance)
             legs.append(leg)
         self._follow(time_s, *legs, self._rest(leg))
 
@@ -202,11 +202,11 @@ class LensMotor:
         )
         self._follow(time_s, down, self._rest(down))
 
-    def turn(self, time_s: float, way: float) -> None:
+    def turn(self, time_s: float, distance: float) -> None:
         """Turn the lens by hand; the controller does not notice."""
         leg = self._standing(time_s)
         low, high = leg.travel
-        lens = min(max(leg.lens + way, low), high)
+        lens = min(max(leg.lens + distance, low), high)
         self._follow(time_s, replace(leg, lens=lens, motor=leg.motor + lens - leg.lens))
 
     def _standing(self, time_s: float) -> Leg:
@@ -221,10 +221,10 @@ class LensMotor:
             lens=leg.lens_at(time_s),
         )
 
-    def _next(self, before: Leg, phase: LensPhase, way: float) -> Leg:
+    def _next(self, before: Leg, phase: LensPhase, distance: float) -> Leg:
         leg = self._rest(before)
-        direction = 1 if way >= 0.0 else -1
-        ramp = ramp_over(abs(way), self.settings)
+        direction = 1 if distance >= 0.0 else -1
+        ramp = ramp_over(abs(distance), self.settings)
         return replace(
             leg, phase=phase, direction=direction, ramp=ramp, share=1.0 - self.lost_share
         )

@@ -41,13 +41,13 @@ class ToolOffsets:
             chance = random.Random(f"tool {name} {seed}")
             sigma = handling.tool_offset_um
             mounted = tuple(chance.gauss(0.0, sigma) for _ in range(3))
-            way = tuple(chance.gauss(0.0, 1.0) for _ in range(3))
-            size = handling.drift_um / max(math.hypot(*way), 1e-9)
+            direction = tuple(chance.gauss(0.0, 1.0) for _ in range(3))
+            size = handling.drift_um / max(math.hypot(*direction), 1e-9)
             period_s = handling.drift_period_s * chance.uniform(0.8, 1.25)
             phase = chance.uniform(0.0, 2.0 * math.pi)
             if wander:
                 self._mounted[name] = mounted[0], mounted[1], mounted[2]
-                amplitude = way[0] * size, way[1] * size, way[2] * size
+                amplitude = direction[0] * size, direction[1] * size, direction[2] * size
                 self._drift[name] = amplitude, 2.0 * math.pi / period_s, phase
         self.tools = tuple(tools)
 
@@ -72,10 +72,10 @@ class ToolOffsets:
         drift = self._drift.get(tool)
         if drift is None:
             return x + bent[0], y + bent[1], z + bent[2]
-        way, rate, phase = drift
+        direction, rate, phase = drift
         part = math.sin(rate * time_s + phase) - math.sin(phase)
         return (
-            x + bent[0] + part * way[0],
-            y + bent[1] + part * way[1],
-            z + bent[2] + part * way[2],
+            x + bent[0] + part * direction[0],
+            y + bent[1] + part * direction[1],
+            z + bent[2] + part * direction[2],
         )

@@ -36,36 +36,36 @@ class PushCurve:
 
     Attributes
     ----------
-    ways_um : list of float
+    travels_um : list of float
         How far the probe's holder went since contact; rises from 0.
     forces_un : list of float
     reach_um : float
         Way at which the fibre slides off, or the end of what is laid out.
     """
 
-    __slots__ = ("forces_un", "reach_um", "ways_um")
+    __slots__ = ("forces_un", "reach_um", "travels_um")
 
     def __init__(self, deflections_um: Floats, forces_un: Floats, sensor_un_um: float) -> None:
-        ways = deflections_um + forces_un / sensor_un_um
-        rises = ways[1:] > np.maximum.accumulate(ways)[:-1]
+        travels = deflections_um + forces_un / sensor_un_um
+        rises = travels[1:] > np.maximum.accumulate(travels)[:-1]
         if not rises.all():
             kept = np.concatenate([[True], rises])
-            ways, forces_un = ways[kept], forces_un[kept]
-        self.ways_um: list[float] = ways.tolist()
+            travels, forces_un = travels[kept], forces_un[kept]
+        self.travels_um: list[float] = travels.tolist()
         self.forces_un: list[float] = forces_un.tolist()
-        self.reach_um: float = self.ways_um[-1]
+        self.reach_um: float = self.travels_um[-1]
 
-    def force_un(self, way_um: float) -> float:
-        """Return the force at a way; the same with the opposite sign on the other side."""
-        ways, forces, way = self.ways_um, self.forces_un, abs(way_um)
-        if way >= self.reach_um:
+    def force_un(self, travel_um: float) -> float:
+        """Return the force after a travel; the same with the opposite sign on the other side."""
+        travels, forces, pushed_um = self.travels_um, self.forces_un, abs(travel_um)
+        if pushed_um >= self.reach_um:
             force = forces[-1]
         else:
-            # A curve is used for few ways, one after another: no array is worth its call.
-            after = bisect_right(ways, way)
-            part = (way - ways[after - 1]) / (ways[after] - ways[after - 1])
+            # A curve is used for few points, one after another: no array is worth its call.
+            after = bisect_right(travels, pushed_um)
+            part = (pushed_um - travels[after - 1]) / (travels[after] - travels[after - 1])
             force = forces[after - 1] + part * (forces[after] - forces[after - 1])
-        return force if way_um >= 0.0 else -force
+        return force if travel_um >= 0.0 else -force
 
 
 @lru_cache(maxsize=128)

@@ -66,8 +66,8 @@ class Path:
         if time_s < times_s[0]:
             return 0.0, times_s[0]
         after = next(index for index, knot_s in enumerate(times_s) if time_s < knot_s)
-        way = abs(positions[after] - positions[after - 1])
-        return way / (times_s[after] - times_s[after - 1]), times_s[after]
+        distance = abs(positions[after] - positions[after - 1])
+        return distance / (times_s[after] - times_s[after - 1]), times_s[after]
 
     def cut(self, time_s: float, *, end_s: float, end: float) -> "Path":
         """Return this path up to `time_s` and from there straight to `end` at `end_s`."""
@@ -267,11 +267,13 @@ class Route:
         """Go towards `target` at `speed` per second; False when a wall ended the leg."""
         low, high = self._stage.bounds
         end = min(max(target, low), high)
-        way = abs(end - self.position)
-        if way > 0.0:
+        distance = abs(end - self.position)
+        if distance > 0.0:
             # No speed means never: the amplitude is too small for any step.
-            duration_s = min(way / speed, ENDLESS_S) if speed > 0.0 else ENDLESS_S
-            end = self.position + math.copysign(min(way, speed * duration_s), end - self.position)
+            duration_s = min(distance / speed, ENDLESS_S) if speed > 0.0 else ENDLESS_S
+            end = self.position + math.copysign(
+                min(distance, speed * duration_s), end - self.position
+            )
             self._add(self.end_s + duration_s, end)
         return low <= target <= high
 

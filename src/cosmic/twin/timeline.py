@@ -21,7 +21,7 @@ KEPT: Final = 20_000
 MOST_LOOKS: Final = 20_000
 """Looks for one question; after a longer journey unseen the rest lie further apart."""
 
-LONGEST_WAY: Final = 0.25
+LONGEST_TRAVEL: Final = 0.25
 """A slow stage goes so far between two looks, um or degrees; a fast one as far as it must."""
 
 SLACK_PART: Final = 0.25
@@ -213,13 +213,13 @@ class Timeline:
         until_s = now_s + LONGEST_REST_S
         at_rest = True
         felt, grippers = self._felt, self._workspace.gripper_stages
-        way = max(LONGEST_WAY, SLACK_PART * felt.slack_um)
-        gap = max(LONGEST_WAY, SLACK_PART * min(felt.slack_um, felt.gap_um))
+        travel = max(LONGEST_TRAVEL, SLACK_PART * felt.slack_um)
+        gap = max(LONGEST_TRAVEL, SLACK_PART * min(felt.slack_um, felt.gap_um))
         for track in self._tracks:
             speed, end_s = track.leg(now_s)
             if speed > 0.0:
                 at_rest = False
-                longest = gap if track.stage.name in grippers else way
+                longest = gap if track.stage.name in grippers else travel
                 end_s = min(end_s, now_s + longest / speed)
             until_s = min(until_s, end_s)
         return until_s, at_rest

@@ -74,11 +74,11 @@ def added(point: Point, offset: Point) -> Point:
 
 def _halfway(first: Slide, second: Slide, higher_um: float) -> Slide:
     """Return the point between two, and higher; what the jaws do alike remains of their ways."""
-    ways: dict[str, Floats] = {}
-    for stage, way in (*first.ways, *second.ways):
-        ways[stage] = ways.get(stage, np.zeros(3)) + 0.5 * np.array(way)
+    directions: dict[str, Floats] = {}
+    for stage, share in (*first.directions, *second.directions):
+        directions[stage] = directions.get(stage, np.zeros(3)) + 0.5 * np.array(share)
     x, y, z = 0.5 * (np.array(first.origin) + np.array(second.origin))
-    kept = {stage: way for stage, way in ways.items() if np.abs(way).max() > 1e-12}
+    kept = {stage: share for stage, share in directions.items() if np.abs(share).max() > 1e-12}
     return Slide(
         (float(x), float(y), float(z) + higher_um),
         tuple((stage, (float(w[0]), float(w[1]), float(w[2]))) for stage, w in kept.items()),

@@ -20,23 +20,23 @@ class Touch:
 
     pressed: bool = False
     _reach: float | None = None
-    _way: float = 0.0
+    _travel: float = 0.0
 
-    def look(self, reach_um: float, way_um: float) -> bool:
+    def look(self, reach_um: float, travel_um: float) -> bool:
         """Take note of where the probe is now, and return whether they touch.
 
         Parameters
         ----------
         reach_um : float
             How far inside the body's reach the probe is, in x and z; negative: outside.
-        way_um : float
+        travel_um : float
             How far the probe's tip is past the body's face; negative: in front of it.
         """
-        before, way_before = self._reach, self._way
-        self._reach, self._way = reach_um, way_um
+        before, way_before = self._reach, self._travel
+        self._reach, self._travel = reach_um, travel_um
         if reach_um <= 0.0:
             self.pressed = False
-        elif not self.pressed and way_um > 0.0:
+        elif not self.pressed and travel_um > 0.0:
             self.pressed = before is not None and self._came_from_front(before, way_before)
         return self.pressed
 
@@ -51,5 +51,5 @@ class Touch:
             return True
         # Both crossed between two looks: which first?
         into_reach = -before / (self._reach - before)
-        past_face = -way_before / (self._way - way_before)
+        past_face = -way_before / (self._travel - way_before)
         return into_reach <= past_face

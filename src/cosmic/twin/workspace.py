@@ -251,19 +251,19 @@ class Workspace:
         line = fibre.line(tools)
         touch = self._touches.setdefault(fibre.number, Touch())
         along = line.abscissa_um(probe[0])
-        way = line.y_um(along) + fibre.settings.width_um / 2.0 - probe[1]
+        travel = line.y_um(along) + fibre.settings.width_um / 2.0 - probe[1]
         reach = self._reach(fibre, line, along, probe[2])
-        if not touch.look(reach, way):
-            self._nothing_before(max(-reach, -way))
+        if not touch.look(reach, travel):
+            self._nothing_before(max(-reach, -travel))
             return None
         self._slack_um = 0.0
         edge = self._geometry.probe_edge_radius_um
-        curve = fibre.push(line, along, way, edge_um=edge, sensor=self._sensor)
-        force = curve.force_un(way)
-        if way > curve.reach_um or force < -self._contact.pull_off_un:
+        curve = fibre.push(line, along, travel, edge_um=edge, sensor=self._sensor)
+        force = curve.force_un(travel)
+        if travel > curve.reach_um or force < -self._contact.pull_off_un:
             touch.lose()
             return None
-        deflection = way - force / self._sensor
+        deflection = travel - force / self._sensor
         if line.free is not None and not self._bears(fibre, along, force, around):
             touch.lose()
             return None
@@ -313,16 +313,16 @@ class Workspace:
             geometry.jaw_height_um + half - above,
         )
         face = tool.hold[1] + tool.gap_um / 2.0 + geometry.jaw_thickness_um
-        way = face - probe[1]
+        travel = face - probe[1]
         touch = self._jaw_touches[name]
-        if not touch.look(reach, way):
-            self._nothing_before(max(-reach, -way))
+        if not touch.look(reach, travel):
+            self._nothing_before(max(-reach, -travel))
             return NOTHING
         self._slack_um = 0.0
-        if way < 0.0:
+        if travel < 0.0:
             touch.lose()
             return NOTHING
-        return self._sensor * way
+        return self._sensor * travel
 
 
 def _named(what: int | str) -> dict[str, int | str]:

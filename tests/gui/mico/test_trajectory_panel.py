@@ -142,7 +142,7 @@ def test_away_from_the_start_it_asks_and_goes_there(
     click(qtbot, panel, "runTrajectory")
     assert panel.question.isVisible()
     assert "left.y at" in panel.question.words.text()
-    assert panel.question.way.isVisible()
+    assert panel.question.around.isVisible()
     click(qtbot, panel, "goStraight")
     wait_for(panel, qtbot, PlayState.ENDED)
     assert at(panel, mico, "left.y") == pytest.approx(450.0, abs=1.0)

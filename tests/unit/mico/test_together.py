@@ -147,9 +147,9 @@ def test_what_remains_after_each_movement_does_not_add_up(ways):
     links.add("a", "b", 2.0)
     stands = {"a": 0.0, "b": 0.0}
     total = 0.0
-    for way, rest_a, rest_b in ways:
-        total += way
-        sent = links.expanded({"a": MoveBy(way, "um")}, stands, 2.0)
+    for distance, rest_a, rest_b in ways:
+        total += distance
+        sent = links.expanded({"a": MoveBy(distance, "um")}, stands, 2.0)
         targets = {name: motion.target for name, motion in sent.items()}
         links.sent(targets)
         stands = {"a": targets["a"] + rest_a, "b": targets["b"] + rest_b}
@@ -174,7 +174,7 @@ def test_an_axis_that_was_moved_otherwise_counts_from_where_it_stands():
         st.sampled_from("abcdef"),
         st.builds(
             Leg,
-            way=st.floats(0.0, 1e5),
+            distance=st.floats(0.0, 1e5),
             step=st.floats(0.01, 10.0),
             approach=st.floats(0.0, 50.0),
             top_hz=st.integers(1, 18500),
@@ -183,7 +183,7 @@ def test_an_axis_that_was_moved_otherwise_counts_from_where_it_stands():
 )
 def test_matched_speeds_are_within_what_was_set_and_end_together(legs):
     found = matched_frequencies(legs)
-    moving = {name: leg for name, leg in legs.items() if leg.way > 0.0}
+    moving = {name: leg for name, leg in legs.items() if leg.distance > 0.0}
     assert found.keys() == moving.keys()
     longest_s = max((leg.steps / leg.top_hz for leg in moving.values()), default=0.0)
     for name, hertz in found.items():

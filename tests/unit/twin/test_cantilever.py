@@ -139,7 +139,7 @@ def test_curves_are_finite_and_rise() -> None:
     for line in shapes:
         for span_um in (5.0, 30.0, 150.0, 399.9):
             curled = curve(span_um, line=line, depth_um=8.0, radius_um=25.0)
-            assert curled.ways_um[0] == curled.forces_un[0] == 0.0
+            assert curled.travels_um[0] == curled.forces_un[0] == 0.0
             assert np.isfinite(curled.forces_un).all()
-            assert (np.diff(curled.ways_um) > 0.0).all()
+            assert (np.diff(curled.travels_um) > 0.0).all()
             assert math.isfinite(curled.force_un(1e6))

@@ -23,7 +23,7 @@ def lens() -> TwinLens:
 @pytest.mark.parametrize("way", [1.0, 50.0, 1599.0, 12000.0])
 def test_a_ramp_leads_as_far_as_asked_and_never_beyond_its_speed(way: float) -> None:
     ramp = ramp_over(way, SETTINGS.zoom)
-    assert ramp.way_counts == pytest.approx(way)
+    assert ramp.travel_counts == pytest.approx(way)
     steps = [ramp.duration_s * part / 500 for part in range(501)]
     gone = [ramp.gone(each) for each in steps]
     assert gone == sorted(gone) and gone[-1] == pytest.approx(way)
@@ -35,7 +35,7 @@ def test_a_ramp_leads_as_far_as_asked_and_never_beyond_its_speed(way: float) -> 
 
 def test_no_travel_takes_no_time_and_slow_motors_stop_at_once() -> None:
     assert ramp_over(0.0, SETTINGS.zoom).duration_s == 0.0
-    assert ramp_down(100.0, SETTINGS.zoom).way_counts == 0.0
+    assert ramp_down(100.0, SETTINGS.zoom).travel_counts == 0.0
 
 
 def test_a_warm_lens_is_homed_at_the_lowest_zoom_and_focused_on_the_plate(lens: TwinLens) -> None:

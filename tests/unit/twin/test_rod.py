@@ -115,7 +115,7 @@ def test_curves_are_finite_and_rise() -> None:
     curves = [both_ends(), both_ends(slack_um=3.0), both_ends(slack_um=-2.0)]
     curves.append(both_ends(span_um=5.0))
     for curve in (*curves, both_ends(ei=0.01)):
-        assert curve.ways_um[0] == curve.forces_un[0] == 0.0
+        assert curve.travels_um[0] == curve.forces_un[0] == 0.0
         assert np.isfinite(curve.forces_un).all()
-        assert (np.diff(curve.ways_um) > 0.0).all()
+        assert (np.diff(curve.travels_um) > 0.0).all()
         assert math.isfinite(curve.force_un(1e6))

@@ -223,7 +223,7 @@ class PathController(QObject):
         self._relay = Relay(self._on_progressed, queued=True)
         self._application.way_found.connect(self._on_answer, queued)
         self._application.way_missing.connect(self._on_answer, queued)
-        panel.way_wanted.connect(self.plan)
+        panel.detour_wanted.connect(self.plan)
         scene.refused_gone.connect(self._on_refused_gone)
         preview.go_requested.connect(self.go)
         preview.cancel_requested.connect(self.cancel)

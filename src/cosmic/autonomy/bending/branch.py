@@ -136,10 +136,10 @@ def stuck(points: Points, drift_un_sqrt_s: float) -> Mask:
 def rough(points: Points, branch: Mask, baseline_un: Floats) -> Rough:
     """Return where a branch has its kink, trying each position."""
     order = np.argsort(points.way_um[branch], kind="stable")
-    way = points.way_um[branch][order]
+    travel = points.way_um[branch][order]
     force = (points.force_un - baseline_un)[branch][order]
-    positions = np.unique(np.concatenate([way, (way[1:] + way[:-1]) / 2.0]))[:-1]
-    ramp = np.maximum(way - positions[:, None], 0.0)
+    positions = np.unique(np.concatenate([travel, (travel[1:] + travel[:-1]) / 2.0]))[:-1]
+    ramp = np.maximum(travel - positions[:, None], 0.0)
     # Of the best line through zero at each position, what it leaves unexplained.
     k = (ramp @ force) / (ramp * ramp).sum(axis=1)
     left = ((force - k[:, None] * ramp) ** 2).sum(axis=1)
@@ -170,10 +170,10 @@ def touched(points: Points, drift_un_sqrt_s: float) -> bool:
     return bool(np.max(mean) > CLEAR_SIGMAS * noise)
 
 
-def rises(points: Points, way: Mask) -> bool:
+def rises(points: Points, travel: Mask) -> bool:
     """Return whether a few points of one way stand clear of the baseline."""
-    height = (points.force_un - free_force_un(points))[way]
-    return bool(np.sum(height > CLEAR_SIGMAS * points.std_un[way]) >= LEAST_CLEAR)
+    height = (points.force_un - free_force_un(points))[travel]
+    return bool(np.sum(height > CLEAR_SIGMAS * points.std_un[travel]) >= LEAST_CLEAR)
 
 
 def saturated(span: Span, range_un: float) -> bool:
@@ -186,10 +186,10 @@ def lost_while_pushing(points: Points) -> bool:
     """Return whether the force fell while the probe went on: fibre broken, or passed by."""
     out = points.loading
     height = (points.force_un - free_force_un(points))[out]
-    way, std = points.way_um[out], points.std_un[out]
-    if len(way) < 3:
+    travel, std = points.way_um[out], points.std_un[out]
+    if len(travel) < 3:
         return False
-    order = np.argsort(way, kind="stable")
+    order = np.argsort(travel, kind="stable")
     highest = np.maximum.accumulate(height[order])
     clear = highest > 2.0 * CLEAR_SIGMAS * std[order]
     return bool(np.any(clear & (height[order] < LOST_PART * highest)))
@@ -202,10 +202,10 @@ def back_and_forth_percent(points: Points, baseline_un: Floats) -> float:
     if out.sum() < 3 or back.sum() < 3:
         return math.nan
     order = np.argsort(points.way_um[back], kind="stable")
-    way, force = points.way_um[back][order], height[back][order]
+    travel, force = points.way_um[back][order], height[back][order]
     peak = float(np.max(height[out]))
-    high = (height[out] > COMPARED_FROM * peak) & (points.way_um[out] <= way[-1])
+    high = (height[out] > COMPARED_FROM * peak) & (points.way_um[out] <= travel[-1])
     if not high.any():
         return math.nan
-    there = np.interp(points.way_um[out][high], way, force)
+    there = np.interp(points.way_um[out][high], travel, force)
     return 100.0 * float(np.mean(height[out][high] - there)) / peak

@@ -80,5 +80,5 @@ def force_un(
     else:
         deflection, pushed = cantilever(round(radius_um / span_um, 3))
     force = k_un_um * span_um * pushed
-    way = span_um * deflection + force / sensor_un_um
-    return np.asarray(np.interp(way_um, way, force), dtype=np.float64)
+    travel = span_um * deflection + force / sensor_un_um
+    return np.asarray(np.interp(way_um, travel, force), dtype=np.float64)

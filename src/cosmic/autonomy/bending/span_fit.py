@@ -28,7 +28,7 @@ from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
 
 ROUNDS: Final = 2
-LEAST_OF_A_WAY: Final = 3
+LEAST_OF_A_BRANCH: Final = 3
 CLOSE_SIGMAS: Final = 2.5
 TINY: Final = 1e-4
 BRANCH_STDS: Final = (5.0, 1000.0)
@@ -190,9 +190,12 @@ def fit_span(span: Span, *, settings: FitSettings, place_um: float, length_um: f
 
 
 def _alone(points: Points) -> Mask:
-    """Return the points of a way that has too few of them for a line."""
-    ways = (points.loading, ~points.loading)
-    return next((way for way in ways if 0 < way.sum() < LEAST_OF_A_WAY), points.loading & False)
+    """Return the points of a branch that has too few of them for a line."""
+    halves = (points.loading, ~points.loading)
+    return next(
+        (half for half in halves if 0 < half.sum() < LEAST_OF_A_BRANCH),
+        points.loading & False,
+    )
 
 
 def _without_contact(span: Span, place_um: float, peak_un: float) -> SpanFit:

@@ -10,7 +10,7 @@ from cosmic.autonomy.handling.grasp import Carry
 from cosmic.autonomy.handling.plate import PlateFrame, Reach
 from cosmic.autonomy.handling.prepare import clear_image
 from cosmic.autonomy.handling.put_away import SKIPPED, Wipe, bin_position
-from cosmic.autonomy.handling.survey import NONE_LEFT, Choose, none_left, ways_of
+from cosmic.autonomy.handling.survey import NONE_LEFT, Choose, approaches_of, none_left
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
 from cosmic.frame.errors import MoveRefused
 from cosmic.frame.verdict import Reason
@@ -35,10 +35,10 @@ def behind_um(work: HandlingContext) -> float:
     return (positions.hold_x_um - pair.behind_um) * work.jaws.forward
 
 
-def hidden(work: HandlingContext, way: Reach) -> bool:
+def hidden(work: HandlingContext, approach: Reach) -> bool:
     """Return whether a fibre lies where an arm at the probe, or the probe itself, may hide it."""
     positions, side = work.settings.places, front(work)
-    nearest_um = float((side * way.line_um[:, 1]).max())
+    nearest_um = float((side * approach.line_um[:, 1]).max())
     return nearest_um > side * positions.hold_y_um - work.settings.pair.hidden_um
 
 
@@ -50,7 +50,7 @@ def over(work: HandlingContext) -> bool:
     if again and shared.since_survey >= again:
         return True
     angle = work.table_deg
-    return not any(ways_of(work, each, angle) for each in work.shared.candidates)
+    return not any(approaches_of(work, each, angle) for each in work.shared.candidates)
 
 
 def stands_aside(work: HandlingContext) -> bool:
@@ -64,8 +64,8 @@ class ChooseInTurn(Choose):
     """The fibre that can be seen beside the other arm, by the smallest turn of the table."""
 
     @override
-    def rank(self, work: HandlingContext, way: Reach, angle_deg: float) -> tuple[float, ...]:
-        return float(hidden(work, way)), *super().rank(work, way, angle_deg)
+    def rank(self, work: HandlingContext, approach: Reach, angle_deg: float) -> tuple[float, ...]:
+        return float(hidden(work, approach)), *super().rank(work, approach, angle_deg)
 
     @override
     def none(self, work: HandlingContext) -> OperationFailed:

@@ -10,7 +10,7 @@ from typing_extensions import override
 from cosmic.autonomy.bending.curved import NaturalShape
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.held_fibre import HeldFibre
-from cosmic.autonomy.handling.plate import along, ways
+from cosmic.autonomy.handling.plate import along, arc_lengths
 from cosmic.autonomy.handling.reach import LOST, line_of
 from cosmic.autonomy.handling.sight import trace_along
 from cosmic.autonomy.procedures.operation import OperationFailed, Steps
@@ -77,7 +77,7 @@ def held_shape(line_um: Floats, inside_um: float, forward: float) -> HeldShape:
     forward : float
         1 or -1: which way along x the jaws point.
     """
-    whole = float(ways(line_um)[-1])
+    whole = float(arc_lengths(line_um)[-1])
     near = np.linspace(max(0.0, inside_um - TANGENT_UM), min(whole, inside_um + TANGENT_UM), 25)
     points = np.array([along(line_um, float(way)) for way in near])
     slope = np.array([np.polyfit(near - inside_um, points[:, i], 2)[1] for i in (0, 1)])

@@ -133,13 +133,15 @@ def reaches(
     return sorted(found, key=lambda each: (each.under, abs(each.angle_deg - angle_now_deg)))
 
 
-def along(line: Floats, way_um: float) -> Floats:
+def along(line: Floats, along_um: float) -> Floats:
     """Return the position so far along a line from its begin."""
-    way = ways(line)
-    return np.array([np.interp(way_um, way, line[:, 0]), np.interp(way_um, way, line[:, 1])])
+    arc_length = arc_lengths(line)
+    return np.array(
+        [np.interp(along_um, arc_length, line[:, 0]), np.interp(along_um, arc_length, line[:, 1])]
+    )
 
 
-def ways(line: Floats) -> Floats:
+def arc_lengths(line: Floats) -> Floats:
     """Return how far along a line each of its points lies."""
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     return np.concatenate([np.zeros(1), np.cumsum(steps)])

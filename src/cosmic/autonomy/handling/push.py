@@ -145,7 +145,7 @@ class OneSpan:
     def _way(self, tip_y_um: float) -> float:
         return self._sign * tip_y_um
 
-    def _to_way(self, way_um: float) -> RetryingMove:
+    def _to_travel(self, way_um: float) -> RetryingMove:
         return self._work.go({self._probe.y_axis: self._sign * way_um - self._probe.tip_um[1]})
 
     def _surface_um(self) -> float:
@@ -173,7 +173,7 @@ class OneSpan:
         aside = surface - push.stand_off_um - push.bow_part * bow
         _, y = work.tip_now(self._probe)
         if self._way(y) > aside:
-            yield self._to_way(aside)
+            yield self._to_travel(aside)
         if self._fibre.zero_un is None:
             self._fibre.zero_un = yield from self._mean_un(push.average_s)
         yield work.go({self._probe.x_axis: x - self._probe.tip_um[0]})
@@ -181,14 +181,14 @@ class OneSpan:
             part = self._plan.span_um / push.tilt_longest_um
             side = -1.0 if self._fibre.tilts % 2 else 1.0
             yield work.go_up(work.hold_tip_um + side * push.tilt_um * part)
-        for way in (aside, surface - push.retreat_um) if known else (aside,):
-            yield from self._come_to(way)
+        for travel in (aside, surface - push.retreat_um) if known else (aside,):
+            yield from self._come_to(travel)
 
     def _come_to(self, way_um: float) -> Steps:
         """Go there, and back again as long as something is felt that should not be there."""
         push, back = self._push, 0.0
         while True:
-            yield self._to_way(way_um - back)
+            yield self._to_travel(way_um - back)
             force = yield from self._mean_un(push.search_average_s)
             if abs(force - (self._fibre.zero_un or 0.0)) <= 2.0 * push.contact_un:
                 return
@@ -216,7 +216,7 @@ class OneSpan:
         return mean.mean_un
 
     def _to(self, way_um: float, seconds: float, *, loading: bool) -> Reading:
-        yield self._to_way(way_um)
+        yield self._to_travel(way_um)
         return (yield from self._measure(seconds, loading=loading))
 
     def _step_um(self) -> float:
@@ -229,11 +229,11 @@ class OneSpan:
 
     def _search(self, base_un: float) -> Generator[Yielded, object, float]:
         push, step = self._push, self._step_um()
-        way = self._points.way_um[-1]
+        travel = self._points.way_um[-1]
         end = self._surface_um() + push.search_um
-        while way < end:
-            before = way
-            way, mean = yield from self._to(way + step, push.search_average_s, loading=True)
+        while travel < end:
+            before = travel
+            travel, mean = yield from self._to(travel + step, push.search_average_s, loading=True)
             if mean.mean_un - base_un > push.contact_un:
                 self._fibre.contacts.append((self._plan.span_um, before - self._foreseen_um()))
                 return before
@@ -261,8 +261,8 @@ class OneSpan:
     def _back(self, contact_um: float) -> Steps:
         push = self._push
         top, end = self._points.way_um[-1], contact_um - push.retreat_um / 2.0
-        for way in np.linspace(top, end, push.steps_back + 1)[1:].tolist():
-            yield from self._to(way, push.average_s, loading=False)
+        for travel in np.linspace(top, end, push.steps_back + 1)[1:].tolist():
+            yield from self._to(travel, push.average_s, loading=False)
         yield from self._to(contact_um - push.retreat_um, push.average_s, loading=False)
 
     def _keep(self) -> None:

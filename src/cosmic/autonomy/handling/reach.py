@@ -8,7 +8,7 @@ from typing_extensions import override
 from cosmic.autonomy.handling.context import FibreOperation, HandlingContext
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.jaws import move_jaws, note_gap
-from cosmic.autonomy.handling.plate import along, ways
+from cosmic.autonomy.handling.plate import along, arc_lengths
 from cosmic.autonomy.handling.sight import SeenFibre, box_around, find_seen, trace_along
 from cosmic.autonomy.handling.tips import see_tip
 from cosmic.autonomy.procedures.operation import SAFE_POINT, OperationFailed, Steps
@@ -188,7 +188,7 @@ def _off_um(work: HandlingContext, fibre: HeldFibre, image: CameraImage) -> floa
     line = line_of(fibre)
     order = np.argsort(line[:, 0])
     beside = float(np.interp(hold[0], line[order, 0], line[order, 1]))
-    way = float(np.interp(hold[0], line[order, 0], ways(line)[order]))
+    way = float(np.interp(hold[0], line[order, 0], arc_lengths(line)[order]))
     fibre.inside_um, fibre.free_um = way, fibre.length_um - way
     return beside - float(hold[1])
 

@@ -179,8 +179,12 @@ class Choose(FibreOperation):
     @override
     def steps(self, work: HandlingContext) -> Steps:
         angle = work.table_deg
-        ways = [way for each in work.shared.candidates for way in ways_of(work, each, angle)]
-        best = min(ways, key=lambda each: self.rank(work, each, angle), default=None)
+        approaches = [
+            approach
+            for each in work.shared.candidates
+            for approach in approaches_of(work, each, angle)
+        ]
+        best = min(approaches, key=lambda each: self.rank(work, each, angle), default=None)
         if best is None:
             raise self.none(work)
         work.shared.candidates = [
@@ -201,9 +205,9 @@ class Choose(FibreOperation):
             work.forces.take_peak_un()
         yield SAFE_POINT
 
-    def rank(self, work: HandlingContext, way: Reach, angle_deg: float) -> tuple[float, ...]:  # noqa: ARG002
+    def rank(self, work: HandlingContext, approach: Reach, angle_deg: float) -> tuple[float, ...]:  # noqa: ARG002
         """Return by what the best way is known: the smallest."""
-        return way.under, abs(way.angle_deg - angle_deg)
+        return approach.under, abs(approach.angle_deg - angle_deg)
 
     def none(self, work: HandlingContext) -> OperationFailed:
         """Return what it fails with where none can be taken."""
@@ -214,7 +218,7 @@ class Choose(FibreOperation):
         return OperationFailed(cause, none_left(work.shared.skip_reasons))
 
 
-def ways_of(work: HandlingContext, candidate: Candidate, angle_deg: float) -> list[Reach]:
+def approaches_of(work: HandlingContext, candidate: Candidate, angle_deg: float) -> list[Reach]:
     """Return the ways to take a candidate, the best first."""
     own = candidate.line_um.mean(axis=0)
     others = [

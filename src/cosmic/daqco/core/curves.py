@@ -49,13 +49,13 @@ def fit_slope(positions: Values, values: Values, unit: str = "") -> Slope:
     if count < FEWEST_SAMPLES:
         raise RecordingError(f"a slope needs at least {FEWEST_SAMPLES} samples, there are {count}")
     middle = float(positions.mean())
-    way = positions - middle
-    spread = float(way @ way)
+    offsets = positions - middle
+    spread = float(offsets @ offsets)
     if not spread > 0.0:
         raise RecordingError(f"a slope needs travel; all {count} samples lie at {middle:g}")
-    value = float(way @ values) / spread
+    value = float(offsets @ values) / spread
     level = float(values.mean())
-    residuals = values - level - value * way
+    residuals = values - level - value * offsets
     squares = float(residuals @ residuals)
     variance = squares / (count - 2)
     return Slope(

@@ -257,15 +257,15 @@ class CosmicServerGui(QMainWindow):
         elif tabbed:
             self.tabifyDockWidget(neighbour, dock)
         else:
-            way = Qt.Orientation.Vertical if below else Qt.Orientation.Horizontal
-            self.splitDockWidget(neighbour, dock, way)
+            direction = Qt.Orientation.Vertical if below else Qt.Orientation.Horizontal
+            self.splitDockWidget(neighbour, dock, direction)
         if self._restored:
             self.restoreDockWidget(dock)
         return dock
 
-    def share_out(self, titles: Sequence[str], shares: Sequence[int], way: Way) -> None:
+    def share_out(self, titles: Sequence[str], shares: Sequence[int], direction: Way) -> None:
         """Have panels that stand in a row or a column share its length so at a first start."""
-        self._shares.append((tuple(titles), tuple(shares), way))
+        self._shares.append((tuple(titles), tuple(shares), direction))
 
     def set_failed(self, title: str, reason: str, *, rescan: bool = True) -> None:
         """Grey the panel `title`, say why and offer a rescan where that may help."""
@@ -334,10 +334,10 @@ class CosmicServerGui(QMainWindow):
         # Those above are named, too: Qt shares out anew only among the docks it is given.
         heights = [height if below else self.height() - height for below in bottom.values()]
         self.resizeDocks(list(bottom), heights, Qt.Orientation.Vertical)
-        for titles, shares, way in self._shares:
-            room = self.height() - height if way is Way.Vertical else self.width()
+        for titles, shares, direction in self._shares:
+            room = self.height() - height if direction is Way.Vertical else self.width()
             lengths = [room * share // sum(shares) for share in shares]
-            self.resizeDocks([self._docks[title] for title in titles], lengths, way)
+            self.resizeDocks([self._docks[title] for title in titles], lengths, direction)
 
     def _on_theme_requested(self) -> None:
         self.set_theme("light" if self.theme == "dark" else "dark")

@@ -155,10 +155,10 @@ def _access_control(station: str, clients: tuple[str, ...]) -> dict[str, Any]:
     rules = []
     for name in clients:
         its_own = f"{name}/*"
-        ways = (greetings(station, its_own), asks(station, its_own))
+        topics = (greetings(station, its_own), asks(station, its_own))
         rules += [
-            _rule(f"{name} asks", ["query"], "ingress", *ways),
-            _rule(f"{name} is answered", ["reply"], "egress", *ways),
+            _rule(f"{name} asks", ["query"], "ingress", *topics),
+            _rule(f"{name} is answered", ["reply"], "egress", *topics),
             _rule(
                 f"{name} finds where to ask",
                 ["declare_queryable"],

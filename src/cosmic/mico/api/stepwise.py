@@ -46,9 +46,9 @@ class StepwiseMove:
     ) -> None:
         self._axis = axis
         self._largest = _above_zero(largest, axis)
-        self._start, self._way = _way(axis, target, consent=consent)
+        self._start, self._travel = _travel(axis, target, consent=consent)
         self._consent = consent
-        self.planned = max(1, math.ceil(abs(self._way) / self._largest - 1e-9))
+        self.planned = max(1, math.ceil(abs(self._travel) / self._largest - 1e-9))
         self._begun = 0
         self._lock = RLock()
         self._abandoned = False
@@ -62,8 +62,8 @@ class StepwiseMove:
         cls, axis: Axis, distance: Number, largest: Number, *, consent: bool = False
     ) -> "StepwiseMove":
         """Move by `distance` from where the axis stands."""
-        way = as_number(distance, axis.unit, axis.name)
-        return cls(axis, _position(axis) + way, largest, consent=consent)
+        travel = as_number(distance, axis.unit, axis.name)
+        return cls(axis, _position(axis) + travel, largest, consent=consent)
 
     @property
     def begun(self) -> int:
@@ -93,9 +93,9 @@ class StepwiseMove:
                 self.movement.fail(MoveCancelled(f"{self._axis.name}: the series was given up"))
                 return
             self._begun += 1
-            way = min(self._begun * self._largest, abs(self._way))
+            travel = min(self._begun * self._largest, abs(self._travel))
             # From where it began, even if the user has set another zero meanwhile.
-            target = self._start + math.copysign(way, self._way) - self._axis.details.zero
+            target = self._start + math.copysign(travel, self._travel) - self._axis.details.zero
             if self._part is None:
                 part = self._axis.move_to(target, wait=False, consent=self._consent)
             else:
@@ -135,7 +135,7 @@ def _above_zero(largest: Number, axis: Axis) -> float:
     return value
 
 
-def _way(axis: Axis, target: Number, *, consent: bool) -> tuple[float, float]:
+def _travel(axis: Axis, target: Number, *, consent: bool) -> tuple[float, float]:
     """Return where it starts, in gate coordinates, and how far it goes.
 
     The gate has then seen the whole of it.
@@ -144,5 +144,5 @@ def _way(axis: Axis, target: Number, *, consent: bool) -> tuple[float, float]:
     if not verdict.allowed:
         raise refusal(verdict)
     start = _position(axis)
-    way = as_number(target, axis.unit, axis.name) - start
-    return start + axis.details.zero, way
+    travel = as_number(target, axis.unit, axis.name) - start
+    return start + axis.details.zero, travel

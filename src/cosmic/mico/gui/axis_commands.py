@@ -74,7 +74,7 @@ class AxisCommands(QObject):
     verdict_given = Signal(object)
     ended = Signal(str)
     consent_wanted = Signal(object)
-    way_wanted = Signal(object)
+    detour_wanted = Signal(object)
     noted = Signal(str)
 
     def __init__(self, axis_name: str, parent: QObject) -> None:
@@ -158,7 +158,7 @@ class AxisCommands(QObject):
             return
         reason = error.verdict.reason
         if reason is Reason.COLLISION and command.goal is not None and self.seeks_ways:
-            self._want_way(command, command.goal, error.verdict)
+            self._want_detour(command, command.goal, error.verdict)
             return
         self.verdict_given.emit(error.verdict)
         if reason is Reason.STOPPED and self._moved:
@@ -176,23 +176,23 @@ class AxisCommands(QObject):
     def _agree(self, command: _Command) -> None:
         self._issue(replace(command, consented=True))
 
-    def _want_way(self, command: _Command, goal: Goal, verdict: MoveVerdict) -> None:
+    def _want_detour(self, command: _Command, goal: Goal, verdict: MoveVerdict) -> None:
         self._blocked = command
         request = DetourRequest(
             axis=self._axis_name,
             target=goal.target,
             where=goal.text,
             verdict=verdict,
-            note=lambda text: self._note_way(command, text),
-            refuse=lambda why: self._refuse_way(command, why),
+            note=lambda text: self._note_detour(command, text),
+            refuse=lambda why: self._refuse_detour(command, why),
         )
-        self.way_wanted.emit(request)
+        self.detour_wanted.emit(request)
 
-    def _note_way(self, command: _Command, text: str) -> None:
+    def _note_detour(self, command: _Command, text: str) -> None:
         if command is self._blocked:
             self.noted.emit(text)
 
-    def _refuse_way(self, command: _Command, verdict: MoveVerdict) -> None:
+    def _refuse_detour(self, command: _Command, verdict: MoveVerdict) -> None:
         """Refuse it now, unless something newer was commanded meanwhile."""
         if command is not self._blocked:
             return

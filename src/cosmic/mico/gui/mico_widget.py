@@ -63,7 +63,7 @@ class MicoWidget(QWidget):
     refreshed = Signal()
     verdict_given = Signal(object)
     undo_planned = Signal(object)
-    way_wanted = Signal(object)
+    detour_wanted = Signal(object)
 
     def __init__(self, mico: Mico, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -179,7 +179,7 @@ class MicoWidget(QWidget):
             card.show_stopped(reason)
 
     def set_seeking_ways(self, on: bool) -> None:
-        """Ask with `way_wanted` instead of refusing a move that something stands in the way of."""
+        """Ask with `detour_wanted` instead of refusing a move that something blocks."""
         self._seeks_ways = on
         for card in self._cards.values():
             card.commands.seeks_ways = on
@@ -228,7 +228,7 @@ class MicoWidget(QWidget):
             card = make_card(axis, self._settings_of(name), self._settings.defaults)
             card.consent_wanted.connect(self._on_consent_wanted)
             card.commands.verdict_given.connect(self.verdict_given)
-            card.commands.way_wanted.connect(self.way_wanted)
+            card.commands.detour_wanted.connect(self.detour_wanted)
             card.commands.seeks_ways = self._seeks_ways
             card.show_stopped(self._stopped)
             if isinstance(card, ClosedLoopGUI):

@@ -87,10 +87,12 @@ class MoveFields:
 
     def move_by(self, direction: int, *, consent: bool) -> Movement | StepwiseMove:
         """Move by the step size in `direction`, 1 or -1, at once or in parts."""
-        way = direction * self.distance.value()
+        distance_typed = direction * self.distance.value()
         if self.split.isChecked():
-            return StepwiseMove.by(self._axis, way, self.largest.value(), consent=consent)
-        return self._axis.move_by(way, wait=False, consent=consent)
+            return StepwiseMove.by(
+                self._axis, distance_typed, self.largest.value(), consent=consent
+            )
+        return self._axis.move_by(distance_typed, wait=False, consent=consent)
 
     def move_to(self, *, consent: bool) -> Movement | StepwiseMove:
         """Move to the position, at once or in parts."""

@@ -38,7 +38,7 @@ class PosesBox(QWidget):
         self._taught, self._removed = Relay(self._on_taught), Relay(self._on_removed)
         self.poses = named(tipped(QComboBox(), "Named poses"), "poses")
         self.go = named(push_button("Go", "Move all axes of the pose there, together"), "goPose")
-        self.way = named(
+        self.around = named(
             push_button("Go round", "Go there on a path around what is in between"), "goPoseWay"
         )
         self.remove = named(push_button("Remove", "Forget this pose"), "removePose")
@@ -49,8 +49,8 @@ class PosesBox(QWidget):
         self.teach = named(push_button("Teach", "Keep the positions of the axes now"), "teachPose")
         self.message = ElidedLabel()
         self._arrange()
-        self.go.clicked.connect(lambda: self._go(way=False))
-        self.way.clicked.connect(lambda: self._go(way=True))
+        self.go.clicked.connect(lambda: self._go(around=False))
+        self.around.clicked.connect(lambda: self._go(around=True))
         self.remove.clicked.connect(self._on_remove)
         self.teach.clicked.connect(self._on_teach)
         self.name.returnPressed.connect(self._on_teach)
@@ -63,7 +63,7 @@ class PosesBox(QWidget):
         first, second = tight_row(STEP_PX), tight_row(STEP_PX)
         first[1].addWidget(QLabel("Poses"))
         first[1].addWidget(self.poses, 1)
-        for button in (self.go, self.way, self.remove):
+        for button in (self.go, self.around, self.remove):
             first[1].addWidget(button)
         second[1].addWidget(self.name, 1)
         second[1].addWidget(self.group)
@@ -85,7 +85,7 @@ class PosesBox(QWidget):
         has_model = self._mico.checks_collisions
         for button in (self.go, self.remove):
             button.setEnabled(bool(names))
-        self.way.setEnabled(bool(names) and has_model)
+        self.around.setEnabled(bool(names) and has_model)
 
     @override
     def showEvent(self, event: QShowEvent) -> None:
@@ -119,10 +119,10 @@ class PosesBox(QWidget):
         self.refresh()
         self.poses_changed.emit()
 
-    def _go(self, *, way: bool) -> None:
+    def _go(self, *, around: bool) -> None:
         """Begin to go; how it ends is shown by the window's task bar."""
         try:
-            task = self._mico.poses.go(self.poses.currentText(), way=way, wait=False)
+            task = self._mico.poses.go(self.poses.currentText(), way=around, wait=False)
         except CosmicError as exc:
             self.message.set_text(str(exc))
             return

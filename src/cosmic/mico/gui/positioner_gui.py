@@ -184,8 +184,10 @@ class PositionerBaseGUI(Card):
         key = key_text(key)
         name = self.settings.name
         held = f"; hold the key {key} to move on and on" if key else ""
-        way = "forwards" if sign == "+" else "backwards"
-        button = push_button(f"{text} [{key}]" if key else text, f"Move {name} {way} once{held}")
+        heading = "forwards" if sign == "+" else "backwards"
+        button = push_button(
+            f"{text} [{key}]" if key else text, f"Move {name} {heading} once{held}"
+        )
         button.setAccessibleName(f"{name} {text}")
         button.setMinimumWidth(12 * STEP_PX)
         return button

@@ -120,13 +120,13 @@ class StartQuestion(QWidget):
         self.straight = named(
             push_button("Go there straight", "All axes together; the gate decides"), "goStraight"
         )
-        self.way = named(
+        self.around = named(
             push_button("Plan a path", "Plan a path around what is in between"), "goWay"
         )
         self.leave = named(push_button("Leave it", "Nothing moves"), "leaveStart")
         row, beside = tight_row(STEP_PX)
         beside.addStretch(1)
-        for button in (self.straight, self.way, self.leave):
+        for button in (self.straight, self.around, self.leave):
             beside.addWidget(button)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -134,14 +134,14 @@ class StartQuestion(QWidget):
         column.addWidget(self.words)
         column.addWidget(row)
         self.straight.clicked.connect(lambda: self._choose("straight"))
-        self.way.clicked.connect(lambda: self._choose("way"))
+        self.around.clicked.connect(lambda: self._choose("way"))
         self.leave.clicked.connect(self.hide)
         self.hide()
 
     def ask(self, why: str, *, has_model: bool) -> None:
         """Show the question."""
         self.words.setText(f"{why.partition('; go there first')[0]}.")
-        self.way.setVisible(has_model)
+        self.around.setVisible(has_model)
         self.show()
 
     def _choose(self, mode: str) -> None:

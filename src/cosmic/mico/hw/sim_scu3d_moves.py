@@ -40,14 +40,14 @@ def step(
         route.wait(channel.settings.amplitude_setting_s)
         channel.amplitude_dv = amplitude_dv
     drive_s = route.end_s
-    way = channel.stage.noisy_steps(steps, amplitude_dv / 10.0)
+    distance = channel.stage.noisy_steps(steps, amplitude_dv / 10.0)
     duration_s = abs(steps) / frequency_hz
     endless = abs(steps) == ENDLESS_STEPS
     if endless:
-        way, duration_s = way * (ENDLESS_S / duration_s), ENDLESS_S
+        distance, duration_s = distance * (ENDLESS_S / duration_s), ENDLESS_S
     start = route.position
-    channel.obstruct_if_faulty(start, start + way)
-    route.go(start + way, abs(way) / duration_s)
+    channel.obstruct_if_faulty(start, start + distance)
+    route.go(start + distance, abs(distance) / duration_s)
     end_s = math.inf if endless else drive_s + duration_s
     if not endless:
         # At a stop the slider slips: the steps run out where it stands.
@@ -198,8 +198,10 @@ def _find_mark(channel: Channel, route: Route, speed: float) -> float | None:
 
 def _find_coded_marks(channel: Channel, route: Route, speed: float) -> float | None:
     kind = channel.stage.kind
-    way = kind.coded_mark_way if channel.safe_direction else -kind.coded_mark_way
-    if not route.go(route.position + way, speed) and not route.go(route.position - way, speed):
+    distance = kind.coded_mark_way if channel.safe_direction else -kind.coded_mark_way
+    if not route.go(route.position + distance, speed) and not route.go(
+        route.position - distance, speed
+    ):
         return None
     error = channel.random.uniform(-0.5, 0.5) * kind.reference_repeatability
     return kind.reference_mark + error

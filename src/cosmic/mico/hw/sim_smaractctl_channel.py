@@ -279,8 +279,8 @@ class Channel:
     def _ramp_down(self, now_s: float) -> None:
         path = self.stage.path
         speed, _ = path.leg(now_s)
-        way = path.at(path.end_s) - self.stage.position(now_s)
-        direction = 1.0 if way >= 0.0 else -1.0
+        travel = path.at(path.end_s) - self.stage.position(now_s)
+        direction = 1.0 if travel >= 0.0 else -1.0
         route = self.stage.route(now_s)
         slice_s = speed / self.acceleration / SLICES
         for number in range(SLICES):

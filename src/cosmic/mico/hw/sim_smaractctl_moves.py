@@ -85,14 +85,14 @@ def _drive(channel: Channel, now_s: float, wanted: int) -> None:
         arrive(channel, route, start)
 
 
-def _lag_time_s(channel: Channel, way: float) -> float | None:
+def _lag_time_s(channel: Channel, travel: float) -> float | None:
     """Return after which time the stage lags too far behind its setpoint; None: it does not."""
     limit = channel.value(sa.SA_CTL_PKEY_FOLLOWING_ERROR_LIMIT)
-    behind = channel.velocity - channel.step_speed(1 if way > 0.0 else -1)
+    behind = channel.velocity - channel.step_speed(1 if travel > 0.0 else -1)
     if limit == 0 or behind <= 0.0:
         return None
     lag = abs(channel.position(limit) - channel.position(0))
-    return lag / behind if abs(way) > lag else None
+    return lag / behind if abs(travel) > lag else None
 
 
 def _fall_behind(channel: Channel, route: Route, start: Turn, time_s: float) -> None:
@@ -181,11 +181,11 @@ def _step(channel: Channel, now_s: float, value: int) -> None:
     channel.target = None
     volts = channel.value(sa.SA_CTL_PKEY_STEP_AMPLITUDE) / FULL_SCAN * 100.0
     hertz = channel.value(sa.SA_CTL_PKEY_STEP_FREQUENCY)
-    way = channel.stage.noisy_steps(value, volts)
+    travel = channel.stage.noisy_steps(value, volts)
     duration_s = abs(value) / hertz
-    _obstruct_if_faulty(channel, route.position, route.position + way)
-    if way:
-        route.go(route.position + way, abs(way) / duration_s)
+    _obstruct_if_faulty(channel, route.position, route.position + travel)
+    if travel:
+        route.go(route.position + travel, abs(travel) / duration_s)
     # At a stop the slider slips: the steps run out where it stands.
     route.wait(max(now_s + duration_s - route.end_s, 0.0))
     turns = [
@@ -202,9 +202,9 @@ def _scan_to(channel: Channel, now_s: float, value: int) -> None:
     channel.target = None
     change = value - channel.scan
     duration_s = abs(change) / channel.value(sa.SA_CTL_PKEY_SCAN_VELOCITY)
-    way = change / FULL_SCAN * channel.stage.kind.step_at_100v
-    if way:
-        route.go(route.position + way, abs(way) / duration_s)
+    travel = change / FULL_SCAN * channel.stage.kind.step_at_100v
+    if travel:
+        route.go(route.position + travel, abs(travel) / duration_s)
     channel.scan = value
     turns = [
         Turn(now_s, Phase.OPEN_LOOP),
@@ -284,8 +284,10 @@ def _find_mark(channel: Channel, route: Route, speed: float) -> float | None:
 def _find_coded_marks(channel: Channel, route: Route, speed: float) -> float | None:
     kind = channel.stage.kind
     backward = channel.value(sa.SA_CTL_PKEY_REFERENCING_OPTIONS) & sa.SA_CTL_REF_OPT_BIT_START_DIR
-    way = -kind.coded_mark_way if backward else kind.coded_mark_way
-    if not route.go(route.position + way, speed) and not route.go(route.position - way, speed):
+    travel = -kind.coded_mark_way if backward else kind.coded_mark_way
+    if not route.go(route.position + travel, speed) and not route.go(
+        route.position - travel, speed
+    ):
         return None
     error = channel.random.uniform(-0.5, 0.5) * kind.reference_repeatability
     return kind.reference_mark + error

@@ -114,8 +114,8 @@ def _pieces(line: Floats, reach: float) -> Floats:
     middle = line.mean(axis=0)
     few = cv2.approxPolyDP((line - middle).astype(np.float32), TOLERANCE, False)
     nodes = few.reshape(-1, 2).astype(np.float64) + middle
-    ways = np.abs(np.diff(nodes, axis=0)).min(axis=1)
-    counts = np.maximum(np.ceil(ways / (2.0 * reach)), 1.0).astype(int)
+    lengths = np.abs(np.diff(nodes, axis=0)).min(axis=1)
+    counts = np.maximum(np.ceil(lengths / (2.0 * reach)), 1.0).astype(int)
     if counts.max(initial=1) == 1:
         return np.asarray(nodes)
     parts = [

@@ -93,8 +93,8 @@ class Move:
 
     def _report(self, axis: LensAxis, start: int, state: LensState) -> None:
         target = self.targets[axis]
-        way = (target if target is not None else -state.limit_counts) - start
-        part = (state.position_counts - start) / way if way else 0.0
+        travel = (target if target is not None else -state.limit_counts) - start
+        part = (state.position_counts - start) / travel if travel else 0.0
         done = len(self.targets) - len(self.left)
         text = f"{axis} at {state.position_counts}" if target is not None else f"{axis} goes home"
         self.task.report((done + min(max(part, 0.0), 1.0)) / len(self.targets), text)

@@ -42,8 +42,8 @@ class Measure:
 
 def angle_deg(first: Pixel, vertex: Pixel, last: Pixel) -> float:
     """Return the angle at `vertex`, 0 to 180 degrees."""
-    ways = [math.atan2(y - vertex[1], x - vertex[0]) for x, y in (first, last)]
-    between = abs(math.degrees(ways[0] - ways[1])) % 360.0
+    directions = [math.atan2(y - vertex[1], x - vertex[0]) for x, y in (first, last)]
+    between = abs(math.degrees(directions[0] - directions[1])) % 360.0
     return min(between, 360.0 - between)
 
 

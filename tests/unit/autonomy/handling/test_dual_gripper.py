@@ -21,7 +21,7 @@ from cosmic.autonomy.handling.dual_gripper import (
 from cosmic.autonomy.handling.held_fibre import HeldFibre
 from cosmic.autonomy.handling.plate import Candidate, Jaws, PlateFrame, Reach
 from cosmic.autonomy.handling.settings import HandlingSettings, of_arm
-from cosmic.autonomy.handling.survey import NONE_LEFT, ways_of
+from cosmic.autonomy.handling.survey import NONE_LEFT, approaches_of
 from cosmic.autonomy.procedures.operation import OperationFailed
 from cosmic.frame.clock import ManualClock
 from cosmic.vico.core.tool_settings import ToolSettings
@@ -100,15 +100,17 @@ def end_round(arm: Arm) -> None:
 def test_each_arm_stays_on_its_own_side_and_both_are_mirrored() -> None:
     for x_um in (-2500.0, -900.0, 0.0, 700.0, 2500.0):
         left, right = arms(straight(x_um, -800.0))
-        ways = {arm: ways_of(arm, arm.shared.candidates[0], 0.0) for arm in (left, right)}
-        assert all(way.tip_um[0] <= -250.0 for way in ways[left])
-        assert all(way.tip_um[0] >= 250.0 for way in ways[right])
-        assert ways[left], "each can be had by one of its ends"
-        mirrored = {tuple(np.round(np.negative(way.tip_um), 6)) for way in ways[right]}
-        assert {tuple(np.round(way.tip_um, 6)) for way in ways[left]} == mirrored
-        for way in ways[left]:
+        approaches = {
+            arm: approaches_of(arm, arm.shared.candidates[0], 0.0) for arm in (left, right)
+        }
+        assert all(way.tip_um[0] <= -250.0 for way in approaches[left])
+        assert all(way.tip_um[0] >= 250.0 for way in approaches[right])
+        assert approaches[left], "each can be had by one of its ends"
+        mirrored = {tuple(np.round(np.negative(way.tip_um), 6)) for way in approaches[right]}
+        assert {tuple(np.round(way.tip_um, 6)) for way in approaches[left]} == mirrored
+        for way in approaches[left]:
             assert np.all(np.diff(way.line_um[:, 0]) > 0.0)
-        for way in ways[right]:
+        for way in approaches[right]:
             assert np.all(np.diff(way.line_um[:, 0]) < 0.0)
 
 
@@ -151,10 +153,10 @@ def test_a_fibre_that_the_other_arm_may_hide_is_chosen_last(name: str) -> None:
     near, far = straight(side * 1800.0, 500.0, 0.0), straight(side * 1800.0, -3000.0, 150.0)
     left, right = arms(near, far)
     arm = left if name == "left" else right
-    ways = {each: ways_of(arm, each, 0.0) for each in (far, near)}
-    assert [hidden(arm, way) for way in ways[near]] == [True]
-    assert not all(hidden(arm, way) for way in ways[far])
-    assert ways[near][0].angle_deg == 0.0, "it would be the smaller turn"
+    approaches = {each: approaches_of(arm, each, 0.0) for each in (far, near)}
+    assert [hidden(arm, way) for way in approaches[near]] == [True]
+    assert not all(hidden(arm, way) for way in approaches[far])
+    assert approaches[near][0].angle_deg == 0.0, "it would be the smaller turn"
     assert chosen(arm).reach.candidate is far
     assert chosen(arm).reach.candidate is near
 

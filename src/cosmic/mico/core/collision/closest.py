@@ -47,9 +47,9 @@ def _cross(one: Point, other: Point) -> Point:
 
 def _of_segment(corners: list[Point], numbers: tuple[int, ...]) -> Shares:
     first, second = numbers
-    one, way = corners[first], _minus(corners[second], corners[first])
-    length = dot(way, way)
-    share = -dot(one, way) / length if length > 0.0 else 0.0
+    one, edge = corners[first], _minus(corners[second], corners[first])
+    length = dot(edge, edge)
+    share = -dot(one, edge) / length if length > 0.0 else 0.0
     if not share > 0.0:
         return [(first, 1.0)]
     if share >= 1.0:

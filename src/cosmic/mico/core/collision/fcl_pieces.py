@@ -116,12 +116,12 @@ def separation(one: ConvexPiece, other: ConvexPiece) -> Separation:
     result = fcl.DistanceResult()
     reported = fcl.distance(one.fcl_object, other.fcl_object, _REQUEST, result)
     here, there = result.nearest_points
-    way = there - here
-    length = math.sqrt(way @ way)
+    offset = there - here
+    length = math.sqrt(offset @ offset)
     places = _point(here), _point(there)
     if not (reported > 0.0 and length > 0.0):
         return Separation(0.0, (0.0, 0.0, 0.0), *places)
-    normal = way / length
+    normal = offset / length
     gap = gap_along(one, other, normal)
     if not gap > 0.0 or not abs(gap - reported) <= TRUST_UM + 1e-6 * reported:
         # One inside the other looks like a distance to python-fcl.

@@ -29,7 +29,7 @@ class Slide:
     ----------
     place_um : ndarray, shape (3,)
         Where the second piece stands in the middle of the box; the first stands there already.
-    ways : ndarray, shape (3, m), um/um
+    shifts : ndarray, shape (3, m), um/um
         How joint values shift the second against the first.
     half : ndarray, shape (m,)
         Half the widths of the box.
@@ -45,7 +45,7 @@ class Slide:
     second: ConvexPiece
     rotation: Floats
     place_um: Floats
-    ways: Floats
+    shifts: Floats
     half: Floats
     start: Floats
     lowest: Floats
@@ -90,18 +90,18 @@ def guess_holds(slide: Slide, normal: Floats, margin_um: float) -> bool:
     """Return True when `normal` alone proves the gap, without measuring a distance."""
     slide.second.put(slide.rotation, slide.place_um)
     gap = gap_along(slide.first, slide.second, normal)
-    return bool(gap - np.abs(normal @ slide.ways) @ slide.half > margin_um)
+    return bool(gap - np.abs(normal @ slide.shifts) @ slide.half > margin_um)
 
 
 def smallest_gap(slide: Slide, margin_um: float, guess: Floats | None = None) -> Finding:
     """Decide whether the gap stays above `margin_um` over the whole box."""
     first, second = slide.first, slide.second
     second.put(slide.rotation, slide.place_um)
-    answer = decide(first.world_um(), second.world_um(), slide.ways, slide.half, margin_um, guess)
+    answer = decide(first.world_um(), second.world_um(), slide.shifts, slide.half, margin_um, guess)
     if answer is not None and answer[0]:
         return Finding(clear=True, normal=answer[1])
     if slide.known:
-        second.put(slide.rotation, slide.place_um + slide.ways @ slide.start)
+        second.put(slide.rotation, slide.place_um + slide.shifts @ slide.start)
         found = separation(first, second)
         if found.gap_um > 0.0 and leaves(slide, np.array(found.normal)):
             return Finding(clear=True)
@@ -116,10 +116,10 @@ def by_advancement(slide: Slide, margin_um: float) -> Finding:
     best: _Bound | None = None
     closest, closest_gap = at, np.inf
     for _ in range(MOST_QUERIES):
-        slide.second.put(slide.rotation, slide.place_um + slide.ways @ at)
+        slide.second.put(slide.rotation, slide.place_um + slide.shifts @ at)
         found = separation(slide.first, slide.second)
         normal = np.array(found.normal)
-        slope = normal @ slide.ways
+        slope = normal @ slide.shifts
         if not found.gap_um > margin_um:
             return Finding(clear=False, at=at)
         if found.gap_um < closest_gap:
@@ -141,7 +141,7 @@ def leaves(slide: Slide, normal: Floats, *, strictly: bool = False) -> bool:
     The gap of two convex bodies is then nowhere less than where the movement begins. `strictly`
     it also goes along it.
     """
-    slope = normal @ slide.ways
+    slope = normal @ slide.shifts
     low, high = slope * slide.lowest, slope * slide.highest
     if not float(np.minimum(low, high).sum()) >= -NOTHING_UM:
         return False
@@ -175,7 +175,7 @@ def _by_hull(slide: Slide, margin_um: float, closest: Floats) -> Finding:
     """Measure once, from the first piece to all that the second sweeps."""
     used = slide.half > 0.0
     signs = np.array(list(product((-1.0, 1.0), repeat=int(used.sum()))))
-    corners = (signs * slide.half[used]) @ slide.ways[:, used].T
+    corners = (signs * slide.half[used]) @ slide.shifts[:, used].T
     slide.second.put(slide.rotation, slide.place_um)
     found = separation(slide.first, slide.second.swept(corners))
     clear = found.gap_um > margin_um

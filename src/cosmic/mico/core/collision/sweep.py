@@ -109,7 +109,7 @@ class Sweep:
         chains, arrangement = self._arrangement.chains, self._arrangement
         first_body, second_body = self._body[self._first], self._body[self._second]
         self._between = chains[first_body] ^ chains[second_body]
-        self._ways = arrangement.shifts[second_body] - arrangement.shifts[first_body]
+        self._relative = arrangement.shifts[second_body] - arrangement.shifts[first_body]
 
     # The question
 
@@ -176,7 +176,7 @@ class Sweep:
         if concern is None:
             rows = np.flatnonzero((self._between & moving).any(axis=1))
             # What joints that swing can do is added to the boxes.
-            steady = np.where(self._arrangement.swings, 0.0, np.abs(self._ways[rows]))
+            steady = np.where(self._arrangement.swings, 0.0, np.abs(self._relative[rows]))
             concern = _Concern(
                 rows, self._first[rows], self._second[rows], self._margin[rows], steady
             )
@@ -290,7 +290,7 @@ class Sweep:
     ) -> bool:
         """Return True when a piece that slides comes nowhere closer than `least`."""
         slide = self._slide(row, onward, stand, used)
-        slide.second.put(slide.rotation, slide.place_um + slide.ways @ slide.start)
+        slide.second.put(slide.rotation, slide.place_um + slide.shifts @ slide.start)
         found = separation(slide.first, slide.second)
         if found.gap_um > 0.0 and leaves(slide, np.array(found.normal)):
             return True
@@ -321,10 +321,10 @@ class Sweep:
         choices: list[tuple[float, Floats]] = []
         for row in overlapping:
             choices += overlaps(*self._put(row, stand))
-        ways = self._ways[rows[0]][:, self._between[rows[0]]]
+        relative = self._relative[rows[0]][:, self._between[rows[0]]]
         steady = not self._arrangement.swings[self._between[rows[0]]].any()
         for _, normal in sorted(choices, key=lambda choice: choice[0]):
-            if steady and not np.abs(normal @ ways).max(initial=0.0) > _ACROSS:
+            if steady and not np.abs(normal @ relative).max(initial=0.0) > _ACROSS:
                 continue
             deepest = max(self._overlap(row, stand, normal) for row in overlapping)
             shift = (deepest + _BEYOND_UM) * normal
@@ -356,7 +356,7 @@ class Sweep:
             second=self._pieces[second],
             rotation=stand.rotations[body],
             place_um=stand.places[body],
-            ways=self._ways[row][:, used],
+            shifts=self._relative[row][:, used],
             half=half,
             start=np.clip(box.origin[used] - box.centre[used], -half, half),
             lowest=box.lowest[used],

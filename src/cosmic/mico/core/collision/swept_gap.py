@@ -19,7 +19,7 @@ MOST_STEPS: Final = 30
 def decide(
     first: Floats,
     second: Floats,
-    ways: Floats,
+    shifts: Floats,
     half: Floats,
     margin_um: float,
     guess: Floats | None = None,
@@ -30,7 +30,7 @@ def decide(
     ----------
     first, second : ndarray, shape (3, n), um
         Vertices in the world with the joints in the middle of the box.
-    ways : ndarray, shape (3, m)
+    shifts : ndarray, shape (3, m)
         How the joints shift the second piece against the first.
     half : ndarray, shape (m,)
         Half the widths of the box.
@@ -53,14 +53,14 @@ def decide(
     for _ in range(MOST_STEPS):
         one, other = normal @ first, normal @ second
         near, far = int(one.argmax()), int(other.argmin())
-        slope = normal @ ways
+        slope = normal @ shifts
         below = float(other[far] - one[near] - np.abs(slope) @ half)
         if below > margin_um:
             return True, normal
         if corners and not above - below > 1e-9 * (1.0 + above):
             return None
         place = -half * np.sign(slope)
-        x, y, z = (second[:, far] - first[:, near] + ways @ place).tolist()
+        x, y, z = (second[:, far] - first[:, near] + shifts @ place).tolist()
         corners.append((x, y, z))
         places.append(place)
         shares = nearest_of(corners)

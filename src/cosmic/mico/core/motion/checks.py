@@ -164,8 +164,8 @@ def swept_interval(
     return EVERYWHERE
 
 
-def _extended(place: Interval, way: float) -> Interval:
-    return Interval(place.low + min(way, 0.0), place.high + max(way, 0.0))
+def _extended(place: Interval, travelled: float) -> Interval:
+    return Interval(place.low + min(travelled, 0.0), place.high + max(travelled, 0.0))
 
 
 def _to_the_stop(place: Interval, direction: Direction | None) -> Interval:
@@ -307,8 +307,8 @@ def _limit(
 ) -> MoveVerdict | None:
     travel = rules.counted.get(state.name)
     if travel is not None and isinstance(motion, Step):
-        way = motion.steps * travel.step_um * motion.amplitude_v / AMPLITUDE_V[1]
-        return travel.refuse_beyond(state, way, held)
+        travelled = motion.steps * travel.step_um * motion.amplitude_v / AMPLITUDE_V[1]
+        return travel.refuse_beyond(state, travelled, held)
     if state.limits is None:
         return None
     low, high = state.limits
@@ -475,10 +475,10 @@ def _planned(requests: Sequence[Request], snapshot: PlatformSnapshot) -> Decisio
         if target is not None:
             targets[request.axis] = target
         place = snapshot.place(state)
-        way = heading(request.motion, state, target)
+        travelled = heading(request.motion, state, target)
         headings.pop(request.axis, None)
-        if way is not None:
-            headings[request.axis] = way
+        if travelled is not None:
+            headings[request.axis] = travelled
         intervals[request.axis] = swept_interval(
             request.motion, state, target, place, snapshot.rules
         )
@@ -596,8 +596,8 @@ def span_of(state: PositionerState, asked: Interval | None, snapshot: PlatformSn
     sure = state.present and fresh and (moving or state.activity.at_rest)
     place = asked or (snapshot.place(state) if sure else EVERYWHERE)
     now = origin(state, snapshot.begun_at) if sure else None
-    way = snapshot.headings.get(state.name) if moving else None
-    if way is not None and now is not None:
+    travelled = snapshot.headings.get(state.name) if moving else None
+    if travelled is not None and now is not None:
         now = state.position  # what lies behind it, it does not go to again
     estimated = state.confidence is Confidence.ESTIMATED
     counted = estimated and state.name in snapshot.rules.counted and math.isfinite(state.std)
@@ -607,7 +607,7 @@ def span_of(state: PositionerState, asked: Interval | None, snapshot: PlatformSn
         now,
         moving=moving,
         estimated=estimated,
-        heading=way if now is not None else None,
+        heading=travelled if now is not None else None,
         spread=TIMES_STD * state.std if counted else None,
     )
 

@@ -31,7 +31,7 @@ class Leg:
 
     Attributes
     ----------
-    way : float
+    distance : float
         How far it goes, without sign, in its unit.
     step : float
         How far it goes with one step, in its unit.
@@ -43,7 +43,7 @@ class Leg:
         The fewest that its controller can be told.
     """
 
-    way: float
+    distance: float
     step: float
     approach: float
     top_hz: int
@@ -52,7 +52,7 @@ class Leg:
     @property
     def steps(self) -> float:
         """How many steps its way is worth."""
-        return (self.way + self.approach) / self.step
+        return (self.distance + self.approach) / self.step
 
 
 def matched_frequencies(legs: Mapping[str, Leg]) -> dict[str, int]:
@@ -60,7 +60,7 @@ def matched_frequencies(legs: Mapping[str, Leg]) -> dict[str, int]:
 
     The axis that takes longest keeps the speed that it has; the others are slowed down to it.
     """
-    moving = {name: leg for name, leg in legs.items() if leg.way > 0.0}
+    moving = {name: leg for name, leg in legs.items() if leg.distance > 0.0}
     longest_s = max((leg.steps / leg.top_hz for leg in moving.values()), default=0.0)
     return {
         name: max(leg.low_hz, min(leg.top_hz, math.ceil(leg.steps / longest_s - 1e-9)))
@@ -95,25 +95,27 @@ def straight_line(
         None where fewer than two axes have a way to go.
     """
     lengths = {name: target - (states[name].position or 0.0) for name, target in targets.items()}
-    going = {name: abs(way) for name, way in lengths.items() if abs(way) >= NO_WAY}
+    going = {name: abs(distance) for name, distance in lengths.items() if abs(distance) >= NO_WAY}
     if len(going) < 2:
         return None
-    duration_s = max(way / speeds[name] for name, way in going.items())
-    rate = min(defaults.acceleration(states[name].unit) / way for name, way in going.items())
+    duration_s = max(distance / speeds[name] for name, distance in going.items())
+    rate = min(
+        defaults.acceleration(states[name].unit) / distance for name, distance in going.items()
+    )
     errors = {name: defaults.following_error(states[name].unit) for name in going}
     ways: dict[str, Way] = {}
-    for name, way in going.items():
-        state, speed = states[name], way / duration_s
+    for name, distance in going.items():
+        state, speed = states[name], distance / duration_s
         others = [other for other in going if other != name]
         beside = min(others, key=lambda other: errors[other] / going[other])
-        lag = errors[name] + way * errors[beside] / going[beside] + speed * spread_s
+        lag = errors[name] + distance * errors[beside] / going[beside] + speed * spread_s
         move = MatchedMove(
             channel=state.address,
             target=targets[name],
             unit=state.unit,
             hold_s=hold_s[name],
             speed=speed,
-            acceleration=rate * way,
+            acceleration=rate * distance,
             following_error=errors[name],
         )
         start = targets[name] - lengths[name]
@@ -374,7 +376,7 @@ def _frequencies(
             continue
         rotary = state.unit == "deg"
         legs[name] = Leg(
-            way=abs(reservation.target - state.position),
+            distance=abs(reservation.target - state.position),
             step=defaults.nominal_step_deg if rotary else defaults.nominal_step_um,
             approach=defaults.approach_deg if rotary else defaults.approach_um,
             top_hz=usual_hz(name),

@@ -117,8 +117,8 @@ class JogRun:
         sign, reach = self._jog.direction, SHARE * speed * packet_s
         ahead = speed * (now_s - self._started_s) + reach
         # Never more than one packet ahead of where the axis really is.
-        way = min(ahead, sign * (position - self._start) + reach)
-        target = self._start + sign * way
+        travel = min(ahead, sign * (position - self._start) + reach)
+        target = self._start + sign * travel
         if state.limits is not None:
             outermost = state.limits[1] if sign > 0 else state.limits[0]
             if sign * (outermost - position) <= 0.1 * min(reach, 1.0):
@@ -257,12 +257,12 @@ class SteerRun(JogRun):
         reach = SHARE * speed * packet_s
         here = self._here(state)
         if self._target is None:
-            way = reach
+            travel = reach
         else:
             ahead = sign * (self._target - here) + speed * (now_s - self._target_s)
-            way = min(max(ahead, 0.0), reach)  # never more than one packet ahead of the axis
+            travel = min(max(ahead, 0.0), reach)  # never more than one packet ahead of the axis
         first = self._target is None and self._velocity == 0.0
-        target = here + sign * way
+        target = here + sign * travel
         if state.limits is not None:
             outermost = state.limits[1] if sign > 0 else state.limits[0]
             if sign * (outermost - here) <= 0.1 * min(reach, 1.0) and not first:

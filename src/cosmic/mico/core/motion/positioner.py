@@ -305,24 +305,26 @@ class CountedTravel:
         low, high = max(self.low, position - off), min(self.high, position + off)
         return Interval(min(low, self.high), max(high, self.low))
 
-    def after(self, position: float, std: float, way: float) -> tuple[float, float]:
-        """Return position and standard deviation after steps that count for `way`, um.
+    def after(self, position: float, std: float, distance: float) -> tuple[float, float]:
+        """Return position and standard deviation after steps that count for `distance`, um.
 
         Where they must have reached an end stop, the axis is there; otherwise the uncertainty
         grows by a part of the way.
         """
         place = self.around(position, std)
-        least = abs(way) * (1.0 - TIMES_STD * self.step_std)
-        if way < 0.0 and least >= place.high - self.low:
+        least = abs(distance) * (1.0 - TIMES_STD * self.step_std)
+        if distance < 0.0 and least >= place.high - self.low:
             return self.low, self.end_std_um
-        if way > 0.0 and least >= self.high - place.low:
+        if distance > 0.0 and least >= self.high - place.low:
             return self.high, self.end_std_um
-        return min(max(position + way, self.low), self.high), std + self.step_std * abs(way)
+        return min(max(position + distance, self.low), self.high), std + self.step_std * abs(
+            distance
+        )
 
     def refuse_beyond(
-        self, state: PositionerState, way: float, held: Interval | None
+        self, state: PositionerState, distance: float, held: Interval | None
     ) -> MoveVerdict | None:
-        """Return why steps that count for `way` must not be made, or None.
+        """Return why steps that count for `distance` must not be made, or None.
 
         They are refused when they drive against an end stop for longer than it takes to be there
         for sure, wherever in its uncertainty the axis stands. Towards the inside all may be made.
@@ -331,12 +333,12 @@ class CountedTravel:
         place = self.around(here, state.std)
         if held is not None:
             place = place.union(Interval(max(self.low, held.low), min(self.high, held.high)))
-        room = place.high - self.low if way < 0.0 else self.high - place.low
-        least = abs(way) * (1.0 - TIMES_STD * self.step_std)
+        room = place.high - self.low if distance < 0.0 else self.high - place.low
+        least = abs(distance) * (1.0 - TIMES_STD * self.step_std)
         if least <= (1.0 + OVER) * room + OVER_UM:
             return None
-        limit = (self.low if way < 0.0 else self.high) - state.zero
-        value = here + way - state.zero
+        limit = (self.low if distance < 0.0 else self.high) - state.zero
+        value = here + distance - state.zero
         off = f" ± {format_quantity(state.std, 'um')}" if math.isfinite(state.std) else ", unsure"
         text = (
             f"{state.name}: estimated at {format_quantity(here - state.zero, 'um')}{off}; "

@@ -340,10 +340,10 @@ class UndoHistory(QObject):
         defaults = self._manager.settings.defaults
         found = next(each for each in self._manager.settings.positioner if each.name == name)
         step_um = found.step_um or defaults.nominal_step_um
-        way_um = where - (state.position or 0.0)
-        steps = round(way_um / step_um * 100.0 / defaults.amplitude_v)
+        travel_um = where - (state.position or 0.0)
+        steps = round(travel_um / step_um * 100.0 / defaults.amplitude_v)
         if not abs(steps) <= LARGEST_STEPS:
-            text = f"{name}: {format_quantity(way_um, 'um')} back is more than it can step at once"
+            text = f"{name}: {format_quantity(travel_um, 'um')} back is more than it steps at once"
             raise refusal(refuse(Reason.LIMIT, text, axis=name))
         slow_hz = min(defaults.frequency_hz, self._manager.settings.jog.frequency_hz)
         return Step(steps, defaults.amplitude_v, slow_hz)

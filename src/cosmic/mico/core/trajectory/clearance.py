@@ -46,9 +46,9 @@ class ClearanceSearch:
         """Go straight from one pose to another."""
         if not self._any or self.best is None:
             return
-        way = self._travel(start, end)
-        if self._at_least - way >= self._enough():
-            self._at_least -= way
+        longest = self._travel(start, end)
+        if self._at_least - longest >= self._enough():
+            self._at_least -= longest
             return
         before, after = self._look(start, line), self._look(end, line)
         self._at_least = after
@@ -68,9 +68,9 @@ class ClearanceSearch:
                 return
             middle = (first + last) / 2.0
             here = self._look(_between(start, end, middle), line)
-            way = self._travel(start, end) * (last - first) / 2.0
-            heapq.heappush(parts, (_least(at_first, here, way), first, middle, at_first, here))
-            heapq.heappush(parts, (_least(here, at_last, way), middle, last, here, at_last))
+            longest = self._travel(start, end) * (last - first) / 2.0
+            heapq.heappush(parts, (_least(at_first, here, longest), first, middle, at_first, here))
+            heapq.heappush(parts, (_least(here, at_last, longest), middle, last, here, at_last))
 
     def _look(self, pose: Pose, line: int) -> float:
         """Measure at a pose."""
@@ -86,8 +86,8 @@ class ClearanceSearch:
         return sum(reach * abs(end[axis] - start[axis]) for axis, reach in self._reach.items())
 
 
-def _least(before: float, after: float, way: float) -> float:
-    return (before + after - way) / 2.0
+def _least(before: float, after: float, longest: float) -> float:
+    return (before + after - longest) / 2.0
 
 
 def _between(start: Pose, end: Pose, share: float) -> dict[str, float]:

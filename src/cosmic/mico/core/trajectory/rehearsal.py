@@ -186,20 +186,20 @@ class _Play:
         """Have the axes go, each at its speed, and look how near they come."""
         before = self._poses[-1]
         targets = {axis: self._target(axis, motion) for axis, motion in leg.motions.items()}
-        ways = {axis: target - before.get(axis, target) for axis, target in targets.items()}
+        distances = {axis: target - before.get(axis, target) for axis, target in targets.items()}
         hertz = {axis: scaled_hz(value, self._stage.speed) for axis, value in self._hertz.items()}
         facts = self._stage.facts
-        times_s = leg_times_s(leg.motions, ways, hertz, facts.axes, facts.defaults)
+        times_s = leg_times_s(leg.motions, distances, hertz, facts.axes, facts.defaults)
         for axis, target in targets.items():
             self._states[axis] = replace(self._states[axis], position=target)
         self._poses.append({**before, **targets})
         self._time_s += max(times_s.values(), default=0.0) + LANDING_S
-        self._look(before, ways, times_s, leg.line)
+        self._look(before, distances, times_s, leg.line)
 
     def _look(
         self,
         before: Mapping[str, float],
-        ways: Mapping[str, float],
+        distances: Mapping[str, float],
         times_s: Mapping[str, float],
         line: int,
     ) -> None:
@@ -210,8 +210,8 @@ class _Play:
         at = before
         for bend_s in sorted({time_s for time_s in times_s.values() if time_s > 0.0}):
             there = {
-                axis: before[axis] + way * min(1.0, bend_s / times_s[axis])
-                for axis, way in ways.items()
+                axis: before[axis] + length * min(1.0, bend_s / times_s[axis])
+                for axis, length in distances.items()
                 if times_s[axis] > 0.0 and axis in before
             }
             after = {**at, **there}

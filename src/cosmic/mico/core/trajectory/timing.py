@@ -14,7 +14,7 @@ LANDING_S: Final = 0.025
 
 def leg_times_s(
     motions: Mapping[str, Motion],
-    ways: Mapping[str, float],
+    distances: Mapping[str, float],
     frequencies_hz: Mapping[str, float],
     axes: Mapping[str, AxisFacts],
     defaults: MotionDefaults,
@@ -23,7 +23,7 @@ def leg_times_s(
 
     Parameters
     ----------
-    ways : mapping of float
+    distances : mapping of float
         How far each axis goes, in its unit.
     frequencies_hz : mapping of float
         Closed-loop frequency limit of each axis.
@@ -36,15 +36,15 @@ def leg_times_s(
         unit = axes[axis].unit
         speed = frequencies_hz[axis] * nominal_step(defaults, unit)
         rise = defaults.acceleration_deg_s2 if unit == "deg" else defaults.acceleration_um_s2
-        times[axis] = move_s(abs(ways[axis]), speed, rise)
+        times[axis] = move_s(abs(distances[axis]), speed, rise)
     return times
 
 
-def move_s(way: float, speed: float, acceleration: float) -> float:
+def move_s(distance: float, speed: float, acceleration: float) -> float:
     """Return how long a movement from rest to rest takes."""
-    if way * acceleration >= speed**2:
-        return way / speed + speed / acceleration
-    return 2.0 * math.sqrt(way / acceleration)
+    if distance * acceleration >= speed**2:
+        return distance / speed + speed / acceleration
+    return 2.0 * math.sqrt(distance / acceleration)
 
 
 def scaled_hz(frequency_hz: float, factor: float) -> int:

@@ -117,9 +117,11 @@ class Camera:
         """Return where the line of sight through a pixel leaves the cut, mm, and its direction."""
         scale = self._scale(width, height) * min(width, height) / 2.0
         seen = np.array([(right - width / 2.0) / scale, (height / 2.0 - down) / scale, -1.0])
-        way = seen @ self.axes
-        way /= np.linalg.norm(way)
-        return self.place_mm + way * self.near_mm / float(-way @ self.axes[2]), way
+        seen_along = seen @ self.axes
+        seen_along /= np.linalg.norm(seen_along)
+        return self.place_mm + seen_along * self.near_mm / float(
+            -seen_along @ self.axes[2]
+        ), seen_along
 
     def orbit(self, azimuth_deg: float, elevation_deg: float) -> Self:
         """Return the camera turned about its centre."""

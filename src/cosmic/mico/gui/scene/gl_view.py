@@ -160,8 +160,10 @@ class GLSceneView(SceneView):
 
     @override
     def body_at(self, place: QPointF) -> str:
-        origin, way = self._camera.ray(place.x(), place.y(), self.width(), self.height())
-        return pick(self.content.meshes, self.content.poses, Ray(origin, way), self.content.hidden)
+        origin, direction = self._camera.ray(place.x(), place.y(), self.width(), self.height())
+        return pick(
+            self.content.meshes, self.content.poses, Ray(origin, direction), self.content.hidden
+        )
 
     @override
     def drag(self, before: QPointF, now: QPointF, *, turn: bool) -> None:

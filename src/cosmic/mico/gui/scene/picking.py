@@ -51,8 +51,8 @@ def _in_body(ray: Ray, pose: Floats) -> Ray:
 
 def _enters_box(ray: Ray, low: Floats, high: Floats) -> float:
     """Return the distance at which the ray enters a box; infinite when it misses."""
-    way = np.where(np.abs(ray.direction) < 1e-15, 1e-15, ray.direction)
-    ends = np.stack([(low - ray.origin_mm) / way, (high - ray.origin_mm) / way])
+    slope = np.where(np.abs(ray.direction) < 1e-15, 1e-15, ray.direction)
+    ends = np.stack([(low - ray.origin_mm) / slope, (high - ray.origin_mm) / slope])
     enter, leave = float(ends.min(axis=0).max()), float(ends.max(axis=0).min())
     return max(enter, 0.0) if enter <= leave and leave >= 0.0 else float("inf")
 

@@ -62,11 +62,11 @@ class Panel:
         """Return the line of sight at a place of the widget."""
         right, up, towards = self.plane
         from_middle = place - self.box.center()
-        way, origin = np.zeros(3), np.array(self.centre_mm)
+        direction, origin = np.zeros(3), np.array(self.centre_mm)
         origin[right] += from_middle.x() / self.px_mm
         origin[up] -= from_middle.y() / self.px_mm
-        way[towards] = -eye(self.plane)
-        return Ray(origin - self.cut_mm * way, way)
+        direction[towards] = -eye(self.plane)
+        return Ray(origin - self.cut_mm * direction, direction)
 
 
 class ProjectionView(SceneView):
@@ -230,8 +230,8 @@ def _draw_rulers(painter: QPainter, panel: Panel, palette: Palette) -> None:
     painter.setFont(number_font(11))
     step = round_length(70.0 / panel.px_mm)
     box, middle = panel.box, panel.box.center()
-    for across, way in ((True, panel.plane[0]), (False, panel.plane[1])):
-        centre = panel.centre_mm[way]
+    for across, direction in ((True, panel.plane[0]), (False, panel.plane[1])):
+        centre = panel.centre_mm[direction]
         half = (box.width() if across else box.height()) / 2.0 / panel.px_mm
         first, last = np.ceil((centre - half) / step), np.floor((centre + half) / step)
         for number in np.arange(first, last + 1):

@@ -140,8 +140,8 @@ def sharpest_turn(course: Course) -> float:
     line = course.line
     if len(line) < 2 * count + 2:
         return 0.0
-    way = line[count:] - line[:-count]
-    angle = np.arctan2(way[:, 1], way[:, 0])
+    step = line[count:] - line[:-count]
+    angle = np.arctan2(step[:, 1], step[:, 0])
     turn = np.angle(np.exp(1j * (angle[count:] - angle[:-count])))
     return float(np.abs(turn).max()) if len(turn) else 0.0
 
@@ -158,12 +158,12 @@ def continued(lines: list[Floats], widths: list[float]) -> set[int]:
     for first, last in cKDTree(points).query_pairs(4.0 * max(widths) + 30.0):
         i, point, out = ends[first]
         j, other, other_out = ends[last]
-        way = other - point
-        gap = float(np.linalg.norm(way))
+        step = other - point
+        gap = float(np.linalg.norm(step))
         if gap > 2.0 * (widths[i] + widths[j]) + 30.0:
             continue
-        way /= max(gap, 1e-9)
-        if float(out @ way) > 0.8 and float(other_out @ -way) > 0.8:
+        step /= max(gap, 1e-9)
+        if float(out @ step) > 0.8 and float(other_out @ -step) > 0.8:
             found |= {i, j}
     return found
 
@@ -171,5 +171,5 @@ def continued(lines: list[Floats], widths: list[float]) -> set[int]:
 def outward(line: Floats, at: int) -> Floats:
     """Return the direction in which a line leaves its first (0) or last (-1) point."""
     inner = min(8, len(line) - 1)
-    way = line[0] - line[inner] if at == 0 else line[-1] - line[-1 - inner]
-    return np.asarray(way / max(float(np.linalg.norm(way)), 1e-9))
+    step = line[0] - line[inner] if at == 0 else line[-1] - line[-1 - inner]
+    return np.asarray(step / max(float(np.linalg.norm(step)), 1e-9))

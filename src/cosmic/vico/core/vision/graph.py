@@ -182,18 +182,18 @@ def paths(pieces: Mask) -> list[list[tuple[int, int]]]:
 
 def walked(start: tuple[int, int], left: set[tuple[int, int]]) -> list[tuple[int, int]]:
     """Return the pixels after `start` as far as they go, and take them from `left`."""
-    way = []
+    path = []
     row, column = start
     while True:
         for down, right in NEIGHBOURS:
             ahead = (row + down, column + right)
             if ahead in left:
                 left.discard(ahead)
-                way.append(ahead)
+                path.append(ahead)
                 row, column = ahead
                 break
         else:
-            return way
+            return path
 
 
 def branch(pixels: list[tuple[int, int]], labels: npt.NDArray[np.int32]) -> Branch:

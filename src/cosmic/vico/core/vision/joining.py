@@ -51,15 +51,15 @@ def turn(first: Floats, last: Floats) -> float:
 
 def bending(first: Exit, last: Exit) -> float:
     """Return how much a curve must leave its bow to enter by one branch and leave by another."""
-    way = last.point - first.point
-    gap = float(np.linalg.norm(way))
+    pairing = last.point - first.point
+    gap = float(np.linalg.norm(pairing))
     if gap < 1e-6 or first.branch == last.branch:
         # A fibre has ends: a branch is not joined to itself.
         return float(np.pi**2)
     bow = 0.5 * (last.curvature - first.curvature) * gap
     change = (last.curvature + first.curvature) * gap
-    enter = turn(way, -first.direction) + 0.5 * bow
-    leave = turn(way, last.direction) - 0.5 * bow
+    enter = turn(pairing, -first.direction) + 0.5 * bow
+    leave = turn(pairing, last.direction) - 0.5 * bow
     return enter**2 + enter * leave + leave**2 + change**2 / 12.0
 
 
@@ -251,12 +251,15 @@ def pair(graph: Graph, joint: Joint, half_width: list[float]) -> None:
         leaving(graph.branches[index], index, end, half_width[index]) for index, end in joint.stubs
     ]
     costs = np.array([[bending(a, b) for b in exits] for a in exits])
-    ways = pairings(count, count % 2 + (2 if count > 3 else 0))
+    choices = pairings(count, count % 2 + (2 if count > 3 else 0))
     prices = np.array(
-        [sum(costs[i, j] for i, j in way) + LOOSE * (count - 2 * len(way)) for way in ways]
+        [
+            sum(costs[i, j] for i, j in pairing) + LOOSE * (count - 2 * len(pairing))
+            for pairing in choices
+        ]
     )
     order = np.argsort(prices)
-    best = ways[int(order[0])]
+    best = choices[int(order[0])]
     for i, j in best:
         joint.partner[joint.stubs[i]] = joint.stubs[j]
         joint.partner[joint.stubs[j]] = joint.stubs[i]

@@ -17,9 +17,9 @@ def longest_extent(line: Floats) -> tuple[float, float]:
     x, y = (np.subtract.outer(points[:, axis], points[:, axis]) for axis in (0, 1))
     squared = x * x + y * y
     first, last = np.unravel_index(int(np.argmax(squared)), squared.shape)
-    way = points[last] - points[first]
-    angle = float(np.degrees(np.arctan2(way[1], way[0]))) % 180.0
-    return float(np.linalg.norm(way)), angle
+    span = points[last] - points[first]
+    angle = float(np.degrees(np.arctan2(span[1], span[0]))) % 180.0
+    return float(np.linalg.norm(span)), angle
 
 
 def hull_of(line: Floats) -> Floats:

@@ -83,8 +83,8 @@ def _curve(s: Floats, line: Floats, at: Floats) -> Floats:
     width = gap[index]
     part = (at - s[index])[:, None] / width
     rest = 1.0 - part
-    first, last, way = line[index], line[index + 1], chord[index]
-    bend = rest * (slope[index] - way) - part * (slope[index + 1] - way)
+    first, last, mean_slope = line[index], line[index + 1], chord[index]
+    bend = rest * (slope[index] - mean_slope) - part * (slope[index + 1] - mean_slope)
     return np.asarray(rest * first + part * last + part * rest * width * bend)
 
 
