@@ -18,6 +18,7 @@ from cosmic.daqco.core.settings import (
 )
 from cosmic.mico.core.link_settings import LinkSettings
 from cosmic.mico.core.sequence.settings import InitialisationSettings, StepSettings
+from cosmic.mico.core.settings import ContactSettings as MicoContactSettings
 from cosmic.mico.core.settings import ControllerSettings as MicoControllerSettings
 from cosmic.mico.core.settings import (
     GroupSettings,
@@ -75,6 +76,7 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[platform]": PlatformSettings,
     "[mico]": MicoSettings,
     "[[mico.controller]]": MicoControllerSettings,
+    "[[mico.contact]]": MicoContactSettings,
     "[mico.defaults]": MotionDefaults,
     "[mico.jog]": JogSettings,
     "[mico.undo]": UndoSettings,

@@ -1,20 +1,21 @@
 """A platform as its files describe it: configuration in, running applications out."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Final
 
+from cosmic.app.applications import Site
 from cosmic.app.configuration.network import own_certificates
 from cosmic.app.configuration.platform_file import KNOWN_APPLICATIONS, PlatformFile, load_platform
 from cosmic.app.configuration.references import misnamed
 from cosmic.app.garbage_watch import GarbageWatch
 from cosmic.app.simulation import SimulationFaults, make_scene
 from cosmic.app.stations.address import StationAddress
-from cosmic.app.stations.hosting import Site, build_applications
+from cosmic.app.stations.hosting import build_applications
 from cosmic.app.stations.joins import join_here, join_stations, join_vision
 from cosmic.app.stations.remote_applications import RemoteApplications, open_stations
 from cosmic.daqco.api.application import DaqcoApplication
@@ -48,6 +49,10 @@ class Platform:
     ----------
     seed : int
         Of everything random in the simulated platform.
+    others : mapping of str to CosmicApplicationBase
+        Applications of other packages that run here, by name.
+    failed : mapping of str to str
+        Why an application that the platform file names is not there.
     """
 
     file: PlatformFile
@@ -61,6 +66,8 @@ class Platform:
     vico: VicoApplication | RemoteApplication[Vico] | None = None
     remote: RemoteApplications = field(default_factory=RemoteApplications)
     scene: Scene | None = None
+    others: Mapping[str, CosmicApplicationBase] = field(default_factory=dict)
+    failed: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def simulated(self) -> bool:
@@ -75,7 +82,8 @@ class Platform:
 
     @property
     def _all(self) -> dict[str, CosmicApplicationBase]:
-        found = (("mico", self.mico), ("daqco", self.daqco), ("vico", self.vico))
+        own = (("mico", self.mico), ("daqco", self.daqco), ("vico", self.vico))
+        found = (*own, *self.others.items())
         return {name: each for name, each in found if each is not None}
 
     @property
@@ -115,6 +123,8 @@ class Platform:
             self.daqco.initialize_later()
         if self.vico in own and self.vico is not None:
             self.vico.initialize()
+        for each in self.others.values():
+            each.initialize()
 
     def shut_down(self) -> None:
         """Stop and close every application; any state. Motion ends first."""
@@ -126,6 +136,8 @@ class Platform:
             for each in (self.vico, self.daqco, self.mico):
                 if each is not None:
                     at_end.callback(each.shut_down)
+            for other in self.others.values():  # before what they may use
+                at_end.callback(other.shut_down)
 
 
 @dataclass(frozen=True)
@@ -208,11 +220,8 @@ def build_platform(
     with ExitStack() as undo:
         remote = _connect(uses, applications, file, path, policy)
         undo.callback(remote.close)
-        hosted = [
-            name
-            for name in applications
-            if name in file.platform.applications and name not in remote.host_of
-        ]
+        wanted = _wanted(file, applications)
+        hosted = [name for name in wanted if name not in remote.host_of]
         if mistakes := misnamed(file, path, hosted):
             raise ConfigError("\n".join(mistakes))
         scene: Scene | None = None
@@ -237,11 +246,23 @@ def build_platform(
             vico=own.vico or used["vico"],
             remote=remote,
             scene=scene,
+            others=own.others,
+            failed=own.failed,
         )
         undo.callback(platform.shut_down)
         platform.begin_remote()
         undo.pop_all()
     return platform
+
+
+def _wanted(file: PlatformFile, applications: Sequence[str]) -> list[str]:
+    """Return those of the platform file that are asked for; all three stand for the others too."""
+    whole = set(KNOWN_APPLICATIONS) <= set(applications)
+    return [
+        name
+        for name in file.platform.applications
+        if name in applications or (whole and name not in KNOWN_APPLICATIONS)
+    ]
 
 
 def _check_simulation(file: PlatformFile, path: Path, *, rate: float, only_simulated: bool) -> None:

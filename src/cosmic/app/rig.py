@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 from weakref import WeakSet
 
 from typing_extensions import override
@@ -94,6 +94,24 @@ class Rig:
         if self._control is None:
             raise NotAvailable("mico is not hosted here; a control loop needs axes")
         return self._control
+
+    def application(self, name: str) -> Any:
+        """Return an application of another package, as it offers itself to scripts.
+
+        Raises
+        ------
+        NotAvailable
+            None of that name runs here; the text says why, or which there are.
+        """
+        if name in self._platform.others:
+            return self._platform.others[name].interface
+        if name in self._platform.failed:
+            raise NotAvailable(self._platform.failed[name])
+        there = ", ".join(self._platform.others) or "none"
+        raise NotAvailable(
+            f"application {name!r} is not hosted here; name it in [platform] applications of the "
+            f"platform file. Others that are: {there}"
+        )
 
     def campaign(self, recipe: "Recipe | str | Path", folder: str | Path) -> "Campaign":
         """Return a campaign that is ready to start: many fibres by one recipe.

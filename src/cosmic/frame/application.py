@@ -46,6 +46,11 @@ class CosmicApplicationBase(WorkerThread):
         """What the operator reads."""
         return self.name
 
+    @property
+    def interface(self) -> object:
+        """What scripts have of it: itself, or an object whose class declares what others may do."""
+        return self
+
     def initialize(self) -> None:
         """Open what the application needs and start its threads; override it."""
         raise NotImplementedError(f"{type(self).__name__} does not say how it is initialised")

@@ -1,8 +1,8 @@
 """What `cosmic check` finds wrong in a platform file and in the twin it names."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
+from cosmic.app.configuration.backends import named_backends
 from cosmic.app.configuration.network import serving
 from cosmic.app.configuration.platform_file import (
     KNOWN_APPLICATIONS,
@@ -14,11 +14,10 @@ from cosmic.app.configuration.references import kept_mistakes, misnamed, recipe_
 from cosmic.app.configuration.scene_fit import misfits
 from cosmic.frame.config import load_model, read_toml
 from cosmic.frame.errors import ConfigError, NotAvailable
-from cosmic.frame.plugins import Kind, missing_packages, read_options
+from cosmic.frame.plugins import missing_packages, read_options
 from cosmic.frame.units import format_quantity
 from cosmic.mico.core.settings import MicoSettings, PositionerSettings
 from cosmic.twin.settings import StageKind, TwinSettings
-from cosmic.vico.hw.factory import NONE
 
 
 def find_mistakes(config: str | Path) -> list[str]:
@@ -72,33 +71,15 @@ def _network_mistakes(file: PlatformFile, path: Path) -> list[str]:
 
 
 def _backend_mistakes(file: PlatformFile, path: Path) -> list[str]:
-    named: list[tuple[str, Kind, str, Mapping[str, object]]] = [
-        ("mico", Kind.CONTROLLER, file.mico.backend, file.mico.options)
-    ]
-    named += [
-        (f"mico.controller[{index}]", Kind.CONTROLLER, each.backend, each.options)
-        for index, each in enumerate(file.mico.controller)
-    ]
-    if file.daqco is not None:
-        named += [("daqco", Kind.BOARD, each.backend, each.options) for each in file.daqco.drivers]
-    if file.vico is not None:
-        options = file.vico.options
-        used = dict.fromkeys([*(each.backend for each in file.vico.camera), *options])
-        named += [("vico", Kind.CAMERA, name, options.get(name, {})) for name in used]
-        lens, light = file.vico.lens, file.vico.light
-        if lens.backend != NONE:
-            named.append(("vico.lens", Kind.LENS, lens.backend, lens.options))
-        if light.backend != NONE:
-            named.append(("vico.light", Kind.LIGHT, light.backend, light.options))
     lines = [
         f"{path}: platform.requires: {each} is not installed: pip install '{each}'"
         for each in missing_packages(file.platform.requires)
     ]
-    for section, kind, name, given in named:
+    for each in named_backends(file):
         try:
-            read_options(kind, name, given)
+            read_options(each.kind, each.name, each.options)
         except ConfigError as exc:
-            lines += [f"{path}: {section}: {line}" for line in str(exc).splitlines()]
+            lines += [f"{path}: {each.section}: {line}" for line in str(exc).splitlines()]
     return lines
 
 

@@ -12,6 +12,7 @@ from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.frame.config import StrictModel, load_model, shipped_config_dir
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.plugins import Kind, has_twin, is_simulated
+from cosmic.frame.plugins import names as plugin_names
 from cosmic.mico.core.settings import MicoSettings
 from cosmic.twin.settings import TwinSettings
 from cosmic.vico.core.settings import VicoSettings
@@ -38,6 +39,7 @@ class PlatformFile(StrictModel):
     mico: MicoSettings
     daqco: DaqcoSettings | None = None
     vico: VicoSettings | None = None
+    application: dict[str, dict[str, object]] = Field(default_factory=dict)
     control: ControlSettings = ControlSettings()
     network: NetworkSettings = NetworkSettings()
 
@@ -93,11 +95,13 @@ def check_applications(names: Iterable[str], where: str) -> None:
     ConfigError
         One is not.
     """
-    unknown = [name for name in names if name not in KNOWN_APPLICATIONS]
+    brought = [each for each in plugin_names(Kind.APPLICATION) if each not in KNOWN_APPLICATIONS]
+    known = [*KNOWN_APPLICATIONS, *brought]
+    unknown = [name for name in names if name not in known]
     if unknown:
         raise ConfigError(
-            f"{where}: unknown application {unknown[0]!r}; "
-            f"known are {', '.join(KNOWN_APPLICATIONS)}"
+            f"{where}: unknown application {unknown[0]!r}; known are {', '.join(known)}. Others "
+            f"come in packages that announce them in their entry points [{Kind.APPLICATION.value}]"
         )
 
 

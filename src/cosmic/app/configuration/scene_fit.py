@@ -1,12 +1,17 @@
 """Whether a scene and the positioners of a platform fit together."""
 
+import logging
 from pathlib import Path
 
 from cosmic.app.configuration.platform_file import PlatformFile
-from cosmic.frame.errors import ConfigError
+from cosmic.frame.errors import ConfigError, NotAvailable, PluginError
+from cosmic.frame.plugins import Kind, make
 from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
 from cosmic.mico.core.collision.collision_manager import CollisionManager
-from cosmic.mico.core.collision.model import SceneModel
+from cosmic.mico.core.collision.model import SceneModel, pair_of
+from cosmic.mico.core.settings import ContactSettings
+
+logger = logging.getLogger(__name__)
 
 
 def load_checker(file: PlatformFile, path: Path) -> CollisionChecker:
@@ -26,11 +31,25 @@ def load_checker(file: PlatformFile, path: Path) -> CollisionChecker:
     mistakes = misfits(file, path, scene)
     if mistakes:
         raise ConfigError("\n".join(mistakes))
-    return CollisionManager(
+    checker = CollisionManager(
         scene,
         answer_s=file.mico.watch.collision_answer_s,
         axes=(each.name for each in file.mico.positioner),
     )
+    for each in file.mico.contact:
+        _respond(checker, each, path)
+    return checker
+
+
+def _respond(checker: CollisionManager, contact: ContactSettings, path: Path) -> None:
+    """Set what the platform file says of a contact; one that cannot be loaded is refused."""
+    try:
+        callback = make(Kind.CONTACT, contact.response, None, contact.options)
+        checker.set_callback(pair_of(*contact.bodies), callback)
+    except PluginError as exc:
+        logger.error("%s; contacts of %s are refused", exc, " and ".join(contact.bodies))
+    except NotAvailable as exc:
+        raise ConfigError(f"{path}: mico.contact: {exc}") from exc
 
 
 def misfits(file: PlatformFile, path: Path, scene: SceneModel) -> list[str]:

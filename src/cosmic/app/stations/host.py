@@ -9,6 +9,7 @@ from cosmic.app.platform import Platform
 from cosmic.app.stations.facts import ITSELF, StationFacts, StationSide
 from cosmic.daqco.api.application import DaqcoApplication
 from cosmic.daqco.api.daqco import Daqco
+from cosmic.frame.declaration import Declared
 from cosmic.frame.errors import ConfigError
 from cosmic.frame.network.errors import StationAway
 from cosmic.frame.network.host import Host
@@ -112,6 +113,10 @@ def _sides(platform: Platform) -> dict[str, object]:
             sides[name] = Host(name, Daqco(application))
         elif isinstance(application, VicoApplication):
             sides[name] = Host(name, Vico(application))
+        else:
+            offered = application.interface
+            if isinstance(offered, Declared):
+                sides[name] = Host(name, offered)
     return sides
 
 

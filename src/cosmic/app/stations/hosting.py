@@ -2,13 +2,14 @@
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import QStandardPaths
 
-from cosmic.app.configuration.platform_file import PlatformFile
+from cosmic.app.applications import ApplicationBackend, ApplicationContext, Site
+from cosmic.app.configuration.platform_file import KNOWN_APPLICATIONS
 from cosmic.app.configuration.scene_fit import load_checker
 from cosmic.app.simulation import SimulationFaults
 from cosmic.daqco.api.application import DaqcoApplication
@@ -17,10 +18,9 @@ from cosmic.daqco.core.settings import DaqcoSettings, DriverSettings
 from cosmic.daqco.hw.factory import UnavailableBoards, make_library
 from cosmic.daqco.hw.factory import join as join_boards
 from cosmic.daqco.hw.interface import BoardLibrary, Source
-from cosmic.frame.application import GuiFactory
-from cosmic.frame.clock import Clock
-from cosmic.frame.errors import PluginError
-from cosmic.frame.failure import FailurePolicy
+from cosmic.frame.application import CosmicApplicationBase, GuiFactory
+from cosmic.frame.errors import ConfigError, NotAvailable, PluginError
+from cosmic.frame.plugins import Kind, NoOptions, make
 from cosmic.frame.version import __version__
 from cosmic.mico.api.application import MicoApplication
 from cosmic.mico.core.settings import ControllerSettings, MicoSettings
@@ -29,7 +29,6 @@ from cosmic.mico.hw.interface import Controller
 from cosmic.mico.hw.joined import UnavailableController
 from cosmic.twin.scene import Scene
 from cosmic.vico.api.application import VicoApplication
-from cosmic.vico.core.settings import VicoSettings
 from cosmic.vico.hw.factory import make_camera_library, make_lens, make_light
 from cosmic.vico.hw.interface import CameraLibrary
 from cosmic.vico.hw.peripherals import Lens, Light
@@ -62,47 +61,69 @@ def close_left_open(notes: OpenRecordings, folders: tuple[Path, ...]) -> list[Cl
 
 
 @dataclass(frozen=True)
-class Site:
-    """What the applications of one process share while they are built."""
-
-    file: PlatformFile
-    path: Path
-    clock: Clock
-    policy: FailurePolicy
-    scene: Scene | None
-    seed: int
-
-
-@dataclass(frozen=True)
 class Hosted:
-    """The applications of one process, and what injects faults into what it simulates."""
+    """The applications of one process, and what injects faults into what it simulates.
+
+    Attributes
+    ----------
+    others : mapping of str to CosmicApplicationBase
+        Applications of other packages, by name.
+    failed : mapping of str to str
+        Why an application that is named is not there.
+    """
 
     mico: MicoApplication | None = None
     daqco: DaqcoApplication | None = None
     vico: VicoApplication | None = None
     faults: SimulationFaults | None = None
+    others: Mapping[str, CosmicApplicationBase] = field(default_factory=dict)
+    failed: Mapping[str, str] = field(default_factory=dict)
 
 
 def build_applications(
     site: Site, names: Sequence[str], guis: Mapping[str, GuiFactory | None]
 ) -> Hosted:
-    """Make the applications of those names that the platform file describes."""
-    mico, daqco, vico = None, None, None
+    """Make the applications of those names that the platform file describes.
+
+    Raises
+    ------
+    ConfigError
+        An application, or something that it needs, is wrong in the platform file.
+    """
     faults = SimulationFaults()
     if site.scene is not None:
         faults.join("scene", site.scene.faults)
-    if "mico" in names:
-        mico = _build_mico(site, faults, guis.get("mico"))
-    if "daqco" in names and site.file.daqco is not None:
-        daqco = _build_daqco(site, faults, site.file.daqco, guis.get("daqco"))
-    if "vico" in names and site.file.vico is not None:
-        vico = _build_vico(site, faults, site.file.vico, guis.get("vico"))
-    return Hosted(mico, daqco, vico, None if site.scene is None else faults)
+    described = {"daqco": site.file.daqco, "vico": site.file.vico}
+    wanted = [each for each in KNOWN_APPLICATIONS if each in names]
+    wanted = [each for each in wanted if described.get(each, site) is not None]
+    wanted += [each for each in names if each not in KNOWN_APPLICATIONS]
+    made: dict[str, CosmicApplicationBase] = {}
+    failed: dict[str, str] = {}
+    for name in wanted:
+        context = ApplicationContext(
+            name, site, faults, guis.get(name), window=any(guis.values()), hosted=dict(made)
+        )
+        options = site.file.application.get(name, {})
+        try:
+            made[name] = make(Kind.APPLICATION, name, context, options)
+        except (PluginError, NotAvailable) as exc:  # the others do without it
+            if name in KNOWN_APPLICATIONS:
+                raise
+            logger.error("%s", exc)
+            failed[name] = str(exc)
+    mico, daqco, vico = (made.pop(each, None) for each in KNOWN_APPLICATIONS)
+    return Hosted(
+        mico if isinstance(mico, MicoApplication) else None,
+        daqco if isinstance(daqco, DaqcoApplication) else None,
+        vico if isinstance(vico, VicoApplication) else None,
+        None if site.scene is None else faults,
+        made,
+        failed,
+    )
 
 
-def _build_mico(
-    site: Site, faults: SimulationFaults, gui_factory: GuiFactory | None
-) -> MicoApplication:
+def _build_mico(_options: NoOptions, context: ApplicationContext) -> CosmicApplicationBase:
+    site, faults = context.site, context.faults
     settings = site.file.mico
     controllers = [_make_controller(site, each) for each in settings.controllers]
     for each in reversed(controllers):  # the first has the last word
@@ -115,7 +136,7 @@ def _build_mico(
         checker=load_checker(site.file, site.path),
         platform=site.file.platform.name,
         folder=site.path.parent,
-        gui_factory=gui_factory,
+        gui_factory=context.gui_factory,
     )
 
 
@@ -150,9 +171,11 @@ def _make_boards(site: Site, settings: DaqcoSettings, driver: DriverSettings) ->
         return UnavailableBoards(driver.backend, str(exc))
 
 
-def _build_daqco(
-    site: Site, faults: SimulationFaults, settings: DaqcoSettings, gui_factory: GuiFactory | None
-) -> DaqcoApplication:
+def _build_daqco(_options: NoOptions, context: ApplicationContext) -> CosmicApplicationBase:
+    site, faults = context.site, context.faults
+    settings = site.file.daqco
+    if settings is None:
+        raise ConfigError(f"{site.path}: daqco: the section is missing")
     libraries = [_make_boards(site, settings, each) for each in settings.drivers]
     for each in reversed(libraries):  # what is injected reaches the boards of the first
         faults.join_simulated("board", each)
@@ -165,15 +188,17 @@ def _build_daqco(
         software=f"CoSMic {__version__}",
         configuration=site.path.read_text(encoding="utf-8"),
         notes=notes,
-        gui_factory=gui_factory,
+        gui_factory=context.gui_factory,
     )
     close_left_open(notes, (application.directory,))
     return application
 
 
-def _build_vico(
-    site: Site, faults: SimulationFaults, settings: VicoSettings, gui_factory: GuiFactory | None
-) -> VicoApplication:
+def _build_vico(_options: NoOptions, context: ApplicationContext) -> CosmicApplicationBase:
+    site, faults = context.site, context.faults
+    settings = site.file.vico
+    if settings is None:
+        raise ConfigError(f"{site.path}: vico: the section is missing")
     scene, simulation = site.scene, None
     if scene is not None and scene.lens is not None and scene.light is not None:
         simulation = SimPeripherals(scene.lens, scene.light, site.clock, site.seed)
@@ -223,7 +248,7 @@ def _build_vico(
         settings,
         clock=site.clock,
         policy=site.policy,
-        gui_factory=gui_factory,
+        gui_factory=context.gui_factory,
     )
 
 
@@ -237,3 +262,8 @@ def _sources(scene: Scene | None) -> dict[tuple[str, str], Source]:
         board, _, number = place.partition("/")
         sources[board, number] = sensors[name]
     return sources
+
+
+DAQCO: Final = ApplicationBackend(_build_daqco)
+MICO: Final = ApplicationBackend(_build_mico)
+VICO: Final = ApplicationBackend(_build_vico)

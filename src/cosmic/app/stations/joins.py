@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from cosmic.app.stations.hosting import Hosted, Site
+from cosmic.app.applications import Site
+from cosmic.app.stations.hosting import Hosted
 from cosmic.app.stations.remote_applications import RemoteApplications
 from cosmic.autonomy.coordinate_transform import join_transform
 from cosmic.autonomy.couplings import join_teleoperation

@@ -119,6 +119,7 @@ class OperatorWindow(CosmicServerGui):
             self.dock(MICO).raise_()
         if images:
             self.dock(images).raise_()
+        self._add_others()
         self._stations = WindowStations(self, platform, host, self._instruments.panels)
         model = self._mico_gui is not None and self._mico_gui.collision.has_model
         blocked = blocked_modes(
@@ -169,6 +170,16 @@ class OperatorWindow(CosmicServerGui):
         if self._platform.daqco is not None:
             self.top_bar.add_indicator(LimitIndicator(daqco_of(self._platform.daqco)))
         return self._instruments.place(self, scene, MICO if scene else "")
+
+    def _add_others(self) -> None:
+        """Put applications of other packages beside the scene, as far as they have a widget."""
+        beside = SCENE if self._scene is not None else ""
+        for application in self._platform.others.values():
+            gui = application.get_gui()
+            if isinstance(gui, QWidget):
+                self.add_panel(application.title, gui, beside=beside)
+        if beside and self._platform.others:
+            self.dock(SCENE).raise_()
 
     def _add_log(self, ring: RingBufferHandler, *, console: bool) -> None:
         below = Qt.DockWidgetArea.BottomDockWidgetArea

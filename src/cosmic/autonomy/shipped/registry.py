@@ -1,14 +1,22 @@
-"""The procedures that a recipe can name."""
+"""The procedures that a recipe can name: those that ship with CoSMic and those that are brought.
 
-from collections.abc import Callable, Mapping
+A package brings one under ``[project.entry-points."cosmic.procedures"]``; the name there is what a
+recipe says, and the `options` of the backend are the model of the recipe's parameters.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
+
+from typing_extensions import override
 
 from cosmic.autonomy.handling.context import HandlingContext
 from cosmic.autonomy.handling.settings import HandlingSettings
 from cosmic.autonomy.procedures.procedure import Procedure
 from cosmic.autonomy.shipped.bend_test import build_bend_test, build_transport
 from cosmic.autonomy.shipped.ping_pong import build_ping_pong
+from cosmic.frame.config import StrictModel
+from cosmic.frame.plugins import Backend, Kind, find_backend, names
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,16 +34,70 @@ class ShippedProcedure:
         How many fibres may be in work at a time.
     """
 
-    build: Callable[[HandlingSettings], Procedure[HandlingContext]]
+    build: Callable[[Any], Procedure[HandlingContext]]
     measures: bool = True
     arms: int = 1
 
 
-PROCEDURES: Final[Mapping[str, ShippedProcedure]] = {
-    "bend test": ShippedProcedure(build_bend_test),
-    "bend test with two grippers": ShippedProcedure(build_ping_pong, arms=2),
-    "transport": ShippedProcedure(build_transport, measures=False),
-}
+ProcedureBackend = Backend[None, ShippedProcedure]
+"""What an entry point of the group ``cosmic.procedures`` leads to.
 
-PARAMETERS: Final = dict.fromkeys(PROCEDURES, HandlingSettings)
-"""The model of each procedure's parameters."""
+Its `options` are `HandlingSettings` or a model derived from them; what it makes is not bound to the
+parameters, which `ShippedProcedure.build` takes.
+"""
+
+
+class Procedures(Mapping[str, ShippedProcedure]):
+    """All procedures by name, each loaded when it is asked for.
+
+    Asking for one that cannot be loaded raises `PluginError`.
+    """
+
+    @override
+    def __getitem__(self, name: str) -> ShippedProcedure:
+        if name not in names(Kind.PROCEDURE):
+            raise KeyError(name)
+        found: ShippedProcedure = find_backend(Kind.PROCEDURE, name).make(None, None)
+        return found
+
+    @override
+    def __iter__(self) -> Iterator[str]:
+        return iter(names(Kind.PROCEDURE))
+
+    @override
+    def __len__(self) -> int:
+        return len(names(Kind.PROCEDURE))
+
+
+class Parameters(Mapping[str, type[StrictModel]]):
+    """The model of each procedure's parameters; as `Procedures`."""
+
+    @override
+    def __getitem__(self, name: str) -> type[StrictModel]:
+        if name not in names(Kind.PROCEDURE):
+            raise KeyError(name)
+        return find_backend(Kind.PROCEDURE, name).options
+
+    @override
+    def __iter__(self) -> Iterator[str]:
+        return iter(names(Kind.PROCEDURE))
+
+    @override
+    def __len__(self) -> int:
+        return len(names(Kind.PROCEDURE))
+
+
+PROCEDURES: Final = Procedures()
+PARAMETERS: Final = Parameters()
+
+
+def procedure_backend(
+    procedure: ShippedProcedure, options: type[HandlingSettings] = HandlingSettings
+) -> ProcedureBackend:
+    """Return what announces a procedure."""
+    return ProcedureBackend(lambda _options, _context: procedure, options=options)
+
+
+BEND_TEST: Final = procedure_backend(ShippedProcedure(build_bend_test))
+PING_PONG: Final = procedure_backend(ShippedProcedure(build_ping_pong, arms=2))
+TRANSPORT: Final = procedure_backend(ShippedProcedure(build_transport, measures=False))

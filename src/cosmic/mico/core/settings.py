@@ -115,6 +115,7 @@ class PositionerSettings(StrictModel):
     device: int = Field(ge=0)
     channel: int = Field(ge=0, le=17)
     kind: Literal["linear", "rotary", "open-loop"]
+    type: str = ""
     limits_um: Range | None = None
     limits_deg: Range | None = None
     start_um: float | None = None
@@ -205,6 +206,14 @@ class GroupSettings(StrictModel):
     positioners: Names
 
 
+class ContactSettings(StrictModel):
+    """What is to happen when two bodies would touch, in place of refusing the movement."""
+
+    bodies: Annotated[tuple[str, str], Field(strict=False)]
+    response: str = Field(min_length=1)
+    options: dict[str, object] = Field(default_factory=dict)
+
+
 class ControllerSettings(StrictModel):
     """One more controller library; its devices are numbered behind those before it."""
 
@@ -233,6 +242,7 @@ class MicoSettings(StrictModel):
     positioner: Annotated[tuple[PositionerSettings, ...], Field(strict=False)]
     group: Annotated[tuple[GroupSettings, ...], Field(strict=False)] = ()
     link: Annotated[tuple[LinkSettings, ...], Field(strict=False)] = ()
+    contact: Annotated[tuple[ContactSettings, ...], Field(strict=False)] = ()
 
     @model_validator(mode="after")
     def _names_fit(self) -> Self:

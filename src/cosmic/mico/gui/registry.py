@@ -1,7 +1,9 @@
-"""Which card shows which positioner; a new type is one class and one line here."""
+"""Which card shows which positioner; a new type is one class, announced with its driver."""
 
+from importlib import import_module
 from typing import Final
 
+from cosmic.mico.core.motion.positioner import known_driver
 from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
 from cosmic.mico.hw.interface import PositionerKind, PositionerType
@@ -23,4 +25,9 @@ def gui_class(kind: PositionerKind, found: PositionerType | None = None) -> type
     What nobody knows better is shown as open-loop.
     """
     fallback = POSITIONER_GUIS.get(kind, PositionerBaseGUI)
+    driver = known_driver(found)
+    if driver is not None and driver.card:
+        module, _, name = driver.card.partition(":")
+        card: type[PositionerBaseGUI] = getattr(import_module(module), name)
+        return card
     return fallback if found is None else TYPE_GUIS.get(found.code, fallback)

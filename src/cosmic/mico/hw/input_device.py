@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, Protocol
 
+from cosmic.frame.plugins import Backend
+
 ALWAYS_REPORTS_S: Final = 0.05
 """Silence after which a device that reports all the time counts as frozen."""
 
@@ -124,3 +126,11 @@ class InputSource(Protocol):
     @abstractmethod
     def close(self) -> None:
         """Give the library back; harmless the second time."""
+
+
+InputBackend = Backend[None, InputSource]
+"""What an entry point of the group ``cosmic.inputs`` leads to.
+
+Its name stands before the colon in the keys of its devices, such as "spacemouse:0". One that is
+`simulated` is offered where motion is simulated only.
+"""

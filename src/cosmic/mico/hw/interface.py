@@ -82,12 +82,16 @@ class PositionerType:
         None when CoSMic does not know this type.
     reference : ReferenceKind
         How it can be referenced.
+    driver : str
+        The positioner type that the configuration names for it, of the group
+        ``cosmic.positioners``; empty: what the vendor's number or the kind says.
     """
 
     code: int
     name: str
     kind: PositionerKind | None
     reference: ReferenceKind
+    driver: str = ""
 
 
 Serial = int | str

@@ -8,7 +8,15 @@ from typing_extensions import override
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import NotConnectedError
-from cosmic.mico.hw.input_device import InputDevice, InputInfo, InputKind, InputSource, InputState
+from cosmic.frame.plugins import NoOptions
+from cosmic.mico.hw.input_device import (
+    InputBackend,
+    InputDevice,
+    InputInfo,
+    InputKind,
+    InputSource,
+    InputState,
+)
 
 KEYS: Final[dict[str, tuple[str, str]]] = {
     "left_x": ("4", "6"),
@@ -105,3 +113,10 @@ class KeyboardSource(InputSource):
     @override
     def close(self) -> None:
         """Do nothing: the window has the keys."""
+
+
+def _make(_options: NoOptions, _context: None) -> InputSource:
+    return KeyboardSource()
+
+
+BACKEND: Final = InputBackend(_make)

@@ -11,8 +11,10 @@ from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import ConfigError, NotConnectedError
+from cosmic.frame.plugins import NoOptions
 from cosmic.mico.hw.input_device import (
     ALWAYS_REPORTS_S,
+    InputBackend,
     InputDevice,
     InputInfo,
     InputKind,
@@ -203,3 +205,10 @@ class RecordedSource(InputSource):
     @override
     def close(self) -> None:
         """Do nothing: nothing is open."""
+
+
+def _make(_options: NoOptions, _context: None) -> InputSource:
+    return RecordedSource()
+
+
+BACKEND: Final = InputBackend(_make)

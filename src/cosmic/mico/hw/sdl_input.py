@@ -8,8 +8,10 @@ from typing_extensions import override
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import NotConnectedError
+from cosmic.frame.plugins import NoOptions
 from cosmic.mico.hw.input_device import (
     Feedback,
+    InputBackend,
     InputDevice,
     InputInfo,
     InputKind,
@@ -187,3 +189,10 @@ def _describe(sdl: Any, index: int) -> InputInfo:
 
 def _numbered(word: str, count: int) -> tuple[str, ...]:
     return tuple(f"{word}_{number}" for number in range(max(0, count)))
+
+
+def _make(_options: NoOptions, _context: None) -> InputSource:
+    return SdlSource()
+
+
+BACKEND: Final = InputBackend(_make)

@@ -10,9 +10,11 @@ from typing_extensions import override
 
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import NotConnectedError
+from cosmic.frame.plugins import NoOptions
 from cosmic.mico.hw.input_device import (
     ALWAYS_REPORTS_S,
     Feedback,
+    InputBackend,
     InputDevice,
     InputInfo,
     InputKind,
@@ -191,3 +193,10 @@ class SimHapticSource(InputSource):
     @override
     def close(self) -> None:
         """Do nothing: it needs no library."""
+
+
+def _make(_options: NoOptions, _context: None) -> InputSource:
+    return SimHapticSource()
+
+
+BACKEND: Final = InputBackend(_make, simulated=True)

@@ -71,7 +71,9 @@ class VicoApplication(TaskApplication):
             open_lens, open_light, clock, policy, timeout_s=settings.lens.timeout_s
         )
         self.units: dict[str, CameraUnit] = {
-            config.name: CameraUnit(config, self.libraries, self._circumstances, policy)
+            config.name: CameraUnit(
+                config, self.libraries, self._circumstances, policy, settings.analysis
+            )
             for config in settings.camera
         }
         direct = Qt.ConnectionType.DirectConnection

@@ -1,7 +1,7 @@
 """`CameraUnit`: one camera of the platform and what hangs on it."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from threading import Lock
 from typing import Final
@@ -113,11 +113,12 @@ class CameraUnit:
         libraries: CameraLibraries,
         circumstances: CircumstancesOf,
         policy: FailurePolicy,
+        analyses: Mapping[str, Mapping[str, object]] | None = None,
     ) -> None:
         self._config = config
         self._libraries = libraries
         self.background = Background()
-        self.chain = make_chain()
+        self.chain = make_chain(config.algorithms, analyses or {})
         for state in self.chain.states:
             self.chain.switch(state.name, on=state.name in config.algorithms)
         self.thread = CameraThread(

@@ -139,6 +139,8 @@ class VicoSettings(StrictModel):
         GenTL producers (.cti files), for the backend "harvesters"; empty: those installed.
     options : dict of str to dict
         Settings of backends of their own, by backend.
+    analysis : dict of str to dict
+        Settings of algorithms of machine vision of their own, by name.
     """
 
     directory: str = ""
@@ -148,6 +150,7 @@ class VicoSettings(StrictModel):
     sources: Annotated[tuple[str, ...], Field(strict=False)] = ()
     producers: Annotated[tuple[str, ...], Field(strict=False)] = ()
     options: dict[str, dict[str, object]] = Field(default_factory=dict)
+    analysis: dict[str, dict[str, object]] = Field(default_factory=dict)
     camera: Annotated[tuple[CameraConfig, ...], Field(strict=False)] = ()
     tool: Annotated[tuple[ToolSettings, ...], Field(strict=False)] = ()
     lens: MotorLensSettings = Field(default_factory=lambda: MotorLensSettings(backend="none"))

@@ -2,9 +2,11 @@
 
 from abc import ABC, abstractmethod
 from enum import StrEnum
+from typing import Final
 
 from typing_extensions import override
 
+from cosmic.frame.plugins import Backend, NoOptions
 from cosmic.mico.core.collision.answer import Approach, Spans
 
 
@@ -40,3 +42,14 @@ class RefuseContact(CollisionCallbackBase):
     @override
     def on_contact(self, approach: Approach, spans: Spans) -> Response:
         return Response.REFUSE
+
+
+ContactBackend = Backend[None, CollisionCallbackBase]
+"""What an entry point of the group ``cosmic.contacts`` leads to."""
+
+
+def _make_refuse(_options: NoOptions, _context: None) -> CollisionCallbackBase:
+    return RefuseContact()
+
+
+REFUSE: Final = ContactBackend(_make_refuse)

@@ -2,12 +2,12 @@
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Condition
 from typing import Final
 
 from cosmic.frame.clock import WALL
-from cosmic.frame.errors import DeviceFault, NotAvailable
+from cosmic.frame.errors import ConfigError, DeviceFault, NotAvailable
 from cosmic.mico.core.motion.orders import COMMON
 from cosmic.mico.core.motion.positioner import (
     Confidence,
@@ -16,6 +16,7 @@ from cosmic.mico.core.motion.positioner import (
     PositionerState,
     check_estimate,
     class_for,
+    positioner_driver,
 )
 from cosmic.mico.core.settings import PositionerSettings
 from cosmic.mico.hw.interface import (
@@ -28,6 +29,7 @@ from cosmic.mico.hw.interface import (
     PositionerType,
     PositionKnownRead,
     PositionRead,
+    ReferenceKind,
     SafeDirectionRead,
     SensorPresentRead,
     TypeRead,
@@ -140,6 +142,7 @@ class DeviceDataContainer:
         if settings is None:
             return
         wanted = settings.positioner_kind
+        found, trouble = _with_driver(found, settings)
         positioner = class_for(wanted, found)(settings, self.address(channel), found, self._hold_s)
         positioner.update(
             most_steps=self.capabilities.most_steps,
@@ -163,6 +166,9 @@ class DeviceDataContainer:
             positioner.update(present=False, error=text)
             log = logger.debug if reason == NO_DEVICE else logger.error
             log("%s: %s", settings.name, text)
+        elif trouble:
+            positioner.update(present=False, error=trouble)
+            logger.error("%s: %s", settings.name, trouble)
         self._positioners[channel] = positioner
 
     def _unconfigured(self, channel: int, kind: PositionerKind | None) -> PositionerSettings | None:
@@ -260,6 +266,24 @@ class DeviceDataContainer:
     def address(self, channel: int) -> Channel:
         """Return the address of `channel` for calls to the controller."""
         return Channel(self.library_index, channel)
+
+
+def _with_driver(
+    found: PositionerType | None, settings: PositionerSettings
+) -> tuple[PositionerType | None, str]:
+    """Return what was found with the type that the configuration names, or why it has none."""
+    if not settings.type:
+        return found, ""
+    kind = settings.positioner_kind
+    try:
+        driver = positioner_driver(settings.type)
+    except ConfigError as exc:
+        return found, str(exc)
+    if driver.positioner.kind is not kind:
+        return found, f"type {settings.type!r} is {driver.positioner.kind}, the axis is {kind}"
+    if found is None:
+        return PositionerType(-1, settings.type, kind, ReferenceKind.NONE, settings.type), ""
+    return replace(found, driver=settings.type), ""
 
 
 def _reflect(event: Event, positioner: PositionerBase) -> PositionerState:

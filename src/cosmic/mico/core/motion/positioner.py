@@ -8,7 +8,8 @@ from typing import Any, ClassVar, Final, Self
 
 from typing_extensions import override
 
-from cosmic.frame.errors import DeviceError, DeviceFault, NotAvailable, refusal
+from cosmic.frame.errors import ConfigError, DeviceError, DeviceFault, NotAvailable, refusal
+from cosmic.frame.plugins import Backend, Kind, make
 from cosmic.frame.units import AxisUnit, format_quantity
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.mico.core.motion.orders import (
@@ -249,10 +250,64 @@ TYPE_CLASSES: Final[dict[int, type[PositionerBase]]] = {}
 """Positioner types, by the vendor's number, that need more than the class of their kind."""
 
 
+@dataclass(frozen=True, slots=True)
+class PositionerDriver:
+    """A positioner type that the configuration names: ``type`` of a ``[[mico.positioner]]``.
+
+    Attributes
+    ----------
+    positioner : type of PositionerBase
+        What drives it; of the kind that the configuration says.
+    card : str
+        "module:class" of the card that shows it, loaded by windows only; empty: that of its kind.
+    """
+
+    positioner: type[PositionerBase]
+    card: str = ""
+
+
+PositionerBackend = Backend[None, PositionerDriver]
+"""What an entry point of the group ``cosmic.positioners`` leads to."""
+
+
+def positioner_driver(name: str) -> PositionerDriver:
+    """Return the positioner type of that name.
+
+    Raises
+    ------
+    ConfigError
+        There is none, or it cannot be loaded.
+    """
+    driver: PositionerDriver = make(Kind.POSITIONER, name, None)
+    return driver
+
+
+def known_driver(found: PositionerType | None) -> PositionerDriver | None:
+    """Return the driver that is named for what was found; None where none is, or is not here."""
+    if found is None or not found.driver:
+        return None
+    try:
+        return positioner_driver(found.driver)
+    except ConfigError:  # named at a station that has the package, which this process lacks
+        return None
+
+
 def class_for(kind: PositionerKind, found: PositionerType | None) -> type[PositionerBase]:
     """Return the class that drives a positioner: that of its type, or else of its kind."""
+    driver = known_driver(found)
+    if driver is not None:
+        return driver.positioner
     fallback = POSITIONER_CLASSES[kind]
     return fallback if found is None else TYPE_CLASSES.get(found.code, fallback)
+
+
+def _own(positioner: type[PositionerBase]) -> PositionerBackend:
+    return PositionerBackend(lambda _options, _context: PositionerDriver(positioner))
+
+
+LINEAR: Final = _own(LinearPositioner)
+ROTARY: Final = _own(RotaryPositioner)
+OPEN_LOOP: Final = _own(PositionerOL)
 
 
 TIMES_STD: Final = 3.0

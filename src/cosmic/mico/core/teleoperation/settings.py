@@ -107,6 +107,8 @@ class TeleoperationSettings(StrictModel):
     soft_force_un: float = Field(default=60.0, gt=0)
     hard_force_un: float = Field(default=140.0, gt=0)
     profiles: str = "profiles.toml"
+    inputs: Annotated[tuple[str, ...], Field(strict=False)] = ()
+    input: dict[str, dict[str, object]] = Field(default_factory=dict)
     profile: Annotated[tuple[TeleoperationProfileSettings, ...], Field(strict=False)] = ()
 
     @model_validator(mode="after")

@@ -26,7 +26,7 @@ from cosmic.mico.core.teleoperation.state import (
     TeleoperationState,
 )
 from cosmic.mico.hw.input_device import InputDevice, InputInfo
-from cosmic.mico.hw.input_sources import InputSources
+from cosmic.mico.hw.input_sources import InputSources, make_sources
 
 logger = logging.getLogger(__name__)
 
@@ -50,7 +50,9 @@ class Teleoperation:
         self._manager = manager
         self._policy = policy
         self.settings = manager.settings.teleoperation
-        self.sources = sources or InputSources(simulated=manager.controller.simulated)
+        self.sources = sources or make_sources(
+            self.settings.inputs, self.settings.input, simulated=manager.controller.simulated
+        )
         self.coupling: ForceCoupling | None = None
         self._book = ProfileBook(self.settings, user_file(self.settings.profiles, folder))
         for text in self._book.misfits(manager.settings.kinds):

@@ -1,15 +1,24 @@
 """The algorithms that come with ViCo, as links of the chain."""
 
-from collections.abc import Iterable, Mapping
+import logging
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Final, cast
 
 import cv2
 
-from cosmic.frame.errors import ConfigError
+from cosmic.frame.errors import ConfigError, PluginError
+from cosmic.frame.plugins import Kind, NoOptions, make
 from cosmic.vico.core.focus import FocusMeasure, sharpness
 from cosmic.vico.core.image import CameraImage
-from cosmic.vico.core.vision.chain import ALGORITHMS, Chain, Results, Unavailable, algorithm
+from cosmic.vico.core.vision.chain import (
+    ALGORITHMS,
+    Algorithm,
+    AnalysisBackend,
+    Chain,
+    Results,
+    Unavailable,
+)
 from cosmic.vico.core.vision.fibre import Fibre
 from cosmic.vico.core.vision.fibre_tracking import FibreTracker
 from cosmic.vico.core.vision.tool_tips import Expect, find_tool, tip_seen
@@ -17,18 +26,69 @@ from cosmic.vico.core.vision.tool_types import ExpectedTool
 from cosmic.vico.core.vision.tracking import TemplateTracker
 from cosmic.vico.hw.interface import Pixels, Roi
 
+logger = logging.getLogger(__name__)
+
 NO_TOOL: Final = "no tool is expected on the image: calibrate with it, and bring it there"
 
 
-def make_chain(*, off: Iterable[str] = ()) -> Chain:
-    """Return a chain of the built-in algorithms and of those registered since.
+BUILT_IN: Final = ("focus", "fibres", "fibre track", "place track", "tools", "tips")
+"""The algorithms that every chain begins with, in the order in which they run."""
+
+_NO_OPTIONS: Final[Mapping[str, Mapping[str, object]]] = {}
+
+
+class Missing:
+    """In place of an algorithm that cannot be loaded; its result is why.
+
+    Attributes
+    ----------
+    name : str
+        What the camera names.
+    """
+
+    def __init__(self, name: str, reason: str) -> None:
+        self.name = name
+        self._reason = reason
+
+    def run(self, image: CameraImage, results: Results) -> object:  # noqa: ARG002
+        """Say why there is nothing."""
+        return Unavailable(self._reason)
+
+
+def make_chain(
+    named: Iterable[str] = (),
+    options: Mapping[str, Mapping[str, object]] = _NO_OPTIONS,
+    *,
+    off: Iterable[str] = (),
+) -> Chain:
+    """Return a chain of the built-in algorithms, of those named and of those registered since.
+
+    Parameters
+    ----------
+    named : iterable of str
+        Algorithms that are in it besides the built-in ones, which other packages bring.
+    options : mapping of str to mapping
+        Settings of algorithms, by name.
 
     Raises
     ------
     ConfigError
-        Two have one name, or `off` names one that is not there.
+        Two have one name, `off` names one that is not there, nothing has a name among `named`, or
+        the options of one are wrong.
     """
-    return ALGORITHMS.chain(off=off)
+    registered = ALGORITHMS.names
+    brought = [each for each in named if each not in BUILT_IN and each not in registered]
+    made = [_made(each, options.get(each, {})) for each in (*BUILT_IN, *brought)]
+    return ALGORITHMS.chain(made, off=off)
+
+
+def _made(name: str, options: Mapping[str, object]) -> Algorithm:
+    try:
+        found: Algorithm = make(Kind.ANALYSIS, name, None, options)
+    except PluginError as exc:
+        logger.error("%s", exc)
+        return Missing(name, str(exc))
+    return found
 
 
 def grey(data: Pixels) -> Pixels:
@@ -36,7 +96,6 @@ def grey(data: Pixels) -> Pixels:
     return data if data.ndim == 2 else cast("Pixels", cv2.cvtColor(data, cv2.COLOR_RGB2GRAY))
 
 
-@algorithm
 class Sharpness:
     """How sharp the image is; the result is a float.
 
@@ -60,7 +119,6 @@ class Sharpness:
             return Unavailable(str(exc))
 
 
-@algorithm
 class FindFibres:
     """Every fibre on the image; the result is a tuple of `Fibre`."""
 
@@ -74,7 +132,6 @@ class FindFibres:
         return tuple(find_fibres(grey(image.data)))
 
 
-@algorithm
 class TrackFibre:
     """One of the fibres found, followed from image to image; the result is a `FibreTrack`."""
 
@@ -108,7 +165,6 @@ class TrackFibre:
         return self._tracker.follow([each for each in found if isinstance(each, Fibre)])
 
 
-@algorithm
 class TrackPoint:
     """A point on the image, followed by how it looks; the result is a `Track`."""
 
@@ -145,7 +201,6 @@ class TrackPoint:
         return self._tracker.follow(data)
 
 
-@algorithm
 class FindTools:
     """Grippers and probe; the result maps each name to `GripperTips`, `ToolEnd` or `NotSeen`.
 
@@ -177,7 +232,6 @@ class FindTools:
         return MappingProxyType({name: find_tool(data, tool) for name, tool in expected.items()})
 
 
-@algorithm
 class FindTips:
     """The tips of grippers and probe in short, for the display; a tuple of `TipSeen`.
 
@@ -205,3 +259,18 @@ class FindTips:
             found = {name: find_tool(data, tool) for name, tool in expected.items()}
         seen = (tip_seen(name, each) for name, each in found.items())
         return tuple(each for each in seen if each is not None)
+
+
+def _backend(algorithm: Callable[[], Algorithm]) -> AnalysisBackend:
+    def made(_options: NoOptions, _context: None) -> Algorithm:
+        return algorithm()
+
+    return AnalysisBackend(made)
+
+
+SHARPNESS: Final = _backend(Sharpness)
+FIBRES: Final = _backend(FindFibres)
+FIBRE_TRACK: Final = _backend(TrackFibre)
+POINT_TRACK: Final = _backend(TrackPoint)
+TOOLS: Final = _backend(FindTools)
+TIPS: Final = _backend(FindTips)

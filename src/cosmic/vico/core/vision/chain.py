@@ -1,7 +1,10 @@
 """The chain of named algorithms that is run on each image before it is shown.
 
-An algorithm of one's own is a class with `name` and `run`, and `@algorithm` above it, in a module
-that is imported before `algorithms.make_chain` is called::
+A package brings an algorithm under ``[project.entry-points."cosmic.analyses"]``, where an
+`AnalysisBackend` stands; it is in the chain of each camera that names it among its `algorithms`.
+
+In a script, one of one's own is a class with `name` and `run`, and `@algorithm` above it, before
+`algorithms.make_chain` is called::
 
     @algorithm
     class Brightness:
@@ -21,6 +24,7 @@ from typing import Final, Protocol, TypeVar
 
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import ConfigError
+from cosmic.frame.plugins import Backend
 from cosmic.vico.core.image import CameraImage
 
 logger = logging.getLogger(__name__)
@@ -55,6 +59,10 @@ class Algorithm(Protocol):
             for what nobody foresaw: after some of them in a row it runs now and then only, until
             it succeeds.
         """
+
+
+AnalysisBackend = Backend[None, Algorithm]
+"""What an entry point of the group ``cosmic.analyses`` leads to; made anew for each camera."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,20 +264,25 @@ class Registry:
     def __init__(self) -> None:
         self._makers: list[Maker] = []
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of what was added, as far as the makers tell them."""
+        return tuple(getattr(maker, "name", "") for maker in self._makers)
+
     def add(self, maker: M) -> M:
         """Have every chain made from now on end with one of these; decorates a class."""
         self._makers.append(maker)
         return maker
 
-    def chain(self, *, off: Iterable[str] = ()) -> Chain:
-        """Return a chain with one of each, anew.
+    def chain(self, before: Iterable[Algorithm] = (), *, off: Iterable[str] = ()) -> Chain:
+        """Return a chain of those `before`, and then one of each, anew.
 
         Raises
         ------
         ConfigError
             Two have one name, or `off` names one that is not there.
         """
-        return Chain([maker() for maker in self._makers], off=off)
+        return Chain([*before, *(maker() for maker in self._makers)], off=off)
 
 
 ALGORITHMS: Final = Registry()

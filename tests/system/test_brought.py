@@ -1,0 +1,247 @@
+"""What a package outside of the tree brings works on a platform that names it."""
+
+import sys
+import textwrap
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+import cosmic
+from cosmic.app.cli import main
+from cosmic.frame.plugins import find_backend
+
+POINTS = """
+[cosmic.applications]
+heater = {0}:HEATER
+broken = no_such_package:BACKEND
+[cosmic.contacts]
+shrug = {0}:SHRUG
+[cosmic.exporters]
+rows = {0}:ROWS
+[cosmic.analyses]
+brightness = {0}:BRIGHTNESS
+broken = no_such_package:BACKEND
+[cosmic.procedures]
+look = {0}:LOOK
+[cosmic.positioners]
+careful = {0}:CAREFUL
+[cosmic.inputs]
+pedal = {0}:PEDAL
+"""
+
+CODE = """
+from pathlib import Path
+from typing import ClassVar
+
+from cosmic.app.applications import ApplicationBackend
+from cosmic.autonomy.handling.settings import HandlingSettings
+from cosmic.autonomy.shipped.bend_test import build_transport
+from cosmic.autonomy.shipped.registry import ShippedProcedure, procedure_backend
+from cosmic.daqco.api.export import ExporterBackend
+from cosmic.frame.application import CosmicApplicationBase
+from cosmic.frame.config import StrictModel
+from cosmic.mico.core.collision.callback import CollisionCallbackBase, ContactBackend, Response
+from cosmic.mico.core.motion.orders import MoveTo
+from cosmic.mico.core.motion.positioner import (
+    LinearPositioner,
+    PositionerBackend,
+    PositionerDriver,
+)
+from cosmic.mico.hw.input_device import InputBackend, InputInfo, InputKind, InputSource
+from cosmic.vico.core.vision.chain import AnalysisBackend
+
+
+class Options(StrictModel):
+    to_um: float
+
+
+class Heater(CosmicApplicationBase):
+    def __init__(self, options, context):
+        super().__init__("Heater", context.site.policy)
+        self._mico, self._to_um = context.mico, options.to_um
+        self.initialised = False
+
+    def initialize(self):
+        self.initialised = True
+
+    def go(self):
+        return self._mico["left.x"].move_to(self._to_um)
+
+
+class Shrug(CollisionCallbackBase):
+    def on_contact(self, approach, spans):
+        return Response.IGNORE
+
+
+class Brightness:
+    name = "brightness"
+
+    def __init__(self, scale):
+        self._scale = scale
+
+    def run(self, image, results):
+        return self._scale * float(image.data.mean())
+
+
+class Scale(StrictModel):
+    scale: float = 1.0
+
+
+class CarefulPositioner(LinearPositioner):
+    motions: ClassVar = (MoveTo,)
+    advice = "it only moves to positions"
+
+
+class Pedal(InputSource):
+    def devices(self):
+        return (InputInfo("pedal:0", "Pedal", InputKind.JOYSTICK, ("x",)),)
+
+    def open(self, key):
+        raise NotImplementedError
+
+    def close(self):
+        pass
+
+
+def export_rows(recording, path, progress=None, *, overwrite=False):
+    path.write_text(f"{recording.samples} rows of {', '.join(recording.channels)}")
+    return path
+
+
+HEATER = ApplicationBackend(Heater, options=Options)
+SHRUG = ContactBackend(lambda options, context: Shrug())
+ROWS = ExporterBackend(lambda options, context: export_rows)
+BRIGHTNESS = AnalysisBackend(lambda options, context: Brightness(options.scale), options=Scale)
+LOOK = procedure_backend(ShippedProcedure(build_transport, measures=False))
+CAREFUL = PositionerBackend(lambda options, context: PositionerDriver(CarefulPositioner))
+PEDAL = InputBackend(lambda options, context: Pedal())
+"""
+
+Edit = Callable[..., Path]
+
+
+@pytest.fixture
+def laboratory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Iterator[Edit]:
+    """Install a package that brings one of each kind; returns what edits a platform file."""
+    find_backend.cache_clear()
+    module = f"labware_of_{tmp_path.name.replace('-', '_')}"
+    package = tmp_path / "labware"
+    described = package / "labware-1.2.dist-info"
+    described.mkdir(parents=True)
+    (package / f"{module}.py").write_text(textwrap.dedent(CODE), encoding="utf-8")
+    (described / "METADATA").write_text("Name: labware\nVersion: 1.2\n", encoding="utf-8")
+    (described / "entry_points.txt").write_text(POINTS.format(module), encoding="utf-8")
+    monkeypatch.syspath_prepend(str(package))
+    folder = tmp_path / "config"
+    assert main(["init", str(folder)]) == 0
+    file = folder / "platform.toml"
+
+    def edit(*changes: tuple[str, str]) -> Path:
+        text = file.read_text(encoding="utf-8")
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new, 1)
+        file.write_text(text, encoding="utf-8")
+        capsys.readouterr()
+        return folder
+
+    yield edit
+    find_backend.cache_clear()
+    sys.modules.pop(module, None)
+
+
+APPLICATIONS = 'applications = ["mico", "daqco", "vico"]'
+
+
+def test_a_fourth_application_moves_through_the_gate_beside_the_three(laboratory: Edit) -> None:
+    folder = laboratory(
+        (APPLICATIONS, 'applications = ["mico", "heater", "broken"]'),
+        ("[mico]\n", "[application.heater]\nto_um = 25.0\n\n[mico]\n"),
+    )
+    with cosmic.connect(folder, rate=20) as rig:
+        heater = rig.application("heater")
+        assert heater.initialised
+        assert heater.go() == pytest.approx(25.0, abs=1.0)
+        rig.stop()
+        with pytest.raises(cosmic.MoveRefused, match="stop"):
+            heater.go()
+        with pytest.raises(cosmic.NotAvailable, match=r"labware 1\.2.*no_such_package"):
+            rig.application("broken")
+        with pytest.raises(cosmic.NotAvailable, match="heater"):
+            rig.application("cooler")
+
+
+def test_a_check_reads_the_options_of_all_that_is_named(
+    laboratory: Edit, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = laboratory(
+        (APPLICATIONS, 'applications = ["mico", "heater"]\nrequires = ["labware", "other>=2"]'),
+        ("[vico]\n", "[vico.analysis.brightness]\nscal = 2.0\n\n[vico]\n"),
+    )
+    assert main(["check", str(folder)]) == 1
+    said = capsys.readouterr().err
+    assert "application: options of application 'heater': to_um: key is missing" in said
+    assert "vico: options of analysis 'brightness': scal: unknown key" in said
+    assert "platform.requires: other>=2 is not installed: pip install 'other>=2'" in said
+    assert "labware" not in said.replace("options", "")
+
+
+def test_a_response_to_a_contact_needs_a_pair_that_is_watched(laboratory: Edit) -> None:
+    contact = '[[mico.contact]]\nbodies = ["left", "right"]\nresponse = "shrug"\n\n'
+    folder = laboratory(("[[mico.group]]\n", f"{contact}[[mico.group]]\n"))
+    with pytest.raises(cosmic.ConfigError, match="left and right are not watched"):
+        cosmic.connect(folder, applications=("mico",))
+
+
+def test_its_algorithm_is_in_the_chain_of_the_camera_that_names_it(laboratory: Edit) -> None:
+    folder = laboratory(
+        ("[[vico.camera]]\n", '[[vico.camera]]\nalgorithms = ["focus", "brightness", "broken"]\n'),
+        ("[vico]\n", "[vico.analysis.brightness]\nscale = 2.0\n\n[vico]\n"),
+    )
+    assert main(["check", str(folder)]) == 1, "one of them cannot be loaded"
+    with cosmic.connect(folder, applications=("mico", "vico")) as rig:
+        image = rig.vico.snap()
+        chain = rig.vico.application.unit(rig.vico.cameras[0]).chain
+        states = [each.name for each in chain.states]
+        assert states[-2:] == ["brightness", "broken"]
+        assert image.mean() > 0
+
+
+def test_its_exporter_is_a_format(laboratory: Edit, tmp_path: Path) -> None:
+    laboratory()
+    with cosmic.connect(applications=("mico", "daqco")) as rig, rig.daqco.record(tmp_path / "a.h5"):
+        rig.daqco.latest()
+    assert main(["export", str(tmp_path / "a.h5"), "--to", "rows"]) == 0
+    assert "rows of" in (tmp_path / "a.rows").read_text()
+
+
+def test_its_positioner_type_says_what_the_axis_can_do(laboratory: Edit) -> None:
+    folder = laboratory(('name = "left.x"\n', 'name = "left.x"\ntype = "careful"\n'))
+    with cosmic.connect(folder, applications=("mico",), rate=20) as rig:
+        assert rig.mico["left.x"].move_to(30.0) == pytest.approx(30.0, abs=1.0)
+        with pytest.raises(cosmic.MoveRefused, match="it only moves to positions"):
+            rig.mico["left.x"].move_by(5.0)
+        assert rig.mico["left.y"].move_by(5.0) is not None
+
+
+def test_its_input_device_is_listed(laboratory: Edit) -> None:
+    folder = laboratory(("[mico.teleoperation]\n", '[mico.teleoperation]\ninputs = ["pedal"]\n'))
+    with cosmic.connect(folder, applications=("mico",)) as rig:
+        listed = [each.key for each in rig.mico.teleoperation.devices()]
+    assert "pedal:0" in listed
+
+
+def test_its_procedure_is_named_in_a_recipe(laboratory: Edit, tmp_path: Path) -> None:
+    laboratory()
+    from cosmic.autonomy.campaign.opening import read_recipe
+
+    shipped = (tmp_path / "config" / "recipes" / "transport.toml").read_text(encoding="utf-8")
+    recipe = tmp_path / "look.toml"
+    recipe.write_text(shipped.replace('"transport"', '"look"', 1), encoding="utf-8")
+    assert read_recipe(recipe).file.procedure == "look"
+    recipe.write_text(shipped.replace('"transport"', '"lok"', 1), encoding="utf-8")
+    with pytest.raises(cosmic.ConfigError, match=r"there is no procedure 'lok'; known: .*look"):
+        read_recipe(recipe)
