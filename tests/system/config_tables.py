@@ -14,6 +14,7 @@ from cosmic.daqco.core.settings import (
     DaqcoSettings,
     DriverSettings,
     LimitSettings,
+    OutputSettings,
     ScaleSettings,
 )
 from cosmic.mico.core.link_settings import LinkSettings
@@ -95,6 +96,7 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[[daqco.scale]]": ScaleSettings,
     "[[daqco.channel]]": ChannelSettings,
     "[[daqco.limit]]": LimitSettings,
+    "[[daqco.output]]": OutputSettings,
     "[vico]": VicoSettings,
     "[[vico.camera]]": CameraConfig,
     "[[vico.tool]]": ToolSettings,

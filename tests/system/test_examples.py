@@ -161,6 +161,15 @@ def test_a_recorded_hand_steers_as_a_gamepad_does(said: str) -> None:
     assert 10.0 < numbers[2] < 120.0
 
 
+@example("play_a_waveform.py")
+def test_an_output_gives_a_value_and_a_ramp_and_is_refused_while_stopped(said: str) -> None:
+    lines = said.splitlines()
+    assert lines[:2] == ["piezo gives 2", "lamp gives 1"]
+    assert lines[2].startswith("refused: output piezo: 6 V asked; its limits are 0 to 5 V")
+    assert lines[3] == "the ramp ends at 4.0 V"
+    assert lines[4].startswith("refused: output piezo: outputs are stopped")
+
+
 @example("two_makes.py")
 def test_an_axis_of_each_make_stands_where_it_was_sent(said: str) -> None:
     assert re.search(r"left\.x stands at -\d", said)

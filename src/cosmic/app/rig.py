@@ -266,19 +266,31 @@ class Rig:
     def stop(self, reason: str = "stop from a script") -> None:
         """Stop every axis now; nothing moves again before `reset_stop`. Returns at once.
 
+        Outputs marked ``stops`` go to their safe values.
+
         Raises
         ------
         StationAway
             The axes are at a station that cannot be reached. What this program had begun to move
             there stops by itself.
         """
-        if self._platform.mico is not None:
-            self._platform.mico.manager.stop(reason)
+        try:
+            if self._platform.mico is not None:
+                self._platform.mico.manager.stop(reason)
+        finally:
+            if self._has_outputs:
+                self.daqco.stop_outputs(reason)
 
     def reset_stop(self) -> None:
         """Allow motion again; what was stopped does not go on by itself."""
         if self._platform.mico is not None:
             self._platform.mico.manager.reset_stop()
+        if self._has_outputs:
+            self.daqco.reset_outputs()
+
+    @property
+    def _has_outputs(self) -> bool:
+        return self._platform.daqco is not None and bool(self.daqco.outputs)
 
     @property
     def faults(self) -> SimulationFaults:

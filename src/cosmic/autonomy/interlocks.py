@@ -13,6 +13,7 @@ from cosmic.daqco.core.chunk import DataChunk, Values
 from cosmic.daqco.core.recording_format import AxisPosition
 from cosmic.frame.clock import WALL, Clock
 from cosmic.mico.api.application_base import MicoApplicationBase
+from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.vico.api.application import VicoApplication
 
 _UN: Final = {"nN": 1e-3, "uN": 1.0, "µN": 1.0, "mN": 1e3, "N": 1e6}
@@ -30,6 +31,23 @@ def join_force_limits(daqco: DaqcoApplication, mico: MicoApplicationBase) -> Non
     this process, limits are watched and told, and stop nothing.
     """
     daqco.guard.trip = mico.manager.stop
+
+
+def join_outputs(daqco: DaqcoApplication, mico: MicoApplicationBase) -> None:
+    """Have a stop of MiCo stop the outputs of DAQCo as well, until that stop is reset.
+
+    The boards are written to by a thread of their own, after every channel of MiCo was stopped.
+    """
+    latch = mico.manager.latch
+
+    def follow(state: StopState) -> None:
+        if state.reason is not None:
+            daqco.outputs.stop(state.reason)
+        else:
+            daqco.outputs.reset()
+
+    latch.subscribe(follow)
+    daqco.stopped_elsewhere = lambda: latch.state.reason or ""
 
 
 def join_force_cautions(daqco: DaqcoApplication, mico: MicoApplicationBase) -> None:

@@ -163,6 +163,7 @@ def _make_boards(site: Site, settings: DaqcoSettings, driver: DriverSettings) ->
             clock=site.clock,
             scene_sources=_sources(site.scene),
             clock_sources=settings.clock_sources,
+            start_triggers=settings.start_triggers,
             options=driver.options,
             seed=site.seed,
         )

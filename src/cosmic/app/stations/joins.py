@@ -5,11 +5,13 @@ from pathlib import Path
 from cosmic.app.applications import Site
 from cosmic.app.stations.hosting import Hosted
 from cosmic.app.stations.remote_applications import RemoteApplications
+from cosmic.app.stations.remote_station import RemoteStation
 from cosmic.autonomy.coordinate_transform import join_transform
 from cosmic.autonomy.couplings import join_teleoperation
 from cosmic.autonomy.interlocks import (
     join_force_cautions,
     join_force_limits,
+    join_outputs,
     join_positions,
     join_stage_positions,
 )
@@ -19,6 +21,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.network.application import RemoteApplication
 from cosmic.frame.version import __version__
 from cosmic.mico.api.application_base import MicoApplicationBase
+from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.vico.api.application import VicoApplication
 
 
@@ -27,6 +30,7 @@ def join_here(own: Hosted, site: Site) -> None:
     mico, daqco, vico = own.mico, own.daqco, own.vico
     if daqco is not None and mico is not None:
         join_force_limits(daqco, mico)
+        join_outputs(daqco, mico)
         join_force_cautions(daqco, mico)
         join_teleoperation(mico, daqco)
         join_positions(daqco.recorder, mico, site.clock)
@@ -62,6 +66,10 @@ def join_stations(
     there, boards_at = remote.host_of.get("mico"), remote.host_of.get("daqco")
     if mico is None or daqco is None or there is boards_at:
         return
+    if isinstance(daqco, DaqcoApplication):
+        join_outputs(daqco, mico)
+    elif boards_at is not None:
+        _stop_outputs_there(mico, daqco_of(daqco), boards_at, policy)
     guard = daqco_of(daqco).guard
     if there is None:
         guard.trip = mico.manager.stop
@@ -75,3 +83,19 @@ def join_stations(
         )
 
     guard.trip = trip
+
+
+def _stop_outputs_there(
+    mico: MicoApplicationBase, daqco: Daqco, station: RemoteStation, policy: FailurePolicy
+) -> None:
+    """Have a stop of MiCo stop outputs at another station; a reset there is given there."""
+
+    def follow(state: StopState) -> None:
+        reason = state.reason
+        if reason is not None and daqco.outputs:
+            station.later(
+                lambda: daqco.stop_outputs(reason),
+                lambda exc: policy.report(exc, f"stop of outputs at {station.name} ({reason})"),
+            )
+
+    mico.manager.latch.subscribe(follow)

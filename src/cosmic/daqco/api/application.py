@@ -15,6 +15,7 @@ from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.guarded import check_arming, check_guarded, successor
 from cosmic.daqco.core.left_behind import OpenRecordings
 from cosmic.daqco.core.limits import Limit, LimitGuard
+from cosmic.daqco.core.output_control import OutputControl
 from cosmic.daqco.core.plan import AcquisitionPlan, make_plan, restarts
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings, ScaleSettings
@@ -22,6 +23,7 @@ from cosmic.daqco.core.udaq_buffer import UDaqBuffer
 from cosmic.daqco.core.udaq_core import UDaqCore
 from cosmic.daqco.hw.board_group import ClockAgreement
 from cosmic.daqco.hw.interface import Board, BoardInfo, BoardLibrary, OverrunError
+from cosmic.daqco.hw.outputs import open_outputs
 from cosmic.frame.application import GuiFactory
 from cosmic.frame.background import BackgroundJobs, OnResult, do_and_report
 from cosmic.frame.clock import WALL, Clock
@@ -126,6 +128,13 @@ class DaqcoApplication(TaskApplication):
         self._background = BackgroundJobs("DAQCo background", policy)
         self._before_change: tuple[Callable[[DaqcoSettings], None], ...] = ()
         self._failed: Event[str] = Event()
+        self.outputs = OutputControl(
+            settings.output,
+            lambda board: open_outputs(library, board),
+            policy,
+            self.status_changed.emit,
+        )
+        self.stopped_elsewhere: Callable[[], str] = lambda: ""
         self._restarts = RestartBudget()
         self.recorder = Recorder(
             self, policy, software=software, configuration=configuration, notes=notes
@@ -208,6 +217,7 @@ class DaqcoApplication(TaskApplication):
             self.start_acquisition()
         except CosmicError as exc:
             self._fail(str(exc))
+        self.outputs.begin()
         self.status_changed.emit()
 
     def _set_configured_limits(self) -> None:
@@ -419,6 +429,18 @@ class DaqcoApplication(TaskApplication):
         """Call `listener(text)` each time acquisition ends by itself, or cannot begin."""
         return self._failed.subscribe(listener)
 
+    def reset_outputs(self) -> None:
+        """Let outputs be written again after a stop.
+
+        Raises
+        ------
+        NotAvailable
+            Something else keeps them stopped.
+        """
+        if why := self.stopped_elsewhere():
+            raise NotAvailable(f"motion is stopped ({why}): reset that stop, and outputs go on too")
+        self.outputs.reset()
+
     def set_scale(self, channel: str, scale: Scale) -> None:
         """Give a channel a scale of any name; others of that name are replaced by it.
 
@@ -461,6 +483,7 @@ class DaqcoApplication(TaskApplication):
         self.request_end()
         self._background.request_end()
         self._background.join()
+        self.outputs.close()
         self.recorder.stop()
         self._silence.request_end()
         self._silence.join()

@@ -26,11 +26,13 @@ from cosmic.daqco.api.recorder import RecordingState
 from cosmic.daqco.core.chunk import DataChunk, missing_samples
 from cosmic.daqco.core.display_pieces import DISPLAY_S, DisplayPieces
 from cosmic.daqco.core.limits import LOWEST_RATE_HZ, Crossing, Limit, LimitGuard
+from cosmic.daqco.core.output_control import OutputState
 from cosmic.daqco.core.plan import highest_rate_hz
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import ChannelSettings, DaqcoSettings, LimitSettings
 from cosmic.daqco.hw.board_group import ClockAgreement
-from cosmic.daqco.hw.interface import BoardInfo
+from cosmic.daqco.hw.interface import BoardInfo, Volts
+from cosmic.daqco.hw.outputs import Waveform
 from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.arguments import checked_class
 from cosmic.frame.background import OnResult
@@ -39,7 +41,8 @@ from cosmic.frame.declaration import Companion, Declared, command, newest, state
 from cosmic.frame.errors import ConfigError, CosmicError, NotAvailable, RecordingError
 from cosmic.frame.file_names import NameOption, directory_problem, space_left
 from cosmic.frame.network.application import remote_api
-from cosmic.frame.network.caller import called_remotely
+from cosmic.frame.network.caller import called_remotely, current_call
+from cosmic.frame.network.dead_man import DeadMan
 from cosmic.frame.network.transport import Rule
 from cosmic.frame.operation import Task
 from cosmic.frame.weakly import weakly
@@ -305,9 +308,14 @@ class Daqco(Declared):
         present = self._application.settings
         if settings.directory != present.directory:
             self._folders.folder(settings.directory)
-        fixed = [(each.drivers, each.clock_sources) for each in (settings, present)]
+        fixed = [
+            (each.drivers, each.clock_sources, each.start_triggers, each.output)
+            for each in (settings, present)
+        ]
         if fixed[0] != fixed[1]:
-            raise ConfigError("driver and clocks of the boards are set in the platform file only")
+            raise ConfigError(
+                "drivers, clocks, triggers and outputs are set in the platform file only"
+            )
 
     def configure(self, *, rate_hz: float) -> None:
         """Set the sampling rate, 10 to 15000 Hz and as far as the boards go; raises as `apply`."""
@@ -592,6 +600,96 @@ class Daqco(Declared):
         """
         self._application.guard.acknowledge(channel)
         self.note_change()
+
+    # Outputs
+
+    @property
+    @state
+    def outputs(self) -> tuple[OutputState, ...]:
+        """What each output gives that the configuration names."""
+        return self._application.outputs.states
+
+    @property
+    @state
+    def outputs_stopped(self) -> str:
+        """Why nothing may be written to outputs; empty while it may."""
+        return self._application.outputs.stopped
+
+    @command(moves=True)
+    def set_output(self, name: str, volts: float) -> None:
+        """Give a voltage at an analogue output from now on.
+
+        Raises
+        ------
+        ConfigError
+            There is no such output in the configuration, or it is a digital line.
+        MoveRefused
+            The voltage is outside the limits of the output (`LimitError`) or no number, or outputs
+            are stopped (`StoppedError`). Nothing was written.
+        DeviceError
+            The board is gone or refused.
+        """
+        self._application.outputs.set_voltage(name, volts, _dead_man())
+
+    @command(moves=True)
+    def set_line(self, name: str, *, high: bool) -> None:
+        """Set a digital line; raises as `set_output`."""
+        self._application.outputs.set_line(name, high=high, dead_man=_dead_man())
+
+    @command(moves=True, timeout_s=SLOW_S)
+    def play(
+        self, name: str, volts: Volts, rate_hz: float, *, repeat: bool = False, trigger: str = ""
+    ) -> float:
+        """Give the values of a waveform at an analogue output; return the rate really made, Hz.
+
+        It goes on while this returns. Afterwards the output keeps the last value.
+
+        Parameters
+        ----------
+        volts : ndarray, shape (n,), float64, V
+            All are checked against the limits before the first is given.
+        repeat : bool
+            Begin anew at the end, until another value is set.
+        trigger : str
+            Terminal whose rising edge begins it, such as "/Dev1/PFI0", or "/Dev1/ai/StartTrigger"
+            for the next start of the acquisition; empty: it begins at once.
+
+        Raises
+        ------
+        ArgumentError
+            There are no values, too many, or the rate is none.
+        NotAvailable
+            The board plays no waveforms, or one already.
+        LimitError, StoppedError, ConfigError, DeviceError
+            As `set_output`.
+        """
+        waveform = Waveform(volts, rate_hz, repeat, trigger)
+        return self._application.outputs.play(name, waveform, _dead_man())
+
+    @command(at_once=True)
+    def stop_outputs(self, reason: str = "stop of the outputs") -> None:
+        """Drive outputs marked ``stops`` to their safe values, and refuse to write any until reset.
+
+        It returns at once; anybody may give it.
+        """
+        self._application.outputs.stop(reason)
+        self.note_change()
+
+    @command(moves=True)
+    def reset_outputs(self) -> None:
+        """Let outputs be written again after a stop; they keep their safe values until then.
+
+        Raises
+        ------
+        NotAvailable
+            MiCo is stopped: reset that stop.
+        """
+        self._application.reset_outputs()
+
+
+def _dead_man() -> DeadMan | None:
+    call = current_call()
+    return call.dead_man if call is not None else None
 
 
 def daqco_of(application: CosmicApplicationBase) -> Daqco:

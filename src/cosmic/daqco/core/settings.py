@@ -72,6 +72,39 @@ class LimitSettings(StrictModel):
         return self
 
 
+class OutputSettings(StrictModel):
+    """One output that may be used: no other is ever written to."""
+
+    name: str = Field(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)?$")
+    board: str = Field(min_length=1)
+    output: str = Field(pattern=r"^(ao\d+|port\d+/line\d+)$")
+    low_v: float | None = Field(default=None, ge=-10.0, le=10.0)
+    high_v: float | None = Field(default=None, ge=-10.0, le=10.0)
+    safe_v: float = Field(default=0.0, ge=-10.0, le=10.0)
+    safe_high: bool = False
+    stops: bool = True
+
+    @property
+    def analog(self) -> bool:
+        """It gives a voltage; False for a digital line."""
+        return self.output.startswith("ao")
+
+    @model_validator(mode="after")
+    def _has_limits(self) -> Self:
+        if not self.analog:
+            if self.low_v is not None or self.high_v is not None or self.safe_v:
+                raise ValueError(f"{self.name}: a digital line has no voltages; give safe_high")
+        elif self.low_v is None or self.high_v is None:
+            raise ValueError(f"{self.name}: give low_v and high_v, the limits of what it may get")
+        elif not self.low_v < self.high_v:
+            raise ValueError(f"{self.name}: low_v must lie below high_v")
+        elif not self.low_v <= self.safe_v <= self.high_v:
+            raise ValueError(f"{self.name}: safe_v must lie within low_v and high_v")
+        elif self.safe_high:
+            raise ValueError(f"{self.name}: safe_high is for digital lines; give safe_v")
+        return self
+
+
 class DriverSettings(StrictModel):
     """One more driver, whose boards acquire beside those of the first."""
 
@@ -90,11 +123,13 @@ class DaqcoSettings(StrictModel):
     silence_s: float = Field(default=0.1, ge=0.02, le=1.0)
     directory: str = ""
     clock_sources: dict[str, str] = Field(default_factory=dict)
+    start_triggers: dict[str, str] = Field(default_factory=dict)
     clock_ppm: float = Field(default=50.0, ge=0.0, le=1000.0)
     driver: Annotated[tuple[DriverSettings, ...], Field(strict=False)] = ()
     scale: Annotated[tuple[ScaleSettings, ...], Field(strict=False)] = ()
     channel: Annotated[tuple[ChannelSettings, ...], Field(strict=False, min_length=1)]
     limit: Annotated[tuple[LimitSettings, ...], Field(strict=False)] = ()
+    output: Annotated[tuple[OutputSettings, ...], Field(strict=False)] = ()
 
     @property
     def drivers(self) -> tuple[DriverSettings, ...]:
@@ -113,6 +148,8 @@ class DaqcoSettings(StrictModel):
                 ("channel", [each.name for each in self.channel]),
                 ("scale", [each.name for each in self.scale]),
                 ("input", [f"{each.board}/{each.input}" for each in self.channel]),
+                ("output", [each.name for each in self.output]),
+                ("output", [f"{each.board}/{each.output}" for each in self.output]),
             )
             for name, count in Counter(names).items()
             if count > 1

@@ -17,6 +17,7 @@ def make_library(
     clock: Clock | None = None,
     scene_sources: Mapping[tuple[str, str], Source] | None = None,
     clock_sources: Mapping[str, str] | None = None,
+    start_triggers: Mapping[str, str] | None = None,
     options: Mapping[str, object] | None = None,
     seed: int = 0,
 ) -> BoardLibrary:
@@ -35,6 +36,8 @@ def make_library(
     clock_sources : mapping of str to str, or None
         Terminals from which boards take their sample clock, by board, such as
         ``{"Dev2": "/Dev1/ai/SampleClock"}``.
+    start_triggers : mapping of str to str, or None
+        Terminals whose rising edge starts a board: ``{"Dev1": "/Dev1/PFI0"}``.
     options : mapping, or None
         The backend's own settings.
 
@@ -43,7 +46,9 @@ def make_library(
     ConfigError
         There is no such backend, or its options are wrong.
     """
-    context = BoardContext(clock or WALL, clock_sources or {}, scene_sources, seed)
+    context = BoardContext(
+        clock or WALL, clock_sources or {}, scene_sources, seed, start_triggers or {}
+    )
     library: BoardLibrary = make(Kind.BOARD, backend, context, options or {})
     return library
 

@@ -219,6 +219,8 @@ class BoardContext:
     clock_sources : mapping of str to str
         Terminals from which boards take their sample clock, by board, such as
         ``{"Dev2": "/Dev1/ai/SampleClock"}``.
+    start_triggers : mapping of str to str
+        Terminals whose rising edge starts a board, which waits for it: ``{"Dev1": "/Dev1/PFI0"}``.
     scene_sources : mapping of (str, str) to Source, or None
         What the twin connects to each board and input; None where there is no twin.
     seed : int
@@ -229,6 +231,7 @@ class BoardContext:
     clock_sources: Mapping[str, str] = field(default_factory=dict)
     scene_sources: Mapping[tuple[str, str], Source] | None = None
     seed: int = 0
+    start_triggers: Mapping[str, str] = field(default_factory=dict)
 
 
 BoardBackend = Backend[BoardContext, BoardLibrary]

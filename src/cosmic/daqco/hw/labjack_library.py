@@ -2,7 +2,7 @@
 
 import io
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from importlib import import_module
@@ -22,6 +22,8 @@ from cosmic.daqco.hw.interface import (
 from cosmic.daqco.hw.labjack_board import LabjackBoard
 from cosmic.daqco.hw.labjack_connection import Connection
 from cosmic.daqco.hw.labjack_errors import board_error
+from cosmic.daqco.hw.labjack_outputs import LabjackOutputs
+from cosmic.daqco.hw.outputs import BoardOutputs
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.config import StrictModel
 from cosmic.frame.errors import DeviceFault, NotAvailable, NotConnectedError, needs_extra
@@ -158,11 +160,7 @@ class LabjackLibrary(BoardLibrary):
     def open(self, name: str) -> LabjackBoard:
         found = {info.name: info for info in self.list_boards()}
         if name not in found:
-            raise NotConnectedError(
-                f"LJM knows no board {name!r}; it lists: {', '.join(found) or 'none'}. A board is "
-                f"called by its kind and serial number, such as T7_470010103",
-                fault=DeviceFault.COMMUNICATION,
-            )
+            raise self._not_there(name, found)
         return LabjackBoard(
             self._api,
             found[name],
@@ -170,6 +168,20 @@ class LabjackLibrary(BoardLibrary):
             self._clock,
             owners=self._owners,
             resolution_index=self._options.resolution_index,
+        )
+
+    def open_outputs(self, board: str) -> BoardOutputs:
+        """Return the outputs of a board; raises `NotConnectedError` where there is none."""
+        found = {info.name: info for info in self.list_boards()}
+        if board not in found:
+            raise self._not_there(board, found)
+        return LabjackOutputs(self._api, found[board], self._connection(found[board]))
+
+    def _not_there(self, board: str, found: Iterable[str]) -> NotConnectedError:
+        return NotConnectedError(
+            f"LJM knows no board {board!r}; it lists: {', '.join(found) or 'none'}. A board is "
+            f"called by its kind and serial number, such as T7_470010103",
+            fault=DeviceFault.COMMUNICATION,
         )
 
     def _connection(self, info: BoardInfo) -> Connection:
@@ -205,13 +217,22 @@ def info_of(kind: int, serial: int) -> BoardInfo:
 
 def _make(options: LabjackOptions, context: BoardContext) -> BoardLibrary:
     _check_clocks(context.clock_sources)
+    _check_triggers(context.start_triggers)
     return LabjackLibrary(context.clock, options)
 
 
 def _check_clocks(sources: Mapping[str, str]) -> None:
-    for board in sources:
-        if board.startswith(tuple(f"{each.name}_" for each in KINDS.values())):
-            raise NotAvailable(f"clock_sources: {board}: a LabJack board keeps to its own clock")
+    for board in filter(_is_ours, sources):
+        raise NotAvailable(f"clock_sources: {board}: a LabJack board keeps to its own clock")
+
+
+def _check_triggers(triggers: Mapping[str, str]) -> None:
+    for board in filter(_is_ours, triggers):
+        raise NotAvailable(f"start_triggers: {board}: a LabJack board starts when it is told to")
+
+
+def _is_ours(board: str) -> bool:
+    return board.startswith(tuple(f"{each.name}_" for each in KINDS.values()))
 
 
 BACKEND: Final = BoardBackend(_make, options=LabjackOptions)

@@ -32,16 +32,26 @@ class NidaqmxBoard(Board):
     clock_source : str
         Terminal of the sample clock, such as "/Dev1/ai/SampleClock"; empty is the board's own.
         Start the board that takes its clock from another before that other.
+    start_trigger : str
+        Terminal whose rising edge starts it, such as "/Dev1/PFI0"; empty: it starts when told to.
     """
 
     def __init__(
-        self, api: Any, info: BoardInfo, wiring: Wiring, clock: Clock, *, clock_source: str = ""
+        self,
+        api: Any,
+        info: BoardInfo,
+        wiring: Wiring,
+        clock: Clock,
+        *,
+        clock_source: str = "",
+        start_trigger: str = "",
     ) -> None:
         self._api = api
         self._info = info
         self._wiring = wiring
         self._clock = clock
         self._clock_source = clock_source
+        self._start_trigger = start_trigger
         # Orders configure, start, stop and close; the driver's thread never takes it.
         self._lock = RLock()
         self._settings: TaskSettings | None = None
@@ -67,7 +77,12 @@ class NidaqmxBoard(Board):
             check_chunk(self._info, chunk_samples)
             self._drop_task()
             settings = TaskSettings(
-                self._info.name, tuple(inputs), rate_hz, chunk_samples, self._clock_source
+                self._info.name,
+                tuple(inputs),
+                rate_hz,
+                chunk_samples,
+                self._clock_source,
+                self._start_trigger,
             )
             self._task = InputTask(self._api, settings)
             self._settings = settings
@@ -80,7 +95,7 @@ class NidaqmxBoard(Board):
             self._check_idle("start")
             if self._settings is None:
                 raise self._error("start: it was not configured", DeviceFault.STATE)
-            run = Run(self._clock.now_s, clocked=bool(self._clock_source))
+            run = Run(self._clock.now_s, clocked=bool(self._clock_source or self._start_trigger))
             try:
                 self._begin(run)
             except LimitError as exc:

@@ -117,6 +117,7 @@ STATUS: Final[dict[int, Status]] = {
 }
 _TOO_FAST: Final = (-200332, -200335, -200331, -200081)
 _OUT_OF_RANGE: Final = (-200579, -200580, -200695)
+_BEYOND_OUTPUT: Final = (-200561,)
 
 
 def driver_missing() -> NotConnectedError:
@@ -178,6 +179,9 @@ def status_error(
         return LimitError(refuse(Reason.LIMIT, text, axis=board, unit="Hz"))
     if code in _OUT_OF_RANGE:
         text = f"{where}: the board has no such input range{driver}"
+        return LimitError(refuse(Reason.LIMIT, text, axis=board, unit="V"))
+    if code in _BEYOND_OUTPUT:
+        text = f"{where}: the value lies outside the limits of this output{driver}"
         return LimitError(refuse(Reason.LIMIT, text, axis=board, unit="V"))
     known = STATUS.get(code)
     if known is None:

@@ -1,11 +1,12 @@
 """The boards that NI-DAQmx knows."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 import nidaqmx
 import nidaqmx.stream_readers
+import nidaqmx.stream_writers
 import nidaqmx.system
 from nidaqmx.errors import DaqNotFoundError, Error
 from typing_extensions import override
@@ -13,6 +14,8 @@ from typing_extensions import override
 from cosmic.daqco.hw.interface import BoardBackend, BoardContext, BoardInfo, BoardLibrary
 from cosmic.daqco.hw.nidaqmx_board import NidaqmxBoard
 from cosmic.daqco.hw.nidaqmx_errors import board_error
+from cosmic.daqco.hw.nidaqmx_outputs import NidaqmxOutputs, outputs_info
+from cosmic.daqco.hw.outputs import BoardOutputs
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import DeviceFault, NotConnectedError
 from cosmic.frame.plugins import NoOptions
@@ -29,6 +32,8 @@ class NidaqmxLibrary(BoardLibrary):
         Stamps the samples: the platform's.
     clock_sources : mapping of str to str, or None
         Terminal of the sample clock by board; the others use their own.
+    start_triggers : mapping of str to str, or None
+        Terminal whose rising edge starts a board; the others start when they are told to.
     api : module
         nidaqmx, or what tests put in its place.
     """
@@ -38,10 +43,12 @@ class NidaqmxLibrary(BoardLibrary):
         clock: Clock = WALL,
         *,
         clock_sources: Mapping[str, str] | None = None,
+        start_triggers: Mapping[str, str] | None = None,
         api: Any = nidaqmx,
     ) -> None:
         self._clock = clock
         self._clock_sources = dict(clock_sources or {})
+        self._start_triggers = dict(start_triggers or {})
         self._api = api
 
     @property
@@ -63,18 +70,37 @@ class NidaqmxLibrary(BoardLibrary):
     def open(self, name: str) -> NidaqmxBoard:
         found = {info.name: (info, device) for info, device in self._found()}
         if name not in found:
-            raise NotConnectedError(
-                f"NI-DAQmx knows no board {name!r} with analogue inputs; it lists: "
-                f"{', '.join(found) or 'none'}. Names are given in NI MAX",
-                fault=DeviceFault.COMMUNICATION,
-            )
+            raise self._not_there(name, found)
         info, device = found[name]
         try:
             wiring = {_short(each.name): each.ai_term_cfgs for each in device.ai_physical_chans}
         except Error as exc:
             raise board_error(exc, "open", name) from exc
         return NidaqmxBoard(
-            self._api, info, wiring, self._clock, clock_source=self._clock_sources.get(name, "")
+            self._api,
+            info,
+            wiring,
+            self._clock,
+            clock_source=self._clock_sources.get(name, ""),
+            start_trigger=self._start_triggers.get(name, ""),
+        )
+
+    def open_outputs(self, board: str) -> BoardOutputs:
+        """Return the outputs of a board; raises `NotConnectedError` where there is none."""
+        found = {info.name: device for info, device in self._found()}
+        if board not in found:
+            raise self._not_there(board, found)
+        try:
+            info = outputs_info(found[board])
+        except Error as exc:
+            raise board_error(exc, "open its outputs", board) from exc
+        return NidaqmxOutputs(self._api, info)
+
+    def _not_there(self, board: str, found: Iterable[str]) -> NotConnectedError:
+        return NotConnectedError(
+            f"NI-DAQmx knows no board {board!r} with analogue inputs; it lists: "
+            f"{', '.join(found) or 'none'}. Names are given in NI MAX",
+            fault=DeviceFault.COMMUNICATION,
         )
 
     def _found(self) -> list[tuple[BoardInfo, Any]]:
@@ -119,7 +145,11 @@ def _short(physical: str) -> str:
 
 
 def _make(_options: NoOptions, context: BoardContext) -> BoardLibrary:
-    return NidaqmxLibrary(context.clock, clock_sources=context.clock_sources)
+    return NidaqmxLibrary(
+        context.clock,
+        clock_sources=context.clock_sources,
+        start_triggers=context.start_triggers,
+    )
 
 
 BACKEND: Final = BoardBackend(_make)

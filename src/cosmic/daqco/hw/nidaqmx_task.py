@@ -37,6 +37,8 @@ class TaskSettings:
     ----------
     clock_source : str
         Terminal of the sample clock; empty is the board's own.
+    start_trigger : str
+        Terminal whose rising edge starts it; empty: it starts when told to.
     """
 
     board: str
@@ -44,6 +46,7 @@ class TaskSettings:
     rate_hz: float
     chunk_samples: int
     clock_source: str
+    start_trigger: str = ""
 
     @property
     def buffer_samples(self) -> int:
@@ -71,7 +74,7 @@ class Run:
     start_s : float
         Platform time of sample 0.
     clocked : bool
-        By another board, which decides when sample 0 is taken.
+        By another board, or a trigger, which decides when sample 0 is taken.
     over : bool
         Nothing more is put in.
     """
@@ -140,6 +143,8 @@ class InputTask:
             sample_mode=AcquisitionType.CONTINUOUS,
             samps_per_chan=settings.buffer_samples,
         )
+        if settings.start_trigger:
+            task.triggers.start_trigger.cfg_dig_edge_start_trig(settings.start_trigger)
         # The driver takes the line above for a hint and may make a buffer of another size.
         task.in_stream.input_buf_size = settings.buffer_samples
         task.register_every_n_samples_acquired_into_buffer_event(

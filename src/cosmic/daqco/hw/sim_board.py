@@ -19,6 +19,7 @@ from cosmic.daqco.hw.interface import (
     OverrunError,
 )
 from cosmic.daqco.hw.sim_faults import BoardFaults
+from cosmic.daqco.hw.sim_outputs import Terminals
 from cosmic.daqco.hw.sim_signal import Signal
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
@@ -78,6 +79,10 @@ class SimulatedBoard(Board):
         The rate is this over a whole number, as on the real board; 0 allows any rate.
     clock_ppm : float
         How much faster than it says its sample clock runs, in parts of a million.
+    terminals : Terminals or None
+        Of the library: where triggers come in, and where it says that it has started.
+    start_trigger : str
+        Terminal whose rising edge starts it; empty: it starts when told to.
     paced : bool
         False: chunks are due at once, however many are asked for.
     owners : dict of str to SimulatedBoard
@@ -99,6 +104,8 @@ class SimulatedBoard(Board):
         timebase_hz: float = TIMEBASE_HZ,
         paced: bool = True,
         clock_ppm: float = 0.0,
+        terminals: Terminals | None = None,
+        start_trigger: str = "",
     ) -> None:
         self._info = info
         self._clock = clock
@@ -108,6 +115,8 @@ class SimulatedBoard(Board):
         self._timebase_hz = timebase_hz
         self._paced = paced
         self._fast = 1.0 + 1e-6 * clock_ppm
+        self._terminals = terminals or Terminals()
+        self._start_trigger = start_trigger
         self._setup: _Setup | None = None
         self._run: _Run | None = None
         self._closed = False
@@ -148,9 +157,14 @@ class SimulatedBoard(Board):
         with self._faults.changed:
             if self._run is not None:
                 raise self._error("start: it is acquiring already", DeviceFault.STATE)
-            run = _Run(self._setup, self._clock.now_s(), self._clock.horizon())
+            start_s = math.inf if self._start_trigger else self._clock.now_s()
+            run = _Run(self._setup, start_s, self._clock.horizon())
             run.horizon.move_to(self._horizon_s(run))
             self._run = run
+        if self._start_trigger:
+            self._terminals.once(self._start_trigger, lambda at_s: self._triggered(run, at_s))
+        else:
+            self._begun(run)
 
     @override
     def receive(self, timeout_s: float) -> BoardChunk | None:
@@ -179,6 +193,17 @@ class SimulatedBoard(Board):
         with self._faults.changed:
             if self._owners.get(self._info.name) is self:
                 del self._owners[self._info.name]
+
+    def _triggered(self, run: _Run, at_s: float) -> None:
+        with self._faults.changed:
+            if self._run is not run:
+                return
+            run.start_s = at_s
+            self._faults.changed.notify_all()
+        self._begun(run)
+
+    def _begun(self, run: _Run) -> None:
+        self._terminals.rise(f"/{self._info.name}/ai/StartTrigger", run.start_s)
 
     def _wait_until_due(self, timeout_s: float) -> _Run | None:
         """Return the acquisition whose next chunk is due, or None; raises `DeviceError`."""
@@ -236,7 +261,8 @@ class SimulatedBoard(Board):
         setup = run.setup
         if self._faults.hit("overrun", self._info.name):
             raise self._overrun(run, setup.chunk_samples)
-        if not self._paced or self._faults.hit("stalled", self._info.name):
+        waits = math.isinf(run.start_s)  # for its trigger
+        if not self._paced or waits or self._faults.hit("stalled", self._info.name):
             return
         taken = int((self._clock.now_s() - run.start_s) * setup.true_hz)
         # The receiver is late by the wall: on a fast clock the buffer holds as much longer.

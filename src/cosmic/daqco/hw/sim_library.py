@@ -19,6 +19,7 @@ from cosmic.daqco.hw.interface import (
 )
 from cosmic.daqco.hw.sim_board import SimulatedBoard
 from cosmic.daqco.hw.sim_faults import BoardFaults
+from cosmic.daqco.hw.sim_outputs import OutputLevel, SimulatedOutputs, Terminals
 from cosmic.daqco.hw.sim_signal import BoardSignal, Signal
 from cosmic.frame.clock import Clock
 from cosmic.frame.config import StrictModel
@@ -34,6 +35,8 @@ PCI_6229: Final = BoardInfo(
     max_multi_rate_hz=250_000.0,
     ranges_v=((-10.0, 10.0), (-5.0, 5.0), (-1.0, 1.0), (-0.2, 0.2)),
 )
+ANALOG_OUTPUTS: Final = 2
+LINES: Final = 8
 _T7_INPUTS: Final = tuple(f"ai{number}" for number in range(14))
 T7: Final = BoardInfo(
     name="Dev",
@@ -58,12 +61,15 @@ class SimulatedOptions(StrictModel):
         What the boards are called, before their number.
     clock_ppm : float
         How much faster than it says the sample clock of these boards runs, in parts of a million.
+    wires : dict of str to str
+        From an analogue output to an input: ``{"Dev1/ao0": "Dev1/ai7"}``.
     """
 
     product: Literal["PCI-6229", "T7"] = "PCI-6229"
     boards: int = Field(default=2, ge=1, le=16)
     name: str = Field(default=PCI_6229.name, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
     clock_ppm: float = Field(default=0.0, ge=-1000.0, le=1000.0)
+    wires: dict[str, str] = Field(default_factory=dict)
 
 
 class SimulatedLibrary(BoardLibrary):
@@ -82,11 +88,17 @@ class SimulatedLibrary(BoardLibrary):
         What each is; names and serials are numbered from it.
     clock_ppm : float
         How much faster than they say their sample clock runs, in parts of a million.
+    wires : mapping of str to str, or None
+        From analogue outputs to inputs, such as ``{"Dev1/ao0": "Dev1/ai7"}``.
+    start_triggers : mapping of str to str, or None
+        Terminal whose rising edge starts a board.
 
     Attributes
     ----------
     faults : BoardFaults
         Trouble to inject by name.
+    terminals : Terminals
+        Where triggers come in, such as "/Dev1/PFI0".
 
     Raises
     ------
@@ -103,9 +115,12 @@ class SimulatedLibrary(BoardLibrary):
         seed: int = 0,
         info: BoardInfo = PCI_6229,
         clock_ppm: float = 0.0,
+        wires: Mapping[str, str] | None = None,
+        start_triggers: Mapping[str, str] | None = None,
     ) -> None:
         self._clock = clock
         self._clock_ppm = clock_ppm
+        self._start_triggers = dict(start_triggers or {})
         self._sources = dict(sources or {})
         self._seed = seed
         self._infos = {
@@ -118,6 +133,16 @@ class SimulatedLibrary(BoardLibrary):
         self.faults = BoardFaults()
         self._owners: dict[str, SimulatedBoard] = {}
         self._receiver = clock.worker()
+        self.terminals = Terminals()
+        self._levels = {
+            name: {f"ao{number}": OutputLevel() for number in range(ANALOG_OUTPUTS)}
+            for name in self._infos
+        }
+        self._lines = {
+            name: {f"port0/line{number}": False for number in range(LINES)} for name in self._infos
+        }
+        for output, place in (wires or {}).items():
+            self._wire(output, place)
         for board, name in self._sources:
             if board not in self._infos or name not in self._infos[board].inputs:
                 raise ConfigError(
@@ -169,7 +194,37 @@ class SimulatedLibrary(BoardLibrary):
             owners=self._owners,
             receiver=self._receiver,
             clock_ppm=self._clock_ppm,
+            terminals=self.terminals,
+            start_trigger=self._start_triggers.get(name, ""),
         )
+
+    def open_outputs(self, board: str) -> SimulatedOutputs:
+        """Return the outputs of a board; raises `NotConnectedError` where there is none."""
+        if board not in [info.name for info in self.list_boards()]:
+            raise NotConnectedError(f"there is no board {board!r}", fault=DeviceFault.COMMUNICATION)
+        return SimulatedOutputs(
+            self._infos[board],
+            self._clock,
+            self.faults,
+            self.terminals,
+            levels=self._levels[board],
+            lines=self._lines[board],
+        )
+
+    def _wire(self, output: str, place: str) -> None:
+        board, _, name = output.partition("/")
+        where, _, into = place.partition("/")
+        if name not in self._levels.get(board, {}):
+            raise ConfigError(f"wires: there is no analogue output {output!r}")
+        self._sources[where, into] = self._levels[board][name]
+
+    def output_level(self, board: str, output: str) -> OutputLevel:
+        """Return what an analogue output gives, as a voltmeter would read it."""
+        return self._levels[board][output]
+
+    def line_is_high(self, board: str, line: str) -> bool:
+        """Return the state of a digital line."""
+        return self._lines[board][line]
 
 
 def _make(options: SimulatedOptions, context: BoardContext) -> BoardLibrary:
@@ -185,6 +240,8 @@ def _make(options: SimulatedOptions, context: BoardContext) -> BoardLibrary:
         seed=context.seed,
         info=info,
         clock_ppm=options.clock_ppm,
+        wires=options.wires,
+        start_triggers=context.start_triggers,
     )
 
 
