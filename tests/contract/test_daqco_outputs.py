@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contract.daqco_rig import DaqcoRig, at_home, daqco_rig, elsewhere, hosted, settings
+from contract.daqco_rig import DaqcoRig, daqco_rig, hosted, settings, used_locally, used_remotely
 from contract.station_rig import connected, free_port, wait_until
 from cosmic.daqco.core.settings import DaqcoSettings, OutputSettings
 from cosmic.frame.clock import WALL
@@ -35,10 +35,10 @@ def with_outputs(folder: Path) -> DaqcoSettings:
 def at_a_station(folder: Path) -> Iterator[tuple[DaqcoRig, Transport]]:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     with (
-        at_home(with_outputs(folder)) as home,
+        used_locally(with_outputs(folder)) as home,
         hosted(home, endpoint) as station,
         connected(endpoint) as transport,
-        elsewhere(transport) as remote,
+        used_remotely(transport) as remote,
     ):
         yield DaqcoRig(home, remote.api, remote, station), transport
 
