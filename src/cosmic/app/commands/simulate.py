@@ -21,6 +21,8 @@ def run(chosen: argparse.Namespace) -> int:
     """Serve until interrupted, or for as long as was asked; returns 0."""
     links: list[Path] = chosen.link
     ports: list[str] = chosen.port
+    if not (links or ports):
+        raise ArgumentError("name one --link or --port for each unit")
     try:
         scene = Scene.from_layout(
             chosen.layout or ",".join(["LLL"] * (len(links) + len(ports))),
@@ -32,7 +34,7 @@ def run(chosen: argparse.Namespace) -> int:
     except ValueError as exc:
         raise ArgumentError(str(exc)) from exc
     scus = SimulatedScus(scene=scene, baud=chosen.baud)
-    if len(scus.units) != len(links) + len(ports) or not scus.units:
+    if len(scus.units) != len(links) + len(ports):
         raise ArgumentError(
             f"{len(scus.units)} units and {len(links) + len(ports)} lines: name one --link or "
             "--port for each unit of the layout"

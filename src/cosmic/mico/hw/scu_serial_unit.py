@@ -27,6 +27,8 @@ LOST_AFTER: Final = 3
 """So many answers in a row may stay away before the unit counts as lost."""
 LONGEST_LINE: Final = 200
 CHANNELS: Final = 3
+_FAREWELL: Final = b":SRC0R0\n:SRC1R0\n:SRC2R0\n:K0\n:E0\n"
+"""No reports, no dead-man's switch, no answers to commands."""
 
 
 class SerialLike(Protocol):
@@ -357,10 +359,12 @@ class Unit:
         )
 
     def close(self) -> None:
-        """Give the line back; never raises."""
-        fault = DeviceFault.STATE
+        """Leave the unit as other programs expect it, and give the line back; never raises."""
+        fault, gone = DeviceFault.STATE, self._gone
         self._gone = DeviceError(f"{self.name} was closed", fault=fault, device=self.index)
         try:
+            if gone is None:
+                self.port.write(_FAREWELL)
             self.port.close()
         except (OSError, CosmicError) as exc:
             logger.debug("%s: closing: %s", self.name, exc)
