@@ -165,7 +165,7 @@ def end(it: Rig) -> None:
     [
         (unplug, Phase.STOPPED, "stopped: unplugged"),
         (tear, Phase.STOPPED, "stopped: the cable is torn"),
-        (talk_nonsense, Phase.STOPPED, "stopped: the device reports nonsense"),
+        (talk_nonsense, Phase.STOPPED, "stopped: the device reports invalid values"),
         (freeze, Phase.STOPPED, "stopped: frozen"),
         (lose_focus, Phase.PAUSED, "paused: the window is out of focus"),
         (stop_all, Phase.STOPPED, "stopped: test"),

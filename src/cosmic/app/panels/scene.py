@@ -105,7 +105,7 @@ class ScenePanel(QWidget):
         self._movements = Relay(self._on_movement).follow(self._mico.follow_movements)
         self._feed = StateFeed(self._mico, self, period_ms=PERIOD_MS)
         self._feed.set_paused(True)
-        self._wait = named(QLabel("The scene is about to appear"), "sceneWait")
+        self._wait = named(QLabel("The scene is loading"), "sceneWait")
         self._wait.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._note = named(ElidedLabel(), "sceneUnknown")
         self._note.setContentsMargins(STEP_PX, 0, STEP_PX, 0)

@@ -173,7 +173,7 @@ class OrderBook:
 
 
 def _unforeseen(_motions: Mapping[str, Motion], _consent: bool) -> MoveVerdict:
-    return refuse(Reason.NO_ANSWER, "the station has not told anything yet")
+    return refuse(Reason.NO_ANSWER, "no state of the station has arrived yet")
 
 
 class AxisElsewhere:
@@ -768,7 +768,7 @@ class Axis(AxisShape, Declared):
     def begin_jog(
         self, motion: Jog | Steer, key: str, *, consent: bool = False, source: str = "script"
     ) -> Movement:
-        """Begin to move on and on, while `renew` comes with the same key."""
+        """Begin to move continuously, while `renew` comes with the same key."""
         if isinstance(motion, Steer) and not 0.0 < motion.dead_man_s <= MOVE_LIMIT_S:
             text = (
                 f"{self._name}: a dead-man time is at most {MOVE_LIMIT_S:g} s, "

@@ -35,5 +35,5 @@ def check_links_may_change(manager: ManagerPort, names: Collection[str]) -> None
     linked = {other for name in names for other in manager.links.companions(name)}
     moving = sorted(name for name in {*names, *linked} if manager.state(name).in_motion)
     if moving:
-        text = f"{', '.join(moving)} is moving; change the links when it stands"
+        text = f"{', '.join(moving)} is moving; change the links when it is stationary"
         raise NotAvailable(text)

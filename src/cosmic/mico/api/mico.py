@@ -74,7 +74,7 @@ LONGEST_SEARCH_S: Final = 60.0
 """For how long a path may be looked for on a line; other long operations wait for it."""
 NOTHING_KNOWN: Final = MicoSettings(positioner=())
 """Stands for settings while a station was never reached."""
-NOT_YET: Final = "MiCo of the station has not told anything yet"
+NOT_YET: Final = "No state of MiCo at the station has arrived yet"
 
 
 @checked_class
@@ -675,7 +675,7 @@ class Mico(Declared):
         WrongThreadError
             Called in the GUI thread.
         """
-        forbid_waiting_here("looking for a way")
+        forbid_waiting_here("planning a path")
         places = {name: self._in_gate(name, value) for name, value in targets.items()}
         return self._application.find_way(places, budget_s)
 

@@ -165,11 +165,11 @@ class Poses(Declared):
             parts = [pose.positions]
             model = self._site.worker.collision
             if way and model is not None and model.available:
-                task.report(0.0, "looking for a way")
+                task.report(0.0, "planning a path")
                 parts = list(self._site.worker.find_way(pose.positions, WAY_BUDGET_S).waypoints)
             for number, targets in enumerate(parts):
                 if task.cancel_requested:
-                    raise MoveCancelled(f"the way to {pose.name} was left before its end")
+                    raise MoveCancelled(f"the path to {pose.name} was abandoned")
                 task.report(number / len(parts), ", ".join(targets))
                 motions: dict[str, Motion] = {
                     axis: MoveTo(target, manager.state(axis).unit)

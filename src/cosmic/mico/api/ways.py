@@ -60,7 +60,7 @@ def follow(manager: ManagerPort, way: Way, task: Task, source: str) -> None:
         count = len(way.waypoints)
         for number, waypoint in enumerate(way.waypoints):
             if task.cancel_requested:
-                raise MoveCancelled("the way was left before its end")
+                raise MoveCancelled("the way was abandoned")
             task.report(number / count, f"part {number + 1} of {count}: {', '.join(waypoint)}")
             motions: dict[str, Motion] = {
                 name: MoveTo(target, manager.state(name).unit) for name, target in waypoint.items()

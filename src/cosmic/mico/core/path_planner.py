@@ -55,7 +55,7 @@ class PathPlanner:
         if isinstance(answer, NoPath):
             raise refusal(_no_path(answer))
         if not isinstance(answer, Plan):
-            raise refusal(refuse(Reason.NO_ANSWER, "the planner's answer makes no sense"))
+            raise refusal(refuse(Reason.NO_ANSWER, "the answer of the planner is invalid"))
         return self._timed(answer)
 
     def close(self) -> None:

@@ -173,7 +173,7 @@ class TrajectoryRecorder(WorkerThread):
         try:
             return open_file(self.path, "wb" if overwrite else "xb")
         except FileExistsError:
-            text = f"{self.path} is there already; choose another name, or say that it may go"
+            text = f"{self.path} exists already; choose another name, or allow it to be overwritten"
             raise RecordingExistsError(text) from None
         except OSError as exc:
             text = f"{self.path} cannot be written: {exc.strerror or exc}"

@@ -44,9 +44,9 @@ class CautionDialog(QMessageBox):
         self.setInformativeText("\n".join(f"▲ {each}" for each in doubts))
         role = QMessageBox.ButtonRole
         self.go = self.addButton(go_text, role.DestructiveRole)
-        self.go.setToolTip("Do it; look first that nothing is lost")
+        self.go.setToolTip("Continue. Make sure first that no gripper holds anything")
         self.cancel = self.addButton("Cancel", role.RejectRole)
-        self.cancel.setToolTip("Leave everything where it is")
+        self.cancel.setToolTip("Cancel; nothing moves")
         self.setDefaultButton(self.cancel)
         self.setEscapeButton(self.cancel)
         self.setModal(False)

@@ -113,9 +113,7 @@ class TakeOutQuestion(Overlay):
     def __init__(self, axis: str, switch: CollisionSwitch) -> None:
         super().__init__(switch)
         self.setObjectName("takeOutQuestion")
-        text = QLabel(
-            f"Take {axis} out of collision detection? Nothing will keep it from hitting something."
-        )
+        text = QLabel(f"Take {axis} out of collision detection? It can then collide with anything.")
         text.setWordWrap(True)
         text.setFixedWidth(_QUESTION_PX - 2 * STEP_PX)
         self.cancel = named(push_button("Cancel", "Leave it checked"), "cancelTakeOut")

@@ -36,7 +36,7 @@ _LOUD: Final = (StepState.RUNNING, StepState.FAILED)
 _ROWS: Final = 6
 _OPEN_UM: Final = 50.0
 """A gripper that is further open than a fibre is thick holds none."""
-_START_TIP: Final = "Make these steps, one after the other"
+_START_TIP: Final = "Run these steps in order"
 
 
 class InitialisationPanel(QWidget):
@@ -82,11 +82,13 @@ class InitialisationPanel(QWidget):
         title = QLabel("Initialisation")
         title.setFont(ui_font(bold=True))
         self._skip = named(QCheckBox("skip what is known"), "skipKnown")
-        tipped(self._skip, "Look for no position that is known already")
+        tipped(self._skip, "Skip axes whose position is known")
         self._skip.toggled.connect(self.preview)
         self._start = named(push_button("Start", _START_TIP), "start")
         self._start.clicked.connect(self.start)
-        self._close = named(push_button("Hide", "Hide the steps; what runs goes on"), "hideSteps")
+        self._close = named(
+            push_button("Hide", "Hide the steps; a running initialisation continues"), "hideSteps"
+        )
         self._close.clicked.connect(self.hide)
         self._head = QHBoxLayout()
         self._head.setSpacing(STEP_PX)
@@ -103,7 +105,7 @@ class InitialisationPanel(QWidget):
         self._text.setTextFormat(Qt.TextFormat.PlainText)
         self._text.setWordWrap(True)
         self._text.setFont(ui_font(bold=True))
-        self._yes = named(push_button("Yes, go on", "Go on with the next step"), "confirmYes")
+        self._yes = named(push_button("Yes, go on", "Continue with the next step"), "confirmYes")
         self._no = named(push_button("No", "End the sequence here"), "confirmNo")
         row.addWidget(self._text, 1)
         row.addWidget(self._yes)
@@ -206,7 +208,7 @@ class InitialisationPanel(QWidget):
 
     def _show_usable(self, *, running: bool) -> None:
         self._start.setEnabled(not running)
-        self._start.setToolTip("Not available: they are being made" if running else _START_TIP)
+        self._start.setToolTip("Not available: the steps are running" if running else _START_TIP)
         self._skip.setEnabled(not running)
 
     def _show_step(self, number: int, step: StepReport) -> None:

@@ -25,7 +25,7 @@ HEADS: Final = ("input", "moves", "now", "direction", "scale", "dead zone", "spe
 EDITABLE: Final = {DIRECTION: "direction", SCALE: "scale", DEAD_ZONE: "dead_zone"}
 _UNITS: Final = {"linear": "µm/s", "rotary": "°/s", "open-loop": "Hz"}
 _TIPS: Final = {
-    DIRECTION: "1, or -1 to turn it round",
+    DIRECTION: "1, or -1 to reverse it",
     SCALE: "Multiplies the deflection",
     DEAD_ZONE: "Part of the deflection around the middle that moves nothing",
     SPEED: "Speed at full deflection; empty for that of jogging",

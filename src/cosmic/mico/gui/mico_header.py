@@ -89,7 +89,9 @@ class MicoHeader(QWidget):
         self._left.setFont(number_font())
         self._left.setFixedWidth(self._left.fontMetrics().horizontalAdvance("000 s left") + 4)
         tipped(self._left, "Estimated from what is done so far")
-        self._cancel = named(push_button("Cancel", "End it; what it moves is stopped"), "cancel")
+        self._cancel = named(
+            push_button("Cancel", "Cancel; the axes that it moves are stopped"), "cancel"
+        )
         self._cancel.clicked.connect(self._on_cancel)
         busy, row = tight_row(STEP_PX)
         for widget in (self._bar, self._left, self._cancel):
@@ -136,7 +138,7 @@ class MicoHeader(QWidget):
     def set_undo(self, what: str) -> None:
         """Say what Undo takes back; empty when there is nothing."""
         self._undo.setEnabled(bool(what))
-        why_not = "Not available: nothing has moved that could go back"
+        why_not = "Not available: there is no movement to undo"
         self._undo.setToolTip(f"Ctrl+Z: {what}" if what else why_not)
 
     def set_steps_shown(self, shown: bool) -> None:

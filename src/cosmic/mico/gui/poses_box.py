@@ -39,7 +39,7 @@ class PosesBox(QWidget):
         self.poses = named(tipped(QComboBox(), "Named poses"), "poses")
         self.go = named(push_button("Go", "Move all axes of the pose there, together"), "goPose")
         self.around = named(
-            push_button("Go round", "Go there on a path around what is in between"), "goPoseWay"
+            push_button("Go round", "Plan a path around obstacles and follow it"), "goPoseWay"
         )
         self.remove = named(push_button("Remove", "Forget this pose"), "removePose")
         self.name = named(tipped(QLineEdit(), "Name of the pose to teach"), "poseName")

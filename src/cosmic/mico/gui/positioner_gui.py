@@ -183,7 +183,7 @@ class PositionerBaseGUI(Card):
     def _direction_button(self, text: str, key: str, sign: str) -> QPushButton:
         key = key_text(key)
         name = self.settings.name
-        held = f"; hold the key {key} to move on and on" if key else ""
+        held = f"; hold the key {key} to move continuously" if key else ""
         heading = "forwards" if sign == "+" else "backwards"
         button = push_button(
             f"{text} [{key}]" if key else text, f"Move {name} {heading} once{held}"

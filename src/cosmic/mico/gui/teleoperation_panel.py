@@ -287,7 +287,7 @@ class TeleoperationPanel(QWidget):
         if running:
             tip = "End the steering: everything it moves stops"
         elif ready:
-            tip = "Begin to steer; nothing moves before the sticks were at rest"
+            tip = "Start steering. Release all sticks; motion starts afterwards"
         elif not self.profiles.count():
             tip = "Not available: the platform file has no teleoperation profile"
         else:

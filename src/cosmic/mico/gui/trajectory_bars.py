@@ -47,11 +47,9 @@ class RecordBar(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.button = named(push_button("Record…", "Record every movement to a file"), "record")
-        self.source = tipped(QComboBox(), "Whose movements are recorded")
+        self.source = tipped(QComboBox(), "Axes whose movements are recorded")
         self.source.addItems(list(SOURCES))
-        self.timed = tipped(
-            QCheckBox("With timing"), "Keep when movements begin, and how fast jogs go"
-        )
+        self.timed = tipped(QCheckBox("With timing"), "Record start times and jog speeds")
         self.timed.setChecked(True)
         self.pose = tipped(QComboBox(), "Named pose that recorded positions count from")
         self.message = ElidedLabel()
@@ -120,9 +118,7 @@ class StartQuestion(QWidget):
         self.straight = named(
             push_button("Go there straight", "All axes together; the gate decides"), "goStraight"
         )
-        self.around = named(
-            push_button("Plan a path", "Plan a path around what is in between"), "goWay"
-        )
+        self.around = named(push_button("Plan a path", "Plan a path around obstacles"), "goWay")
         self.leave = named(push_button("Leave it", "Nothing moves"), "leaveStart")
         row, beside = tight_row(STEP_PX)
         beside.addStretch(1)
@@ -168,16 +164,16 @@ class RunBar(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.run = named(push_button("Run", "Rehearse, then make the movements"), "runTrajectory")
+        self.run = named(push_button("Run", "Rehearse, then run the trajectory"), "runTrajectory")
         self.pause = named(push_button("Pause", "After the current line"), "pause")
-        self.step = named(push_button("Step", "Make one line, then pause"), "step")
+        self.step = named(push_button("Step", "Run one line, then pause"), "step")
         self.cancel = named(push_button("Cancel", "End it now and stop its axes"), "cancelRun")
-        self.loops = tipped(QSpinBox(), "How many times; 0: until it is paused or cancelled")
+        self.loops = tipped(QSpinBox(), "Number of repetitions; 0: until paused or cancelled")
         self.loops.setRange(0, _MOST_LOOPS)
         self.loops.setValue(1)
         self.loops.setSuffix(" ×")
         self.loops.setSpecialValueText("for ever")
-        self.speed = tipped(QDoubleSpinBox(), "Speed factor; a wait lasts as long as it says")
+        self.speed = tipped(QDoubleSpinBox(), "Speed factor; waits are not scaled")
         self.speed.setRange(*SPEEDS)
         self.speed.setDecimals(2)
         self.speed.setSingleStep(0.25)

@@ -107,7 +107,7 @@ class UndoGui(QObject):
         where = undo_text(entry, states)
         try:
             if self._mico.undo_entry() != entry:
-                raise NotAvailable("something moved meanwhile; look again where it leads")
+                raise NotAvailable("an axis moved meanwhile; check again where the undo leads")
             movement = self._mico.undo(entry.group, wait=False, confirm=confirm)
         except CosmicError as exc:
             self.planned.emit(None)

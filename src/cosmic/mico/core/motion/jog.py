@@ -241,7 +241,7 @@ class SteerRun(JogRun):
         over = self._lost is not None or self._expired()
         if over and self._lost is None:
             # Remembered, for a renewal may come between this and the end that it leads to.
-            self._lost = HandLostError("nothing steers it any more")
+            self._lost = HandLostError("its input was lost")
         return over
 
     @override

@@ -180,7 +180,7 @@ class InputThread(WorkerThread):
         if not inputs.connected:
             return "unplugged"
         if not all(-1.0 <= each <= 1.0 for each in inputs.axes.values()):
-            return "the device reports nonsense"
+            return "the device reports invalid values"
         quiet_s = self._steering.device.info.quiet_s
         if quiet_s is not None and self._silent(inputs, quiet_s):
             return f"frozen, no report for {quiet_s:g} s"

@@ -72,7 +72,7 @@ class TrajectoryReader:
             if number == 1 and not self._headed:
                 return  # of a foreign file one line is enough
             if len(self.problems) >= MOST_PROBLEMS:
-                self.problems.append(Problem(number, "and so on; the rest was not read"))
+                self.problems.append(Problem(number, "the rest was not read: too many mistakes"))
                 return
             if number % _LOOK_EVERY == 0:
                 progress(number / len(lines))
