@@ -219,7 +219,7 @@ def test_an_output_that_is_not_there_is_named_with_those_that_are(rig: OutputRig
     outputs.close()
 
 
-def test_a_lost_board_is_told(rig: OutputRig) -> None:
+def test_a_lost_board_is_reported(rig: OutputRig) -> None:
     outputs = open_outputs(rig.library, rig.board)
     rig.unplug()
     with pytest.raises(NotConnectedError, match=rig.board):
@@ -322,7 +322,7 @@ def test_the_outputs_of_joined_makes_are_those_of_each() -> None:
         outputs.close()
 
 
-def test_a_driver_without_outputs_is_told() -> None:
+def test_a_driver_without_outputs_is_reported() -> None:
     class Plain(BoardLibrary):
         @property
         @override

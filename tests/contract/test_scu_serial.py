@@ -182,7 +182,7 @@ def test_a_lost_answer_is_survived_and_a_silent_unit_is_lost(rig, lines):
     rig.event(ActivityRead, Channel(1, 0))
 
 
-def test_a_pulled_cable_is_told_at_once_and_spares_the_others(rig, lines):
+def test_a_pulled_cable_is_reported_at_once_and_spares_the_others(rig, lines):
     lines.units[0].gone = True
     with pytest.raises(DeviceError) as caught:
         rig.controller.receive(0, 0.1)
@@ -204,7 +204,7 @@ def test_a_port_without_a_unit_is_left_out_and_named_when_it_is_wanted(lines):
     made.close()
 
 
-def test_what_comes_unasked_is_told_with_its_reason(rig, lines):
+def test_what_comes_unasked_is_reported_with_its_reason(rig, lines):
     lines.units[0].say("C1")
     lines.units[0].say("CE0E21")
     lines.units[0].say("CE255E23")
@@ -225,7 +225,7 @@ def test_every_error_code_fails_the_command_that_it_answers(rig, lines, code):
     assert "CS0" in str(failed.error)
 
 
-def test_a_unit_is_told_to_stop_by_itself_when_this_program_falls_silent(lines):
+def test_a_unit_is_reported_to_stop_by_itself_when_this_program_falls_silent(lines):
     with Rig(controller(lines, keep_alive_s=0.06)) as rig:
         assert "K60" in lines.units[0].heard
         lines.units[0].heard.clear()

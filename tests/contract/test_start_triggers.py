@@ -80,7 +80,7 @@ def test_a_waveform_that_begins_with_the_acquisition_lies_on_its_samples(
     outputs.close()
 
 
-def test_the_driver_is_told_the_trigger_and_the_first_chunk_dates_the_start(
+def test_the_driver_is_reported_the_trigger_and_the_first_chunk_dates_the_start(
     clock: ManualClock,
 ) -> None:
     driver = FakeOutputNidaqmx()
@@ -96,5 +96,5 @@ def test_the_driver_is_told_the_trigger_and_the_first_chunk_dates_the_start(
 
 
 def test_a_labjack_refuses_a_trigger() -> None:
-    with pytest.raises(NotAvailable, match="T7_1: a LabJack board starts when it is told to"):
+    with pytest.raises(NotAvailable, match="T7_1: a LabJack board starts on command only"):
         make_library("labjack", start_triggers={"T7_1": "/T7_1/FIO0"})

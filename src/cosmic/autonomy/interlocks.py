@@ -47,7 +47,7 @@ def join_outputs(daqco: DaqcoApplication, mico: MicoApplicationBase) -> None:
             daqco.outputs.reset()
 
     latch.subscribe(follow)
-    daqco.stopped_elsewhere = lambda: latch.state.reason or ""
+    daqco.stopped_outside = lambda: latch.state.reason or ""
 
 
 def join_force_cautions(daqco: DaqcoApplication, mico: MicoApplicationBase) -> None:

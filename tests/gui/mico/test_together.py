@@ -74,7 +74,7 @@ def test_a_ratio_that_makes_no_sense_says_why(panel: MicoWidget, qtbot: QtBot) -
 def test_undo_takes_the_last_movement_back(panel: MicoWidget, qtbot: QtBot) -> None:
     card, button = panel.cards["left.x"], part(panel, "undo", QPushButton)
     assert not button.isEnabled()
-    assert "nothing" in button.toolTip()
+    assert "no movement" in button.toolTip()
     click(qtbot, card, "MiCoCL_6")
     wait_for_position(qtbot, card, 100.0)
     qtbot.waitUntil(button.isEnabled)

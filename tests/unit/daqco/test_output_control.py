@@ -258,7 +258,7 @@ def test_what_another_station_set_goes_safe_when_that_station_falls_silent(site:
     site.control.set_voltage("piezo", 1.0)
 
 
-def test_a_board_that_is_lost_is_told_in_the_state(site: Site) -> None:
+def test_a_board_that_is_lost_is_reported_in_the_state(site: Site) -> None:
     site.library.faults.inject("unplugged", board="Dev1")
     with pytest.raises(CosmicError, match="Dev1"):
         site.control.set_voltage("piezo", 1.0)

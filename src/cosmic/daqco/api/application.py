@@ -134,7 +134,7 @@ class DaqcoApplication(TaskApplication):
             policy,
             self.status_changed.emit,
         )
-        self.stopped_elsewhere: Callable[[], str] = lambda: ""
+        self.stopped_outside: Callable[[], str] = lambda: ""
         self._restarts = RestartBudget()
         self.recorder = Recorder(
             self, policy, software=software, configuration=configuration, notes=notes
@@ -437,7 +437,7 @@ class DaqcoApplication(TaskApplication):
         NotAvailable
             Something else keeps them stopped.
         """
-        if why := self.stopped_elsewhere():
+        if why := self.stopped_outside():
             raise NotAvailable(f"motion is stopped ({why}): reset that stop, and outputs go on too")
         self.outputs.reset()
 

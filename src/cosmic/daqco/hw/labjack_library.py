@@ -228,7 +228,7 @@ def _check_clocks(sources: Mapping[str, str]) -> None:
 
 def _check_triggers(triggers: Mapping[str, str]) -> None:
     for board in filter(_is_ours, triggers):
-        raise NotAvailable(f"start_triggers: {board}: a LabJack board starts when it is told to")
+        raise NotAvailable(f"start_triggers: {board}: a LabJack board starts on command only")
 
 
 def _is_ours(board: str) -> bool:

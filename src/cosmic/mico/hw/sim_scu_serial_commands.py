@@ -87,11 +87,11 @@ def _identify(_unit: Settings, _index: str) -> Answers:
     return ["ISmarAct SCU-3D"]
 
 
-def _tell_number(unit: Settings, _index: str) -> Answers:
+def _answer_number(unit: Settings, _index: str) -> Answers:
     return [f"ID{unit.device.serial}"]
 
 
-def _tell_version(unit: Settings, _index: str) -> Answers:
+def _answer_version(unit: Settings, _index: str) -> Answers:
     return [f"V{unit.device.settings.firmware_version}"]
 
 
@@ -112,7 +112,7 @@ def _stay_alive(unit: Settings, index: str) -> Answers:
     return []
 
 
-def _tell_error(unit: Settings, index: str) -> Answers:
+def _answer_error(unit: Settings, index: str) -> Answers:
     if index == "":
         code, unit.last_error = unit.last_error, 0
         return [f"E{code}"]
@@ -128,7 +128,7 @@ def _set_baud(_unit: Settings, index: str) -> Answers:
     return [f"CB{index}"]
 
 
-def _tell_system(unit: Settings, index: str) -> Answers:
+def _answer_system(unit: Settings, index: str) -> Answers:
     settings = unit.device.settings
     values = {
         "1": settings.temperature_deg_c,
@@ -221,29 +221,29 @@ def _zero(_unit: Settings, channel: Channel, _given: Given, now_s: float) -> Ans
     return []
 
 
-def _tell_position(_unit: Settings, channel: Channel, _given: Given, now_s: float) -> Answers:
+def _answer_position(_unit: Settings, channel: Channel, _given: Given, now_s: float) -> Answers:
     (counts,) = commands.get_position(channel, now_s)
     return [f"P{channel.index}P{counts / 10:.1f}"]
 
 
-def _tell_angle(_unit: Settings, channel: Channel, _given: Given, now_s: float) -> Answers:
+def _answer_angle(_unit: Settings, channel: Channel, _given: Given, now_s: float) -> Answers:
     counts, _ = commands.get_angle(channel, now_s)
     return [f"A{channel.index}A{counts / 10:.1f}R0"]
 
 
-def _tell_status(_unit: Settings, channel: Channel, _given: Given, _now_s: float) -> Answers:
+def _answer_status(_unit: Settings, channel: Channel, _given: Given, _now_s: float) -> Answers:
     return [f"M{channel.index}{_STATUS[channel.status]}"]
 
 
-def _tell_known(_unit: Settings, channel: Channel, _given: Given, _now_s: float) -> Answers:
+def _answer_known(_unit: Settings, channel: Channel, _given: Given, _now_s: float) -> Answers:
     return [f"PPK{channel.index}K{int(channel.scale.known)}"]
 
 
-def _tell_sensor(_unit: Settings, channel: Channel, _given: Given, _now_s: float) -> Answers:
+def _answer_sensor(_unit: Settings, channel: Channel, _given: Given, _now_s: float) -> Answers:
     return [f"SP{channel.index}{'P' if channel.sensor_present else 'N'}"]
 
 
-def _tell_type(_unit: Settings, channel: Channel, _given: Given, _now_s: float) -> Answers:
+def _answer_type(_unit: Settings, channel: Channel, _given: Given, _now_s: float) -> Answers:
     return [f"ST{channel.index}T{channel.positioner_type}"]
 
 
@@ -256,7 +256,7 @@ def _set_type(_unit: Settings, channel: Channel, given: Given, now_s: float) -> 
     return []
 
 
-def _tell_safe(_unit: Settings, channel: Channel, _given: Given, _now_s: float) -> Answers:
+def _answer_safe(_unit: Settings, channel: Channel, _given: Given, _now_s: float) -> Answers:
     return [f"SD{channel.index}D{channel.safe_direction}"]
 
 
@@ -265,7 +265,7 @@ def _set_safe(_unit: Settings, channel: Channel, given: Given, now_s: float) -> 
     return []
 
 
-def _tell_frequency(_unit: Settings, channel: Channel, _given: Given, _now_s: float) -> Answers:
+def _answer_frequency(_unit: Settings, channel: Channel, _given: Given, _now_s: float) -> Answers:
     return [f"CLF{channel.index}F{channel.frequency_hz}"]
 
 
@@ -274,7 +274,7 @@ def _set_frequency(_unit: Settings, channel: Channel, given: Given, _now_s: floa
     return []
 
 
-def _tell_scale(_unit: Settings, channel: Channel, _given: Given, now_s: float) -> Answers:
+def _answer_scale(_unit: Settings, channel: Channel, _given: Given, now_s: float) -> Answers:
     scale, inverted = commands.get_scale(channel, now_s)
     return [f"SC{channel.index}I{inverted}S{scale}"]
 
@@ -286,7 +286,7 @@ def _set_scale(_unit: Settings, channel: Channel, given: Given, now_s: float) ->
     return []
 
 
-def _tell_alignment(_unit: Settings, channel: Channel, _given: Given, _now_s: float) -> Answers:
+def _answer_alignment(_unit: Settings, channel: Channel, _given: Given, _now_s: float) -> Answers:
     vertical, forward, backward = channel.alignment
     amplitudes = f"F{forward}B{backward}" if vertical else ""
     return [f"PA{channel.index}A{vertical}{amplitudes}"]
@@ -301,7 +301,7 @@ def _set_alignment(_unit: Settings, channel: Channel, given: Given, now_s: float
     return []
 
 
-def _tell_property(_unit: Settings, channel: Channel, given: Given, now_s: float) -> Answers:
+def _answer_property(_unit: Settings, channel: Channel, given: Given, now_s: float) -> Answers:
     key = _integer(given, "P", 0, 255)
     if not property_fits(key):
         raise AnsweredError(_PARAMETER)
@@ -339,31 +339,31 @@ _OfChannel = Callable[[Settings, Channel, Given, float], Answers]
 _FOR_ALL: Final = ("A", "SSP", "U", "D", "S", "M")
 _OF_UNIT: Final[dict[str, Callable[[Settings, str], Answers]]] = {
     "I": _identify,
-    "GID": _tell_number,
-    "V": _tell_version,
+    "GID": _answer_number,
+    "V": _answer_version,
     "R": _restart,
     "K": _stay_alive,
-    "E": _tell_error,
+    "E": _answer_error,
     "CB": _set_baud,
-    "GSPR": _tell_system,
+    "GSPR": _answer_system,
 }
 _OF_CHANNEL: Final[dict[str, _OfChannel]] = {
     "A": _set_amplitude,
     "SSP": _set_steps,
     "SZ": _zero,
     "SCLF": _set_frequency,
-    "GCLF": _tell_frequency,
-    "GSP": _tell_sensor,
+    "GCLF": _answer_frequency,
+    "GSP": _answer_sensor,
     "SST": _set_type,
-    "GST": _tell_type,
+    "GST": _answer_type,
     "SPA": _set_alignment,
-    "GPA": _tell_alignment,
+    "GPA": _answer_alignment,
     "SSC": _set_scale,
-    "GSC": _tell_scale,
+    "GSC": _answer_scale,
     "SSD": _set_safe,
-    "GSD": _tell_safe,
+    "GSD": _answer_safe,
     "SCP": _set_property,
-    "GCP": _tell_property,
+    "GCP": _answer_property,
     "SRC": _report_completion,
     "SER": _report_error,
     "U": _up,
@@ -376,10 +376,10 @@ _OF_CHANNEL: Final[dict[str, _OfChannel]] = {
     "MES": _end_stop,
     "CS": _calibrate,
     "S": _stop,
-    "GP": _tell_position,
-    "GA": _tell_angle,
-    "M": _tell_status,
-    "GPPK": _tell_known,
+    "GP": _answer_position,
+    "GA": _answer_angle,
+    "M": _answer_status,
+    "GPPK": _answer_known,
 }
 
 
