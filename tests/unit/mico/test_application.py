@@ -7,10 +7,10 @@ from unit.mico.rigs import mico, wait_until
 
 @pytest.mark.defects
 def test_a_defect_in_a_long_operation_ends_it_and_stops_everything(monkeypatch):
-    def broken(manager, **how):
+    def broken(settings, states, **how):
         raise RuntimeError("defect")
 
-    monkeypatch.setattr(initialisation, "plan", broken)
+    monkeypatch.setattr(initialisation, "plan_sequence", broken)
     with mico() as (rig, _):
         with pytest.raises(RuntimeError, match="defect"):
             rig.initialise()

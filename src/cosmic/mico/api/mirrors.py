@@ -31,7 +31,7 @@ class LatchElsewhere(StopLatch):
     def show(self, state: StopState) -> None:
         """Take what was told."""
         with self._lock:
-            before, self._state = self._state, state
+            before, self.state = self.state, state
         if state != before:
             self.announce()
 

@@ -262,7 +262,10 @@ class Scu3dLibrary:
         KeyError
             The header declares no such function.
         """
-        function = self._function(name)
+        try:
+            function = self._bound[name]
+        except KeyError:
+            function = self._function(name)
         return SA_COMMAND_NOT_SUPPORTED_ERROR if function is None else int(function(*args))
 
     def _function(self, name: str) -> Callable[..., int] | None:

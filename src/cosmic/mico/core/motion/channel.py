@@ -103,6 +103,8 @@ class ChannelController:
 
     Attributes
     ----------
+    name : str
+        Name of the axis.
     monitor : MotionMonitor
         Follows what was sent until the axis is stationary.
     """
@@ -110,14 +112,10 @@ class ChannelController:
     def __init__(self, positioner: PositionerBase, context: ChannelContext) -> None:
         self._positioner = positioner
         self._context = context
+        self.name = positioner.state.name
         self.speed = ChannelSpeed(positioner, context)
         self.monitor = MotionMonitor(positioner, context, self.speed)
         self._starting: tuple[int, JogRun] | None = None
-
-    @property
-    def name(self) -> str:
-        """Name of the axis."""
-        return self._positioner.state.name
 
     def set_frequency(self, frequency_hz: int) -> None:
         """Limit the closed-loop speed; a jog, or one that arrives with others, keeps its own."""
@@ -129,12 +127,12 @@ class ChannelController:
     def launch(self, order: Order) -> None:
         """Ask the gate, send `order` to the library, and begin to follow it."""
         gate = self._context.gate
-        if order.movement.cancelled or (order.follows and order.follows is not self.monitor.newest):
+        if order.movement.cancel_requested or (order.follows and order.follows is not self.monitor.newest):
             gate.withdraw(order.reservation)
             why = "a newer command came first" if order.follows else "cancelled before it started"
             order.movement.fail(MoveCancelled(f"{self.name}: {why}"))
             return
-        refused = self._void(order)
+        refused = self._void(order) if order.reservation is not None else self._outlived(order)
         if refused is not None:
             self.turn_away(order, refused)
             return

@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Final, Self, TypeVar
+from typing import Final, NamedTuple, Self, TypeVar
 
 from cosmic.frame.units import format_quantity
 from cosmic.frame.verdict import ALLOWED, MoveVerdict, Reason, refuse
@@ -340,8 +340,7 @@ STILL: Final = {"um": 0.1, "deg": 0.001}
 """By unit: a reading that changed by less says that the axis stands."""
 
 
-@dataclass(frozen=True, slots=True)
-class Request:
+class Request(NamedTuple):
     """One axis' part of a query to the gate."""
 
     axis: str

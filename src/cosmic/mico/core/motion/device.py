@@ -273,7 +273,10 @@ class Device(WorkerThread):
                 message = self._inbox.get(timeout_s)
             except Empty:
                 return
-            self._guarded(partial(self._take, message))
+            try:
+                self._take(message)
+            except DeviceError as exc:
+                self._on_device_error(exc)
             timeout_s = 0.0
 
     def _pause_s(self) -> float:
@@ -296,10 +299,13 @@ class Device(WorkerThread):
         try:
             action()
         except DeviceError as exc:
-            if exc.fault in (DeviceFault.COMMUNICATION, DeviceFault.TIMEOUT):
-                self._on_lost(exc)
-            else:
-                logger.error("device %d: %s", self.index, exc)
+            self._on_device_error(exc)
+
+    def _on_device_error(self, error: DeviceError) -> None:
+        if error.fault in (DeviceFault.COMMUNICATION, DeviceFault.TIMEOUT):
+            self._on_lost(error)
+        else:
+            logger.error("device %d: %s", self.index, error)
 
     def _take(self, message: Message) -> None:
         match message:

@@ -143,13 +143,13 @@ class DeviceCommander(QObject):
         self, channel: int, target: float, unit: AxisUnit, *, consent: bool = False
     ) -> Movement:
         """Move to `target`."""
-        return self.send(channel, MoveTo(target, unit), consent=consent)
+        return self.order(channel, MoveTo(target, unit), consent=consent).movement
 
     def move_relative(
         self, channel: int, distance: float, unit: AxisUnit, *, consent: bool = False
     ) -> Movement:
         """Move by `distance`."""
-        return self.send(channel, MoveBy(distance, unit), consent=consent)
+        return self.order(channel, MoveBy(distance, unit), consent=consent).movement
 
     def move_steps(
         self,

@@ -22,17 +22,18 @@ class ChannelDiscovery:
     """Makes a `ChannelController` for each channel that says what it has; device thread.
 
     It is over when every channel has answered, is stationary, and its position was read.
+
+    Attributes
+    ----------
+    over : bool
+        Everything is known; any thread may look.
     """
 
     def __init__(self, context: ChannelContext) -> None:
         self._context = context
         self._search = Task(f"finding the axes of device {context.container.device}")
         self.channels: dict[int, ChannelController] = {}
-
-    @property
-    def over(self) -> bool:
-        """True when everything is known; any thread."""
-        return self._search.done
+        self.over = False
 
     def wait(self, timeout_s: float) -> bool:
         """Wait until it is over; False after `timeout_s` of wall time. Any thread."""
@@ -45,6 +46,7 @@ class ChannelDiscovery:
     def give_up(self) -> dict[int, ChannelController]:
         """Part from all channels, as of a device that is gone."""
         channels, self.channels = self.channels, {}
+        self.over = True
         self._search.finish()
         return channels
 
@@ -112,4 +114,5 @@ class ChannelDiscovery:
         if present <= self.channels.keys() and all(
             each.monitor.located for each in self.channels.values()
         ):
+            self.over = True
             self._search.finish()

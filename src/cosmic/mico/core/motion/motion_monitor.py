@@ -314,11 +314,11 @@ class MotionMonitor:
             replaced.replaced = True
             replaced.leave_line(self._name)
             self._withdraw_query(replaced)
-        self._next_poll_s = self._context.clock.wall_s() + self._context.poll_s
         return replaced
 
     def report_begun(self, order: Order, replaced: ActiveMove | None) -> None:
         """Report that `order` was sent, and that it ended the one before."""
+        self._next_poll_s = self._context.clock.wall_s() + self._context.poll_s
         state = self._positioner.state
         failed = self.active is not None and self.active.error is not None
         error = self._positioner.state.error if failed else ""

@@ -1,9 +1,11 @@
 """A movement under way, as seen by whoever asked for it."""
 
+from threading import Lock
 from typing import Any, ClassVar, Self
 
 from typing_extensions import override
 
+from cosmic.frame.clock import WALL
 from cosmic.frame.operation import Operation
 
 
@@ -16,9 +18,13 @@ class Movement(Operation[float | None]):
     """
 
     sent_kind: ClassVar[Any] = float | None
+    _title = "the movement"
+    _clock = WALL
 
     def __init__(self) -> None:
-        super().__init__("the movement")
+        # Not by the base class: one is made between a command and the call of the library.
+        self._began_s = WALL.now_s()
+        self._lock = Lock()
 
     @classmethod
     @override

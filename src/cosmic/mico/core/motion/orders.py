@@ -188,19 +188,21 @@ class Order(_OrderFields):
         guard: Guard | None = None,
     ) -> Self:
         """Return an order with a number, and with a movement, of its own."""
-        return super().__new__(
+        return tuple.__new__(
             cls,
-            channel,
-            motion,
-            token,
-            source,
-            consent,
-            Movement() if movement is None else movement,
-            reservation,
-            follows,
-            epoch,
-            start,
-            frequency_hz,
-            guard,
-            next(_numbers),
+            (
+                channel,
+                motion,
+                token,
+                source,
+                consent,
+                Movement() if movement is None else movement,
+                reservation,
+                follows,
+                epoch,
+                start,
+                frequency_hz,
+                guard,
+                next(_numbers),
+            ),
         )

@@ -29,34 +29,35 @@ class StopState:
 
 
 class StopLatch:
-    """Thread-safe latch that every loop polls; reading it takes no lock."""
+    """Thread-safe latch that every loop polls; reading it takes no lock, and no call.
+
+    Attributes
+    ----------
+    state : StopState
+        The state now; only the latch itself changes it.
+    """
 
     def __init__(self) -> None:
         self._lock = Lock()
-        self._state = StopState(reason=None, epoch=0)
+        self.state = StopState(reason=None, epoch=0)
         self._announced: Event[StopState] = Event()
-
-    @property
-    def state(self) -> StopState:
-        """The state now."""
-        return self._state
 
     def set(self, reason: str) -> None:
         """Latch; the first reason stays until the reset."""
         with self._lock:
-            before = self._state
+            before = self.state
             said = before.reason or str(reason or "stopped")  # no reason at all stops as well
-            self._state = StopState(reason=said, epoch=before.epoch + 1)
+            self.state = StopState(reason=said, epoch=before.epoch + 1)
 
     def void_grants(self) -> None:
         """Let nothing that was reserved or queued so far start any more, without latching."""
         with self._lock:
-            self._state = StopState(reason=self._state.reason, epoch=self._state.epoch + 1)
+            self.state = StopState(reason=self.state.reason, epoch=self.state.epoch + 1)
 
     def reset(self) -> None:
         """Allow motion again; what was stopped does not go on by itself."""
         with self._lock:
-            self._state = StopState(reason=None, epoch=self._state.epoch)
+            self.state = StopState(reason=None, epoch=self.state.epoch)
         self.announce()
 
     def subscribe(self, listener: Callable[[StopState], object]) -> Unsubscribe:
@@ -65,4 +66,4 @@ class StopLatch:
 
     def announce(self) -> None:
         """Notify the listeners; apart from `set`, so that stopping comes first."""
-        self._announced.emit(self._state)
+        self._announced.emit(self.state)
