@@ -127,9 +127,10 @@ class ChannelController:
     def launch(self, order: Order) -> None:
         """Ask the gate, send `order` to the library, and begin to follow it."""
         gate = self._context.gate
-        if order.movement.cancel_requested or (order.follows and order.follows is not self.monitor.newest):
+        follows = order.follows
+        if order.movement.cancel_requested or (follows and follows is not self.monitor.newest):
             gate.withdraw(order.reservation)
-            why = "a newer command came first" if order.follows else "cancelled before it started"
+            why = "a newer command came first" if follows else "cancelled before it started"
             order.movement.fail(MoveCancelled(f"{self.name}: {why}"))
             return
         refused = self._void(order) if order.reservation is not None else self._outlived(order)
