@@ -9,26 +9,42 @@ it, 1/k = 1/(EI cos^2 b) times the integral of (X cos b + Y sin b)^2 over the le
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from cosmic.autonomy.bending.result import BendingError, Floats
 
 POWERS: Final = np.arange(1, 8)
 """Of the length, in the polynomial; the turning is nothing at the clamp."""
 
-POINTS: Final = 24
-LOADS: Final = 30
+POINTS: Final = 20
+LOADS: Final = 40
 HEAVIEST: Final = 1.3
 """Load in units of EI/lever^2; the deflection reaches 0.4 of the lever."""
 
-ROUNDS: Final = 12
-TURNS: Final = 14
-NUDGE: Final = 1e-5
+ROUNDS: Final = 40
+MET_PART: Final = 1e-6
+"""Of the lever: how near the contact must come to the probe."""
+
+LEAST_COS: Final = 0.2
+TURNS: Final = 3
 DIRECTION_UM: Final = 40.0
 """Length to both sides of a place over which its direction is taken."""
+
+
+Mask = npt.NDArray[np.bool_]
+
+
+@cache
+def _quadrature() -> tuple[Floats, Floats, Floats, Floats]:
+    """Return points of the unit length, their weights, the powers there, and bending inverted."""
+    nodes, weights = np.polynomial.legendre.leggauss(POINTS)
+    part = 0.5 * (nodes + 1.0)
+    bending = POWERS[:, None] * POWERS / (POWERS[:, None] + POWERS - 1.0)
+    return part, 0.5 * weights, part[:, None] ** POWERS, np.linalg.inv(bending)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,6 +61,22 @@ class PushedCurve:
 
     deflection: Floats
     pushed: Floats
+
+    def force_un(
+        self, way_um: Floats, *, k_un_um: float, lever_um: float, sensor_un_um: float
+    ) -> Floats:
+        """Return the force in front of a sensor that gives way; 0 before the contact.
+
+        Parameters
+        ----------
+        way_um : ndarray
+            Of the probe's axis since the first contact.
+        k_un_um : float
+            Stiffness of the fibre at the first contact, 3 EI/lever^3.
+        """
+        force = k_un_um * lever_um * self.pushed
+        way = lever_um * self.deflection + force / sensor_un_um
+        return np.asarray(np.interp(way_um, way, force), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,35 +128,90 @@ class NaturalShape:
         depth_um : float
             How far inside the jaws' tip it is clamped.
         """
-        end, slope = self._arc_at(self.at_um), self.slope_rad
-        along = np.unique(np.concatenate([[-depth_um, 0.0], self._arcs[self._arcs < end], [end]]))
-        x, y = self._places(along)
-        arms = (x[-1] - x) + (y[-1] - y) * math.tan(slope)
+        return float(self.levers_um(np.array([depth_um]))[0])
+
+    def levers_um(self, depths_um: Floats) -> Floats:
+        """Return the lever for each of several depths of the clamp."""
+        along, arms = self.arms_um()
         first, second = arms[:-1], arms[1:]
-        parts = (first * first + first * second + second * second) / 3.0 * np.diff(along)
-        return float(np.cbrt(3.0 * parts.sum()))
+        free = float(((first * first + first * second + second * second) * np.diff(along)).sum())
+        # Between the jaws the fibre is straight: its part of the integral is a cube.
+        return np.asarray(np.cbrt(free + (arms[0] + depths_um) ** 3 - arms[0] ** 3))
+
+    def arms_um(self) -> tuple[Floats, Floats]:
+        """Return lengths from the jaws' tip to the contact, and the arm of a push about each."""
+        end = self._arc_at(self.at_um)
+        along = np.unique(np.concatenate([[0.0], self._arcs[self._arcs < end], [end]]))
+        x, y = self._places(along)
+        return along, (x[-1] - x) + (y[-1] - y) * math.tan(self.slope_rad)
+
+    def moved(self, *, ahead_um: float = 0.0, turned_rad: float = 0.0) -> "NaturalShape":
+        """Return the shape with the probe farther ahead, and turned about the jaws' tip."""
+        cos, sin = math.cos(turned_rad), math.sin(turned_rad)
+        ahead = cos * self.ahead_um - sin * self.aside_um
+        aside = sin * self.ahead_um + cos * self.aside_um
+        last = len(ahead) if (rises := np.diff(ahead) > 0.0).all() else int(rises.argmin()) + 1
+        return NaturalShape(ahead[:last], aside[:last], self.at_um + ahead_um)
 
     def curve(self, *, depth_um: float, radius_um: float) -> PushedCurve:
-        """Return force over deflection for a round edge, counted from the first contact.
+        """Return force over deflection for a round edge without friction."""
+        return self.curves(depth_um=depth_um, radius_um=radius_um, friction=0.0)[0]
+
+    def curves(
+        self,
+        *,
+        depth_um: float,
+        radius_um: float,
+        friction: float,
+        ei_un_um2: float = 0.0,
+        side_um_un: float = 0.0,
+    ) -> tuple[PushedCurve, PushedCurve]:
+        """Return force over deflection from the first contact on, on the way out and back.
+
+        The probe rubs the way the contact wanders along the fibre.
 
         Parameters
         ----------
         radius_um : float
             Of the probe's edge and half the fibre together.
+        friction : float
+            Part of the normal force that acts along the fibre.
+        ei_un_um2, side_um_un : float
+            Bending stiffness, about, and how far the probe gives way along the jaws for a force.
+
+        Raises
+        ------
+        BendingError
+            The fibre slides off.
         """
         lever = self.lever_um(depth_um)
-        loads = np.linspace(0.0, 1.0, LOADS) ** 1.5 * (HEAVIEST / lever**2)
-        ends = np.full(LOADS, self._arc_at(self.at_um))
+        one = np.linspace(0.0, 1.0, LOADS) ** 1.5 * (HEAVIEST / lever**2)
+        loads, rub = np.tile(one, 2), np.repeat([math.atan(friction), -math.atan(friction)], LOADS)
+        ends = np.full(2 * LOADS, self._arc_at(self.at_um))
+        aside = ei_un_um2 * side_um_un
+        factors = np.zeros((2 * LOADS, len(POWERS)))
+        off, contact = np.zeros(2 * LOADS), np.zeros(2 * LOADS)
+        y, across = off, off
         for _ in range(ROUNDS):
-            x, _, _ = self._bent(ends, loads, depth_um, radius_um)
-            later, _, _ = self._bent(ends + NUDGE * lever, loads, depth_um, radius_um)
-            rise = (later - x) / (NUDGE * lever)
-            ends = ends + np.clip(
-                (self.at_um - x) / np.maximum(rise, 0.2), -0.1 * lever, 0.1 * lever
+            ends = ends + np.clip(off / np.maximum(np.cos(contact), LEAST_COS), -20.0, 20.0)
+            x, y, across, contact, factors = self._bent(
+                ends, loads, rub, factors, depth_um, radius_um
             )
-        x, y, across = self._bent(ends, loads, depth_um, radius_um)
+            off = self.at_um - aside * loads * np.sin(contact + rub) - x
+            if np.abs(off).max() < MET_PART * lever:
+                break
+        wandered = (ends - radius_um * contact).reshape(2, LOADS).mean(axis=0)
+        inwards = wandered < wandered[0]
+        good = (np.abs(off) < 1e-3 * lever).reshape(2, LOADS)
+        ways = []
+        for first in (0, 1):
+            chosen = np.where(inwards, 1 - first, first) * LOADS + np.arange(LOADS)
+            ways.append(self._pushed(y[chosen], across[chosen], good.ravel()[chosen], lever=lever))
+        return ways[0], ways[1]
+
+    def _pushed(self, y: Floats, across: Floats, good: Mask, *, lever: float) -> PushedCurve:
         deflection = y[0] - y
-        good = np.abs(x - self.at_um) < 1e-3 * lever
+        good = good.copy()
         good[1:] &= (np.diff(deflection) > 0.0) & (np.diff(across) > 0.0)
         last = LOADS if good.all() else int(good.argmin())
         if last < 3:
@@ -135,22 +222,27 @@ class NaturalShape:
         return PushedCurve(deflection[:last] / lever, across[:last] * lever**2 / 3.0)
 
     def _bent(
-        self, ends: Floats, loads: Floats, depth_um: float, radius_um: float
-    ) -> tuple[Floats, Floats, Floats]:
-        """Return the middle of the probe, x and y, and the force across over EI, by load."""
-        nodes, weights = np.polynomial.legendre.leggauss(POINTS)
-        part, weight = 0.5 * (nodes + 1.0), 0.5 * weights
+        self,
+        ends: Floats,
+        loads: Floats,
+        rub: Floats,
+        factors: Floats,
+        depth_um: float,
+        radius_um: float,
+    ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        """Take one step towards equilibrium.
+
+        Returns the middle of the probe, x and y, the force across over EI, the direction at the
+        contact, and the polynomial, by load.
+        """
+        part, weight, shapes, given = _quadrature()
         lengths = (ends + depth_um)[:, None]
         natural = self._headings(lengths * part - depth_um)
         at_end = self._headings(ends)
-        shapes = part[:, None] ** POWERS
-        bending = POWERS[:, None] * POWERS / (POWERS[:, None] + POWERS - 1.0)
-        given = np.linalg.inv(bending)
-        factors = np.zeros((len(ends), len(POWERS)))
         for _ in range(TURNS):
             heading = natural + factors @ shapes.T
-            contact = (at_end + factors.sum(axis=1))[:, None]
-            work = (np.cos(contact - heading) * weight) @ shapes
+            pushes = (at_end + factors.sum(axis=1) + rub)[:, None]
+            work = (np.cos(pushes - heading) * weight) @ shapes
             factors = -(loads[:, None] * lengths**2) * (work @ given)
         heading = natural + factors @ shapes.T
         contact = at_end + factors.sum(axis=1)
@@ -159,7 +251,9 @@ class NaturalShape:
         return (
             x - radius_um * np.sin(contact),
             y + radius_um * np.cos(contact),
-            loads * np.cos(contact),
+            loads * np.cos(contact + rub),
+            contact,
+            factors,
         )
 
     def _arc_at(self, ahead_um: float) -> float:

@@ -2,14 +2,16 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
-from scipy.special import chdtrc  # scipy.stats takes a second to load
-
-from cosmic.autonomy.bending.lever import Lever, fit_lever
+from cosmic.autonomy.bending.checks import checked
+from cosmic.autonomy.bending.inference import FRICTION, Readings, budget_of, readings_of
+from cosmic.autonomy.bending.population import Judged, Population, judge
+from cosmic.autonomy.bending.response import response_of, straight
 from cosmic.autonomy.bending.result import (
     N_M2_PER_UN_UM2,
+    UN_UM2_PER_N_M2,
     BendingError,
     BendingResult,
     Quality,
@@ -19,18 +21,120 @@ from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.bending.span_fit import fit_span
 
-LEAST_SPANS: Final = 2
-POOR_PROBABILITY: Final = 1e-3
+NEAR: Final = 0.03
+LEAST_RUB, MOST_RUB = 0.02, 0.8
+"""Friction that curves are laid out for."""
+
 SPOILT: Final = frozenset(
     {
         Quality.SLIPPED,
         Quality.BROKEN,
+        Quality.SET,
         Quality.HYSTERESIS,
         Quality.SATURATED,
         Quality.POOR_FIT,
         Quality.NO_CONTACT,
     }
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """What is known of a standard.
+
+    Attributes
+    ----------
+    ei_n_m2 : float
+        Its bending stiffness.
+    expanded_part : float
+        Expanded uncertainty of that, k = 2, as a part of it.
+    """
+
+    ei_n_m2: float
+    expanded_part: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredFibre:
+    """One fibre, each span by itself: what a campaign keeps for its fit.
+
+    Attributes
+    ----------
+    used : tuple of int
+        Spans to stand on: the good ones, else any with a stiffness.
+    readings : Readings or None
+        None where no span has a stiffness.
+    raw : tuple of Span
+        What it was measured from.
+    settings : FitSettings
+        With the width of the fibre.
+    part : float
+        Of the campaign that was over, 0 to 1.
+    certificate : Certificate or None
+        Of a standard.
+    """
+
+    spans: tuple[SpanFit, ...]
+    used: tuple[int, ...]
+    readings: Readings | None
+    raw: tuple[Span, ...]
+    settings: FitSettings
+    part: float = 0.0
+    certificate: Certificate | None = None
+
+    def about(self, friction: float) -> "MeasuredFibre":
+        """Return the same, fitted about another friction."""
+        return measure_fibre(
+            self.raw,
+            settings=self.settings,
+            part=self.part,
+            certificate=self.certificate,
+            friction=friction,
+        )
+
+
+def measure_fibre(
+    spans: Sequence[Span],
+    *,
+    settings: FitSettings,
+    part: float = 0.0,
+    certificate: Certificate | None = None,
+    friction: float | None = None,
+) -> MeasuredFibre:
+    """Return what each span of a fibre, or of a standard, says by itself.
+
+    Parameters
+    ----------
+    part : float
+        Of the campaign that was over, 0 to 1.
+    friction : float, optional
+        About which spans are fitted; that of the settings if None.
+
+    Raises
+    ------
+    BendingError
+        There is no span, or one of them is not whole.
+    """
+    if not spans:
+        raise BendingError("there is no span to fit: measure at least one")
+    positions = positions_um(spans)
+    fits = tuple(
+        fit_span(span, settings=settings, place_um=position, friction=friction)
+        for span, position in zip(spans, positions, strict=True)
+    )
+    used = usable(fits)
+    shapes = [spans[n].shape or straight(positions[n]) for n in used]
+    if not shapes:
+        return MeasuredFibre(fits, (), None, tuple(spans), settings, part, certificate)
+    response = response_of(shapes, depth_um=settings.offset_um)
+    certified = None
+    if certificate is not None:
+        log_ei = math.log(certificate.ei_n_m2 * UN_UM2_PER_N_M2)
+        certified = log_ei, certificate.expanded_part / 2.0
+    readings = readings_of(
+        [fits[n] for n in used], response, settings, part=part, certified=certified
+    )
+    return MeasuredFibre(fits, used, readings, tuple(spans), settings, part, certificate)
 
 
 def usable(fits: Sequence[SpanFit]) -> tuple[int, ...]:
@@ -40,51 +144,11 @@ def usable(fits: Sequence[SpanFit]) -> tuple[int, ...]:
 
 
 def _has_value(fit: SpanFit) -> bool:
-    return math.isfinite(fit.k_un_um) and 0.0 < fit.k_std_un_um < math.inf
-
-
-def with_quality(result: BendingResult, settings: FitSettings) -> BendingResult:
-    """Return the result with its flags, whether it is trusted, and why not."""
-    flags, reasons = set(result.flags), []
-    for number, fit in enumerate(result.spans):
-        if spoilt := fit.flags & SPOILT:
-            words = ", ".join(sorted(spoilt))
-            reasons.append(f"span {number + 1} at {fit.place_um:.0f} um: {words}")
-    good = [n for n in result.used if not result.spans[n].flags & SPOILT]
-    if len(good) < LEAST_SPANS:
-        flags.add(Quality.TOO_FEW_SPANS)
-        reasons.append(f"{len(good)} good spans, and {LEAST_SPANS} are needed to find the clamp")
-        flags |= {flag for fit in result.spans for flag in fit.flags & SPOILT}
-    half = half_width_percent(result)
-    if half > settings.soft_percent:
-        flags.add(Quality.TOO_SOFT)
-        reasons.append(f"the interval is +/-{half:.0f} %, more than {settings.soft_percent:g} %")
-    if result.freedom > 0 and _unlikely(result):
-        flags.add(Quality.POOR_FIT)
-        reasons.append(
-            "the spans' stiffnesses do not lie on one line: the grip slipped between spans, or "
-            "the fibre is not uniform"
-        )
-    return replace(result, flags=frozenset(flags), trusted=not flags, reasons=tuple(reasons))
-
-
-def _unlikely(result: BendingResult) -> bool:
-    return float(chdtrc(result.freedom, result.chi2)) < POOR_PROBABILITY
-
-
-def half_width_percent(result: BendingResult) -> float:
-    """Return half of the 95 % interval, as a part of the value; nan where there is none."""
-    if not result.ei_n_m2 > 0.0:
-        return math.nan
-    return 50.0 * (result.ei_high_n_m2 - result.ei_low_n_m2) / result.ei_n_m2
-
-
-NEAR_PART: Final = 0.05
-"""Of a span: an offset that is off by less changes its curve by nothing that counts."""
+    return math.isfinite(fit.k_un_um) and 0.0 < fit.out_std_part < math.inf
 
 
 def fit_bending(spans: Sequence[Span], *, settings: FitSettings | None = None) -> BendingResult:
-    """Return the bending stiffness of a fibre that was pushed as a cantilever.
+    """Return the bending stiffness of a fibre that was pushed as a cantilever, by itself.
 
     Parameters
     ----------
@@ -98,35 +162,76 @@ def fit_bending(spans: Sequence[Span], *, settings: FitSettings | None = None) -
     BendingError
         There is no span, or one of them is not whole.
     """
-    if not spans:
-        raise BendingError("there is no span to fit: measure at least one")
     settings = settings or FitSettings()
-    positions = positions_um(spans)
-    offset = settings.offset_um
-    fits, lever, used = _once(spans, positions, offset, settings)
-    if lever is not None and abs(lever.offset_um - offset) > NEAR_PART * min(positions):
-        fits, lever, used = _once(spans, positions, lever.offset_um, settings)
-    if lever is None:
-        return with_quality(_nothing(fits, settings), settings)
-    low, high = _interval(fits, used, lever, settings)
-    scale = N_M2_PER_UN_UM2
-    return with_quality(
-        BendingResult(
-            ei_n_m2=lever.ei_un_um2 * scale,
-            ei_low_n_m2=low * scale,
-            ei_high_n_m2=high * scale,
-            clamp_offset_um=lever.offset_um,
-            clamp_offset_std_um=lever.offset_std_um,
-            spans=fits,
-            used=used,
-            chi2=lever.chi2,
-            freedom=len(used) - 1,
-            flags=frozenset(),
-            trusted=True,
-            reasons=(),
-        ),
-        settings,
+    return fit_campaign([measure_fibre(spans, settings=settings)], settings=settings)[0]
+
+
+def fit_campaign(
+    fibres: Sequence[MeasuredFibre],
+    *,
+    standards: Sequence[MeasuredFibre] = (),
+    settings: FitSettings | None = None,
+) -> tuple[BendingResult, ...]:
+    """Return the bending stiffness of all fibres of a campaign, judged together.
+
+    Parameters
+    ----------
+    standards : sequence of MeasuredFibre
+        Measured with their certificates; without any the sensor's certificate is in the intervals.
+    """
+    settings = settings or FitSettings()
+    every = [*fibres, *standards]
+    verified = any(each.readings is not None for each in standards)
+    judged = _judged(every, settings)
+    rubs = settings.friction + float(judged.common.mean[FRICTION]) if judged else 0.0
+    if judged and abs(rubs - settings.friction) > NEAR:
+        # What friction does is no straight line: it is taken again about where it lies.
+        rubs = min(max(rubs, LEAST_RUB), MOST_RUB)
+        every = [each.about(rubs) for each in every]
+        judged = _judged(every, settings, friction=rubs)
+    each_judged = iter(judged.fibres if judged else ())
+    return tuple(
+        _nothing(each, settings)
+        if each.readings is None
+        else _concluded(each, each.readings, next(each_judged), settings, verified=verified)
+        for each in every[: len(fibres)]
     )
+
+
+def _judged(
+    fibres: Sequence[MeasuredFibre], settings: FitSettings, *, friction: float | None = None
+) -> Population | None:
+    known = [each.readings for each in fibres if each.readings is not None]
+    return judge(known, settings, friction=friction) if known else None
+
+
+def _concluded(
+    fibre: MeasuredFibre,
+    readings: Readings,
+    judged: Judged,
+    settings: FitSettings,
+    *,
+    verified: bool,
+) -> BendingResult:
+    posterior, scale = judged.posterior, N_M2_PER_UN_UM2
+    chi2 = float(judged.evidence.chi2.min())
+    result = BendingResult(
+        ei_n_m2=math.exp(posterior.log_ei) * scale,
+        ei_low_n_m2=math.exp(posterior.log_low) * scale,
+        ei_high_n_m2=math.exp(posterior.log_high) * scale,
+        clamp_offset_um=posterior.depth_um,
+        clamp_offset_std_um=posterior.depth_std_um,
+        spans=fibre.spans,
+        used=fibre.used,
+        chi2=chi2,
+        freedom=judged.evidence.freedom,
+        flags=frozenset(),
+        trusted=True,
+        reasons=(),
+        budget=budget_of(readings, judged.common, settings, posterior, judged.evidence),
+        scale_verified=verified,
+    )
+    return checked(result, readings, judged, settings)
 
 
 def positions_um(spans: Sequence[Span]) -> tuple[float, ...]:
@@ -142,55 +247,27 @@ def positions_um(spans: Sequence[Span]) -> tuple[float, ...]:
     return tuple(among + sign * (x - middle) for x in read)
 
 
-def _once(
-    spans: Sequence[Span], positions: Sequence[float], offset_um: float, settings: FitSettings
-) -> tuple[tuple[SpanFit, ...], Lever | None, tuple[int, ...]]:
-    fits = tuple(
-        fit_span(
-            span, settings=settings, place_um=position, length_um=max(position + offset_um, 10.0)
-        )
-        for span, position in zip(spans, positions, strict=True)
-    )
-    used = usable(fits)
-    return fits, (fit_lever([fits[n] for n in used], settings) if used else None), used
+def half_width_percent(result: BendingResult) -> float:
+    """Return half of the 95 % interval, as a part of the value; nan where there is none."""
+    if not result.ei_n_m2 > 0.0:
+        return math.nan
+    return 50.0 * (result.ei_high_n_m2 - result.ei_low_n_m2) / result.ei_n_m2
 
 
-def _interval(
-    fits: Sequence[SpanFit], used: Sequence[int], lever: Lever, settings: FitSettings
-) -> tuple[float, float]:
-    """Return the 95 % interval: the profile's, and what all spans have wrong in common."""
-    systematic = math.hypot(
-        settings.gain_std_part,
-        settings.way_scale_std_part,
-        _sensor_part([fits[n] for n in used], lever, settings),
-    )
-    best = math.log(lever.ei_un_um2)
-    below, above = best - math.log(lever.low_un_um2), math.log(lever.high_un_um2) - best
-    common = 1.96 * systematic
-    return math.exp(best - math.hypot(below, common)), math.exp(best + math.hypot(above, common))
-
-
-def _sensor_part(fits: Sequence[SpanFit], lever: Lever, settings: FitSettings) -> float:
-    """Return how much EI changes with one standard deviation of the sensor's stiffness."""
-    softer = settings.sensor_un_um * (1.0 - settings.sensor_std_part / 2.0)
-    change = 1.0 / softer - 1.0 / settings.sensor_un_um
-    moved = [fit.k_un_um / max(1.0 - fit.k_un_um * change, 0.1) for fit in fits]
-    other = fit_lever(fits, settings, stiffnesses=moved)
-    return 2.0 * abs(math.log(other.ei_un_um2 / lever.ei_un_um2))
-
-
-def _nothing(fits: tuple[SpanFit, ...], settings: FitSettings) -> BendingResult:
-    return BendingResult(
+def _nothing(fibre: MeasuredFibre, settings: FitSettings) -> BendingResult:
+    flags = frozenset({Quality.NO_CONTACT, Quality.TOO_FEW_SPANS})
+    result = BendingResult(
         ei_n_m2=math.nan,
         ei_low_n_m2=math.nan,
         ei_high_n_m2=math.nan,
         clamp_offset_um=settings.offset_um,
         clamp_offset_std_um=settings.offset_std_um,
-        spans=fits,
+        spans=fibre.spans,
         used=(),
         chi2=0.0,
         freedom=0,
-        flags=frozenset({Quality.NO_CONTACT}),
+        flags=flags,
         trusted=False,
-        reasons=(),
+        reasons=("0 good spans, and 2 are needed to find the clamp",),
     )
+    return replace(result, flags=flags)

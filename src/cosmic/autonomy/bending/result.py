@@ -1,5 +1,6 @@
 """What a bend test says about a fibre, and how far it may be believed."""
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
@@ -31,6 +32,45 @@ class Quality(StrEnum):
     SATURATED = "sensor saturated"
     TOO_FEW_SPANS = "too few good spans"
     POOR_FIT = "the model does not fit"
+    RELAXED = "relaxes"
+    SET = "plastic set"
+    HINGE = "weak place"
+    NON_UNIFORM = "not uniform"
+    FRICTION = "friction"
+    CLAMP_DEEP = "clamped deep in the jaws"
+    MOVED = "contact moved"
+    NOT_A_FIBRE = "not a fibre"
+
+
+class Kind(StrEnum):
+    """How a contribution to the uncertainty is known, after GUM."""
+
+    A = "A"
+    B = "B"
+
+
+@dataclass(frozen=True, slots=True)
+class Contribution:
+    """One line of the budget of a bending stiffness.
+
+    Attributes
+    ----------
+    kind : Kind
+        A: from the scatter of readings. B: from what is known otherwise.
+    std : float
+        Standard uncertainty of the source, in `unit`.
+    sensitivity : float
+        Change of ln(EI) for one `unit`.
+    share : float
+        Of the variance of ln(EI), 0 to 1; all lines together make 1.
+    """
+
+    source: str
+    kind: Kind
+    std: float
+    unit: str
+    sensitivity: float
+    share: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +99,16 @@ class SpanFit:
     fitted_un : ndarray, shape (n,), float64
         The model at each point of the span, baseline included; nan where it was left out.
     flags : frozenset of Quality
+    out_std_part, back_std_part, ways_correlation : float
+        Standard deviations of ln(k) on the way out and back, and how they go together.
+    by_friction : float
+        Change of ln(k) on the way out for a friction of 1; that of the way back is the opposite.
+    by_side_out, by_side_back : float
+        Change of ln(k) by all that the probe is taken to give way along the fibre.
+    shift_um, shift_std_um : float
+        How much farther out contact ends than it began.
+    relaxation_part, relaxation_std_part : float
+        Part of the force that is lost in a tenfold time.
     """
 
     place_um: float
@@ -76,6 +126,16 @@ class SpanFit:
     freedom: int
     fitted_un: Floats
     flags: frozenset[Quality]
+    out_std_part: float = math.nan
+    back_std_part: float = math.nan
+    ways_correlation: float = 0.0
+    by_friction: float = 0.0
+    by_side_out: float = 0.0
+    by_side_back: float = 0.0
+    shift_um: float = math.nan
+    shift_std_um: float = math.nan
+    relaxation_part: float = math.nan
+    relaxation_std_part: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,6 +160,13 @@ class BendingResult:
         Whether the result may be used without a second look.
     reasons : tuple of str
         Why not, or what was left out.
+    budget : tuple of Contribution
+        What the interval follows from, the largest first; empty where there is no interval.
+    scale_verified : bool
+        Whether the scale of the force comes from a standard; else the sensor's certificate is in
+        the interval.
+    notes : frozenset of Quality
+        What was seen and stands in the interval, without speaking against the value.
     """
 
     ei_n_m2: float
@@ -114,3 +181,6 @@ class BendingResult:
     flags: frozenset[Quality]
     trusted: bool
     reasons: tuple[str, ...]
+    budget: tuple[Contribution, ...] = ()
+    scale_verified: bool = False
+    notes: frozenset[Quality] = frozenset()

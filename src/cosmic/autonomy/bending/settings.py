@@ -16,19 +16,40 @@ class FitSettings(StrictModel):
         Force at which the sensor saturates.
     gain_std_part : float
         Standard deviation of the force's scale, as a part of it.
+    gain_drift_std_part : float
+        Of the change of that scale over a campaign.
     drift_un_sqrt_s : float
         Random walk of the sensor's zero.
     way_std_um, way_scale_std_part : float
         Of one reading of the probe's axis, and of the encoder's scale.
     contact_std_um : float
         How well the position of contact along the fibre repeats from span to span.
+    contact_offset_std_um : float
+        How far all positions of contact may be off in common: nominal position, place of the edge.
     offset_um, offset_std_um : float
-        What is known beforehand of the way from the tip of the jaws back to where the fibre is
-        truly clamped, errors of `Span.nominal_um` included.
+        Mean and spread, before anything is measured, of how deep inside the tip of the jaws
+        fibres are truly clamped. It cannot be negative; a campaign learns both.
+    jaw_un_um, jaw_std_part : float
+        Stiffness of the jaws across, and how uncertain what it gives way is, as a part of that.
     edge_radius_um, fibre_width_um : float
         The probe's round edge and the fibre: a sloping fibre touches nearer to the clamp.
-    hysteresis_percent, slip_um : float
-        What loading and unloading may differ by, in force and in the position of first contact.
+    direction_std_deg : float
+        Error of the direction in which the fibre leaves the jaws, as the image shows it.
+    friction, friction_std : float
+        Between probe and fibre.
+    cross_std_part : float
+        Of a force along the probe's edge, how much the sensor reads as one across.
+    relaxation_part, relaxation_std_part : float
+        Part of its force that a bent fibre loses in a tenfold time.
+    side_un_um, side_std_part : float
+        Stiffness of the probe along the fibre, and how uncertain what it gives way is, as a part
+        of that.
+    shear_um2, shear_std_um2 : float
+        What shear adds to the compliance of a span, times the square of the span.
+    ei_length_um : float
+        Length over which the stiffness of a fibre varies.
+    reversal_um : float
+        Play of the probe's axis when it turns back.
     soft_percent : float
         Half of the interval beyond which a result is too uncertain to be trusted.
     """
@@ -36,17 +57,31 @@ class FitSettings(StrictModel):
     sensor_un_um: float = Field(800.0, gt=0.0)
     sensor_std_part: float = Field(0.2, ge=0.0, le=1.0)
     range_un: float = Field(180.0, gt=0.0)
-    gain_std_part: float = Field(0.01, ge=0.0, le=1.0)
+    gain_std_part: float = Field(0.025, ge=0.0, le=1.0)
+    gain_drift_std_part: float = Field(0.005, ge=0.0, le=1.0)
     drift_un_sqrt_s: float = Field(0.02, ge=0.0)
     way_std_um: float = Field(0.05, ge=0.0)
     way_scale_std_part: float = Field(0.001, ge=0.0, le=1.0)
     contact_std_um: float = Field(1.0, gt=0.0)
-    offset_um: float = 8.0
-    offset_std_um: float = Field(8.0, gt=0.0)
+    contact_offset_std_um: float = Field(3.0, ge=0.0)
+    offset_um: float = Field(25.0, gt=0.0)
+    offset_std_um: float = Field(25.0, gt=0.0)
+    jaw_un_um: float = Field(1500.0, gt=0.0)
+    jaw_std_part: float = Field(1.0, ge=0.0)
     edge_radius_um: float = Field(10.0, ge=0.0)
     fibre_width_um: float = Field(30.0, ge=0.0)
-    hysteresis_percent: float = Field(5.0, gt=0.0)
-    slip_um: float = Field(1.0, gt=0.0)
+    direction_std_deg: float = Field(1.0, ge=0.0)
+    friction: float = Field(0.2, ge=0.0, lt=1.0)
+    friction_std: float = Field(0.15, ge=0.0)
+    cross_std_part: float = Field(0.02, ge=0.0)
+    relaxation_part: float = Field(0.02, ge=0.0)
+    relaxation_std_part: float = Field(0.03, ge=0.0)
+    side_un_um: float = Field(10.0, gt=0.0)
+    side_std_part: float = Field(0.5, ge=0.0)
+    shear_um2: float = Field(500.0, ge=0.0)
+    shear_std_um2: float = Field(500.0, ge=0.0)
+    ei_length_um: float = Field(150.0, gt=0.0)
+    reversal_um: float = Field(0.3, ge=0.0)
     soft_percent: float = Field(30.0, gt=0.0)
 
     @property

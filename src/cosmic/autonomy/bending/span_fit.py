@@ -13,6 +13,7 @@ from cosmic.autonomy.bending.branch import (
     Points,
     back_and_forth_percent,
     free_force_un,
+    largest_drop_un,
     lost_while_pushing,
     points_of,
     rises,
@@ -21,8 +22,8 @@ from cosmic.autonomy.bending.branch import (
     touched,
 )
 from cosmic.autonomy.bending.branch import stuck as clings
-from cosmic.autonomy.bending.curved import PushedCurve
-from cosmic.autonomy.bending.elastica import force_un
+from cosmic.autonomy.bending.curved import NaturalShape, PushedCurve
+from cosmic.autonomy.bending.response import straight
 from cosmic.autonomy.bending.result import Floats, Quality, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
@@ -33,6 +34,19 @@ CLOSE_SIGMAS: Final = 2.5
 TINY: Final = 1e-4
 BRANCH_STDS: Final = (5.0, 1000.0)
 BASELINE_STDS: Final = (1000.0, 10.0)
+TYPICAL_PART: Final = 0.6
+"""Of the stroke: where curves are compared."""
+
+TURNING_PART: Final = 0.1
+RELAXED_AT_S: Final = 1.0
+SLIPPED_PART: Final = 0.03
+"""Of stroke and highest force: less does no harm."""
+
+SURE_TIMES: Final = 2.0
+YIELDS_FROM: Final = 0.4
+MOST_FRICTION: Final = 0.8
+MODEL_PART: Final = 0.03
+"""Of a stiffness: what both ways may differ by besides."""
 """How little is known of each value without any point; of ln(uN/um), um, uN and uN/s."""
 
 HIGHEST_LOG: Final = 20.0
@@ -45,7 +59,7 @@ POOR_PART: Final = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
-    """Logarithms of stiffness and hinges of each branch, baseline, drift; with covariance."""
+    """Logarithms of stiffness and hinges of each branch, baseline, drift, relaxation."""
 
     values: Floats
     covariance: Floats
@@ -54,20 +68,27 @@ class _Found:
 
 
 class _Model:
-    """Force over way of one span, both ways."""
+    """Force over way of one span, both ways; the fibre relaxes, and rubs on the probe."""
 
     def __init__(
-        self,
-        points: Points,
-        settings: FitSettings,
-        length_um: float,
-        curved: PushedCurve | None,
+        self, points: Points, settings: FitSettings, shape: NaturalShape, friction: float
     ) -> None:
         self._points = points
-        self._curved = curved
-        self._settings = settings
-        self._length_um = length_um
+        self._settings, self._friction = settings, friction
+        depth = settings.offset_um
+        self.length_um = shape.lever_um(depth)
+        first = rough(points, points.loading, free_force_un(points))
+        self.stroke_part = max(float(np.max(points.way_um)) - first.hinge_um, 0.0) / self.length_um
+        about = {
+            "depth_um": depth,
+            "radius_um": settings.radius_um,
+            "friction": friction,
+            "ei_un_um2": max(first.k_un_um, 0.0) * self.length_um**3 / 3.0,
+        }
+        self.curves = shape.curves(**about, side_um_un=1.0 / settings.side_un_um)
+        self.stiff_probe = shape.curves(**about)
         self._elapsed_s = points.time_s - points.time_s[0]
+        self._lost = _lost(points.time_s)
         # A way back that never touches says where the baseline is, and nothing of the fibre.
         back = [~points.loading] if rises(points, ~points.loading) else []
         self.branches = [points.loading, *back]
@@ -75,53 +96,89 @@ class _Model:
     def contact(self, values: Floats) -> Floats:
         force = np.zeros(len(self._points.way_um))
         for number, branch in enumerate(self.branches):
-            force[branch] = self._branch(branch, values[2 * number], values[2 * number + 1])
-        return force
+            log_k, hinge_um = values[2 * number], values[2 * number + 1]
+            ahead = self._points.way_um[branch] - hinge_um
+            force[branch] = self._force(ahead, log_k, self.curves[number])
+        return np.asarray(force - values[-1] * (self._lost @ np.diff(force, prepend=0.0)))
 
-    def _branch(self, branch: Mask, log_k: float, hinge_um: float) -> Floats:
-        return force_un(
-            self._points.way_um[branch] - hinge_um,
+    def _force(self, ahead_um: Floats, log_k: float, curve: PushedCurve) -> Floats:
+        return curve.force_un(
+            ahead_um,
             k_un_um=math.exp(min(log_k, HIGHEST_LOG)),
-            span_um=self._length_um,
-            radius_um=self._settings.radius_um,
+            lever_um=self.length_um,
             sensor_un_um=self._settings.sensor_un_um,
-            curved=self._curved,
         )
 
     def slopes(self, values: Floats) -> Floats:
         """Return the derivatives of the force to each value, shape (points, values)."""
         found = np.zeros((len(self._points.way_um), len(values)))
-        for number, branch in enumerate(self.branches):
-            log_k, hinge = values[2 * number], values[2 * number + 1]
-            here = self._branch(branch, log_k, hinge)
-            stiffer = self._branch(branch, log_k + TINY, hinge)
-            later = self._branch(branch, log_k, hinge + TINY)
-            found[branch, 2 * number] = (stiffer - here) / TINY
-            found[branch, 2 * number + 1] = (later - here) / TINY
-        found[:, -2], found[:, -1] = 1.0, self._elapsed_s
+        here = self.contact(values)
+        for number in (*range(2 * len(self.branches)), len(values) - 1):
+            more = values.copy()
+            more[number] += TINY
+            found[:, number] = (self.contact(more) - here) / TINY
+        found[:, -3], found[:, -2] = 1.0, self._elapsed_s
         return found
 
     def total(self, values: Floats) -> Floats:
         return np.asarray(self.contact(values) + self.baseline(values), dtype=np.float64)
 
     def baseline(self, values: Floats) -> Floats:
-        return np.asarray(values[-2] + values[-1] * self._elapsed_s, dtype=np.float64)
+        return np.asarray(values[-3] + values[-2] * self._elapsed_s, dtype=np.float64)
 
-    def covariance(self, values: Floats) -> Floats:
-        """Return the noise foreseen: readings, stage times slope, and the zero's random walk."""
-        slope = np.zeros(len(self._points.way_um))
+    def by_friction(self) -> float:
+        """Return how ln(k) of the way out changes with friction, half of both ways' difference."""
+        out, back = (self._typical(each) for each in self.curves)
+        rub = self._friction
+        return 0.5 * math.log(out / back) / rub if rub > 0.0 else 0.0
+
+    def by_side(self) -> tuple[float, float]:
+        """Return how ln(k) of the ways out and back changes with what the probe gives way aside.
+
+        For all that it is taken to give way.
+        """
+        pairs = zip(self.curves, self.stiff_probe, strict=True)
+        out, back = (math.log(self._typical(one) / self._typical(other)) for one, other in pairs)
+        return out, back
+
+    def _typical(self, curve: PushedCurve) -> float:
+        reach = min(TYPICAL_PART * self.stroke_part, float(curve.deflection[-1]))
+        reach = max(reach, float(curve.deflection[1]))
+        return float(np.interp(reach, curve.deflection, curve.pushed))
+
+    def single_std(self, values: Floats) -> Floats:
+        """Return the noise foreseen of each reading by itself: the sensor's, and the stage's."""
+        points, slope = self._points, np.zeros(len(self._points.way_um))
         for number, branch in enumerate(self.branches):
             # Just before the hinge too: there, a stage a little ahead has touched already.
-            ahead = self._points.way_um - values[2 * number + 1]
+            ahead = points.way_um - values[2 * number + 1]
             pressed = ahead > -CLOSE_SIGMAS * self._settings.way_std_um
             slope[branch & pressed] = math.exp(min(values[2 * number], HIGHEST_LOG))
-        single = self._points.std_un**2 + (slope * self._settings.way_std_um) ** 2
+        return np.hypot(points.std_un, slope * self._settings.way_std_um)
+
+    def covariance(self, values: Floats) -> Floats:
+        """Return the noise foreseen: of single readings, and the zero's random walk."""
+        single = self.single_std(values) ** 2
+        if len(self.branches) == 2:
+            single = single + self._turning(values) ** 2
         walk = np.minimum(self._elapsed_s[:, None], self._elapsed_s[None, :])
         walked = self._settings.drift_un_sqrt_s**2 * np.maximum(walk, 0.0)
         return np.asarray(np.diag(single) + walked, dtype=np.float64)
 
+    def _turning(self, values: Floats) -> Floats:
+        """Return what is not known while the friction turns round, at the begin of the way back."""
+        points, back = self._points, self.branches[1]
+        ahead = points.way_um[back] - values[3]
+        both = [self._force(ahead, values[2], curve) for curve in self.curves]
+        top = float(np.max(points.way_um))
+        stroke = max(top - values[1], 1.0)
+        found = np.zeros(len(points.way_um))
+        gone = (top - points.way_um[back]) / (TURNING_PART * stroke)
+        found[back] = np.abs(both[0] - both[1]) * np.exp(-gone)
+        return found
+
     def fit(self) -> _Found:
-        points = self._points
+        points, settings = self._points, self._settings
         baseline = free_force_un(points)
         from scipy.optimize import least_squares  # half a second, at the first fit
 
@@ -129,37 +186,55 @@ class _Model:
         for branch in self.branches:
             first = rough(points, branch, baseline)
             start += [math.log(max(first.k_un_um, 1e-4)), first.hinge_um]
-        values = np.array([*start, baseline[0], 0.0])
-        chi2, jacobian = 0.0, np.eye(len(values))
+        values = np.array([*start, baseline[0], 0.0, settings.relaxation_part])
+        relaxed_std = max(settings.relaxation_std_part, TINY)
+        known = np.zeros(len(values))
+        known[-1] = 1.0 / relaxed_std
+        jacobian = np.eye(len(values))
+        chi2 = 0.0
         for _ in range(ROUNDS):
             root = np.linalg.cholesky(self.covariance(values))
             whiten = np.asarray(np.linalg.inv(root), dtype=np.float64)
 
             def misfit(tried: Floats, whiten: Floats = whiten) -> Floats:
-                return np.asarray(whiten @ (points.force_un - self.total(tried)))
+                away = (settings.relaxation_part - tried[-1]) / relaxed_std
+                return np.append(whiten @ (points.force_un - self.total(tried)), away)
 
             def slopes(tried: Floats, whiten: Floats = whiten) -> Floats:
-                return np.asarray(-whiten @ self.slopes(tried))
+                return np.vstack([-whiten @ self.slopes(tried), -known])
 
             found = least_squares(
-                misfit, values, jac=slopes, method="lm", x_scale="jac", max_nfev=400
+                misfit, values, jac=slopes, method="lm", x_scale="jac", max_nfev=200
             )
-            values, chi2, jacobian = found.x, 2.0 * float(found.cost), found.jac
-        weak = np.array([*BRANCH_STDS * len(self.branches), *BASELINE_STDS]) ** -2.0
+            values, jacobian = found.x, found.jac
+            chi2 = float((found.fun[:-1] ** 2).sum())
+        weak = np.array([*BRANCH_STDS * len(self.branches), *BASELINE_STDS, 1.0]) ** -2.0
         information = jacobian.T @ jacobian + np.diag(weak)
         covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
-        return _Found(values, covariance, chi2, len(points.way_um) - len(values))
+        return _Found(values, covariance, chi2, len(points.way_um) - len(values) + 1)
 
 
-def fit_span(span: Span, *, settings: FitSettings, place_um: float, length_um: float) -> SpanFit:
+def _lost(time_s: Floats) -> Floats:
+    """Return what of each step of force is lost at each time, for a part of 1 in a tenfold time.
+
+    Counted from `RELAXED_AT_S` after the step: stiffness is what a fibre shows then.
+    """
+    middles = time_s - 0.5 * np.diff(time_s, prepend=2.0 * time_s[0] - time_s[1])
+    since = (time_s[:, None] - middles[None, :]) / RELAXED_AT_S
+    return np.where(since > 0.0, np.log10(np.maximum(since, 1e-3)), 0.0)
+
+
+def fit_span(
+    span: Span, *, settings: FitSettings, place_um: float, friction: float | None = None
+) -> SpanFit:
     """Fit one span.
 
     Parameters
     ----------
     place_um : float
         Its position along the fibre, as told in the result.
-    length_um : float
-        From the clamp to the middle of the probe, as well as it is known.
+    friction : float, optional
+        About which the fit is laid out; that of the settings if None.
 
     Raises
     ------
@@ -172,19 +247,17 @@ def fit_span(span: Span, *, settings: FitSettings, place_um: float, length_um: f
     if not touched(points, settings.drift_un_sqrt_s):
         peak = float(np.max(points.force_un - free_force_un(points)))
         return _without_contact(span, place_um, peak)
-    curved = None
-    if span.shape is not None:
-        curved = span.shape.curve(depth_um=settings.offset_um, radius_um=settings.radius_um)
-    model = _Model(points, settings, length_um, curved)
+    rub = settings.friction if friction is None else friction
+    model = _Model(points, settings, span.shape or straight(place_um), rub)
     found = model.fit()
-    fit = _result(span, points, model, found, place_um)
-    flags = _flags(span, fit, points, settings, found)
-    if flags & {Quality.SLIPPED, Quality.BROKEN, Quality.HYSTERESIS}:
+    fit = _span_result(span, points, model, found, place_um)
+    flags = _flags(span, fit, points, settings, model, found.values)
+    if flags & {Quality.SLIPPED, Quality.BROKEN, Quality.SET, Quality.HYSTERESIS}:
         # Only the way out still says something about the fibre.
         fit = replace(
             fit,
             k_un_um=fit.k_loading_un_um,
-            k_std_un_um=fit.k_loading_un_um * math.sqrt(found.covariance[0, 0]),
+            k_std_un_um=fit.k_loading_un_um * fit.out_std_part,
         )
     return replace(fit, flags=flags)
 
@@ -219,10 +292,13 @@ def _without_contact(span: Span, place_um: float, peak_un: float) -> SpanFit:
     )
 
 
-def _result(span: Span, points: Points, model: _Model, found: _Found, place_um: float) -> SpanFit:
+def _span_result(span: Span, points: Points, model: _Model, found: _Found, place_um: float) -> SpanFit:
     values, both = found.values, len(model.branches) == 2
+    # A scatter beyond the noise foreseen is noise that was not.
+    excess = max(1.0, found.chi2 / max(found.freedom, 1))
+    covariance = found.covariance * excess
     logs = values[[0, 2]] if both else values[[0]]
-    spread = found.covariance[np.ix_([0, 2], [0, 2])] if both else found.covariance[:1, :1]
+    spread = covariance[np.ix_([0, 2], [0, 2])] if both else covariance[:1, :1]
     weights = np.linalg.pinv(spread) @ np.ones(len(logs))
     std = math.sqrt(1.0 / weights.sum()) if weights.sum() > 0.0 else math.inf
     k = math.exp(min(float(weights @ logs / weights.sum()), HIGHEST_LOG))
@@ -230,6 +306,8 @@ def _result(span: Span, points: Points, model: _Model, found: _Found, place_um: 
     fitted = np.full(len(span.way_um), math.nan)
     fitted[points.kept] = model.total(values)
     out, back = (values[:2], values[2:4]) if both else (values[:2], (math.nan, math.nan))
+    stds = np.sqrt(np.diag(covariance))
+    shift = covariance[1, 1] + covariance[3, 3] - 2.0 * covariance[1, 3] if both else math.nan
     return SpanFit(
         place_um=place_um,
         k_un_um=k,
@@ -238,29 +316,44 @@ def _result(span: Span, points: Points, model: _Model, found: _Found, place_um: 
         k_unloading_un_um=math.exp(min(back[0], HIGHEST_LOG)),
         hinge_um=float(out[1]),
         hinge_back_um=float(back[1]),
-        baseline_un=float(values[-2]),
-        drift_un_s=float(values[-1]),
+        baseline_un=float(values[-3]),
+        drift_un_s=float(values[-2]),
         hysteresis_percent=back_and_forth_percent(points, baseline),
         peak_un=float(np.max(points.force_un - baseline)),
         chi2=found.chi2,
         freedom=found.freedom,
         fitted_un=fitted,
         flags=frozenset(),
+        out_std_part=float(stds[0]),
+        back_std_part=float(stds[2]) if both else math.nan,
+        ways_correlation=float(covariance[0, 2] / (stds[0] * stds[2])) if both else 0.0,
+        by_friction=model.by_friction(),
+        by_side_out=model.by_side()[0],
+        by_side_back=model.by_side()[1],
+        shift_um=float(back[1] - out[1]),
+        shift_std_um=math.sqrt(shift) if shift > 0.0 else math.nan,
+        relaxation_part=float(values[-1]),
+        relaxation_std_part=float(stds[-1]),
     )
 
 
 def _flags(
-    span: Span, fit: SpanFit, points: Points, settings: FitSettings, found: _Found
+    span: Span,
+    fit: SpanFit,
+    points: Points,
+    settings: FitSettings,
+    model: _Model,
+    values: Floats,
 ) -> frozenset[Quality]:
     flags = set()
     if saturated(span, settings.range_un):
         flags.add(Quality.SATURATED)
     if lost_while_pushing(points):
         flags.add(Quality.BROKEN)
-    if _shifted(fit, settings, found):
-        flags.add(Quality.SLIPPED)
-    noise = 100.0 * float(np.median(points.std_un)) / fit.peak_un
-    if abs(fit.hysteresis_percent) > settings.hysteresis_percent + 2.0 * noise:
+    gave_way = _gave_way(fit, points, settings, model.single_std(values))
+    if gave_way is not None:
+        flags.add(gave_way)
+    if _differs(fit):
         flags.add(Quality.HYSTERESIS)
     if fit.k_std_un_um > fit.k_un_um * settings.soft_percent / 100.0:
         flags.add(Quality.TOO_SOFT)
@@ -271,11 +364,29 @@ def _flags(
     return frozenset(flags)
 
 
-def _shifted(fit: SpanFit, settings: FitSettings, found: _Found) -> bool:
-    """Whether contact ended elsewhere than it began."""
-    if len(found.values) < 6:
+def _differs(fit: SpanFit) -> bool:
+    """Return whether loading and unloading differ by more than any friction makes them."""
+    if not math.isfinite(fit.back_std_part):
         return False
-    spread = found.covariance
-    std = math.sqrt(max(spread[1, 1] + spread[3, 3] - 2.0 * spread[1, 3], 0.0))
-    away = abs(fit.hinge_back_um - fit.hinge_um)
-    return away > settings.slip_um and away > CLEAR_SIGMAS * std
+    differs = abs(math.log(fit.k_loading_un_um / fit.k_unloading_un_um))
+    variance = fit.out_std_part**2 + fit.back_std_part**2
+    variance -= 2.0 * fit.ways_correlation * fit.out_std_part * fit.back_std_part
+    allowed = 2.0 * MOST_FRICTION * abs(fit.by_friction) + MODEL_PART
+    return differs > allowed + CLEAR_SIGMAS * math.sqrt(max(variance, 0.0))
+
+
+def _gave_way(
+    fit: SpanFit, points: Points, settings: FitSettings, noise_un: Floats
+) -> Quality | None:
+    """Return whether the fibre slipped in the jaws or stayed bent; None: neither."""
+    stroke = max(float(np.max(points.way_um)) - fit.hinge_um, 1e-3)
+    left = points.force_un - fit.fitted_un[points.kept]
+    if largest_drop_un(points, left, noise_un) > SLIPPED_PART * fit.peak_un:
+        return Quality.SLIPPED
+    noise = fit.shift_std_um if math.isfinite(fit.shift_std_um) else math.inf
+    allowed = math.hypot(CLEAR_SIGMAS * noise, SURE_TIMES * settings.reversal_um)
+    if not fit.shift_um > max(allowed, SLIPPED_PART * stroke):
+        return None
+    # Yielding makes the way out softer than the way back; a grip that gives way does not.
+    softer = (1.0 - fit.k_loading_un_um / fit.k_unloading_un_um) * stroke / fit.shift_um
+    return Quality.SET if softer > YIELDS_FROM else Quality.SLIPPED

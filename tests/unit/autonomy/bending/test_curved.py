@@ -7,18 +7,28 @@ import pytest
 
 from cosmic.autonomy.bending.curved import NaturalShape
 from cosmic.autonomy.bending.fit import fit_bending
-from cosmic.autonomy.bending.lever import fit_lever
 from cosmic.autonomy.bending.result import BendingError
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
-from cosmic.autonomy.bending.span_fit import fit_span
 from cosmic.twin.cantilever import Cantilever
 from oracles.pushed_rod import arc, pushed
 
 EI = 5e-11 * 1e18
 SPANS_UM = (600.0, 450.0, 300.0)
 RADIUS_UM = FitSettings().radius_um
-EXACT = FitSettings(offset_um=0.0, offset_std_um=0.1, contact_std_um=0.01, sensor_un_um=1e9)
+EXACT = FitSettings(
+    offset_um=0.1,
+    offset_std_um=0.02,
+    contact_std_um=0.01,
+    sensor_un_um=1e9,
+    jaw_un_um=1e9,
+    side_un_um=1e9,
+    friction=0.0,
+    relaxation_part=0.0,
+    relaxation_std_part=1e-4,
+    shear_um2=0.0,
+    shear_std_um2=1.0,
+)
 
 
 def shape_at(turn_deg: float, at_um: float) -> NaturalShape:
@@ -82,13 +92,8 @@ def old_lever_um(line: np.ndarray, at_um: float) -> float:
 
 @pytest.mark.parametrize("turn_deg", [-60.0, -40.0, -20.0, 0.0, 20.0, 40.0, 60.0])
 def test_curl_does_not_bias_the_stiffness(turn_deg: float) -> None:
-    measured = spans(turn_deg)
-    fits = [
-        fit_span(each, settings=EXACT, place_um=each.nominal_um, length_um=each.nominal_um)
-        for each in measured
-    ]
-    found = fit_lever(fits, EXACT)
-    assert found.ei_un_um2 == pytest.approx(EI, rel=0.01)
+    found = fit_bending(spans(turn_deg), settings=EXACT)
+    assert found.ei_n_m2 == pytest.approx(5e-11, rel=0.01)
 
 
 def test_the_lever_of_before_is_wrong_by_what_the_direction_of_the_force_makes() -> None:
@@ -107,7 +112,8 @@ def test_the_lever_of_before_is_wrong_by_what_the_direction_of_the_force_makes()
 
 
 def test_a_fit_of_curled_spans_is_trusted_and_right() -> None:
-    found = fit_bending(spans(35.0), settings=FitSettings(sensor_un_um=1e9))
+    rigid = EXACT.model_copy(update={"offset_um": 8.0, "offset_std_um": 8.0})
+    found = fit_bending(spans(35.0), settings=rigid)
     assert found.trusted, found.reasons
     assert found.ei_low_n_m2 < 5e-11 < found.ei_high_n_m2
 

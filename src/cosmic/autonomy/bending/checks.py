@@ -1,0 +1,202 @@
+"""What speaks against a bending stiffness, with its cause.
+
+A check widens the interval, or refuses the value; it never shifts it in silence. What it compares
+with follows from noise, stroke and stiffness.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from cosmic.autonomy.bending.inference import (
+    VARIATIONS,
+    Readings,
+    fixed_covariance,
+    own_mean,
+    varied_covariance,
+)
+from cosmic.autonomy.bending.population import Judged
+from cosmic.autonomy.bending.result import BendingResult, Floats, Quality, SpanFit
+from cosmic.autonomy.bending.settings import FitSettings
+
+LEAST_SPANS: Final = 2
+LEAST_FOR_ONE_OUT: Final = 4
+UNLIKELY: Final = 1e-3
+LIKELY: Final = 0.05
+SIGMAS: Final = 3.0
+DEEP_PART: Final = 0.25
+"""Of the shortest span: a clamp deeper than that is told."""
+
+VARIES_FROM: Final = 0.2
+MOSTLY: Final = 0.8
+RELAXES_FROM: Final = 0.04
+RELAXES_MOST: Final = 0.16
+RUBS_FROM: Final = 0.35
+BEAM_POWER: Final = -3.0
+NO_BEAM_POWER: Final = -1.5
+BAD: Final = (
+    Quality.SATURATED,
+    Quality.BROKEN,
+    Quality.SLIPPED,
+    Quality.SET,
+    Quality.HYSTERESIS,
+    Quality.NO_CONTACT,
+    Quality.POOR_FIT,
+)
+"""What spoils a span, the surest cause first."""
+
+WORDS: Final = {
+    Quality.MOVED: "one span does not lie with the others: the contact moved, or the grip slipped "
+    "between spans",
+    Quality.HINGE: "spans beyond one place are softer than those before: a weak place, or a kink",
+    Quality.NON_UNIFORM: "the spans' stiffnesses do not follow one beam: the fibre is not uniform",
+    Quality.NOT_A_FIBRE: "stiffness does not fall with the length of the span: this is no fibre",
+    Quality.RELAXED: "the force relaxes so much that stiffness depends on how long one waits",
+}
+
+
+def checked(
+    result: BendingResult, readings: Readings, judged: Judged, settings: FitSettings
+) -> BendingResult:
+    """Return the result with its flags, whether it is trusted, and why not."""
+    flags: set[Quality] = set()
+    reasons = [
+        f"span {number + 1} at {fit.place_um:.0f} um: {', '.join(sorted(spoilt))}"
+        for number, fit in enumerate(result.spans)
+        if (spoilt := fit.flags & set(BAD))
+    ]
+    good = [n for n in result.used if not result.spans[n].flags & set(BAD)]
+    if len(good) < LEAST_SPANS:
+        flags.add(Quality.TOO_FEW_SPANS)
+        reasons.append(f"{len(good)} good spans, and {LEAST_SPANS} are needed to find the clamp")
+        flags |= {flag for fit in result.spans for flag in fit.flags & set(BAD)}
+    half = 50.0 * (result.ei_high_n_m2 - result.ei_low_n_m2) / result.ei_n_m2
+    if not half <= settings.soft_percent:
+        flags.add(Quality.TOO_SOFT)
+        reasons.append(f"the interval is +/-{half:.0f} %, more than {settings.soft_percent:g} %")
+    used = [result.spans[n] for n in result.used]
+    cause = _cause(used, readings, judged, settings)
+    if cause is not None:
+        flags.add(cause)
+        reasons.append(WORDS[cause])
+    notes = _notes(result, readings, judged) | _spoilt(result)
+    return replace(
+        result,
+        flags=frozenset(flags),
+        trusted=not flags,
+        reasons=tuple(reasons),
+        notes=frozenset(notes - flags),
+    )
+
+
+def _spoilt(result: BendingResult) -> set[Quality]:
+    """Return the causes of the spans that were left out."""
+    counts = Counter(flag for fit in result.spans for flag in fit.flags & set(BAD))
+    return set(counts)
+
+
+def _cause(
+    fits: Sequence[SpanFit], readings: Readings, judged: Judged, settings: FitSettings
+) -> Quality | None:
+    """Return why the spans do not go together; None: they do."""
+    if len(fits) >= LEAST_SPANS and _no_beam(fits, readings):
+        return Quality.NOT_A_FIBRE
+    relaxed = [fit.relaxation_part - SIGMAS * fit.relaxation_std_part for fit in fits]
+    if relaxed and max(relaxed) > RELAXES_MOST:
+        return Quality.RELAXED
+    if judged.posterior.probability >= UNLIKELY:
+        return None
+    return _misfit(fits, readings, judged, settings)
+
+
+def _no_beam(fits: Sequence[SpanFit], readings: Readings) -> bool:
+    levers = np.array([each.lever_um() for each in readings.response.shapes])
+    if np.ptp(np.log(levers)) < 0.2:
+        return False
+    logs = np.log([fit.k_un_um for fit in fits])
+    power = float(np.polyfit(np.log(levers), logs, 1)[0])
+    return power > NO_BEAM_POWER
+
+
+def _misfit(
+    fits: Sequence[SpanFit], readings: Readings, judged: Judged, settings: FitSettings
+) -> Quality:
+    """Return which single change mends the fit best: one span away, or one weak place."""
+    whole, away = _linear(readings, judged, settings)
+    spans, count = readings.span, len(fits)
+    if count < LEAST_FOR_ONE_OUT:
+        return Quality.NON_UNIFORM
+    one_out = [_chi2(away, whole, (spans == n).astype(float)) for n in range(count)]
+    places = np.array([each.at_um for each in readings.response.shapes])
+    hinges = []
+    for at in np.linspace(10.0, 0.9 * float(places.max()), 24):
+        lever = np.maximum(places - at, 0.0) ** 2 / places**3
+        hinges.append(_chi2(away, whole, -lever[spans] * 100.0))
+    if min(one_out) < min(hinges):
+        return Quality.MOVED
+    return Quality.HINGE
+
+
+def _linear(readings: Readings, judged: Judged, settings: FitSettings) -> tuple[Floats, Floats]:
+    """Return covariance and what is left of the readings at the most likely depth."""
+    posterior, depths = judged.posterior, judged.evidence.depths_um
+    here = int(np.unravel_index(posterior.weights.argmax(), posterior.weights.shape)[0])
+    here = min(max(here, 1), len(depths) - 2)
+    geometry = readings.response.log_stiffness(depths[here - 1 : here + 2])[:, readings.span]
+    by_depth = (geometry[2] - geometry[0]) / float(np.log(depths[here + 1] / depths[here - 1]))
+    whole = fixed_covariance(readings, judged.common) + np.outer(by_depth, by_depth)
+    small = float(VARIATIONS[2])
+    whole = whole + varied_covariance(readings, settings)[here] * small**2
+    away = readings.log_k - geometry[1] - own_mean(readings)
+    return whole, away - readings.to_common @ judged.common.mean
+
+
+def _chi2(away: Floats, whole: Floats, column: Floats) -> float:
+    """Return the sum of squares with ln(EI) and one more term free."""
+    matrix = np.column_stack([np.ones(len(away)), column])
+    root = np.linalg.inv(whole)
+    information = matrix.T @ root @ matrix
+    found = np.linalg.pinv(information) @ (matrix.T @ root @ away)
+    left = away - matrix @ found
+    return float(left @ root @ left)
+
+
+def _notes(result: BendingResult, readings: Readings, judged: Judged) -> set[Quality]:
+    """Return what was seen, and is in the interval."""
+    notes = set()
+    used = [result.spans[n] for n in result.used]
+    shortest = min(each.at_um for each in readings.response.shapes)
+    if result.clamp_offset_um - result.clamp_offset_std_um > DEEP_PART * shortest:
+        notes.add(Quality.CLAMP_DEEP)
+    weights = judged.posterior.weights.sum(axis=0)
+    if float(weights[VARIATIONS[: len(weights)] > VARIES_FROM].sum()) > MOSTLY:
+        notes.add(Quality.NON_UNIFORM)
+    relaxed, relaxed_std = _mean([(f.relaxation_part, f.relaxation_std_part) for f in used])
+    if relaxed - SIGMAS * relaxed_std > RELAXES_FROM:
+        notes.add(Quality.RELAXED)
+    rubs, rubs_std = _friction(used, judged.friction)
+    if rubs - 2.0 * rubs_std > RUBS_FROM:
+        notes.add(Quality.FRICTION)
+    return notes
+
+
+def _mean(values: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    weights = np.array([1.0 / max(std, 1e-6) ** 2 for _, std in values])
+    means = np.array([value for value, _ in values])
+    return float(weights @ means / weights.sum()), float(weights.sum() ** -0.5)
+
+
+def _friction(fits: Sequence[SpanFit], base: float) -> tuple[float, float]:
+    """Return friction as the difference of both ways tells it, and its standard deviation."""
+    found = []
+    for fit in fits:
+        if math.isfinite(fit.k_unloading_un_um) and abs(fit.by_friction) > 0.01:
+            differs = math.log(fit.k_loading_un_um / fit.k_unloading_un_um)
+            both = 2.0 * fit.by_friction
+            std = math.hypot(fit.out_std_part, fit.back_std_part) / abs(both)
+            found.append((base + differs / both, std))
+    return _mean(found) if found else (0.0, math.inf)

@@ -1,0 +1,435 @@
+"""Bending stiffness from the stiffnesses of several spans, with all that is not known beside it.
+
+ln(k) of a span, out or back, is ln(EI) plus what the depth of the clamp makes of the geometry, plus
+small terms that are linear in what else is not known. Given the depth and how much the stiffness
+varies along the fibre, all is Gaussian and EI follows in closed form; depth and variation are
+summed over grids. So the interval is no symmetrical one, and a depth below zero does not exist.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.special import chdtrc, ndtr
+
+from cosmic.autonomy.bending.response import Response
+from cosmic.autonomy.bending.result import Contribution, Floats, Kind, SpanFit
+from cosmic.autonomy.bending.settings import FitSettings
+
+DEPTHS: Final = 36
+SHALLOWEST_UM, DEEPEST_UM = 1.5, 240.0
+SURE: Final = 0.3
+"""Of ln(depth): what is known better than this needs a grid of its own."""
+
+VARIATIONS: Final = np.array([0.0, 0.05, 0.1, 0.17, 0.28, 0.45])
+"""How much ln(EI) varies along a fibre, one standard deviation: those that are weighed."""
+
+VARIATION_PRIOR: Final = np.array([0.12, 0.2, 0.24, 0.22, 0.15, 0.07])
+LOW_TAIL, HIGH_TAIL = 0.025, 0.975
+ROUNDS: Final = 60
+LEAST_STD: Final = 0.004
+"""Of ln(k): a model is no better than this."""
+
+COMMON: Final = ("gain", "gain drift", "friction", "compliance", "contact", "cross-talk", "aside")
+GAIN, DRIFT, FRICTION, COMPLIANCE, CONTACT, CROSS, ASIDE = range(len(COMMON))
+
+
+def depth_prior(settings: FitSettings) -> tuple[float, float]:
+    """Return median and spread of ln(depth) before anything is measured."""
+    spread = math.sqrt(math.log1p((settings.offset_std_um / settings.offset_um) ** 2))
+    return math.log(settings.offset_um) - 0.5 * spread**2, spread
+
+
+def depths_of(settings: FitSettings) -> Floats:
+    """Return the depths of the clamp that are weighed, um, evenly on a scale of logarithms."""
+    middle, spread = depth_prior(settings)
+    if spread < SURE:
+        return np.exp(middle + spread * np.linspace(-4.0, 4.0, DEPTHS))
+    return np.geomspace(SHALLOWEST_UM, DEEPEST_UM, DEPTHS)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Common:
+    """What all fibres of a campaign share, as far as it is known: a Gaussian.
+
+    Attributes
+    ----------
+    mean : ndarray, shape (7,), float64
+        In the order of `COMMON`: error of ln(gain), its change from begin to end of the campaign,
+        friction less that about which spans were fitted, compliance of jaws and sensor less the
+        sensor's nominal one (um/uN), place of contact (um), the part of a force along the edge
+        that is read as one across, and how much more than foreseen the probe gives way along the
+        fibre, as a part.
+    covariance : ndarray, shape (7, 7), float64
+    """
+
+    mean: Floats
+    covariance: Floats
+
+
+def common_prior(settings: FitSettings, *, friction: float | None = None) -> Common:
+    """Return what is known of the instrument before anything is measured.
+
+    Parameters
+    ----------
+    friction : float, optional
+        About which the spans were fitted; that of the settings if None.
+    """
+    rubs = 0.0 if friction is None else settings.friction - friction
+    sensor = settings.sensor_std_part / settings.sensor_un_um
+    jaws = 1.0 / settings.jaw_un_um
+    stds = np.array(
+        [
+            math.hypot(settings.gain_std_part, settings.way_scale_std_part),
+            settings.gain_drift_std_part,
+            settings.friction_std,
+            math.hypot(sensor, settings.jaw_std_part * jaws),
+            settings.contact_offset_std_um,
+            settings.cross_std_part,
+            settings.side_std_part,
+        ]
+    )
+    mean = np.array([0.0, 0.0, rubs, jaws, 0.0, 0.0, 0.0])
+    return Common(mean, np.diag(np.maximum(stds, 1e-9) ** 2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Readings:
+    """Stiffnesses of one fibre, both ways of each span in one row after the other.
+
+    Attributes
+    ----------
+    log_k : ndarray, shape (m,), float64
+        Of force and travel in uN and um.
+    noise : ndarray, shape (m, m), float64
+        Their covariance by the scatter of readings.
+    span : ndarray, shape (m,), int
+        Which span a row belongs to.
+    to_common : ndarray, shape (m, 7), float64
+        Derivatives to what is common.
+    own : tuple of (str, str, ndarray, float, float)
+        What is each fibre's own beside clamp and variation: name, unit, derivatives, mean and
+        standard deviation.
+    repeat : ndarray, shape (m, m), float64
+        Covariance by places of contact that do not repeat.
+    """
+
+    log_k: Floats
+    noise: Floats
+    span: np.ndarray
+    to_common: Floats
+    own: tuple[tuple[str, str, Floats, float, float], ...]
+    repeat: Floats
+    response: Response
+    longest: int
+    certified: tuple[float, float] | None = None
+
+
+def readings_of(
+    fits: Sequence[SpanFit],
+    response: Response,
+    settings: FitSettings,
+    *,
+    part: float = 0.0,
+    certified: tuple[float, float] | None = None,
+) -> Readings:
+    """Return the readings of the spans of one fibre.
+
+    Parameters
+    ----------
+    part : float
+        Of the campaign that was over, 0 to 1: the gain drifts.
+    certified : tuple of float, optional
+        Of a standard: ln(EI), EI in uN um2, and its standard uncertainty.
+    """
+    rows: list[tuple[int, float, float, float]] = []
+    for number, fit in enumerate(fits):
+        rows.append((number, fit.k_loading_un_um, fit.out_std_part, 1.0))
+        if math.isfinite(fit.k_unloading_un_um) and math.isfinite(fit.back_std_part):
+            rows.append((number, fit.k_unloading_un_um, fit.back_std_part, -1.0))
+    span = np.array([row[0] for row in rows])
+    k = np.array([row[1] for row in rows])
+    friction_std = settings.friction_std
+    # Friction is taken to be linear; what that leaves out is about its square.
+    bent = np.array([0.5 * (fits[row[0]].by_friction * friction_std) ** 2 for row in rows])
+    stds = np.sqrt(np.array([row[2] for row in rows]) ** 2 + LEAST_STD**2 + bent**2)
+    way = np.array([row[3] for row in rows])
+    noise = np.diag(stds**2)
+    for i in np.flatnonzero(way < 0.0):  # the way out stands before it
+        both = fits[span[i]].ways_correlation * stds[i] * stds[i - 1]
+        noise[i, i - 1] = noise[i - 1, i] = both
+    friction = np.array([fits[n].by_friction for n in span]) * way
+    place = np.array([each.at_um for each in response.shapes])[span]
+    contact = response.by_contact[span]
+    to_common = np.column_stack(
+        [
+            np.ones(len(k)),
+            np.full(len(k), part),
+            friction,
+            -k,
+            contact,
+            response.slopes[span],
+            np.array([_aside(fits[n], sign) for n, sign in zip(span, way, strict=True)]),
+        ]
+    )
+    apart = contact[:, None] * contact[None, :] * (span[:, None] == span[None, :])
+    own = (
+        ("shear", "um2", -response.by_square[span], settings.shear_um2, settings.shear_std_um2),
+        (
+            "direction of the fibre",
+            "rad",
+            response.by_direction[span],
+            0.0,
+            math.radians(settings.direction_std_deg),
+        ),
+        ("scale of the stage", "", contact * place, 0.0, settings.way_scale_std_part),
+    )
+    return Readings(
+        log_k=np.log(k),
+        noise=noise,
+        span=span,
+        to_common=to_common,
+        own=own if certified is None else own[2:],
+        repeat=apart * settings.contact_std_um**2,
+        response=response,
+        longest=_longest(response),
+        certified=certified,
+    )
+
+
+def _aside(fit: SpanFit, way: float) -> float:
+    return fit.by_side_out if way > 0.0 else fit.by_side_back
+
+
+def _longest(response: Response) -> int:
+    return int(np.argmax([each.at_um for each in response.shapes]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """What the readings of a fibre say for each depth of the clamp and each variation.
+
+    Attributes
+    ----------
+    log_likelihood, log_ei, variance, chi2 : ndarray, shape (depths, variations), float64
+        ln(EI) in uN um2, and what is not known of it with both given.
+    """
+
+    depths_um: Floats
+    log_likelihood: Floats
+    log_ei: Floats
+    variance: Floats
+    chi2: Floats
+    freedom: int
+
+
+def evidence_of(readings: Readings, common: Common, settings: FitSettings) -> Evidence:
+    """Return the evidence of a fibre's readings."""
+    span = readings.span
+    depths = depths_of(settings)
+    geometry = readings.response.log_stiffness(depths)[:, span]
+    known = readings.to_common @ common.mean + own_mean(readings)
+    away = readings.log_k - geometry - known
+    total = np.broadcast_to(
+        fixed_covariance(readings, common), (len(depths), 1, *(2 * (len(span),)))
+    )
+    varied = varied_covariance(readings, settings)
+    variations = VARIATIONS if readings.certified is None else VARIATIONS[:1]
+    whole = total + varied[:, None] * (variations**2)[None, :, None, None]
+    ones = np.ones(len(span))
+    root = np.linalg.inv(whole)
+    each = root @ ones
+    weight = each @ ones
+    if readings.certified is not None:
+        log_ei, std = readings.certified
+        off = away[:, None, :] - log_ei
+        whole = whole + std**2
+        root = np.linalg.inv(whole)
+        chi2 = np.einsum(
+            "dvi,dvij,dvj->dv",
+            np.broadcast_to(off, root.shape[:3]),
+            root,
+            np.broadcast_to(off, root.shape[:3]),
+        )
+        best, extra = np.full(chi2.shape, log_ei), np.zeros(chi2.shape)
+        variance = np.full(chi2.shape, std**2)
+    else:
+        best = np.einsum("dvi,di->dv", each, away) / weight
+        off = away[:, None, :] - best[:, :, None]
+        chi2 = np.einsum("dvi,dvij,dvj->dv", off, root, off)
+        extra, variance = np.log(weight), 1.0 / weight
+    likely = -0.5 * (chi2 + np.linalg.slogdet(whole)[1] + extra)
+    return Evidence(depths, np.asarray(likely), best, variance, chi2, len(span) - 1)
+
+
+def own_mean(readings: Readings) -> Floats:
+    """Return what each fibre's own small terms add to ln(k), by what is known beforehand."""
+    total = np.zeros(len(readings.log_k))
+    for _, _, column, mean, _ in readings.own:
+        total = total + column * mean
+    return total
+
+
+def fixed_covariance(readings: Readings, common: Common | None = None) -> Floats:
+    """Return the covariance of the readings that no depth and no variation changes."""
+    whole = readings.noise + readings.repeat
+    if common is not None:
+        whole = whole + readings.to_common @ common.covariance @ readings.to_common.T
+    for _, _, column, _, std in readings.own:
+        whole = whole + std**2 * np.outer(column, column)
+    return np.asarray(whole)
+
+
+def varied_covariance(readings: Readings, settings: FitSettings) -> Floats:
+    """Return the covariance of a variation of 1, for each depth; shape (depths, m, m)."""
+    span, index = readings.span, np.ix_(readings.span, readings.span)
+    if len(set(span.tolist())) == 1:
+        return np.zeros((DEPTHS, len(span), len(span)))
+    depths = depths_of(settings)
+    few = depths[:: DEPTHS // 3]
+    coarse = np.array(
+        [
+            readings.response.variation(float(depth), settings.ei_length_um, readings.longest)[
+                index
+            ]
+            for depth in few
+        ]
+    )
+    nearest = np.abs(np.log(depths[:, None] / few[None, :])).argmin(axis=1)
+    return np.asarray(coarse[nearest])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Posterior:
+    """What is known of one fibre in the end.
+
+    Attributes
+    ----------
+    log_ei, log_low, log_high : float
+        Median and ends of the 95 % interval, EI in uN um2.
+    depth_um, depth_std_um : float
+        Of the clamp.
+    variation : float
+        How much ln(EI) varies along the fibre, one standard deviation.
+    probability : float
+        That readings miss the best model by more than they do.
+    weights : ndarray, shape (depths, variations), float64
+    """
+
+    log_ei: float
+    log_low: float
+    log_high: float
+    depth_um: float
+    depth_std_um: float
+    variation: float
+    probability: float
+    weights: Floats
+
+
+def posterior_of(evidence: Evidence, prior: Floats) -> Posterior:
+    """Return what follows from evidence and prior weights of depths and variations."""
+    prior = prior[:, : evidence.chi2.shape[1]]
+    logs = evidence.log_likelihood + np.log(np.maximum(prior, 1e-300))
+    weights = np.exp(logs - logs.max())
+    weights /= weights.sum()
+    stds = np.sqrt(evidence.variance)
+    ends = [_quantile(weights, evidence.log_ei, stds, each) for each in (LOW_TAIL, 0.5, HIGH_TAIL)]
+    of_depth = weights.sum(axis=1)
+    depths = evidence.depths_um
+    depth = float(of_depth @ depths)
+    variation = VARIATIONS[: weights.shape[1]]
+    return Posterior(
+        log_ei=ends[1],
+        log_low=ends[0],
+        log_high=ends[2],
+        depth_um=depth,
+        depth_std_um=float(np.sqrt(of_depth @ (depths - depth) ** 2)),
+        variation=float(weights.sum(axis=0) @ variation),
+        # The depth's prior is no reading: the best depth stands for the check.
+        probability=float(chdtrc(max(evidence.freedom - 1, 1), evidence.chi2.min())),
+        weights=weights,
+    )
+
+
+def _quantile(weights: Floats, means: Floats, stds: Floats, part: float) -> float:
+    low = float((means - 8.0 * stds).min())
+    high = float((means + 8.0 * stds).max())
+    for _ in range(ROUNDS):
+        middle = 0.5 * (low + high)
+        below = float((weights * ndtr((middle - means) / stds)).sum())
+        low, high = (middle, high) if below < part else (low, middle)
+    return 0.5 * (low + high)
+
+
+def budget_of(
+    readings: Readings,
+    common: Common,
+    settings: FitSettings,
+    posterior: Posterior,
+    evidence: Evidence,
+) -> tuple[Contribution, ...]:
+    """Return the contributions to the variance of ln(EI), the largest first.
+
+    With depth and variation at their means ln(EI) is a weighted sum of the readings; the weights
+    are the sensitivities. What the depth adds is the spread of ln(EI) over its weights.
+    """
+    span, variation = readings.span, posterior.variation
+    nearest = int(np.abs(evidence.depths_um - posterior.depth_um).argmin())
+    varied = varied_covariance(readings, settings)[nearest] * variation**2
+    whole = fixed_covariance(readings, common) + varied
+    each = np.linalg.solve(whole, np.ones(len(span)))
+    weights = each / each.sum()
+    by = weights @ readings.to_common
+    lines = [
+        _line("readings", Kind.A, 1.0, "", _root(weights, readings.noise)),
+        _line(
+            "places of contact",
+            Kind.A,
+            settings.contact_std_um,
+            "um",
+            _root(weights, readings.repeat),
+        ),
+        _line("stiffness along the fibre", Kind.B, variation, "", _root(weights, varied)),
+    ]
+    stds = np.sqrt(np.diag(common.covariance))
+    words = (
+        "scale of the force",
+        "drift of the scale",
+        "friction",
+        "jaws and sensor give way",
+        "place of the probe's edge",
+        "cross-talk",
+        "probe gives way aside",
+    )
+    units = ("", "", "", "um/uN", "um", "", "")
+    for number, (name, unit) in enumerate(zip(words, units, strict=True)):
+        # What goes together is shared among both by its covariance.
+        part = float(by[number] * (common.covariance[number] @ by))
+        lines.append((name, Kind.B, float(stds[number]), unit, float(by[number]), max(part, 0.0)))
+    for name, unit, column, _, std in readings.own:
+        slope = float(weights @ column)
+        lines.append((name, Kind.B, std, unit, slope, (slope * std) ** 2))
+    of_depth = posterior.weights.sum(axis=1)
+    at_depth = (posterior.weights * evidence.log_ei).sum(axis=1) / np.maximum(of_depth, 1e-12)
+    mean = float(of_depth @ at_depth)
+    clamp = float(of_depth @ (at_depth - mean) ** 2)
+    slope = math.sqrt(clamp) / max(posterior.depth_std_um, 1e-9)
+    lines.append(("depth of the clamp", Kind.B, posterior.depth_std_um, "um", slope, clamp))
+    variance = sum(line[5] for line in lines) or 1.0
+    budget = [
+        Contribution(name, kind, std, unit, slope, part / variance)
+        for name, kind, std, unit, slope, part in lines
+    ]
+    return tuple(sorted(budget, key=lambda line: -line.share))
+
+
+def _root(weights: Floats, covariance: Floats) -> float:
+    return math.sqrt(max(float(weights @ covariance @ weights), 0.0))
+
+
+def _line(
+    name: str, kind: Kind, std: float, unit: str, effect: float
+) -> tuple[str, Kind, float, str, float, float]:
+    return name, kind, std, unit, effect / std if std > 0.0 else 0.0, effect**2

@@ -1,0 +1,217 @@
+"""What the fibres of a campaign say together of clamp, probe, sensor and each other.
+
+The scale of the force, friction, what gives way and the place of the probe's edge are common to
+all fibres; how deep the jaws clamp and how much the stiffness varies along a fibre are drawn for
+each from spreads that are common. All of it is learned from all fibres and standards, and each
+fibre is then judged by what the others say.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cosmic.autonomy.bending.inference import (
+    VARIATION_PRIOR,
+    Common,
+    Evidence,
+    Posterior,
+    Readings,
+    common_prior,
+    depth_prior,
+    evidence_of,
+    fixed_covariance,
+    own_mean,
+    posterior_of,
+    varied_covariance,
+)
+from cosmic.autonomy.bending.result import Floats
+from cosmic.autonomy.bending.settings import FitSettings
+
+MIDDLES: Final = 13
+SPREADS: Final = np.array([0.15, 0.3, 0.45, 0.65, 0.9])
+"""Of ln(depth) between fibres, as a part of what is not known beforehand."""
+
+REACH: Final = 2.5
+MIDDLE_PART: Final = 0.8
+ROUNDS: Final = 3
+PRIOR_FIBRES: Final = 3.0
+"""So many fibres weigh as much as what is known of the variation beforehand."""
+
+LEAST_PROBABILITY: Final = 1e-3
+"""Fibres that the model fits worse teach nothing."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """One fibre, with what the others say, and friction about which its spans were fitted."""
+
+    posterior: Posterior
+    evidence: Evidence
+    common: Common
+    friction: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Population:
+    """A campaign as it is known.
+
+    Attributes
+    ----------
+    common : Common
+        From all fibres and standards.
+    fibres : tuple of Judged
+        In the order they were handed over; standards too.
+    """
+
+    common: Common
+    fibres: tuple[Judged, ...]
+
+
+def depth_weights(settings: FitSettings, depths_um: Floats) -> tuple[Floats, Floats]:
+    """Return the spreads of depth there may be: prior of each, and its weights of the depths.
+
+    Shapes (h,) and (h, depths).
+    """
+    middle, spread = depth_prior(settings)
+    middles = np.linspace(-REACH, REACH, MIDDLES) * MIDDLE_PART * spread
+    of_middle = np.exp(-0.5 * (middles / (MIDDLE_PART * spread)) ** 2)
+    logs = np.log(depths_um)
+    priors, weights = [], []
+    for away, weight in zip(middles, of_middle, strict=True):
+        for part in SPREADS:
+            each = np.exp(-0.5 * ((logs - middle - away) / (part * spread)) ** 2)
+            total = float(each.sum())
+            if total > 0.0:
+                priors.append(weight)
+                weights.append(each / total)
+    prior = np.array(priors)
+    return prior / prior.sum(), np.array(weights)
+
+
+def judge(
+    readings: Sequence[Readings], settings: FitSettings, *, friction: float | None = None
+) -> Population:
+    """Return what the fibres of a campaign, its standards among them, say together.
+
+    Parameters
+    ----------
+    friction : float, optional
+        About which the spans were fitted; that of the settings if None.
+    """
+    prior = common_prior(settings, friction=friction)
+    known = [prior] * len(readings)
+    spreads = VARIATION_PRIOR / VARIATION_PRIOR.sum()
+    common, judged = prior, []
+    for number in range(ROUNDS):
+        evidence = [
+            evidence_of(each, of, settings) for each, of in zip(readings, known, strict=True)
+        ]
+        weights = _prior_weights(evidence, readings, settings, spreads)
+        posteriors = [
+            posterior_of(each, weight) for each, weight in zip(evidence, weights, strict=True)
+        ]
+        about = settings.friction if friction is None else friction
+        judged = [Judged(*each, about) for each in zip(posteriors, evidence, known, strict=True)]
+        if number == ROUNDS - 1:
+            break
+        if len(readings) > 1:
+            spreads = _variations(judged, readings)
+        common, known = _shared(readings, judged, weights, prior, settings)
+    return Population(common, tuple(judged))
+
+
+def _teaches(judged: Judged) -> bool:
+    return judged.posterior.probability > LEAST_PROBABILITY
+
+
+def _prior_weights(
+    evidence: Sequence[Evidence],
+    readings: Sequence[Readings],
+    settings: FitSettings,
+    spreads: Floats,
+) -> list[Floats]:
+    """Return for each fibre the weights of depths and variations that the others speak for."""
+    prior, of_depth = depth_weights(settings, evidence[0].depths_um)
+    logs = np.zeros((len(readings), len(prior)))
+    for number, (each, read) in enumerate(zip(evidence, readings, strict=True)):
+        fits = each.chi2.min() < 4.0 * max(each.freedom, 1) + 10.0
+        if read.certified is None and fits and len(readings) > 1:
+            likely = np.exp(each.log_likelihood - each.log_likelihood.max()) @ spreads
+            logs[number] = np.log(of_depth @ likely + 1e-300)
+    total = logs.sum(axis=0) + np.log(prior)
+    found = []
+    for number, read in enumerate(readings):
+        left = total - logs[number] if read.certified is None else np.log(prior)
+        weight = np.exp(left - left.max())
+        depths = (weight / weight.sum()) @ of_depth
+        found.append(depths[:, None] * spreads[None, :])
+    return found
+
+
+def _variations(judged: Sequence[Judged], readings: Sequence[Readings]) -> Floats:
+    """Return how often fibres vary by how much."""
+    total = PRIOR_FIBRES * VARIATION_PRIOR / VARIATION_PRIOR.sum()
+    for each, read in zip(judged, readings, strict=True):
+        if read.certified is None and _teaches(each):
+            total = total + each.posterior.weights.sum(axis=0)
+    return np.asarray(total / total.sum())
+
+
+def _shared(
+    readings: Sequence[Readings],
+    judged: Sequence[Judged],
+    weights: Sequence[Floats],
+    prior: Common,
+    settings: FitSettings,
+) -> tuple[Common, list[Common]]:
+    """Return what is common by all, and by all but each."""
+    precision = np.linalg.inv(prior.covariance)
+    total, pulled = precision.copy(), precision @ prior.mean
+    told = []
+    for read, of, weight in zip(readings, judged, weights, strict=True):
+        own, pull = np.zeros_like(total), np.zeros_like(pulled)
+        if read.certified is not None or _teaches(of):
+            own, pull = _says(read, of, weight, settings)
+        told.append((own, pull))
+        total, pulled = total + own, pulled + pull
+
+    def solved(own: Floats, pull: Floats) -> Common:
+        covariance = np.asarray(np.linalg.inv(total - own), dtype=np.float64)
+        return Common(np.asarray(covariance @ (pulled - pull)), covariance)
+
+    none = np.zeros_like(total), np.zeros_like(pulled)
+    return solved(*none), [solved(*each) for each in told]
+
+
+def _says(
+    read: Readings, judged: Judged, weight: Floats, settings: FitSettings
+) -> tuple[Floats, Floats]:
+    """Return what one fibre says of what is common: precision, and precision times mean."""
+    depths = judged.evidence.depths_um
+    posterior = judged.posterior
+    here = int(np.abs(np.log(depths / posterior.depth_um)).argmin())
+    here = min(max(here, 1), len(depths) - 2)
+    geometry = read.response.log_stiffness(depths[here - 1 : here + 2])[:, read.span]
+    step = float(np.log(depths[here + 1] / depths[here - 1]))
+    by_depth = (geometry[2] - geometry[0]) / step
+    of_depth = weight.sum(axis=1) / weight.sum()
+    logs = np.log(depths)
+    middle = float(of_depth @ logs)
+    variance = float(of_depth @ (logs - middle) ** 2)
+    whole = fixed_covariance(read) + variance * np.outer(by_depth, by_depth)
+    variation = posterior.variation
+    whole = whole + varied_covariance(read, settings)[here] * variation**2
+    away = read.log_k - own_mean(read) - geometry[1] - by_depth * (middle - logs[here])
+    ones = np.ones(len(away))
+    if read.certified is not None:
+        log_ei, std = read.certified
+        root = np.linalg.inv(whole + std**2)
+        away = away - log_ei
+    else:
+        root = np.linalg.inv(whole)
+        each = root @ ones
+        root = root - np.outer(each, each) / float(each.sum())
+    column = read.to_common
+    return column.T @ root @ column, column.T @ root @ away

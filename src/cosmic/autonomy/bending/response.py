@@ -1,0 +1,96 @@
+"""What each span of a fibre answers to what is not known of fibre, clamp and probe."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cosmic.autonomy.bending.curved import NaturalShape
+from cosmic.autonomy.bending.result import BendingError, Floats
+
+CELLS: Final = 48
+TURNED_RAD: Final = 0.01
+MOVED_UM: Final = 2.0
+BEYOND: Final = 1.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Response:
+    """Logarithmic derivatives of the first stiffness of n spans.
+
+    Attributes
+    ----------
+    shapes : tuple of NaturalShape
+        Of each span.
+    by_contact, by_direction, by_square : ndarray, shape (n,), float64
+        To the place of contact (1/um), to the direction out of the jaws (1/rad), and one over the
+        square of the lever (1/um2).
+    slopes : ndarray, shape (n,), float64
+        Tangent of the fibre's natural slope at the probe.
+    """
+
+    shapes: tuple[NaturalShape, ...]
+    by_contact: Floats
+    by_direction: Floats
+    by_square: Floats
+    slopes: Floats
+
+    def log_stiffness(self, depths_um: Floats) -> Floats:
+        """Return ln(k / EI) of each span for depths of the clamp, shape (depths, n)."""
+        levers = np.column_stack([each.levers_um(depths_um) for each in self.shapes])
+        return np.asarray(math.log(3.0) - 3.0 * np.log(levers))
+
+    def weights(self, depth_um: float) -> tuple[Floats, Floats]:
+        """Return places along the fibre, and how much each counts in each span, shape (n, m)."""
+        arms = [each.arms_um() for each in self.shapes]
+        end = max(float(along[-1]) for along, _ in arms)
+        edges = np.linspace(-depth_um, end, CELLS + 1)
+        middles = 0.5 * (edges[1:] + edges[:-1])
+        rows = []
+        for along, arm in arms:
+            inside = arm[0] - np.minimum(middles, 0.0)
+            here = np.where(middles < 0.0, inside, np.interp(middles, along, arm, right=0.0)) ** 2
+            rows.append(here / here.sum())
+        return middles, np.array(rows)
+
+    def variation(self, depth_um: float, length_um: float, reference: int) -> Floats:
+        """Return the covariance of ln(k) for a stiffness that varies by 1 along the fibre.
+
+        Counted from the mean over the span `reference`, as compliance weighs it; shape (n, n).
+        """
+        middles, weights = self.weights(depth_um)
+        alike = np.exp(-np.abs(middles[:, None] - middles[None, :]) / length_um)
+        off = weights - weights[reference]
+        return np.asarray(off @ alike @ off.T)
+
+
+def straight(at_um: float) -> NaturalShape:
+    """Return the shape of a straight fibre that is pushed so far from the jaws."""
+    return NaturalShape(np.array([0.0, BEYOND * at_um]), np.zeros(2), at_um)
+
+
+def response_of(shapes: Sequence[NaturalShape], *, depth_um: float) -> Response:
+    """Return the answers of spans with these shapes."""
+    depth = np.array([depth_um])
+
+    def log_lever(shape: NaturalShape) -> float:
+        return float(np.log(shape.levers_um(depth)[0]))
+
+    def differs(shape: NaturalShape, **change: float) -> float:
+        try:
+            return -3.0 * (log_lever(shape.moved(**change)) - log_lever(shape))
+        except BendingError:  # the shape ends just there
+            return 0.0
+
+    levers = np.array([math.exp(log_lever(each)) for each in shapes])
+    contact = [-differs(each, ahead_um=-MOVED_UM) / MOVED_UM for each in shapes]
+    turned = [differs(each, turned_rad=TURNED_RAD) / TURNED_RAD for each in shapes]
+    return Response(
+        shapes=tuple(shapes),
+        by_contact=np.array(contact),
+        by_direction=np.array(turned),
+        by_square=levers**-2.0,
+        slopes=np.array([math.tan(each.slope_rad) for each in shapes]),
+    )
