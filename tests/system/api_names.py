@@ -9,7 +9,13 @@ from pydantic import BaseModel
 import cosmic
 from cosmic.app.stations.remote_station import StationControl
 from cosmic.autonomy.bending.plan import PlannedSpan
-from cosmic.autonomy.bending.result import BendingError, BendingResult, Contribution, Quality, SpanFit
+from cosmic.autonomy.bending.result import (
+    BendingError,
+    BendingResult,
+    Contribution,
+    Quality,
+    SpanFit,
+)
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.calibrating.registry import (
     CalibrationEntry,

@@ -19,7 +19,7 @@ from cosmic.autonomy.bending.inference import (
     own_mean,
     varied_covariance,
 )
-from cosmic.autonomy.bending.population import Judged
+from cosmic.autonomy.bending.population import Assessed
 from cosmic.autonomy.bending.result import BendingResult, Floats, Quality, SpanFit
 from cosmic.autonomy.bending.settings import FitSettings
 
@@ -60,7 +60,7 @@ WORDS: Final = {
 
 
 def checked(
-    result: BendingResult, readings: Readings, judged: Judged, settings: FitSettings
+    result: BendingResult, readings: Readings, assessed: Assessed, settings: FitSettings
 ) -> BendingResult:
     """Return the result with its flags, whether it is trusted, and why not."""
     flags: set[Quality] = set()
@@ -79,11 +79,11 @@ def checked(
         flags.add(Quality.TOO_SOFT)
         reasons.append(f"the interval is +/-{half:.0f} %, more than {settings.soft_percent:g} %")
     used = [result.spans[n] for n in result.used]
-    cause = _cause(used, readings, judged, settings)
+    cause = _cause(used, readings, assessed, settings)
     if cause is not None:
         flags.add(cause)
         reasons.append(WORDS[cause])
-    notes = _notes(result, readings, judged) | _spoilt(result)
+    notes = _notes(result, readings, assessed) | _spoilt(result)
     return replace(
         result,
         flags=frozenset(flags),
@@ -100,7 +100,7 @@ def _spoilt(result: BendingResult) -> set[Quality]:
 
 
 def _cause(
-    fits: Sequence[SpanFit], readings: Readings, judged: Judged, settings: FitSettings
+    fits: Sequence[SpanFit], readings: Readings, assessed: Assessed, settings: FitSettings
 ) -> Quality | None:
     """Return why the spans do not go together; None: they do."""
     if len(fits) >= LEAST_SPANS and _no_beam(fits, readings):
@@ -108,9 +108,9 @@ def _cause(
     relaxed = [fit.relaxation_part - SIGMAS * fit.relaxation_std_part for fit in fits]
     if relaxed and max(relaxed) > RELAXES_MOST:
         return Quality.RELAXED
-    if judged.posterior.probability >= UNLIKELY:
+    if assessed.posterior.probability >= UNLIKELY:
         return None
-    return _misfit(fits, readings, judged, settings)
+    return _misfit(fits, readings, assessed, settings)
 
 
 def _no_beam(fits: Sequence[SpanFit], readings: Readings) -> bool:
@@ -123,10 +123,10 @@ def _no_beam(fits: Sequence[SpanFit], readings: Readings) -> bool:
 
 
 def _misfit(
-    fits: Sequence[SpanFit], readings: Readings, judged: Judged, settings: FitSettings
+    fits: Sequence[SpanFit], readings: Readings, assessed: Assessed, settings: FitSettings
 ) -> Quality:
     """Return which single change mends the fit best: one span away, or one weak place."""
-    whole, away = _linear(readings, judged, settings)
+    whole, away = _linear(readings, assessed, settings)
     spans, count = readings.span, len(fits)
     if count < LEAST_FOR_ONE_OUT:
         return Quality.NON_UNIFORM
@@ -141,18 +141,18 @@ def _misfit(
     return Quality.HINGE
 
 
-def _linear(readings: Readings, judged: Judged, settings: FitSettings) -> tuple[Floats, Floats]:
+def _linear(readings: Readings, assessed: Assessed, settings: FitSettings) -> tuple[Floats, Floats]:
     """Return covariance and what is left of the readings at the most likely depth."""
-    posterior, depths = judged.posterior, judged.evidence.depths_um
+    posterior, depths = assessed.posterior, assessed.evidence.depths_um
     here = int(np.unravel_index(posterior.weights.argmax(), posterior.weights.shape)[0])
     here = min(max(here, 1), len(depths) - 2)
     geometry = readings.response.log_stiffness(depths[here - 1 : here + 2])[:, readings.span]
     by_depth = (geometry[2] - geometry[0]) / float(np.log(depths[here + 1] / depths[here - 1]))
-    whole = fixed_covariance(readings, judged.common) + np.outer(by_depth, by_depth)
+    whole = fixed_covariance(readings, assessed.common) + np.outer(by_depth, by_depth)
     small = float(VARIATIONS[2])
     whole = whole + varied_covariance(readings, settings)[here] * small**2
     away = readings.log_k - geometry[1] - own_mean(readings)
-    return whole, away - readings.to_common @ judged.common.mean
+    return whole, away - readings.to_common @ assessed.common.mean
 
 
 def _chi2(away: Floats, whole: Floats, column: Floats) -> float:
@@ -165,20 +165,20 @@ def _chi2(away: Floats, whole: Floats, column: Floats) -> float:
     return float(left @ root @ left)
 
 
-def _notes(result: BendingResult, readings: Readings, judged: Judged) -> set[Quality]:
+def _notes(result: BendingResult, readings: Readings, assessed: Assessed) -> set[Quality]:
     """Return what was seen, and is in the interval."""
     notes = set()
     used = [result.spans[n] for n in result.used]
     shortest = min(each.at_um for each in readings.response.shapes)
     if result.clamp_offset_um - result.clamp_offset_std_um > DEEP_PART * shortest:
         notes.add(Quality.CLAMP_DEEP)
-    weights = judged.posterior.weights.sum(axis=0)
+    weights = assessed.posterior.weights.sum(axis=0)
     if float(weights[VARIATIONS[: len(weights)] > VARIES_FROM].sum()) > MOSTLY:
         notes.add(Quality.NON_UNIFORM)
     relaxed, relaxed_std = _mean([(f.relaxation_part, f.relaxation_std_part) for f in used])
     if relaxed - SIGMAS * relaxed_std > RELAXES_FROM:
         notes.add(Quality.RELAXED)
-    rubs, rubs_std = _friction(used, judged.friction)
+    rubs, rubs_std = _friction(used, assessed.friction)
     if rubs - 2.0 * rubs_std > RUBS_FROM:
         notes.add(Quality.FRICTION)
     return notes

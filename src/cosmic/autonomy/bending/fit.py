@@ -7,7 +7,7 @@ from typing import Final
 
 from cosmic.autonomy.bending.checks import checked
 from cosmic.autonomy.bending.inference import FRICTION, Readings, budget_of, readings_of
-from cosmic.autonomy.bending.population import Judged, Population, judge
+from cosmic.autonomy.bending.population import Assessed, Population, assess
 from cosmic.autonomy.bending.response import response_of, straight
 from cosmic.autonomy.bending.result import (
     N_M2_PER_UN_UM2,
@@ -172,7 +172,7 @@ def fit_campaign(
     standards: Sequence[MeasuredFibre] = (),
     settings: FitSettings | None = None,
 ) -> tuple[BendingResult, ...]:
-    """Return the bending stiffness of all fibres of a campaign, judged together.
+    """Return the bending stiffness of all fibres of a campaign, assessed together.
 
     Parameters
     ----------
@@ -182,39 +182,39 @@ def fit_campaign(
     settings = settings or FitSettings()
     every = [*fibres, *standards]
     verified = any(each.readings is not None for each in standards)
-    judged = _judged(every, settings)
-    rubs = settings.friction + float(judged.common.mean[FRICTION]) if judged else 0.0
-    if judged and abs(rubs - settings.friction) > NEAR:
+    assessed = _assessed(every, settings)
+    rubs = settings.friction + float(assessed.common.mean[FRICTION]) if assessed else 0.0
+    if assessed and abs(rubs - settings.friction) > NEAR:
         # What friction does is no straight line: it is taken again about where it lies.
         rubs = min(max(rubs, LEAST_RUB), MOST_RUB)
         every = [each.about(rubs) for each in every]
-        judged = _judged(every, settings, friction=rubs)
-    each_judged = iter(judged.fibres if judged else ())
+        assessed = _assessed(every, settings, friction=rubs)
+    each_assessed = iter(assessed.fibres if assessed else ())
     return tuple(
         _nothing(each, settings)
         if each.readings is None
-        else _concluded(each, each.readings, next(each_judged), settings, verified=verified)
+        else _concluded(each, each.readings, next(each_assessed), settings, verified=verified)
         for each in every[: len(fibres)]
     )
 
 
-def _judged(
+def _assessed(
     fibres: Sequence[MeasuredFibre], settings: FitSettings, *, friction: float | None = None
 ) -> Population | None:
     known = [each.readings for each in fibres if each.readings is not None]
-    return judge(known, settings, friction=friction) if known else None
+    return assess(known, settings, friction=friction) if known else None
 
 
 def _concluded(
     fibre: MeasuredFibre,
     readings: Readings,
-    judged: Judged,
+    assessed: Assessed,
     settings: FitSettings,
     *,
     verified: bool,
 ) -> BendingResult:
-    posterior, scale = judged.posterior, N_M2_PER_UN_UM2
-    chi2 = float(judged.evidence.chi2.min())
+    posterior, scale = assessed.posterior, N_M2_PER_UN_UM2
+    chi2 = float(assessed.evidence.chi2.min())
     result = BendingResult(
         ei_n_m2=math.exp(posterior.log_ei) * scale,
         ei_low_n_m2=math.exp(posterior.log_low) * scale,
@@ -224,14 +224,14 @@ def _concluded(
         spans=fibre.spans,
         used=fibre.used,
         chi2=chi2,
-        freedom=judged.evidence.freedom,
+        freedom=assessed.evidence.freedom,
         flags=frozenset(),
         trusted=True,
         reasons=(),
-        budget=budget_of(readings, judged.common, settings, posterior, judged.evidence),
+        budget=budget_of(readings, assessed.common, settings, posterior, assessed.evidence),
         scale_verified=verified,
     )
-    return checked(result, readings, judged, settings)
+    return checked(result, readings, assessed, settings)
 
 
 def positions_um(spans: Sequence[Span]) -> tuple[float, ...]:

@@ -3,7 +3,7 @@
 The scale of the force, friction, what gives way and the place of the probe's edge are common to
 all fibres; how deep the jaws clamp and how much the stiffness varies along a fibre are drawn for
 each from spreads that are common. All of it is learned from all fibres and standards, and each
-fibre is then judged by what the others say.
+fibre is then assessed by what the others say.
 """
 
 from collections.abc import Sequence
@@ -44,7 +44,7 @@ LEAST_PROBABILITY: Final = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judged:
+class Assessed:
     """One fibre, with what the others say, and friction about which its spans were fitted."""
 
     posterior: Posterior
@@ -61,12 +61,12 @@ class Population:
     ----------
     common : Common
         From all fibres and standards.
-    fibres : tuple of Judged
+    fibres : tuple of Assessed
         In the order they were handed over; standards too.
     """
 
     common: Common
-    fibres: tuple[Judged, ...]
+    fibres: tuple[Assessed, ...]
 
 
 def depth_weights(settings: FitSettings, depths_um: Floats) -> tuple[Floats, Floats]:
@@ -90,7 +90,7 @@ def depth_weights(settings: FitSettings, depths_um: Floats) -> tuple[Floats, Flo
     return prior / prior.sum(), np.array(weights)
 
 
-def judge(
+def assess(
     readings: Sequence[Readings], settings: FitSettings, *, friction: float | None = None
 ) -> Population:
     """Return what the fibres of a campaign, its standards among them, say together.
@@ -103,7 +103,7 @@ def judge(
     prior = common_prior(settings, friction=friction)
     known = [prior] * len(readings)
     spreads = VARIATION_PRIOR / VARIATION_PRIOR.sum()
-    common, judged = prior, []
+    common, assessed = prior, []
     for number in range(ROUNDS):
         evidence = [
             evidence_of(each, of, settings) for each, of in zip(readings, known, strict=True)
@@ -113,17 +113,19 @@ def judge(
             posterior_of(each, weight) for each, weight in zip(evidence, weights, strict=True)
         ]
         about = settings.friction if friction is None else friction
-        judged = [Judged(*each, about) for each in zip(posteriors, evidence, known, strict=True)]
+        assessed = [
+            Assessed(*each, about) for each in zip(posteriors, evidence, known, strict=True)
+        ]
         if number == ROUNDS - 1:
             break
         if len(readings) > 1:
-            spreads = _variations(judged, readings)
-        common, known = _shared(readings, judged, weights, prior, settings)
-    return Population(common, tuple(judged))
+            spreads = _variations(assessed, readings)
+        common, known = _shared(readings, assessed, weights, prior, settings)
+    return Population(common, tuple(assessed))
 
 
-def _teaches(judged: Judged) -> bool:
-    return judged.posterior.probability > LEAST_PROBABILITY
+def _teaches(assessed: Assessed) -> bool:
+    return assessed.posterior.probability > LEAST_PROBABILITY
 
 
 def _prior_weights(
@@ -150,10 +152,10 @@ def _prior_weights(
     return found
 
 
-def _variations(judged: Sequence[Judged], readings: Sequence[Readings]) -> Floats:
+def _variations(assessed: Sequence[Assessed], readings: Sequence[Readings]) -> Floats:
     """Return how often fibres vary by how much."""
     total = PRIOR_FIBRES * VARIATION_PRIOR / VARIATION_PRIOR.sum()
-    for each, read in zip(judged, readings, strict=True):
+    for each, read in zip(assessed, readings, strict=True):
         if read.certified is None and _teaches(each):
             total = total + each.posterior.weights.sum(axis=0)
     return np.asarray(total / total.sum())
@@ -161,7 +163,7 @@ def _variations(judged: Sequence[Judged], readings: Sequence[Readings]) -> Float
 
 def _shared(
     readings: Sequence[Readings],
-    judged: Sequence[Judged],
+    assessed: Sequence[Assessed],
     weights: Sequence[Floats],
     prior: Common,
     settings: FitSettings,
@@ -169,12 +171,12 @@ def _shared(
     """Return what is common by all, and by all but each."""
     precision = np.linalg.inv(prior.covariance)
     total, pulled = precision.copy(), precision @ prior.mean
-    told = []
-    for read, of, weight in zip(readings, judged, weights, strict=True):
+    said = []
+    for read, of, weight in zip(readings, assessed, weights, strict=True):
         own, pull = np.zeros_like(total), np.zeros_like(pulled)
         if read.certified is not None or _teaches(of):
             own, pull = _says(read, of, weight, settings)
-        told.append((own, pull))
+        said.append((own, pull))
         total, pulled = total + own, pulled + pull
 
     def solved(own: Floats, pull: Floats) -> Common:
@@ -182,15 +184,15 @@ def _shared(
         return Common(np.asarray(covariance @ (pulled - pull)), covariance)
 
     none = np.zeros_like(total), np.zeros_like(pulled)
-    return solved(*none), [solved(*each) for each in told]
+    return solved(*none), [solved(*each) for each in said]
 
 
 def _says(
-    read: Readings, judged: Judged, weight: Floats, settings: FitSettings
+    read: Readings, assessed: Assessed, weight: Floats, settings: FitSettings
 ) -> tuple[Floats, Floats]:
     """Return what one fibre says of what is common: precision, and precision times mean."""
-    depths = judged.evidence.depths_um
-    posterior = judged.posterior
+    depths = assessed.evidence.depths_um
+    posterior = assessed.posterior
     here = int(np.abs(np.log(depths / posterior.depth_um)).argmin())
     here = min(max(here, 1), len(depths) - 2)
     geometry = read.response.log_stiffness(depths[here - 1 : here + 2])[:, read.span]

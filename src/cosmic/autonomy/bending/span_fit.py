@@ -292,7 +292,9 @@ def _without_contact(span: Span, place_um: float, peak_un: float) -> SpanFit:
     )
 
 
-def _span_result(span: Span, points: Points, model: _Model, found: _Found, place_um: float) -> SpanFit:
+def _span_result(
+    span: Span, points: Points, model: _Model, found: _Found, place_um: float
+) -> SpanFit:
     values, both = found.values, len(model.branches) == 2
     # A scatter beyond the noise foreseen is noise that was not.
     excess = max(1.0, found.chi2 / max(found.freedom, 1))
