@@ -1,17 +1,19 @@
 """How a campaign is stored: the tables of its database, and the HDF5 file of each fibre."""
 
 import io
+import json
 import math
 import sqlite3
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path, PurePosixPath
-from typing import Final
+from typing import Any, Final
 
 import h5py
 import numpy as np
 
 from cosmic.autonomy.bending.curved import NaturalShape
-from cosmic.autonomy.bending.result import BendingResult, Quality, SpanFit
+from cosmic.autonomy.bending.result import BendingResult, Contribution, Kind, Quality, SpanFit
 from cosmic.autonomy.bending.span import Span
 from cosmic.autonomy.campaign.records import (
     CampaignError,
@@ -60,7 +62,9 @@ CREATE TABLE fibre (
     ei_n_m2 REAL, ei_low_n_m2 REAL, ei_high_n_m2 REAL,
     clamp_offset_um REAL, clamp_offset_std_um REAL, chi2 REAL, freedom INTEGER,
     trusted INTEGER, flags TEXT NOT NULL DEFAULT '', reasons TEXT NOT NULL DEFAULT '',
-    used_spans TEXT NOT NULL DEFAULT '', file TEXT NOT NULL DEFAULT ''
+    used_spans TEXT NOT NULL DEFAULT '', file TEXT NOT NULL DEFAULT '',
+    budget_json TEXT NOT NULL DEFAULT '[]', scale_verified INTEGER NOT NULL DEFAULT 0,
+    notes TEXT NOT NULL DEFAULT ''
 );
 CREATE TABLE span (
     fibre INTEGER NOT NULL REFERENCES fibre, number INTEGER NOT NULL,
@@ -88,6 +92,15 @@ CREATE TABLE journal (
 );
 """
 
+
+ADDED: Final = {
+    "fibre": {
+        "budget_json": "TEXT NOT NULL DEFAULT '[]'",
+        "scale_verified": "INTEGER NOT NULL DEFAULT 0",
+        "notes": "TEXT NOT NULL DEFAULT ''",
+    }
+}
+"""Columns that a campaign begun with an earlier program does not have."""
 
 Cell = str | int | float | bytes | None
 Row = Mapping[str, Cell]
@@ -163,6 +176,9 @@ def fibre_row(record: FibreRecord, file: str) -> dict[str, Cell]:
         row["flags"] = SEPARATOR.join(sorted(result.flags))
         row["reasons"] = SEPARATOR.join(result.reasons)
         row["used_spans"] = " ".join(map(str, result.used))
+        row["budget_json"] = json.dumps([asdict(line) for line in result.budget])
+        row["scale_verified"] = int(result.scale_verified)
+        row["notes"] = SEPARATOR.join(sorted(result.notes))
     return row
 
 
@@ -250,16 +266,28 @@ def _flags(text: Cell) -> frozenset[Quality]:
 
 
 def _result(row: Row, spans: Sequence[Row]) -> BendingResult:
-    numbers = {name: number(row[name]) for name in RESULT_NUMBERS}
+    found = {name: number(row[name]) for name in RESULT_NUMBERS}
     return BendingResult(
-        **numbers,
+        ei_n_m2=found["ei_n_m2"],
+        ei_low_n_m2=found["ei_low_n_m2"],
+        ei_high_n_m2=found["ei_high_n_m2"],
+        clamp_offset_um=found["clamp_offset_um"],
+        clamp_offset_std_um=found["clamp_offset_std_um"],
+        chi2=found["chi2"],
         spans=tuple(_span_fit(each, np.empty(0)) for each in spans),
         used=tuple(int(each) for each in str(row["used_spans"]).split()),
         freedom=int(row["freedom"] or 0),
         flags=_flags(row["flags"]),
         trusted=bool(row["trusted"]),
         reasons=tuple(each for each in str(row["reasons"]).split(SEPARATOR) if each),
+        budget=tuple(_contribution(each) for each in json.loads(str(row.get("budget_json", "[]")))),
+        scale_verified=bool(row.get("scale_verified")),
+        notes=_flags(row.get("notes", "")),
     )
+
+
+def _contribution(line: Mapping[str, Any]) -> Contribution:
+    return Contribution(**{**line, "kind": Kind(line["kind"])})
 
 
 def _span_fit(row: Row, fitted_un: Floats) -> SpanFit:
@@ -281,6 +309,15 @@ def _operation(row: Row) -> OperationRecord:
         cause=str(row["cause"]),
         text=str(row["text"]),
     )
+
+
+def add_columns(connection: sqlite3.Connection) -> None:
+    """Give the tables of a campaign begun with an earlier program the columns they lack."""
+    for table, columns in ADDED.items():
+        there = {row[1] for row in connection.execute(f"PRAGMA table_info({table})")}
+        for name, kind in columns.items():
+            if name not in there:
+                connection.execute(f"ALTER TABLE {table} ADD COLUMN {name} {kind}")
 
 
 def insert(connection: sqlite3.Connection, table: str, row: Row) -> None:

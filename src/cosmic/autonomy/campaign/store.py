@@ -31,6 +31,7 @@ from cosmic.autonomy.campaign.storage_format import (
     SCHEMA_VERSION,
     TABLES,
     Row,
+    add_columns,
     cell,
     curves_file,
     fibre_row,
@@ -310,6 +311,8 @@ class CampaignStore:
         try:
             store.reader.check()
             remove_parts(folder / FIBRES)
+            with store._connection.transaction() as connection:  # noqa: SLF001 - its own class
+                add_columns(connection)
             store._begin_run(time_s, versions or {})  # noqa: SLF001 - its own class
         except BaseException:
             store.close()
