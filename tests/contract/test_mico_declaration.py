@@ -11,12 +11,14 @@ from cosmic.frame.declaration import Declared, declaration_of
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.operation import Operation
 from cosmic.mico.api.mico import Mico
-from cosmic.mico.api.ways import Way
+from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.motion.orders import Jog, MoveBy, MoveTo
 
 TEXT = "cosmic-trajectory 1\nplatform FiberStation\nleft.x to 20 um\n"
 KEYS = count()
-ROUND_TRIP = Way({"left.x": 0.0}, ({"left.x": 30.0}, {"left.x": 10.0}), "straight", 40.0, 40.0, 1.0)
+ROUND_TRIP = PlannedPath(
+    {"left.x": 0.0}, ({"left.x": 30.0}, {"left.x": 10.0}), "straight", 40.0, 40.0, 1.0
+)
 
 
 def moved(mico: Mico) -> float:

@@ -45,7 +45,7 @@ from cosmic.mico.api.mico import Mico, mico_of
 from cosmic.mico.api.stepwise import StepwiseMove
 from cosmic.mico.api.trajectory_places import AwayFromStartError
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
-from cosmic.mico.api.ways import Way
+from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.motion.orders import Jog, MoveTo, Steer
 from cosmic.mico.core.motion.positioner import Confidence, Status
 
@@ -254,7 +254,7 @@ def test_poses_paths_and_collisions(mico: Mico) -> None:
     assert mico["left.x"].position_um == pytest.approx(0.0, abs=1.0)
     mico.poses.remove("there")
     assert "there" not in mico.poses
-    way = mico.find_way({"left.x": 60.0})
+    way = mico.plan_path({"left.x": 60.0})
     mico.follow(way)
     assert mico["left.x"].position_um == pytest.approx(60.0, abs=1.0)
     assert mico.clearance().distance_um > 0.0
@@ -486,7 +486,7 @@ def test_what_the_station_carries_out_for_a_client_ends_with_its_lease(
     with remote_mico(hosted, how) as (mico, _, transport):
         mico["left.x"].set_closed_loop_frequency(SLOW_HZ)
         waypoints = ({"left.x": 5_000.0}, {"left.x": 0.0})
-        way = Way({"left.x": 0.0}, waypoints, "straight", 5_000.0, 5_000.0, 1.0)
+        way = PlannedPath({"left.x": 0.0}, waypoints, "straight", 5_000.0, 5_000.0, 1.0)
         task = mico.follow(way, wait=False)
         wait_for(lambda: hosted.mico["left.x"].details.in_motion)
         transport.release_lease()

@@ -78,7 +78,7 @@ from cosmic.mico.api.trajectory_places import AwayFromStartError
 from cosmic.mico.api.trajectory_player import TrajectoryPlayer
 from cosmic.mico.api.trajectory_recording import TrajectoryRecording
 from cosmic.mico.api.trajectory_state import PlayProgress, PlayState
-from cosmic.mico.api.ways import Way
+from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.motion.links import Link
 from cosmic.mico.core.motion.movement import Movement
@@ -107,7 +107,7 @@ CLASSES: Final[dict[str, type]] = {
     "Mico": Mico,
     "Collision": Collision,
     "Approach": Approach,
-    "Way": Way,
+    "PlannedPath": PlannedPath,
     "Link": Link,
     "UndoEntry": UndoEntry,
     "Trajectories": Trajectories,
@@ -246,7 +246,7 @@ MADE_LATER: Final = {
     "Approach": ("bodies", "distance_um", "places_um", "pose"),
     "Link": ("first", "second", "ratio"),
     "UndoEntry": ("group", "before", "number"),
-    "Way": ("start", "waypoints", "method", "length", "straight_length", "duration_s"),
+    "PlannedPath": ("start", "waypoints", "method", "length", "straight_length", "duration_s"),
     "GroupMovement": ("movements",),
     "MoveStatus": ("movement",),
     "DataChunk": ("first_sample", "time_s", "rate_hz", "channels", "volts", "scales"),

@@ -209,7 +209,7 @@ def test_a_path_is_found_where_the_straight_one_collides(rig: cosmic.Rig) -> Non
     mico["right.x"].move_to(-4500.0)
     targets = {"left.y": 2000.0}
     assert not mico.check(targets).allowed
-    way = mico.find_way(targets)
+    way = mico.plan_path(targets)
     assert way.length >= way.straight_length
     assert way.duration_s > 0.0
     assert mico["left.y"].position_um == pytest.approx(-2000.0, abs=1.0), "nothing moved yet"
@@ -221,9 +221,9 @@ def test_a_path_is_found_where_the_straight_one_collides(rig: cosmic.Rig) -> Non
 
 def test_no_path_to_a_position_that_is_taken_says_what_is_there(rig: cosmic.Rig) -> None:
     with pytest.raises(cosmic.CollisionError) as refused:
-        rig.mico.find_way({"left.z": -3000.0})
+        rig.mico.plan_path({"left.z": -3000.0})
     assert "plate" in refused.value.verdict.bodies
     with pytest.raises(cosmic.LimitError):
-        rig.mico.find_way({"left.z": 9000.0})
+        rig.mico.plan_path({"left.z": 9000.0})
     with pytest.raises(cosmic.CosmicError):
-        rig.mico.find_way({"nobody": 1.0})
+        rig.mico.plan_path({"nobody": 1.0})

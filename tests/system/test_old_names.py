@@ -11,6 +11,7 @@ IN_MODULES = {
     "cosmic.vico.core.recording.reading": ("open_picture_recording", "open_image_recording"),
     "cosmic.vico.core.recording.export": ("export_pictures", "export_images"),
     "cosmic.vico.core.recording.snap": ("save_picture", "save_image"),
+    "cosmic.mico.api.ways": ("Way", "PlannedPath"),
 }
 OLD = [
     (title, name)
@@ -31,6 +32,11 @@ def test_an_old_name_leads_to_one_that_is_there(title: str, name: str) -> None:
 def test_the_old_names_of_a_camera_are_kept() -> None:
     kept = {name for title, name in OLD if title == "CameraHandle"}
     assert {"next_picture", "plan_pictures", "picture_since", "on_picture"} <= kept
+
+
+def test_the_old_names_of_the_axes_are_kept() -> None:
+    kept = {name for title, name in OLD if title in ("Mico", "Declared")}
+    assert {"find_way", "elsewhere", "moves_elsewhere"} <= kept
 
 
 @pytest.mark.parametrize(("module", "names"), IN_MODULES.items())

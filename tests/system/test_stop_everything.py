@@ -13,7 +13,7 @@ import pytest
 from cosmic.frame.clock import WALL
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.stepwise import StepwiseMove
-from cosmic.mico.api.ways import Way
+from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.trajectory.parser import parse
 from cosmic.mico.hw.sdl_virtual import VirtualGamepad
 from cosmic.twin.scene import Scene
@@ -81,7 +81,7 @@ def linked(mico: Mico) -> Keep:
 
 def way(mico: Mico) -> Keep:
     parts = ({"left.x": 30.0}, {"left.x": FAR, "left.y": FAR}, {"left.x": 0.0})
-    found = Way(
+    found = PlannedPath(
         start={"left.x": 0.0}, waypoints=parts, method="", length=0, straight_length=0, duration_s=0
     )
     mico.follow(found, wait=False)

@@ -13,7 +13,7 @@ from cosmic.app.configuration.platform_file import load_platform
 from cosmic.app.panels.path_preview import PathPreview, PreviewState, path_text, poses_along
 from cosmic.app.windows.operator_window import OperatorWindow
 from cosmic.frame.config import shipped_config_dir
-from cosmic.mico.api.ways import Way
+from cosmic.mico.api.ways import PlannedPath
 from gui.app.windows import Make, card, mico, scene
 from gui.mico.panels import click, enter, field, part, position, wait_for_position
 
@@ -337,7 +337,7 @@ def test_back_in_mcm_an_offer_is_gone_and_moves_are_refused(
 
 
 def test_a_path_is_described_in_one_line() -> None:
-    way = Way({"a": 0.0}, ({"a": 1.0}, {"a": 2.0}), "detour", 9230.0, 400.0, 3.14)
+    way = PlannedPath({"a": 0.0}, ({"a": 1.0}, {"a": 2.0}), "detour", 9230.0, 400.0, 3.14)
     assert path_text(way) == "detour, 9.2 mm instead of 400 µm, about 3.1 s, 2 waypoints"
     assert poses_along(way, {"a": 9.0, "b": 5.0}) == [
         {"a": 0.0, "b": 5.0},

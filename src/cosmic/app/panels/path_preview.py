@@ -21,7 +21,7 @@ from cosmic.frame.gui.theme import STEP_PX, State, ui_font
 from cosmic.frame.operation import Progress, Task
 from cosmic.frame.overrides import override
 from cosmic.frame.verdict import MoveVerdict
-from cosmic.mico.api.ways import Way
+from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.gui.detour_request import DetourRequest
 from cosmic.mico.gui.mico_widget import MicoWidget
 
@@ -124,7 +124,7 @@ class PathPreview(QWidget):
         self._show(PreviewState.PLANNING, State.BUSY, f"Planning a detour for {what}", why)
         self._progress.setRange(0, 0)
 
-    def show_found(self, what: str, path: Way) -> None:
+    def show_found(self, what: str, path: PlannedPath) -> None:
         """Offer a path."""
         words = f"{path_text(path)}. Nothing moves before you press Go."
         self._show(PreviewState.FOUND, State.OK, f"Detour found for {what}", words)
@@ -216,8 +216,8 @@ class PathController(QObject):
         self._preview = preview
         self._request: DetourRequest | None = None
         self._task: Task | None = None
-        self._answer: Way | MoveVerdict | None = None
-        self._path: Way | None = None
+        self._answer: PlannedPath | MoveVerdict | None = None
+        self._path: PlannedPath | None = None
         # Queued even from this thread: the answer was sent before, and comes before its end.
         queued = Qt.ConnectionType.QueuedConnection
         self._relay = Relay(self._on_progressed, queued=True)
@@ -258,7 +258,7 @@ class PathController(QObject):
         request.refuse(replace(request.verdict, text=text))
 
     def _on_answer(self, answer: object) -> None:
-        if isinstance(answer, Way | MoveVerdict):
+        if isinstance(answer, PlannedPath | MoveVerdict):
             self._answer = answer
 
     def _on_progressed(self, task: Task, progress: Progress) -> None:
@@ -277,7 +277,7 @@ class PathController(QObject):
         request, answer, self._answer = self._request, self._answer, None
         if request is None:
             return
-        if isinstance(answer, Way) and not progress.error:
+        if isinstance(answer, PlannedPath) and not progress.error:
             self._offer(request, answer)
             return
         verdict = replace(request.verdict, text=progress.error)
@@ -287,7 +287,7 @@ class PathController(QObject):
         request.refuse(verdict)
         self._preview.show_end(f"No detour for {_what(request)}", str(verdict))
 
-    def _offer(self, request: DetourRequest, path: Way) -> None:
+    def _offer(self, request: DetourRequest, path: PlannedPath) -> None:
         self._path = path
         self._scene.clear_refused()
         self._scene.set_planned(poses_along(path, self._positions()))
@@ -321,7 +321,7 @@ class PathController(QObject):
         self._preview.show_moving(_what(request))
         task.subscribe(partial(self._relay, task))
 
-    def _left_start(self, path: Way) -> bool:
+    def _left_start(self, path: PlannedPath) -> bool:
         for name, start in path.start.items():
             state = self._mico[name].details
             away = state.position is None or abs(state.position - start) > _AT_START
@@ -361,7 +361,7 @@ class PathController(QObject):
             self._forget()
 
 
-def path_text(path: Way) -> str:
+def path_text(path: PlannedPath) -> str:
     """Return a path in one line: "detour, 9.2 mm instead of 4.0 mm, about 3 s, 5 waypoints"."""
     count = len(path.waypoints)
     lengths = f"{_length_text(path.length)} instead of {_length_text(path.straight_length)}"
@@ -383,7 +383,7 @@ def _what(request: DetourRequest) -> str:
     return f"{request.axis} to {request.where}"
 
 
-def poses_along(path: Way, positions: dict[str, float]) -> list[dict[str, float]]:
+def poses_along(path: PlannedPath, positions: dict[str, float]) -> list[dict[str, float]]:
     """Return where all axes are at the start of a path and after each of its waypoints."""
     poses = [{**positions, **path.start}]
     for waypoint in path.waypoints:

@@ -16,7 +16,7 @@ from cosmic.mico.api.application_base import MicoApplicationBase
 from cosmic.mico.api.initialisation import Asker, Confirm, InitialisationRun
 from cosmic.mico.api.trajectory_player import Players
 from cosmic.mico.api.trajectory_site import TrajectorySite
-from cosmic.mico.api.ways import Way, follow, way_from_plan
+from cosmic.mico.api.ways import PlannedPath, follow, way_from_plan
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT, CollisionChecker
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.collision_manager import CollisionManager
@@ -187,7 +187,7 @@ class MicoApplication(MicoApplicationBase):
     # Ways round (ECM)
 
     @override
-    def find_way(self, targets: Mapping[str, float], budget_s: float) -> Way:
+    def find_way(self, targets: Mapping[str, float], budget_s: float) -> PlannedPath:
         """Return a way of some axes to `targets`, in gate coordinates; waits for it.
 
         Raises
@@ -201,9 +201,9 @@ class MicoApplication(MicoApplicationBase):
             raise NotAvailable(f"{NO_MODEL_TEXT}: without one there is nothing to go round")
         return way_from_plan(self.path_planner.plan_path(targets, budget_s))
 
-    def begin_search(self, targets: Mapping[str, float], budget_s: float) -> Operation[Way]:
+    def begin_search(self, targets: Mapping[str, float], budget_s: float) -> Operation[PlannedPath]:
         """Begin to look for a path in the application's thread; raises `NotAvailable`."""
-        found: Operation[Way] = Operation("Looking for a path")
+        found: Operation[PlannedPath] = Operation("Looking for a path")
 
         def search(task: Task) -> None:
             try:
@@ -221,7 +221,7 @@ class MicoApplication(MicoApplicationBase):
         return found
 
     @override
-    def follow_way(self, way: Way, source: str) -> Task:
+    def follow_way(self, way: PlannedPath, source: str) -> Task:
         return self.begin("Going round", lambda task: follow(self.manager, way, task, source))
 
     def _rescan(self, task: Task) -> None:

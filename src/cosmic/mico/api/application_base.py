@@ -14,7 +14,7 @@ from cosmic.frame.task_application import TaskApplication
 from cosmic.mico.api.initialisation import Confirm
 from cosmic.mico.api.ports import CollisionPort
 from cosmic.mico.api.trajectory_recording import Recordings
-from cosmic.mico.api.ways import Way
+from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.motion.undo import Cautions
 from cosmic.mico.core.ports import ManagerPort
@@ -79,7 +79,7 @@ class MicoApplicationBase(TaskApplication):
         """
 
     @abstractmethod
-    def find_way(self, targets: Mapping[str, float], budget_s: float) -> Way:
+    def find_way(self, targets: Mapping[str, float], budget_s: float) -> PlannedPath:
         """Return a way of some axes to `targets`, in gate coordinates; waits for it.
 
         Raises
@@ -111,7 +111,7 @@ class MicoApplicationBase(TaskApplication):
         """
 
     @abstractmethod
-    def follow_way(self, way: Way, source: str) -> Task:
+    def follow_way(self, way: PlannedPath, source: str) -> Task:
         """Go a way that was found; returns at once.
 
         Raises

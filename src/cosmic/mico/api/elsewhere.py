@@ -21,7 +21,7 @@ from cosmic.mico.api.initialisation import POLL_S, Confirm
 from cosmic.mico.api.manager_elsewhere import ManagerElsewhere
 from cosmic.mico.api.mico import Mico
 from cosmic.mico.api.mirrors import CollisionElsewhere
-from cosmic.mico.api.ways import Way
+from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.collision.clearance_watch import ClearanceWatch
 from cosmic.mico.core.collision.model import SceneModel
 from cosmic.mico.core.motion.undo import Cautions
@@ -179,11 +179,11 @@ class MicoElsewhere(MicoApplicationBase):
         return self._begin_there("Looking for devices", self.api.begin_rescan)
 
     @override
-    def find_way(self, targets: Mapping[str, float], budget_s: float) -> Way:
+    def find_way(self, targets: Mapping[str, float], budget_s: float) -> PlannedPath:
         return self.api.begin_search(dict(targets), float(budget_s)).wait()
 
     @override
-    def follow_way(self, way: Way, source: str) -> Task:
+    def follow_way(self, way: PlannedPath, source: str) -> Task:
         return self._begin_there("Going round", lambda: self.api.begin_detour(way, source=source))
 
     @override

@@ -24,6 +24,7 @@ from cosmic.frame.network.caller import current_call
 from cosmic.frame.network.lease import StationLease
 from cosmic.frame.network.transport import Rule
 from cosmic.frame.operation import Operation, Progress, Task, wait_or_cancel
+from cosmic.frame.renamed import Renamed
 from cosmic.frame.threads import forbid_waiting_here, may_wait_here
 from cosmic.frame.verdict import MoveVerdict, Reason, refuse
 from cosmic.frame.weakly import weakly
@@ -49,7 +50,7 @@ from cosmic.mico.api.news import (
 from cosmic.mico.api.poses import Poses
 from cosmic.mico.api.trajectories import Trajectories
 from cosmic.mico.api.trajectory_recording import Recordings
-from cosmic.mico.api.ways import Way
+from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.collision.answer import Approach
 from cosmic.mico.core.collision.checker import NO_MODEL_TEXT
 from cosmic.mico.core.collision.collision_manager import CollisionManager
@@ -652,10 +653,14 @@ class Mico(Declared):
             wait_or_cancel(task)
         return task
 
-    # Ways round (ECM)
+    # Detours, in mode ECM
 
-    def find_way(self, targets: Mapping[str, Number], *, budget_s: float = WAY_BUDGET_S) -> Way:
-        """Look for a way to absolute targets round what is in between, without moving.
+    find_way = Renamed("plan_path")
+
+    def plan_path(
+        self, targets: Mapping[str, Number], *, budget_s: float = WAY_BUDGET_S
+    ) -> PlannedPath:
+        """Plan a path to absolute targets around obstacles, without moving.
 
         Parameters
         ----------
@@ -671,7 +676,7 @@ class Mico(Declared):
         UnknownAxisError
             One axis does not exist.
         MoveRefused
-            No way was found; the verdict says what blocks.
+            No path was found; the verdict says what blocks.
         WrongThreadError
             Called in the GUI thread.
         """
@@ -680,21 +685,25 @@ class Mico(Declared):
         return self._application.find_way(places, budget_s)
 
     @command
-    def begin_search(self, targets: dict[str, float], budget_s: float) -> Operation[Way]:
+    def begin_search(self, targets: dict[str, float], budget_s: float) -> Operation[PlannedPath]:
         """Begin to look for a path to targets in gate coordinates, for at most a minute."""
         if not 0.0 < budget_s <= LONGEST_SEARCH_S:
             raise NotAvailable(f"a path is looked for during at most {LONGEST_SEARCH_S:g} s")
         return self._home.begin_search(targets, budget_s)
 
     @command(moves=True)
-    def begin_detour(self, way: Way, *, source: str = "script") -> Task:
+    def begin_detour(self, way: PlannedPath, *, source: str = "script") -> Task:
         """Begin to go a path that was found, where the axes are; see `follow`."""
         return self._home.follow_way(way, source_of(source))
 
     def follow(
-        self, way: Way, progress: Callable[[Progress], None] | None = None, *, wait: bool = True
+        self,
+        way: PlannedPath,
+        progress: Callable[[Progress], None] | None = None,
+        *,
+        wait: bool = True,
     ) -> Task:
-        """Go a way that `find_way` found, part by part; the arguments are those of `initialise`.
+        """Follow a planned path, part by part; the arguments are those of `initialise`.
 
         Raises
         ------
@@ -708,8 +717,8 @@ class Mico(Declared):
     def move_around(
         self, targets: Mapping[str, Number], *, budget_s: float = WAY_BUDGET_S, wait: bool = True
     ) -> Task:
-        """Find a way to absolute targets and go it; raises as `find_way` and `follow`."""
-        return self.follow(self.find_way(targets, budget_s=budget_s), wait=wait)
+        """Plan a path to absolute targets and follow it; raises as `plan_path` and `follow`."""
+        return self.follow(self.plan_path(targets, budget_s=budget_s), wait=wait)
 
     # Teleoperation
 

@@ -12,7 +12,7 @@ from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.operation import Operation, Task
 from cosmic.frame.task_application import Job
 from cosmic.mico.api.ports import CollisionPort
-from cosmic.mico.api.ways import Way
+from cosmic.mico.api.ways import PlannedPath
 from cosmic.mico.core.collision.checker import CollisionChecker, NoCollisionModel
 from cosmic.mico.core.motion.checks import Limits
 from cosmic.mico.core.motion.positioner import Confidence, PositionerState, class_for
@@ -40,7 +40,7 @@ class Worker(Protocol):
     def begin(self, title: str, job: Job) -> Task:
         """See `TaskApplication.begin`."""
 
-    def find_way(self, targets: Mapping[str, float], budget_s: float) -> Way:
+    def find_way(self, targets: Mapping[str, float], budget_s: float) -> PlannedPath:
         """See `MicoApplication.find_way`."""
 
 

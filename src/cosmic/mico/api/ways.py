@@ -1,4 +1,4 @@
-"""Ways round what is in between: found first, looked at, then gone (ECM, thesis 3.4.2)."""
+"""Paths around obstacles: planned first, shown, then followed (ECM, thesis 3.4.2)."""
 
 import math
 from collections.abc import Mapping
@@ -6,15 +6,18 @@ from dataclasses import dataclass
 
 from cosmic.frame.errors import CosmicError, MoveCancelled
 from cosmic.frame.operation import Task
+from cosmic.frame.renamed import renamed_in
 from cosmic.mico.api.group import move_together
 from cosmic.mico.core.motion.orders import Motion, MoveTo
 from cosmic.mico.core.planning.problem import Plan
 from cosmic.mico.core.ports import ManagerPort
 
+__getattr__ = renamed_in(__name__, {"Way": "PlannedPath"})
+
 
 @dataclass(frozen=True)
-class Way:
-    """A way to some targets on which nothing comes closer than its margin.
+class PlannedPath:
+    """A path to some targets on which nothing comes closer than its margin.
 
     Attributes
     ----------
@@ -26,7 +29,7 @@ class Way:
     method : str
         How it was found: "straight", "detour", ...
     length, straight_length : float
-        Of the way, and of the straight line to its end; um.
+        Of the path, and of the straight line to its end; um.
     duration_s : float
         How long it takes, at the speeds that are set.
     """
@@ -39,9 +42,9 @@ class Way:
     duration_s: float
 
 
-def way_from_plan(plan: Plan) -> Way:
+def way_from_plan(plan: Plan) -> PlannedPath:
     """Return a plan as scripts and windows see it."""
-    return Way(
+    return PlannedPath(
         start=dict(plan.start),
         waypoints=tuple(dict(segment.targets) for segment in plan.segments),
         method=plan.method,
@@ -51,7 +54,7 @@ def way_from_plan(plan: Plan) -> Way:
     )
 
 
-def follow(manager: ManagerPort, way: Way, task: Task, source: str) -> None:
+def follow(manager: ManagerPort, way: PlannedPath, task: Task, source: str) -> None:
     """Go `way` part by part and end `task`; in the application's thread.
 
     The gate decides each part again when its turn comes.
