@@ -136,10 +136,10 @@ def _near(calibration: Calibration, tool: str, zoom_counts: float, height_um: fl
     heights = sorted(
         {plane.height_um for plane in calibration.planes}, key=lambda each: abs(each - height_um)
     )
-    failure: NotAvailable | None = None
+    why = ""  # the error itself would hold this frame, and with it an image, until a collection
     for at_um in (height_um, *(each for each in heights if abs(each - height_um) <= NEAR_UM)):
         try:
             return MapFound(calibration.map_at(zoom_counts, at_um), abs(at_um - height_um), tool)
         except NotAvailable as exc:
-            failure = failure or exc
-    raise failure or NotAvailable(f"calibration of {calibration.camera}: nothing was measured")
+            why = why or str(exc)
+    raise NotAvailable(why or f"calibration of {calibration.camera}: nothing was measured")
