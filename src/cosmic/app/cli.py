@@ -17,6 +17,16 @@ from cosmic.frame.log import set_up_logging
 _WINDOWS: Final = (None, "mico", "daqco", "vico")
 _LOG_THEMSELVES: Final = (*_WINDOWS, "serve")
 """Commands that run on, and log more than warnings."""
+DEVICE_KINDS: Final = (
+    "controller",
+    "board",
+    "camera",
+    "lens",
+    "procedure",
+    "analysis",
+    "exporter",
+)
+"""What `cosmic new-device` writes packages for."""
 _CONFIG: Final = "a platform.toml or its folder"
 
 
@@ -34,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             at_end.callback(set_up_logging(console=True, console_level=logging.WARNING))
         try:
             # Loaded when called: most commands need no widgets, and none needs all the rest.
-            file = "window" if opens_window else chosen.command
+            file = "window" if opens_window else chosen.command.replace("-", "_")
             carried_out: int = import_module(f"cosmic.app.commands.{file}").run(chosen)
         except CosmicError as exc:
             for line in str(exc).splitlines():
@@ -109,6 +119,12 @@ def _add_file_commands(
         "--output", type=Path, metavar="FILE", help="output file (default: beside the recording)"
     )
     export.add_argument("--overwrite", action="store_true", help="replace a file that exists")
+    device = commands.add_parser(
+        "new-device", help="write a package that brings a device or a method, to change it"
+    )
+    device.add_argument("kind", choices=DEVICE_KINDS, metavar="KIND", help=", ".join(DEVICE_KINDS))
+    device.add_argument("name", metavar="NAME", help="what the platform file will say")
+    device.add_argument("--out", type=Path, metavar="FOLDER", help="where (default: here)")
     repair = commands.add_parser("repair", help="close recordings that a killed process left open")
     repair.add_argument("recordings", type=Path, nargs="+", metavar="FILE")
     repair.add_argument("--ended", action="store_true", help="no program writes them any more")

@@ -224,11 +224,11 @@ class JoinedController(Controller):
         self._at(channel, lambda to, at: to.stop(at))
 
     def _at(self, channel: Channel, call: Callable[[Controller, Channel], T]) -> T:
-        place = self._place(channel.device)
         try:
+            place = self._place(channel.device)
             return call(place.controller, Channel(place.index, channel.channel))
         except DeviceError as exc:
-            exc.device = channel.device
+            exc.device, exc.channel = channel.device, channel.channel
             raise
 
     def _place(self, device: int) -> _Place:
