@@ -10,6 +10,7 @@ from cosmic.app.configuration.network import NetworkSettings
 from cosmic.app.configuration.platform_file import PlatformFile, PlatformSettings
 from cosmic.autonomy.control.settings import ControlSettings
 from cosmic.daqco.core.settings import (
+    CameraTriggerSettings,
     ChannelSettings,
     DaqcoSettings,
     DriverSettings,
@@ -96,6 +97,7 @@ SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "[[daqco.scale]]": ScaleSettings,
     "[[daqco.channel]]": ChannelSettings,
     "[[daqco.limit]]": LimitSettings,
+    "[daqco.camera_trigger]": CameraTriggerSettings,
     "[[daqco.output]]": OutputSettings,
     "[vico]": VicoSettings,
     "[[vico.camera]]": CameraConfig,
@@ -179,7 +181,8 @@ def rows(model: type[BaseModel]) -> Iterator[tuple[str, str, str, str]]:
     schema = model.model_json_schema()
     required = schema.get("required", [])
     for key, described in schema["properties"].items():
-        parts = (described, described.get("items", {}), described.get("additionalProperties", {}))
+        parts = [described, described.get("items", {}), described.get("additionalProperties", {})]
+        parts += described.get("anyOf", [])
         if any("$ref" in part for part in parts if isinstance(part, dict)):
             continue
         # The schema does not tell what a factory makes; here they make empty tables only.

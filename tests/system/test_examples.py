@@ -170,6 +170,14 @@ def test_an_output_gives_a_value_and_a_ramp_and_is_refused_while_stopped(said: s
     assert lines[4].startswith("refused: output piezo: outputs are stopped")
 
 
+@example("camera_on_the_sample_clock.py")
+def test_an_image_and_the_force_of_its_sample_are_found(said: str) -> None:
+    found = re.fullmatch(r"the image was taken at sample (\d+), at (\S+) uN", said.strip())
+    assert found is not None
+    assert int(found[1]) % 100 == 0
+    assert abs(float(found[2])) < 50.0
+
+
 @example("two_makes.py")
 def test_an_axis_of_each_make_stands_where_it_was_sent(said: str) -> None:
     assert re.search(r"left\.x stands at -\d", said)

@@ -120,6 +120,19 @@ def _continues(chunk: DataChunk, last: DataChunk) -> bool:
     )
 
 
+def join_exposures(vico: VicoApplication, daqco: DaqcoApplication) -> None:
+    """Have the sample at which an exposure began stand beside every image that it triggered."""
+
+    def sample(camera: str, exposed_s: float) -> tuple[int, float] | None:
+        trigger = daqco.settings.camera_trigger
+        if trigger is None or trigger.camera != camera:
+            return None
+        found = daqco.exposure_near(exposed_s)
+        return None if found is None else (found.sample, found.time_s)
+
+    vico.sample_source = sample
+
+
 def join_positions(recorder: Recorder, mico: MicoApplicationBase, clock: Clock) -> None:
     """Have the positions of all axes written into every recording, on its clock.
 

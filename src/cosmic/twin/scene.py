@@ -19,6 +19,7 @@ from cosmic.twin.optics.optics import Optics
 from cosmic.twin.plates import Plates
 from cosmic.twin.settings import StageKind, TwinSettings
 from cosmic.twin.stage import Stage
+from cosmic.twin.trigger_line import TriggerLine
 from cosmic.twin.truth import NO_TRUTH, Truth, record_sample
 from cosmic.twin.twin_faults import TwinFaults
 
@@ -79,6 +80,8 @@ class Scene:
         The lamp; None in a scene of bare stages.
     optics : Optics or None
         What cameras see; None in a scene of bare stages.
+    trigger_lines : mapping of str to TriggerLine
+        The wires that begin at counters of boards, such as "Dev1/ctr0".
     faults : TwinFaults or None
         Trouble with fibres, tips, lamp, lens and sensors, by name.
     truth : Truth
@@ -117,6 +120,7 @@ class Scene:
         self.light = light
         self.optics = optics
         self.faults = faults or TwinFaults()
+        self.trigger_lines = {place: TriggerLine() for place in settings.camera_wiring}
         self._truth = truth
         self._plates = plates
         self._plate = 0
@@ -252,6 +256,13 @@ class Scene:
             wiring=tuple(wiring),
             at_power_up=at_power_up,
         )
+
+    def trigger_line_of(self, camera: str) -> TriggerLine | None:
+        """Return the wire to the trigger input of a simulated camera; None where there is none."""
+        for place, wired in self.settings.camera_wiring.items():
+            if wired == camera:
+                return self.trigger_lines[place]
+        return None
 
     def devices_of(self, make: str) -> tuple[int, ...]:
         """Return the numbers of the devices of one make; all of a scene that has none of it."""

@@ -183,6 +183,7 @@ class TwinSettings(StrictModel):
     samples: dict[str, SampleSettings] = Field(default_factory=dict)
     force_sensors: dict[str, ForceSensorSettings]
     sensor_wiring: dict[str, str] = Field(default_factory=dict)
+    camera_wiring: dict[str, str] = Field(default_factory=dict)
     optics: OpticsSettings
     lens: LensSettings
     light: LightSettings

@@ -164,6 +164,7 @@ def _make_boards(site: Site, settings: DaqcoSettings, driver: DriverSettings) ->
             scene_sources=_sources(site.scene),
             clock_sources=settings.clock_sources,
             start_triggers=settings.start_triggers,
+            trigger_lines=None if site.scene is None else site.scene.trigger_lines,
             options=driver.options,
             seed=site.seed,
         )

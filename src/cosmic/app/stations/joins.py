@@ -9,6 +9,7 @@ from cosmic.app.stations.remote_station import RemoteStation
 from cosmic.autonomy.coordinate_transform import join_transform
 from cosmic.autonomy.couplings import join_teleoperation
 from cosmic.autonomy.interlocks import (
+    join_exposures,
     join_force_cautions,
     join_force_limits,
     join_outputs,
@@ -36,6 +37,8 @@ def join_here(own: Hosted, site: Site) -> None:
         join_positions(daqco.recorder, mico, site.clock)
     if vico is not None and mico is not None:
         join_vision(vico, mico, site.path)
+    if vico is not None and daqco is not None:
+        join_exposures(vico, daqco)
 
 
 def join_vision(vico: VicoApplication, mico: MicoApplicationBase, path: Path) -> None:

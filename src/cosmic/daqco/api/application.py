@@ -2,7 +2,7 @@
 
 import logging
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from threading import RLock
 from typing import Final, TypeVar
@@ -17,6 +17,7 @@ from cosmic.daqco.core.left_behind import OpenRecordings
 from cosmic.daqco.core.limits import Limit, LimitGuard
 from cosmic.daqco.core.output_control import OutputControl
 from cosmic.daqco.core.plan import AcquisitionPlan, make_plan, restarts
+from cosmic.daqco.core.recording_format import RecordedExposure
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings, ScaleSettings
 from cosmic.daqco.core.udaq_buffer import UDaqBuffer
@@ -24,6 +25,7 @@ from cosmic.daqco.core.udaq_core import UDaqCore
 from cosmic.daqco.hw.board_group import ClockAgreement
 from cosmic.daqco.hw.interface import Board, BoardInfo, BoardLibrary, OverrunError
 from cosmic.daqco.hw.outputs import open_outputs
+from cosmic.daqco.hw.pulses import PulseTrain
 from cosmic.frame.application import GuiFactory
 from cosmic.frame.background import BackgroundJobs, OnResult, do_and_report
 from cosmic.frame.clock import WALL, Clock
@@ -175,6 +177,37 @@ class DaqcoApplication(TaskApplication):
         return core.rate_hz if core is not None else self._settings.rate_hz
 
     @property
+    def pulses(self) -> PulseTrain | None:
+        """The trigger of a camera that is given now."""
+        core = self._core
+        return core.plan.pulses if core is not None else None
+
+    def exposure_near(self, time_s: float) -> RecordedExposure | None:
+        """Return the pulse at which an exposure began that began about then; any thread.
+
+        None where no pulse lies within half a period, or acquisition began anew since.
+        """
+        train, chunk = self.pulses, self.buffer.latest_chunk
+        trigger = self._settings.camera_trigger
+        if train is None or chunk is None or trigger is None:
+            return None
+        about = chunk.first_sample + (time_s - chunk.time_s) * chunk.rate_hz
+        sample = train.nearest(about)
+        if abs(sample - about) > 0.5 * train.every_samples:
+            return None
+        at_s = chunk.time_s + (sample - chunk.first_sample) / chunk.rate_hz
+        return RecordedExposure(sample, at_s, train.number_of(sample), trigger.camera)
+
+    def exposures_in(self, chunk: DataChunk) -> Iterator[RecordedExposure]:
+        """Return the exposures of a camera that begin at samples of a chunk."""
+        train, trigger = self.pulses, self._settings.camera_trigger
+        if train is None or trigger is None:
+            return
+        for sample in train.samples_in(chunk.first_sample, chunk.samples):
+            at_s = chunk.time_s + (sample - chunk.first_sample) / chunk.rate_hz
+            yield RecordedExposure(sample, at_s, train.number_of(sample), trigger.camera)
+
+    @property
     def clock_agreement(self) -> tuple[ClockAgreement, ...]:
         """How well the sample clocks of the boards agree that have clocks of their own."""
         core = self._core
@@ -268,7 +301,9 @@ class DaqcoApplication(TaskApplication):
             # simulation runs; but who waits for samples waits for their chunk.
             longer_s = min(settings.chunk_s * self.clock.rate / MORE_CHUNKS, LONGEST_CHUNK_S)
             chunk_s = max(settings.chunk_s, longer_s)
-            plan = make_plan(settings.channel, settings.rate_hz, chunk_s, self._infos)
+            plan = make_plan(
+                settings.channel, settings.rate_hz, chunk_s, self._infos, settings.camera_trigger
+            )
             for name in plan.boards:
                 if name not in self._boards:
                     self._boards[name] = self.library.open(name)
@@ -331,7 +366,13 @@ class DaqcoApplication(TaskApplication):
         """
         with self._lock:
             if self._infos:
-                make_plan(settings.channel, settings.rate_hz, settings.chunk_s, self._infos)
+                make_plan(
+                    settings.channel,
+                    settings.rate_hz,
+                    settings.chunk_s,
+                    self._infos,
+                    settings.camera_trigger,
+                )
             before = self._settings
             limits = self.guard.limits.values()
             for check in self._before_change:

@@ -16,7 +16,12 @@ from cosmic.daqco.core.file_writer import RecordingStats, UDaqFileWriter
 from cosmic.daqco.core.left_behind import OpenRecordings
 from cosmic.daqco.core.limits import Crossing, LimitGuard
 from cosmic.daqco.core.plan import restarts
-from cosmic.daqco.core.recording_format import AxisPosition, RecordedEvent, RecordingHeader
+from cosmic.daqco.core.recording_format import (
+    AxisPosition,
+    RecordedEvent,
+    RecordedExposure,
+    RecordingHeader,
+)
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.core.settings import DaqcoSettings
 from cosmic.daqco.core.udaq_buffer import UDaqBuffer
@@ -93,6 +98,10 @@ class Acquisition(Protocol):
     @abstractmethod
     def clock_agreement(self) -> tuple[ClockAgreement, ...]:
         """How well the sample clocks of the boards agree that have clocks of their own."""
+
+    @abstractmethod
+    def exposures_in(self, chunk: DataChunk) -> Iterable[RecordedExposure]:
+        """Return the exposures of a camera that begin at samples of a chunk."""
 
     @abstractmethod
     def scales(self) -> dict[str, Scale]:
@@ -260,6 +269,8 @@ class Recorder:
         if writer is None:
             return
         writer.put(chunk)
+        for exposure in self._application.exposures_in(chunk):
+            writer.add_exposure(exposure)
         now_s = WALL.now_s()
         if self.position_source is not None and now_s >= self._positions_due_s:
             self._positions_due_s = now_s + POSITIONS_S

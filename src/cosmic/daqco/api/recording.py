@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from cosmic.daqco.core import recording_format as form
 from cosmic.daqco.core.curves import Slope, fit_slope
-from cosmic.daqco.core.recording_format import Overrun, RecordedEvent
+from cosmic.daqco.core.recording_format import Overrun, RecordedEvent, RecordedExposure
 from cosmic.daqco.core.recording_source import Columns, RecordingSource
 from cosmic.daqco.core.scale import Scale
 from cosmic.frame.arguments import checked, checked_class
@@ -157,6 +157,19 @@ class Recording:
                 value=float(row["value"]),
             )
             for row in self._source.tables["events"]
+        )
+
+    @property
+    def exposures(self) -> tuple[RecordedExposure, ...]:
+        """Exposures of a camera that the sample clock triggered, each with its sample."""
+        return tuple(
+            RecordedExposure(
+                sample=int(row["sample"]),
+                time_s=float(row["time_s"]),
+                number=int(row["number"]),
+                camera=form.decoded(row["camera"]),
+            )
+            for row in self._source.tables["exposures"]
         )
 
     @property

@@ -12,7 +12,13 @@ from typing_extensions import override
 
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.recording_file import WRITE_ERRORS, RecordingFile
-from cosmic.daqco.core.recording_format import AxisPosition, RecordedEvent, RecordingHeader, reason
+from cosmic.daqco.core.recording_format import (
+    AxisPosition,
+    RecordedEvent,
+    RecordedExposure,
+    RecordingHeader,
+    reason,
+)
 from cosmic.frame.clock import WALL
 from cosmic.frame.errors import CosmicError, RecordingError
 from cosmic.frame.failure import FailurePolicy
@@ -56,7 +62,7 @@ class _End:
     """Everything before it in the queue is still written."""
 
 
-_Item = DataChunk | RecordedEvent | tuple[AxisPosition, ...] | _End
+_Item = DataChunk | RecordedEvent | RecordedExposure | tuple[AxisPosition, ...] | _End
 
 
 class UDaqFileWriter(WorkerThread):
@@ -160,6 +166,11 @@ class UDaqFileWriter(WorkerThread):
         if not (self._ended or self._refused):
             self._queue.put(event)
 
+    def add_exposure(self, exposure: RecordedExposure) -> None:
+        """Have `exposure` written; returns at once. Any thread."""
+        if not (self._ended or self._refused):
+            self._queue.put(exposure)
+
     def add_positions(self, positions: Iterable[AxisPosition]) -> None:
         """Have `positions` written; returns at once. Any thread.
 
@@ -228,6 +239,8 @@ class UDaqFileWriter(WorkerThread):
             self._taken += item.samples
         elif isinstance(item, RecordedEvent):
             self._file.add_event(item)
+        elif isinstance(item, RecordedExposure):
+            self._file.add_exposure(item)
         elif isinstance(item, tuple):
             self._file.add_positions(item)
 

@@ -213,7 +213,7 @@ def _end_of(path: Path, head: bytes) -> tuple[int, int]:
     ends: list[int] = []
     try:
         with h5py.File(UnclosedFile(path), "r") as file:
-            for name in ("volts", *form.GROWING):
+            for name in filter(file.__contains__, ("volts", *form.GROWING)):
                 file[name].id.chunk_iter(lambda each: ends.append(each.byte_offset + each.size))
     except READ_ERRORS as exc:
         raise _broken(path, exc) from exc

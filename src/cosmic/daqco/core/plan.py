@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from cosmic.daqco.core.settings import (
     HIGHEST_RATE_HZ,
     LOWEST_RATE_HZ,
+    CameraTriggerSettings,
     ChannelSettings,
     DaqcoSettings,
 )
 from cosmic.daqco.hw.board_checks import negative_input
 from cosmic.daqco.hw.interface import BoardInfo, InputMode, InputSettings
+from cosmic.daqco.hw.pulses import LEAST_EVERY, PulseTrain
 from cosmic.frame.errors import LimitError, NotConnectedError
 from cosmic.frame.verdict import Reason, refuse
 
@@ -25,11 +27,14 @@ class AcquisitionPlan:
         The active ones: the order of the rows in every chunk.
     chunk_samples : int
         Samples a channel in one chunk.
+    pulses : PulseTrain or None
+        The trigger of a camera.
     """
 
     channels: tuple[ChannelSettings, ...]
     rate_hz: float
     chunk_samples: int
+    pulses: PulseTrain | None = None
 
     @property
     def boards(self) -> tuple[str, ...]:
@@ -61,8 +66,9 @@ def make_plan(
     rate_hz: float,
     chunk_s: float,
     boards: Mapping[str, BoardInfo],
+    trigger: CameraTriggerSettings | None = None,
 ) -> AcquisitionPlan:
-    """Return a plan for the active ones of `channels`.
+    """Return a plan for the active ones of `channels`, with the trigger of a camera.
 
     Raises
     ------
@@ -87,7 +93,28 @@ def make_plan(
                 f"board {name} is not there; there are {', '.join(boards) or 'none'}"
             )
         _check_board(boards[name], [each for each in active if each.board == name], rate_hz)
-    return AcquisitionPlan(tuple(active), rate_hz, max(1, round(rate_hz * chunk_s)))
+    pulses = None if trigger is None else _pulses(trigger, active, rate_hz)
+    return AcquisitionPlan(tuple(active), rate_hz, max(1, round(rate_hz * chunk_s)), pulses)
+
+
+def _pulses(
+    trigger: CameraTriggerSettings, active: Sequence[ChannelSettings], rate_hz: float
+) -> PulseTrain:
+    if trigger.board not in {each.board for each in active}:
+        raise _limit(
+            f"camera_trigger: no channel of {trigger.board} is active, and without samples it has "
+            f"no sample clock; switch one on"
+        )
+    every = round(rate_hz / trigger.rate_hz)
+    if not every >= LEAST_EVERY:
+        highest_hz = rate_hz / LEAST_EVERY
+        raise _limit(
+            f"camera_trigger: {trigger.rate_hz:g} Hz asked; at {rate_hz:g} samples a second up to "
+            f"{highest_hz:g} Hz",
+            value=trigger.rate_hz,
+            limit=highest_hz,
+        )
+    return PulseTrain(trigger.board, trigger.counter, every, every)
 
 
 def highest_rate_hz(channels: Sequence[ChannelSettings], boards: Mapping[str, BoardInfo]) -> float:
@@ -154,6 +181,6 @@ def restarts(before: DaqcoSettings, after: DaqcoSettings) -> bool:
             for each in settings.channel
             if each.active
         ]
-        return settings.rate_hz, settings.chunk_s, inputs
+        return settings.rate_hz, settings.chunk_s, inputs, settings.camera_trigger
 
     return wiring(before) != wiring(after)

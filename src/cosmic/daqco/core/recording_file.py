@@ -10,7 +10,13 @@ import numpy as np
 
 from cosmic.daqco.core import recording_format as form
 from cosmic.daqco.core.chunk import DataChunk
-from cosmic.daqco.core.recording_format import AxisPosition, Overrun, RecordedEvent, RecordingHeader
+from cosmic.daqco.core.recording_format import (
+    AxisPosition,
+    Overrun,
+    RecordedEvent,
+    RecordedExposure,
+    RecordingHeader,
+)
 from cosmic.daqco.core.room import TABLES_BYTES, Room, cut
 from cosmic.daqco.core.scale import Scale
 from cosmic.frame.errors import RecordingError, RecordingExistsError
@@ -133,6 +139,12 @@ class RecordingFile:
                 form.encoded(event.text, form.TEXT_BYTES),
             )
         )
+
+    def add_exposure(self, exposure: RecordedExposure) -> None:
+        """Add an exposure of a camera."""
+        camera = form.encoded(exposure.camera, form.NAME_BYTES)
+        row = (exposure.sample, exposure.time_s, exposure.number, camera)
+        self._rows["exposures"].append(row)
 
     def add_positions(self, positions: Iterable[AxisPosition]) -> None:
         """Add where axes were; an axis is known from its first row on."""

@@ -80,6 +80,28 @@ class RecordedEvent:
 
 
 @dataclass(frozen=True, slots=True)
+class RecordedExposure:
+    """An exposure of a camera that the sample clock triggered.
+
+    Attributes
+    ----------
+    sample : int
+        Number of the sample at which it began, since acquisition began.
+    time_s : float
+        Platform time of that sample.
+    number : int
+        Of the pulse, from 0 since acquisition began; a camera that was busy let it pass.
+    camera : str
+        Which one is triggered.
+    """
+
+    sample: int
+    time_s: float
+    number: int
+    camera: str
+
+
+@dataclass(frozen=True, slots=True)
 class Overrun:
     """Samples that are missing in front of sample number `sample`.
 
@@ -182,6 +204,14 @@ EVENT: Final = np.dtype(
 OVERRUN: Final = np.dtype(
     [("sample", "<i8"), ("lost", "<i8"), ("time_s", "<f8"), ("column", "<i8")]
 )
+EXPOSURE: Final = np.dtype(
+    [
+        ("sample", "<i8"),
+        ("time_s", "<f8"),
+        ("number", "<i8"),
+        ("camera", text_type(NAME_BYTES)),
+    ]
+)
 POSITION: Final = np.dtype(
     [
         ("time_s", "<f8"),
@@ -209,6 +239,7 @@ GROWING: Final[dict[str, "np.dtype[np.void]"]] = {
     "axes": AXIS,
     "positions": POSITION,
     "events": EVENT,
+    "exposures": EXPOSURE,
     "scales": SCALE,
     "chunks": CHUNK,
 }

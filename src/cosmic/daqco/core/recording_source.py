@@ -185,7 +185,11 @@ class RecordingSource:
         self.names = tuple(form.decoded(each) for each in self.channels["name"])
         self.complete = bool(file["complete"][()])
         # Backwards: what a row of `chunks` speaks of was written before it.
-        self.tables: dict[str, Table] = {name: file[name][:] for name in reversed(form.GROWING)}
+        self.tables: dict[str, Table] = {
+            # Files of before lack some tables.
+            name: file[name][:] if name in file else np.empty(0, dtype)
+            for name, dtype in reversed(form.GROWING.items())
+        }
         self.attributes = {name: file.attrs[name] for name in ("software", "start_utc", "start_s")}
         self.configuration = form.decoded(file["configuration"][()])
         self._volts = file["volts"]

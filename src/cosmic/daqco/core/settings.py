@@ -105,6 +105,15 @@ class OutputSettings(StrictModel):
         return self
 
 
+class CameraTriggerSettings(StrictModel):
+    """A camera that exposes on the sample clock of a board."""
+
+    camera: str = Field(min_length=1)
+    board: str = Field(min_length=1)
+    counter: str = Field(default="ctr0", pattern=r"^ctr\d+$")
+    rate_hz: float = Field(gt=0.0, le=1000.0)
+
+
 class DriverSettings(StrictModel):
     """One more driver, whose boards acquire beside those of the first."""
 
@@ -130,6 +139,8 @@ class DaqcoSettings(StrictModel):
     channel: Annotated[tuple[ChannelSettings, ...], Field(strict=False, min_length=1)]
     limit: Annotated[tuple[LimitSettings, ...], Field(strict=False)] = ()
     output: Annotated[tuple[OutputSettings, ...], Field(strict=False)] = ()
+
+    camera_trigger: CameraTriggerSettings | None = None
 
     @property
     def drivers(self) -> tuple[DriverSettings, ...]:

@@ -13,7 +13,8 @@ from cosmic.daqco.core.plan import AcquisitionPlan
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.hw.board_group import BoardGroup, ClockAgreement
 from cosmic.daqco.hw.interface import Board, BoardChunk
-from cosmic.frame.errors import DeviceError
+from cosmic.daqco.hw.pulses import PulsingBoard
+from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.frame.failure import FailurePolicy
 from cosmic.frame.threads import WorkerThread
 
@@ -58,6 +59,7 @@ class UDaqCore(WorkerThread):
     ) -> None:
         super().__init__("acquisition", policy, parent)
         self.plan = plan
+        self._each = dict(boards)
         self._boards = BoardGroup(
             [boards[name] for name in plan.boards], clocked, clock_ppm=clock_ppm
         )
@@ -88,10 +90,25 @@ class UDaqCore(WorkerThread):
             A board is gone or taken.
         """
         plan = self.plan
+        self._set_pulses()
         inputs = {board: plan.inputs(board) for board in plan.boards}
         self.rate_hz = self._boards.configure(inputs, plan.rate_hz, plan.chunk_samples)
         self._boards.start()
         self.start()
+
+    def _set_pulses(self) -> None:
+        train = self.plan.pulses
+        for name in self.plan.boards:
+            board = self._each[name]
+            wanted = train if train is not None and train.board == name else None
+            if isinstance(board, PulsingBoard):
+                board.pulse(wanted)
+            elif wanted is not None:
+                raise DeviceError(
+                    f"{name}: a {board.info.product} triggers no camera on its sample clock; "
+                    f"leave camera_trigger out, or name another board",
+                    fault=DeviceFault.UNSUPPORTED,
+                )
 
     @override
     def run_body(self) -> None:

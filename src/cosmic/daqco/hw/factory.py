@@ -9,6 +9,7 @@ from cosmic.daqco.hw.joined_boards import JoinedLibrary
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import DeviceFault, NotConnectedError
 from cosmic.frame.plugins import Kind, make
+from cosmic.twin.trigger_line import TriggerLine
 
 
 def make_library(
@@ -18,6 +19,7 @@ def make_library(
     scene_sources: Mapping[tuple[str, str], Source] | None = None,
     clock_sources: Mapping[str, str] | None = None,
     start_triggers: Mapping[str, str] | None = None,
+    trigger_lines: Mapping[str, TriggerLine] | None = None,
     options: Mapping[str, object] | None = None,
     seed: int = 0,
 ) -> BoardLibrary:
@@ -38,6 +40,8 @@ def make_library(
         ``{"Dev2": "/Dev1/ai/SampleClock"}``.
     start_triggers : mapping of str to str, or None
         Terminals whose rising edge starts a board: ``{"Dev1": "/Dev1/PFI0"}``.
+    trigger_lines : mapping of str to TriggerLine, or None
+        For "simulated": what the twin connects to the counters of boards.
     options : mapping, or None
         The backend's own settings.
 
@@ -47,7 +51,12 @@ def make_library(
         There is no such backend, or its options are wrong.
     """
     context = BoardContext(
-        clock or WALL, clock_sources or {}, scene_sources, seed, start_triggers or {}
+        clock or WALL,
+        clock_sources or {},
+        scene_sources,
+        seed,
+        start_triggers or {},
+        trigger_lines or {},
     )
     library: BoardLibrary = make(Kind.BOARD, backend, context, options or {})
     return library

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from cosmic.frame.clock import Clock
 from cosmic.frame.errors import DeviceError, DeviceFault
 from cosmic.frame.plugins import Backend
+from cosmic.twin.trigger_line import TriggerLine
 
 Volts = npt.NDArray[np.float64]
 
@@ -223,6 +224,8 @@ class BoardContext:
         Terminals whose rising edge starts a board, which waits for it: ``{"Dev1": "/Dev1/PFI0"}``.
     scene_sources : mapping of (str, str) to Source, or None
         What the twin connects to each board and input; None where there is no twin.
+    trigger_lines : mapping of str to TriggerLine
+        What the twin connects to counters of simulated boards, such as "Dev1/ctr0".
     seed : int
         Of what is random in simulated boards.
     """
@@ -232,6 +235,7 @@ class BoardContext:
     scene_sources: Mapping[tuple[str, str], Source] | None = None
     seed: int = 0
     start_triggers: Mapping[str, str] = field(default_factory=dict)
+    trigger_lines: Mapping[str, TriggerLine] = field(default_factory=dict)
 
 
 BoardBackend = Backend[BoardContext, BoardLibrary]

@@ -11,7 +11,9 @@ from typing_extensions import override
 
 from cosmic.daqco.hw.board_checks import check_chunk, check_inputs, check_rate
 from cosmic.daqco.hw.interface import Board, BoardChunk, BoardInfo, InputSettings
+from cosmic.daqco.hw.nidaqmx_pulses import CounterTask
 from cosmic.daqco.hw.nidaqmx_task import TERMINALS, InputTask, Run, TaskSettings
+from cosmic.daqco.hw.pulses import PulseTrain
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import CosmicError, DeviceError, DeviceFault, LimitError
 
@@ -52,6 +54,8 @@ class NidaqmxBoard(Board):
         self._clock = clock
         self._clock_source = clock_source
         self._start_trigger = start_trigger
+        self._train: PulseTrain | None = None
+        self._counter: CounterTask | None = None
         # Orders configure, start, stop and close; the driver's thread never takes it.
         self._lock = RLock()
         self._settings: TaskSettings | None = None
@@ -130,6 +134,7 @@ class NidaqmxBoard(Board):
             if run is None:
                 return
             run.end(None)
+            self._end_pulses()
             if self._task is not None and not self._task.stop():
                 self._drop_task()
 
@@ -140,11 +145,19 @@ class NidaqmxBoard(Board):
             self._drop_task()
             self._closed = True
 
+    def pulse(self, train: PulseTrain | None) -> None:
+        """Give these pulses with each acquisition from the next start on; None: none."""
+        self._train = train
+
     def _begin(self, run: Run) -> None:
         assert self._settings is not None
         if self._task is None:
             # The last one died with an error; a board that was lost may be back.
             self._task = InputTask(self._api, self._settings)
+        self._end_pulses()
+        if self._train is not None:
+            # Who counts the sample clock must listen before it begins.
+            self._counter = CounterTask(self._api, self._train)
         run.start_s = self._clock.now_s()
         try:
             self._task.start(run)
@@ -177,7 +190,13 @@ class NidaqmxBoard(Board):
                 self._run = None
                 self._drop_task()
 
+    def _end_pulses(self) -> None:
+        counter, self._counter = self._counter, None
+        if counter is not None:
+            counter.close()
+
     def _drop_task(self) -> None:
+        self._end_pulses()
         task, self._task = self._task, None
         if task is not None:
             task.close()

@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -18,12 +18,14 @@ from cosmic.daqco.hw.interface import (
     InputSettings,
     OverrunError,
 )
+from cosmic.daqco.hw.pulses import PulseTrain
 from cosmic.daqco.hw.sim_faults import BoardFaults
 from cosmic.daqco.hw.sim_outputs import Terminals
 from cosmic.daqco.hw.sim_signal import Signal
 from cosmic.frame.clock import WALL, Clock
 from cosmic.frame.errors import DeviceError, DeviceFault, NotConnectedError
 from cosmic.frame.time_scale import Horizon, Worker
+from cosmic.twin.trigger_line import TriggerLine
 
 logger = logging.getLogger(__name__)
 
@@ -81,6 +83,8 @@ class SimulatedBoard(Board):
         How much faster than it says its sample clock runs, in parts of a million.
     terminals : Terminals or None
         Of the library: where triggers come in, and where it says that it has started.
+    trigger_lines : mapping of str to TriggerLine, or None
+        What is connected to counters, by board and counter.
     start_trigger : str
         Terminal whose rising edge starts it; empty: it starts when told to.
     paced : bool
@@ -106,6 +110,7 @@ class SimulatedBoard(Board):
         clock_ppm: float = 0.0,
         terminals: Terminals | None = None,
         start_trigger: str = "",
+        trigger_lines: Mapping[str, TriggerLine] | None = None,
     ) -> None:
         self._info = info
         self._clock = clock
@@ -117,6 +122,8 @@ class SimulatedBoard(Board):
         self._fast = 1.0 + 1e-6 * clock_ppm
         self._terminals = terminals or Terminals()
         self._start_trigger = start_trigger
+        self._trigger_lines = trigger_lines or {}
+        self._train: PulseTrain | None = None
         self._setup: _Setup | None = None
         self._run: _Run | None = None
         self._closed = False
@@ -202,7 +209,14 @@ class SimulatedBoard(Board):
             self._faults.changed.notify_all()
         self._begun(run)
 
+    def pulse(self, train: PulseTrain | None) -> None:
+        """Give these pulses with each acquisition from the next start on; None: none."""
+        self._train = train
+
     def _begun(self, run: _Run) -> None:
+        line, train = self._line, self._train
+        if line is not None and train is not None:
+            line.drive(run.time_s(train.first_sample), train.every_samples / run.setup.true_hz)
         self._terminals.rise(f"/{self._info.name}/ai/StartTrigger", run.start_s)
 
     def _wait_until_due(self, timeout_s: float) -> _Run | None:
@@ -254,8 +268,16 @@ class SimulatedBoard(Board):
         """Acquire no more, and let the time run without this board; the lock is held."""
         if self._run is not None:
             self._run.horizon.close()
+            if self._line is not None:
+                self._line.rest(self._clock.now_s())
         self._run = None
         self._receiver.idle()
+
+    @property
+    def _line(self) -> TriggerLine | None:
+        train = self._train
+        place = f"{self._info.name}/{train.counter}" if train is not None else ""
+        return self._trigger_lines.get(place)
 
     def _check_overrun(self, run: _Run) -> None:
         setup = run.setup

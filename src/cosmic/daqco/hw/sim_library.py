@@ -24,6 +24,7 @@ from cosmic.daqco.hw.sim_signal import BoardSignal, Signal
 from cosmic.frame.clock import Clock
 from cosmic.frame.config import StrictModel
 from cosmic.frame.errors import ConfigError, DeviceFault, NotConnectedError
+from cosmic.twin.trigger_line import TriggerLine
 
 PCI_6229: Final = BoardInfo(
     name="Dev",
@@ -92,6 +93,8 @@ class SimulatedLibrary(BoardLibrary):
         From analogue outputs to inputs, such as ``{"Dev1/ao0": "Dev1/ai7"}``.
     start_triggers : mapping of str to str, or None
         Terminal whose rising edge starts a board.
+    trigger_lines : mapping of str to TriggerLine, or None
+        What is connected to counters, by board and counter: "Dev1/ctr0".
 
     Attributes
     ----------
@@ -117,10 +120,12 @@ class SimulatedLibrary(BoardLibrary):
         clock_ppm: float = 0.0,
         wires: Mapping[str, str] | None = None,
         start_triggers: Mapping[str, str] | None = None,
+        trigger_lines: Mapping[str, TriggerLine] | None = None,
     ) -> None:
         self._clock = clock
         self._clock_ppm = clock_ppm
         self._start_triggers = dict(start_triggers or {})
+        self._trigger_lines = dict(trigger_lines or {})
         self._sources = dict(sources or {})
         self._seed = seed
         self._infos = {
@@ -196,6 +201,7 @@ class SimulatedLibrary(BoardLibrary):
             clock_ppm=self._clock_ppm,
             terminals=self.terminals,
             start_trigger=self._start_triggers.get(name, ""),
+            trigger_lines=self._trigger_lines,
         )
 
     def open_outputs(self, board: str) -> SimulatedOutputs:
@@ -242,6 +248,7 @@ def _make(options: SimulatedOptions, context: BoardContext) -> BoardLibrary:
         clock_ppm=options.clock_ppm,
         wires=options.wires,
         start_triggers=context.start_triggers,
+        trigger_lines=context.trigger_lines,
     )
 
 

@@ -20,7 +20,7 @@ from cosmic.vico.core.image import Circumstances
 from cosmic.vico.core.lens_control import PeripheralThread
 from cosmic.vico.core.settings import CameraConfig, VicoSettings
 from cosmic.vico.core.zoom_scale import ZoomScale
-from cosmic.vico.hw.interface import CameraInfo, CameraLibrary, CameraSettings, Frame
+from cosmic.vico.hw.interface import CameraInfo, CameraLibrary, CameraSettings, Frame, Trigger
 from cosmic.vico.hw.peripherals import Lens, LensAxis, Light
 
 logger = logging.getLogger(__name__)
@@ -40,6 +40,9 @@ class VicoApplication(TaskApplication):
     ----------
     units : mapping of str to CameraUnit
         By the camera's name, in the order of the platform file.
+    sample_source : callable or None
+        Takes a camera and when an exposure of it began by the trigger; returns the number of the
+        sample at which it did and the time of that sample, or None. Returns at once.
     position_source : callable or None
         Returns where every axis was at a platform time; called in the cameras' threads.
     points : Points or None
@@ -65,6 +68,7 @@ class VicoApplication(TaskApplication):
         self.libraries = CameraLibraries(make_library)
         self.zoom_scale: ZoomScale = settings.lens.zoom_scale()
         self.position_source: Callable[[float], Mapping[str, float]] | None = None
+        self.sample_source: Callable[[str, float], tuple[int, float] | None] | None = None
         self.transform: CoordinateTransform | None = None
         self.found: tuple[CameraInfo, ...] = ()
         self.peripherals = PeripheralThread(
@@ -179,6 +183,7 @@ class VicoApplication(TaskApplication):
         zoom = history.counts_at(LensAxis.ZOOM, middle_s) if config.behind_lens else None
         focus = history.counts_at(LensAxis.FOCUS, middle_s) if config.behind_lens else None
         positions = self.position_source(middle_s) if self.position_source is not None else {}
+        sample, sample_s = self._sample(config, frame, settings)
         return Circumstances(
             exposure_s=settings.exposure_s,
             gain_db=settings.gain_db,
@@ -187,7 +192,17 @@ class VicoApplication(TaskApplication):
             light_percent=history.light_at(middle_s),
             scale_um_px=self._scale_um_px(config, zoom, settings.binning),
             positions=positions,
+            sample=sample,
+            sample_s=sample_s,
         )
+
+    def _sample(
+        self, config: CameraConfig, frame: Frame, settings: CameraSettings
+    ) -> tuple[int | None, float | None]:
+        """Return the sample at which the exposure began, and its time, where that is known."""
+        if settings.trigger is not Trigger.HARDWARE or self.sample_source is None:
+            return None, None
+        return self.sample_source(config.name, frame.exposed_s) or (None, None)
 
     def _scale_um_px(
         self, config: CameraConfig, zoom_counts: float | None, binning: int

@@ -88,6 +88,8 @@ class SentImage:
     light_percent: float | None
     scale_um_px: float | None
     positions: dict[str, float]
+    sample: int | None
+    sample_s: float | None
     plate: PlateMap | None
     plate_problem: str
 
@@ -118,6 +120,8 @@ class SentImage:
             known.light_percent,
             known.scale_um_px,
             dict(known.positions),
+            known.sample,
+            known.sample_s,
             plate,
             problem,
         )
@@ -141,6 +145,8 @@ class SentImage:
             self.light_percent,
             self.scale_um_px,
             self.positions,
+            self.sample,
+            self.sample_s,
         )
         return ReceivedImage(
             self.camera, frame, known, self.lost_before, self.plate, self.plate_problem

@@ -21,7 +21,15 @@ from cosmic.vico.core.settings import CameraConfig
 from cosmic.vico.core.vision.algorithms import make_chain
 from cosmic.vico.core.vision.chain import Analysis
 from cosmic.vico.core.vision_thread import VisionThread
-from cosmic.vico.hw.interface import Camera, CameraSettings, Frame, FrameStatus, PixelFormat, Roi
+from cosmic.vico.hw.interface import (
+    Camera,
+    CameraSettings,
+    Frame,
+    FrameStatus,
+    PixelFormat,
+    Roi,
+    Trigger,
+)
 
 logger = logging.getLogger(__name__)
 
@@ -214,5 +222,5 @@ class CameraUnit:
             roi=roi,
             binning=config.binning,
             pixel_format=pixel_format if pixel_format in ranges.pixel_formats else now.pixel_format,
-            trigger=now.trigger,
+            trigger=now.trigger if config.trigger is None else Trigger(config.trigger),
         )

@@ -20,6 +20,10 @@ class Circumstances:
         Of the zoom position, for one pixel of this frame (binning counted).
     positions : mapping of str to float
         Stage positions by axis, um or degrees.
+    sample : int or None
+        Number of the sample at which its exposure began, where the sample clock triggered it.
+    sample_s : float or None
+        Platform time of that sample.
     """
 
     exposure_s: float | None = None
@@ -29,6 +33,8 @@ class Circumstances:
     light_percent: float | None = None
     scale_um_px: float | None = None
     positions: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    sample: int | None = None
+    sample_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

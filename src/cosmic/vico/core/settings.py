@@ -97,6 +97,8 @@ class CameraConfig(StrictModel):
         Of an unbinned pixel, for a camera with a lens of its own.
     exposure_s, gain_db, rate_hz : float or None
         None: as the camera has it.
+    trigger : str or None
+        What starts an exposure; None: as the camera has it.
     algorithms : tuple of str
         Links of the chain of machine vision that are on at the start.
     """
@@ -112,6 +114,7 @@ class CameraConfig(StrictModel):
     rate_hz: float | None = Field(default=None, gt=0.0)
     binning: int = Field(default=1, ge=1, le=16)
     pixel_format: Literal["Mono8", "Mono10", "Mono12", "Mono16", "RGB8"] = "Mono8"
+    trigger: Literal["free run", "software", "hardware"] | None = None
     algorithms: Annotated[tuple[str, ...], Field(strict=False)] = ("focus",)
 
     @property

@@ -17,6 +17,7 @@ from cosmic.twin.optics.drawing import Drawing
 from cosmic.twin.optics.optics import Optics
 from cosmic.twin.optics.settings import SensorSettings
 from cosmic.twin.scene import Scene
+from cosmic.twin.trigger_line import TriggerLine
 from cosmic.vico.hw.base_camera import BaseCamera, BaseCameraLibrary, Sensor, check_values
 from cosmic.vico.hw.interface import (
     CameraBackend,
@@ -72,6 +73,10 @@ class CameraRun:
     ----------
     buffers : int
         How many frames may wait or be under way.
+    line : TriggerLine or None
+        What triggers it, with `Trigger.HARDWARE`.
+    busy_s : callable
+        Returns how long after one exposure's begin the next can begin.
 
     Attributes
     ----------
@@ -79,13 +84,24 @@ class CameraRun:
         Frames that found no buffer free when their exposure began.
     """
 
-    def __init__(self, settings: CameraSettings, now_s: float, buffers: int) -> None:
+    def __init__(
+        self,
+        settings: CameraSettings,
+        now_s: float,
+        buffers: int,
+        *,
+        line: TriggerLine | None = None,
+        busy_s: Callable[[CameraSettings], float] = lambda _settings: 0.0,
+    ) -> None:
         self.settings = settings
         self.underrun = 0
         self._buffers = buffers
         self._waiting: deque[Exposure] = deque()
         self._next_id = 0
         self._next_s = now_s if settings.trigger is Trigger.FREE_RUN else math.inf
+        self._line = line if settings.trigger is Trigger.HARDWARE else None
+        self._busy_s = busy_s
+        self._free_s = now_s
 
     def first(self, now_s: float) -> Exposure | None:
         """Return the frame that is next to be received, or None before its exposure began."""
@@ -95,7 +111,7 @@ class CameraRun:
     @property
     def next_exposed_s(self) -> float:
         """When the next exposure begins that is not under way."""
-        return self._next_s
+        return self._next_s if self._line is None else self._line.next_edge_s(self._free_s)
 
     def take(self) -> None:
         """Give the buffer of the first frame free."""
@@ -121,6 +137,10 @@ class CameraRun:
         self._begin(max(now_s, last_s + busy_s))
 
     def _advance(self, now_s: float) -> None:
+        while self._line is not None and (edge_s := self.next_exposed_s) <= now_s:
+            self._begin(edge_s)
+            # What comes before it can expose again is not heard.
+            self._free_s = edge_s + self._busy_s(self.settings)
         while self._next_s <= now_s:
             if len(self._waiting) >= self._buffers:
                 # Nobody receives: nothing but the count changes.
@@ -207,6 +227,8 @@ class SimulatedCamera(BaseCamera):
     ----------
     view : str
         What it sees, by the name that `Optics` has for it.
+    line : TriggerLine or None
+        What its trigger input is wired to.
 
     Notes
     -----
@@ -223,8 +245,10 @@ class SimulatedCamera(BaseCamera):
         faults: CameraFaults,
         *,
         closed: Callable[[BaseCamera], None],
+        line: TriggerLine | None = None,
     ) -> None:
         super().__init__(info, clock, closed=closed)
+        self._line = line
         self._optics = optics
         self._view = view
         self._faults = faults
@@ -256,7 +280,10 @@ class SimulatedCamera(BaseCamera):
 
     @override
     def _read_ranges(self) -> CameraRanges:
-        return ranges_of(self._optics.settings.camera, self._settings)
+        ranges = ranges_of(self._optics.settings.camera, self._settings)
+        if self._line is None:
+            return ranges
+        return replace(ranges, triggers=(*ranges.triggers, Trigger.HARDWARE))
 
     @override
     def _sensor(self, binning: int) -> Sensor:
@@ -285,7 +312,13 @@ class SimulatedCamera(BaseCamera):
             self._last = None
             # The receiver is late by the wall: on a fast clock more frames come meanwhile.
             buffers = round(BUFFERS * max(1.0, self._clock.rate))
-            self._run = CameraRun(self._settings, self._clock.now_s(), buffers)
+            self._run = CameraRun(
+                self._settings,
+                self._clock.now_s(),
+                buffers,
+                line=self._line,
+                busy_s=self._busy_s,
+            )
 
     @override
     def _fetch(self, wait_s: float) -> Frame | None:
@@ -302,9 +335,7 @@ class SimulatedCamera(BaseCamera):
         with self._faults.changed:
             if self._run is None:
                 raise self._error("trigger: it takes no images; start it", DeviceFault.STATE)
-            settings = self._settings
-            busy_s = max(settings.exposure_s, self._readout_s(settings.roi))
-            self._run.expose(self._clock.now_s(), busy_s)
+            self._run.expose(self._clock.now_s(), self._busy_s(self._settings))
             self._faults.changed.notify_all()
 
     @override
@@ -365,6 +396,9 @@ class SimulatedCamera(BaseCamera):
         transfer_s = self._optics.settings.camera.transfer_s
         way_s = settings.exposure_s + self._readout_s(settings.roi) + transfer_s
         return exposure.exposed_s + way_s + late_s
+
+    def _busy_s(self, settings: CameraSettings) -> float:
+        return max(settings.exposure_s, self._readout_s(settings.roi))
 
     def _readout_s(self, roi: Roi) -> float:
         return self._optics.settings.camera.readout_s * roi.height_px / self._info.sensor_px[1]
@@ -433,6 +467,7 @@ class SimulatedCameraLibrary(BaseCameraLibrary[SimulatedCamera]):
         if optics is None:
             raise ValueError("a scene of bare stages has nothing for cameras to see")
         self._optics = optics
+        self._line_of = scene.trigger_line_of if isinstance(scene, Scene) else lambda _key: None
         super().__init__(clock)
         self.faults = CameraFaults(seed)
         self._views = {f"Sim{number}": view for number, view in enumerate(optics.views, start=1)}
@@ -467,6 +502,7 @@ class SimulatedCameraLibrary(BaseCameraLibrary[SimulatedCamera]):
             self._clock,
             self.faults,
             closed=self._forget,
+            line=self._line_of(key),
         )
 
     @override

@@ -23,6 +23,7 @@ _CIRCUMSTANCES: Final = (
     "focus_counts",
     "light_percent",
     "scale_um_px",
+    "sample_s",
 )
 COLUMNS: Final = (
     "index",
@@ -32,6 +33,7 @@ COLUMNS: Final = (
     "exposed_s",
     "utc",
     *_CIRCUMSTANCES,
+    "sample",
     "lost_before",
     "dropped",
     "status",
@@ -84,7 +86,7 @@ class SideRow:
         """Return the values of `COLUMNS`, empty where nobody knows."""
         found: dict[str, object] = {name: getattr(self, name) for name in COLUMNS[:5]}
         found["utc"] = self.utc.isoformat(timespec="microseconds") if self.utc else None
-        found |= {name: getattr(self.circumstances, name) for name in _CIRCUMSTANCES}
+        found |= {name: getattr(self.circumstances, name) for name in (*_CIRCUMSTANCES, "sample")}
         found |= {name: getattr(self, name) for name in COLUMNS[-5:]}
         return {name: _text(value) for name, value in found.items()}
 
@@ -121,7 +123,11 @@ def row_from(texts: Mapping[str, str], axes: Mapping[str, str]) -> SideRow:
     """
     try:
         positions = {axis: float(texts[column]) for column, axis in axes.items() if texts[column]}
-        known = {name: float(texts[name]) if texts[name] else None for name in _CIRCUMSTANCES}
+        # Side files of before lack what the sample clock says.
+        known = {
+            name: float(told) if (told := texts.get(name)) else None for name in _CIRCUMSTANCES
+        }
+        sample = int(told) if (told := texts.get("sample")) else None
         return SideRow(
             frame_id=int(texts["frame_id"]),
             device_ns=int(texts["device_ns"]) if texts["device_ns"] else None,
@@ -131,7 +137,9 @@ def row_from(texts: Mapping[str, str], axes: Mapping[str, str]) -> SideRow:
             status=texts["status"],
             camera=texts["camera"],
             pixel_format=texts["pixel_format"],
-            circumstances=Circumstances(**known, positions=MappingProxyType(positions)),
+            circumstances=Circumstances(
+                **known, positions=MappingProxyType(positions), sample=sample
+            ),
             lost_before=int(texts["lost_before"]),
             dropped=int(texts["dropped"]),
             index=int(texts["index"]),
