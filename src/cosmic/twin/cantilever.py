@@ -33,6 +33,10 @@ HEAVIEST: Final = 2.6
 STEEPEST_RAD: Final = 1.15
 """Heading at the contact up to which a curve is laid out."""
 
+RIGID_UN_UM: Final = 1e6
+HARDEST_UN: Final = 1500.0
+"""Beyond any sensor's range; more is not laid out where tools give way."""
+
 SHORTEST_UM: Final = 4.0
 ROUNDS: Final = 7
 NUDGE_RAD: Final = 1e-5
@@ -45,13 +49,14 @@ BEYOND: Final = 1.9
 class _Table:
     """What a push meets, by load (rows) and place of the probe (columns), without units.
 
-    Deflection is a part of the length, force is in EI/length^2, the arc from the jaws' tip to the
+    Deflection is a part of the length, forces are in EI/length^2, the arc from the jaws' tip to the
     contact is a part of the length; length counts from the clamp to the probe.
     """
 
     log_lengths: Floats
     deflections: Floats
     forces: Floats
+    alongs: Floats
     arcs: Floats
 
 
@@ -76,6 +81,8 @@ class Cantilever:
         By how much the clamp turns under a moment.
     side_un_um : float
         Stiffness of the jaws across; inf: rigid.
+    probe_un_um : float
+        Stiffness of the probe along the jaws; inf: rigid.
     stiffness : callable, optional
         Arc lengths from the jaws' tip to bending stiffness as a part of `ei_un_um2`.
     """
@@ -91,10 +98,12 @@ class Cantilever:
         friction: float = 0.0,
         turn_rad_un_um: float = 0.0,
         side_un_um: float = math.inf,
+        probe_un_um: float = math.inf,
         stiffness: Callable[[Floats], Floats] | None = None,
     ) -> None:
         self._ei, self._depth, self._radius = ei_un_um2, depth_um, radius_um
         self._friction, self._turn, self._side = friction, turn_rad_un_um, side_un_um
+        self._probe = probe_un_um
         self._stiffness = stiffness
         steps = np.hypot(np.diff(abscissas_um), np.diff(asides_um))
         self._free_um = float(steps.sum())
@@ -118,17 +127,18 @@ class Cantilever:
         weights, columns = _between(table.log_lengths, math.log(length))
         deflections = table.deflections[:, columns] @ weights * length
         forces = table.forces[:, columns] @ weights * (self._ei / length**2)
+        alongs = table.alongs[:, columns] @ weights * (self._ei / length**2)
         arcs = table.arcs[:, columns] @ weights * length
         last = _last(deflections, forces, arcs, self._free_um)
         if last < len(arcs) and last > 0 and arcs[last - 1] < self._free_um < arcs[last]:
             # It slides off on its way to the next load.
             part = (self._free_um - arcs[last - 1]) / (arcs[last] - arcs[last - 1])
-            for values in (deflections, forces):
+            for values in (deflections, forces, alongs):
                 values[last] = values[last - 1] + part * (values[last] - values[last - 1])
             last += 1
         last = max(last, 1)
-        deflections[0] = forces[0] = 0.0
-        return PushCurve(deflections[:last], forces[:last], sensor_un_um)
+        deflections[0] = forces[0] = alongs[0] = 0.0
+        return PushCurve(deflections[:last], forces[:last], sensor_un_um, alongs[:last])
 
     @cached_property
     def _table(self) -> _Table:
@@ -139,23 +149,24 @@ class Cantilever:
             SHORTEST_UM + self._depth, float(np.max(pushed.x[0])) + self._depth, PLACES
         )
         rows = [self._row(pushed, number, np.log(lengths)) for number in range(LOADS)]
-        y, forces, arcs = (np.array(each) for each in zip(*rows, strict=True))
-        return _Table(np.log(lengths), (y[0] - y) / lengths, forces, arcs / lengths)
+        y, forces, alongs, arcs = (np.array(each) for each in zip(*rows, strict=True))
+        return _Table(np.log(lengths), (y[0] - y) / lengths, forces, alongs, arcs / lengths)
 
     def _row(self, pushed: "_Pushed", number: int, wanted: Floats) -> tuple[Floats, ...]:
-        """Return height, force and arc of one load at the places wanted; nan where none is."""
+        """Return height, forces and arc of one load at the places wanted; nan where none is."""
         good = pushed.met[number]
         x = pushed.x[number] + self._depth
         rises = good & (x > np.maximum.accumulate(np.concatenate([[0.0], x[:-1]])))
         last = len(x) if rises.all() else int(rises.argmin())
         if last < 4:
-            return tuple(np.full((3, len(wanted)), math.nan))
+            return tuple(np.full((4, len(wanted)), math.nan))
         logs = np.log(x[:last])
         length = np.exp(wanted)
         out = (wanted < logs[0] - 0.2) | (wanted > logs[-1] + 1e-9)
         values = [
             _smooth(logs, pushed.y[number, :last], wanted),
             _smooth(logs, pushed.force[number, :last] * x[:last] ** 2, wanted) / self._ei,
+            _smooth(logs, pushed.along[number, :last] * x[:last] ** 2, wanted) / self._ei,
             _smooth(logs, pushed.arcs[:last] / x[:last], wanted) * length,
         ]
         return tuple(np.where(out, math.nan, each) for each in values)
@@ -164,6 +175,10 @@ class Cantilever:
         """Solve for all places of contact along the fibre and all loads."""
         lengths = places + self._depth
         normal = loads[:, None] * (self._ei / lengths**2)
+        if self._probe < RIGID_UN_UM or self._turn:
+            # Short pieces bear more than any probe does, and a soft one would give way by more
+            # than they are long.
+            normal = normal / (1.0 + normal / HARDEST_UN)
         nodes = np.linspace(places, np.full_like(places, -self._depth), CELLS + 1)
         x, y = np.interp(nodes, self._s, self._x), np.interp(nodes, self._s, self._y)
         chords = x[:-1] - x[1:], y[:-1] - y[1:]
@@ -180,10 +195,12 @@ class Cantilever:
             turn = turn - np.clip(step, -0.5, 0.5)
         missed, px, py, felt = self._back(turn[None], normal, heading, chords, bends)
         theta = heading + turn
+        along = -normal * (np.sin(theta) + self._friction * np.cos(theta))
         return _Pushed(
-            x=px[0] - self._depth - self._radius * np.sin(theta),
+            x=px[0] - self._depth - self._radius * np.sin(theta) - along / self._probe,
             y=py[0] + self._radius * np.cos(theta) - felt[0] / self._side,
             force=felt[0],
+            along=along,
             arcs=places,
             met=(np.abs(missed[0]) < MET_RAD) & (np.abs(theta) < STEEPEST_RAD),
         )
@@ -222,11 +239,12 @@ class Cantilever:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pushed:
-    """Middle of the probe, um from the jaws' tip, and force across, uN; by load and place."""
+    """Where the probe's holder is, um from the jaws' tip, and forces, uN; by load and place."""
 
     x: Floats
     y: Floats
     force: Floats
+    along: Floats
     arcs: Floats
     met: npt.NDArray[np.bool_]
 

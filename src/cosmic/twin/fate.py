@@ -2,7 +2,7 @@
 
 import math
 import random
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from cosmic.twin.force_settings import ContactSettings
 from cosmic.twin.handling_settings import HandlingSettings
@@ -30,6 +30,10 @@ class Fate:
         Strain at the clamp at which it breaks, and the grip gives way.
     loosen_um : float
         By how much.
+    grip_un : float
+        Pull at which it slips out while it is lifted.
+    roll_rad : float
+        By how much it rolls in the jaws.
     """
 
     depth_um: float
@@ -41,10 +45,17 @@ class Fate:
     break_strain: float = math.inf
     loosen_strain: float = math.inf
     loosen_um: float = 0.0
+    grip_un: float = math.inf
+    roll_rad: float = 0.0
 
 
 def draw_fate(
-    handling: HandlingSettings, contact: ContactSettings, key: str, *, faults: bool
+    handling: HandlingSettings,
+    contact: ContactSettings,
+    key: str,
+    *,
+    faults: bool,
+    grasps: int = 0,
 ) -> Fate:
     """Return the fate of one grasp.
 
@@ -54,11 +65,23 @@ def draw_fate(
         Names seed, fibre and which grasp of it this is: the same key, the same fate.
     faults : bool
         Whether anything goes wrong by chance.
+    grasps : int
+        How often the fibre was taken before.
     """
     chance = random.Random(f"grasp {key}")
     depth = max(chance.gauss(contact.clamp_depth_um, contact.clamp_depth_spread_um), 0.0)
+    jaws = random.Random(f"jaws {key}")
+    deep, grip, rolls, roll = jaws.gauss(0, 1), jaws.gauss(0, 1), jaws.random(), jaws.random()
+    if contact.clamp_depth_sigma_ln:
+        depth = contact.clamp_depth_um * math.exp(contact.clamp_depth_sigma_ln * deep)
+    held = Fate(
+        depth + contact.clamp_depth_per_grasp_um * grasps,
+        break_strain=handling.break_strain,
+        grip_un=contact.jaw_grip_un * math.exp(contact.jaw_grip_sigma_ln * grip),
+        roll_rad=math.pi * roll if rolls < contact.roll_share else 0.0,
+    )
     if not faults:
-        return Fate(depth, break_strain=handling.break_strain)
+        return held
     # Every number is drawn, needed or not, so that another rate changes nothing else.
     missed, slips, drops, sticks = (chance.random() for _ in range(4))
     lifted, loosens, breaks = (chance.random() for _ in range(3))
@@ -69,8 +92,8 @@ def draw_fate(
     steep = chance.choice((-1.0, 1.0)) * chance.uniform(0.6, 1.4) * handling.out_of_plane_deg
     if lifted < handling.out_of_plane:
         tilt = steep
-    return Fate(
-        depth,
+    return replace(
+        held,
         missed=missed < handling.missed_grasp,
         slip_at_um=slip_at if slips < handling.slip_in_lift else math.inf,
         drop_after_um=drop_after if drops < handling.drop else math.inf,

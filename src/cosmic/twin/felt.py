@@ -19,12 +19,16 @@ class Push:
         From the jaws' tip to the probe.
     deflection_um : float
         Of the fibre at the probe.
+    along_un, up_un : float
+        Load on the probe along the world's x and z.
     """
 
     fibre: int
     force_un: float
     abscissa_um: float
     deflection_um: float
+    along_un: float = 0.0
+    up_un: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

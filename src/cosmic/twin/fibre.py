@@ -11,11 +11,14 @@ import numpy.typing as npt
 
 from cosmic.twin.cantilever import Cantilever
 from cosmic.twin.centre_line import CentreLine
+from cosmic.twin.climate import STANDARD_RH, STILL_AIR, Climate
 from cosmic.twin.fate import Fate
 from cosmic.twin.force_settings import ContactSettings, FibreSettings
 from cosmic.twin.grip import Free, Hold, make_hold
 from cosmic.twin.handling_settings import HandlingSettings
+from cosmic.twin.inelastic import Inelastic
 from cosmic.twin.kinematics import Point
+from cosmic.twin.measurand import compliance_weights
 from cosmic.twin.rod import (
     EI_UN_UM2_PER_N_M2,
     UN_PER_N,
@@ -24,7 +27,7 @@ from cosmic.twin.rod import (
     tension_un,
 )
 from cosmic.twin.rubbing import RubbedPush, Rubbing
-from cosmic.twin.stiffness import StiffnessProfile
+from cosmic.twin.section import Section
 from cosmic.twin.tools import Tool
 
 Floats = npt.NDArray[np.float64]
@@ -36,6 +39,18 @@ SPAN_STEP_UM: Final = 0.02
 
 NEAREST_UM: Final = 5.0
 """Nearer to a clamp the jaws are in the way."""
+
+STALE_PART: Final = 0.003
+"""A stiffness that changed by so much with the humidity is solved for anew."""
+
+NEVER_YIELDS: Final = 1.0
+JUMP_UM: Final = 0.35
+"""From so far 1 uC/m2 has a fibre of 30 um and 1 uN/um jump: 9 um for 1 mm of 5e-11 N m2."""
+
+IMAGE_UN_UM_MM: Final = 0.08
+"""Pull of 1 uC/m2 on 1 mm that is 1 um above the plate, uN: its weight, 2 nN, at 40 um."""
+
+NOT_INELASTIC: Final = Inelastic(1.0, slope=0.0, yield_curvature=math.inf)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +134,8 @@ class Fibre:
         Of everything that happens to it.
     line : CentreLine or None
         Its shape; None: as the settings have it.
+    climate : Climate
+        The air around it.
     """
 
     def __init__(
@@ -129,6 +146,7 @@ class Fibre:
         handling: HandlingSettings,
         seed: int,
         line: CentreLine | None = None,
+        climate: Climate = STILL_AIR,
     ) -> None:
         self.number = number
         self.settings = settings
@@ -145,13 +163,11 @@ class Fibre:
         self.falls = 0
         self._contact = contact
         self._rubbing = Rubbing(contact.friction_turn_um)
-        self._profile: StiffnessProfile | None = None
-        if settings.ei_variation:
-            self._profile = StiffnessProfile(
-                settings.length_um, settings.ei_variation, settings.ei_length_um, self.key
-            )
-        self._cantilevers: tuple[Free, float, tuple[Cantilever, ...]] | None = None
+        self._climate = climate
+        self._section = Section(settings, self.key)
+        self._solved: _Solved | None = None
         self._curves: tuple[float, tuple[PushCurve, ...]] | None = None
+        self._inelastic: Inelastic | None = None
         energy = handling.adhesion_un * math.exp(
             handling.adhesion_sigma_ln * random.Random(f"adhesion {self.key}").gauss(0.0, 1.0)
         )
@@ -164,6 +180,7 @@ class Fibre:
         """Have a gripper hold the fibre at a position along it."""
         self.holds[tool.name] = make_hold(self.line_um, at_um, outwards, tool.towards, fate)
         self.carried = None
+        self._solved = self._inelastic = None
 
     def lay(self, pose: PlatePose) -> None:
         """Put it on the plate."""
@@ -249,28 +266,123 @@ class Fibre:
 
     # ------------------------------------------------------------------ what the probe feels
 
+    def ei_un_um2(self, time_s: float) -> float:
+        """Return its bending stiffness flat way in the air of now."""
+        dry = 1.0 + self.settings.ei_per_rh * (self._climate.rh_percent(time_s) - STANDARD_RH)
+        return self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2 * max(dry, 0.05)
+
+    def span_ei_n_m2(self, abscissa_um: float, time_s: float) -> float:
+        """Return what a bending test at an abscissa is about.
+
+        The flexural rigidity in the plane of bending, averaged from the clamp to the contact as
+        compliance weighs it, in the air of now.
+        """
+        hold = next(iter(self.holds.values()))
+        places, weights = compliance_weights(hold, abscissa_um)
+        across, _, _ = self._section.flexibility(places, hold.fate.roll_rad)
+        mean = float(weights @ across) / float(weights.sum())
+        return self.ei_un_um2(time_s) / (EI_UN_UM2_PER_N_M2 * mean)
+
+    @property
+    def orientation_deg(self) -> float:
+        """By how much its section is turned in the plane of bending where it is held."""
+        hold = next(iter(self.holds.values()))
+        angle = self._section.angle_rad(np.array(hold.at_um), hold.fate.roll_rad)
+        return math.degrees(float(angle))
+
+    @property
+    def seen_um(self) -> float:
+        """How wide it looks from above, and how far it reaches in the plane of bending."""
+        if not self.holds:
+            return self.settings.width_um
+        hold = next(iter(self.holds.values()))
+        return self._section.seen_um(hold.at_um, hold.fate.roll_rad)
+
     def strain(self, abscissa_um: float, force_un: float) -> float:
         """Return the strain at the clamp under a force there."""
+        hold = next(iter(self.holds.values()))
         moment = abs(force_un) * self._arm_um(abscissa_um)
         stiffness = self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2
-        return 0.5 * self.settings.thickness_um * moment / stiffness
+        if not self._section.even:
+            across, _, _ = self._section.flexibility(np.array([hold.at_um]), hold.fate.roll_rad)
+            stiffness /= float(across[0])
+        thick = self._section.thickness_um(hold.at_um, hold.fate.roll_rad)
+        return 0.5 * thick * moment / stiffness
+
+    def back_um(self, abscissa_um: float) -> float:
+        """Return how far it stands back there by what crept or set."""
+        return (
+            0.0 if self._inelastic is None else self._inelastic.offset_um(self._arm_um(abscissa_um))
+        )
+
+    def follow(self, time_s: float, force_un: float, abscissa_um: float) -> None:
+        """Take note of the probe's force from now on: it creeps, and may set."""
+        inelastic = self._inelastic
+        if inelastic is None and not force_un:
+            return
+        if inelastic is None:
+            inelastic = self._inelastic = self._new_inelastic(time_s)
+        if inelastic is not NOT_INELASTIC:
+            ei = self.ei_un_um2(time_s) if self._solved is None else self._solved.in_plane_un_um2
+            inelastic.follow(time_s, force_un, self._arm_um(abscissa_um), ei)
+
+    @property
+    def restless_s(self) -> float:
+        """For how long nothing changes that the probe feels, though all stands still."""
+        return math.inf if self._inelastic is None else self._inelastic.restless_s
+
+    def _new_inelastic(self, time_s: float) -> Inelastic:
+        hold = next(iter(self.holds.values()))
+        each = self.settings
+        slope = each.relaxation_per_decade * self._climate.creep(time_s)
+        if not slope and each.yield_strain >= NEVER_YIELDS:
+            return NOT_INELASTIC
+        thick = self._section.thickness_um(hold.at_um, hold.fate.roll_rad)
+        curvature = 2.0 * each.yield_strain / thick
+        length = hold.free.length_um + hold.depth_um
+        made = Inelastic(length, slope=min(slope, 0.3), yield_curvature=curvature)
+        made.follow(time_s, 0.0, length, 1.0)
+        return made
+
+    def jump_um(self, abscissa_um: float, time_s: float) -> float:
+        """Return from how far its charge has it jump to a probe there, and stay."""
+        if not self.settings.charge_uc_m2:
+            return 0.0
+        charge = self.settings.charge_uc_m2 * self._climate.charge(time_s)
+        stiffness = 3.0 * self.ei_un_um2(time_s) / self._arm_um(abscissa_um) ** 3
+        from_um = JUMP_UM * abs(charge) * self.settings.width_um / 30.0 / math.sqrt(stiffness)
+        return min(from_um, 0.9 * self._contact.pull_off_un / stiffness)
+
+    def pull_un(self, height_um: float, time_s: float) -> float:
+        """Return how hard the plate holds it back that is lifted so high at one end.
+
+        It peels off with the force that bends a strip so far, and the pull-off of all of it is the
+        most there is; its charge pulls it down besides.
+        """
+        each = self.settings
+        if not (each.adhesion_un_mm or each.charge_uc_m2):
+            return 0.0
+        free_mm = 1e-3 * next(iter(self.holds.values())).free.length_um
+        most = each.adhesion_un_mm * free_mm * self._climate.adhesion(time_s)
+        height = max(height_um, 0.1)
+        peeled = max(self.peeled_um(height), 1.0)
+        bent = 12.0 * each.ei_n_m2 * EI_UN_UM2_PER_N_M2 * height / peeled**3
+        charge = each.charge_uc_m2 * self._climate.charge(time_s)
+        return min(bent, most) + IMAGE_UN_UM_MM * charge**2 * free_mm / max(height, 0.5)
 
     def push(
-        self, line: Line, abscissa_um: float, travel_um: float, *, edge_um: float, sensor: float
+        self,
+        line: Line,
+        abscissa_um: float,
+        travel_um: float,
+        probe: "ProbeShape",
+        time_s: float,
     ) -> PushCurve | RubbedPush:
-        """Return force over travel for a probe at an abscissa, which has come so far.
-
-        Parameters
-        ----------
-        edge_um : float
-            Radius of the probe's edge.
-        sensor : float
-            Stiffness of the sensor, uN/um.
-        """
+        """Return force over travel for a probe at an abscissa, which has come so far."""
         (hold, *more) = self.holds.values()
         if line.free is not None:
             part = self._rubbing.follow(travel_um)
-            growing, *falling = self._held_at_one_end(hold, line.free, abscissa_um, edge_um, sensor)
+            growing, *falling = self._held_at_one_end(hold, line.free, abscissa_um, probe, time_s)
             return RubbedPush(growing, falling[0], part) if falling else growing
         distance = _rounded(line.reach_um + hold.depth_um + more[0].depth_um)
         return held_at_both_ends(
@@ -280,7 +392,7 @@ class Fibre:
             distance_um=distance,
             slack_um=_rounded(self.slack_um(line.reach_um)),
             gripper_un_um=self._contact.gripper_un_um,
-            sensor_un_um=sensor,
+            sensor_un_um=probe.sensor_un_um,
         )
 
     def _arm_um(self, abscissa_um: float) -> float:
@@ -288,43 +400,92 @@ class Fibre:
         return max(abscissa_um, NEAREST_UM) + next(iter(self.holds.values())).depth_um
 
     def _held_at_one_end(
-        self, hold: Hold, free: Free, abscissa_um: float, edge_um: float, sensor: float
+        self, hold: Hold, free: Free, abscissa_um: float, probe: "ProbeShape", time_s: float
     ) -> tuple[PushCurve, ...]:
         """Return the curve, or with friction those of a growing and of a falling push."""
-        solved = self._cantilevers
-        if solved is None or solved[0] is not free or solved[1] != hold.depth_um:
-            made = self._solved(hold, free, edge_um)
-            solved = self._cantilevers = free, hold.depth_um, made
+        solved, ei = self._solved, self.ei_un_um2(time_s)
+        if (
+            solved is None
+            or solved.free is not free
+            or solved.depth_um != hold.depth_um
+            or abs(ei / solved.ei_un_um2 - 1.0) > STALE_PART
+        ):
+            solved = self._solved = self._solve(hold, free, probe, ei)
             self._curves = None
         place = _rounded(max(abscissa_um, NEAREST_UM))
         if self._curves is None or self._curves[0] != place:
-            curves = tuple(each.curve(place, sensor_un_um=sensor) for each in solved[2])
+            shear = self._section.shear_um_un(
+                place + hold.depth_um, solved.thickness_um, solved.in_plane_un_um2
+            )
+            spring = 1.0 / (1.0 / probe.sensor_un_um + shear)
+            curves = tuple(each.curve(place, sensor_un_um=spring) for each in solved.cantilevers)
             self._curves = place, curves
         return self._curves[1]
 
-    def _solved(self, hold: Hold, free: Free, edge_um: float) -> tuple[Cantilever, ...]:
-        friction, profile = self._contact.probe_friction, self._profile
-        stiffness = None
-        if profile is not None:
-            begin, outwards = hold.at_um, hold.outwards
+    def _solve(self, hold: Hold, free: Free, probe: "ProbeShape", ei: float) -> "_Solved":
+        friction, section, roll = self._contact.probe_friction, self._section, hold.fate.roll_rad
+        begin, outwards = hold.at_um, hold.outwards
+        near = begin + outwards * np.linspace(0.0, 0.5 * free.length_um, 40)
+        across, askew, up = section.flexibility(near, roll)
+        # Friction holds it up or down, as far as it can, where it would give way askew.
+        held = min(max(float(askew.mean() / up.mean()), -friction), friction)
+        in_plane = ei / float(across.mean())
+
+        def cantilever(rubbed: float) -> Cantilever:
+            lift = math.copysign(held, held * rubbed) if rubbed else 0.0
 
             def stiffness(along_um: Floats) -> Floats:
-                return profile(begin + outwards * along_um)
+                across, askew, _ = section.flexibility(begin + outwards * along_um, roll)
+                return np.asarray(1.0 / np.maximum(across - lift * askew, 0.05 * across))
 
-        return tuple(
-            Cantilever(
+            return Cantilever(
                 free.abscissas_um,
                 free.asides_um,
-                ei_un_um2=self.settings.ei_n_m2 * EI_UN_UM2_PER_N_M2,
+                ei_un_um2=ei,
                 depth_um=hold.depth_um,
-                radius_um=edge_um + self.settings.width_um / 2.0,
+                radius_um=probe.edge_um + self.seen_um / 2.0,
                 friction=rubbed,
                 turn_rad_un_um=math.radians(self._contact.jaw_turn_deg) * 1e-3,
                 side_un_um=self._contact.jaw_side_un_um,
-                stiffness=stiffness,
+                probe_un_um=self._contact.probe_side_un_um,
+                stiffness=None if section.even else stiffness,
             )
-            for rubbed in ((friction, -friction) if friction else (0.0,))
+
+        return _Solved(
+            free,
+            hold.depth_um,
+            ei,
+            in_plane,
+            section.thickness_um(hold.at_um, roll),
+            held,
+            tuple(cantilever(each) for each in ((friction, -friction) if friction else (0.0,))),
         )
+
+    @property
+    def up_part(self) -> float:
+        """Part of the force across that pushes the probe up or down."""
+        return 0.0 if self._solved is None else self._solved.up_part
+
+
+@dataclass(frozen=True, slots=True)
+class ProbeShape:
+    """What a fibre meets: radius of the edge, and stiffness of the sensor behind it."""
+
+    edge_um: float
+    sensor_un_um: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solved:
+    """All pushes of one grip, as they were solved for one air."""
+
+    free: Free
+    depth_um: float
+    ei_un_um2: float
+    in_plane_un_um2: float
+    thickness_um: float
+    up_part: float
+    cantilevers: tuple[Cantilever, ...]
 
 
 def _rounded(length_um: float) -> float:

@@ -39,6 +39,8 @@ class FibreState:
         So high above the plate its middle lies on it.
     tension_un : float
         Pull between two grippers.
+    seen_um : float
+        How wide it looks from above: a ribbon in the jaws shows its edge, or its face.
     """
 
     number: int
@@ -50,6 +52,7 @@ class FibreState:
     anchor: str
     relative_um: Floats
     tension_un: float
+    seen_um: float
     _position: Floats
 
     @property
@@ -98,5 +101,6 @@ def state_of(
         anchor,
         relative,
         tension,
+        fibre.seen_um,
         position,
     )

@@ -8,7 +8,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from cosmic.twin.climate import STILL_AIR, Climate
 from cosmic.twin.force_settings import ForceSensorSettings
+from cosmic.twin.transducer import Flicker, Transducer
 
 Floats = npt.NDArray[np.float64]
 
@@ -26,12 +28,16 @@ class ForceSensor:
     settings : ForceSensorSettings
         Constants.
     force_un : callable
-        The true force at rising times, uN; None for a sensor that nothing touches.
+        What its transducer makes of the loads at rising times, uN; None for a sensor that nothing
+        touches.
     seed : int
         Of noise, drift, and how far it is from its data sheet.
+    climate : Climate
+        The air around it.
 
     Attributes
     ----------
+    transducer : Transducer
     saturated : bool
         The output stands at the end of the range, whatever it feels.
     dead : bool
@@ -51,12 +57,24 @@ class ForceSensor:
         settings: ForceSensorSettings,
         force_un: Callable[[Floats], Floats] | None,
         seed: int,
+        climate: Climate = STILL_AIR,
     ) -> None:
         self.name = name
         self.settings = settings
         self._force_un = force_un
-        streams = np.random.SeedSequence([seed, *name.encode()]).spawn(3)
-        mounting, self._noise, self._drift = (np.random.default_rng(each) for each in streams)
+        streams = np.random.SeedSequence([seed, *name.encode()]).spawn(6)
+        mounting, self._noise, self._drift, load, room, slow = (
+            np.random.default_rng(each) for each in streams
+        )
+        self.transducer = Transducer(settings, load)
+        self._climate = climate
+        self._gain_k = 1e-6 * settings.gain_ppm_k * float(room.standard_normal())
+        self._zero_un_k = settings.zero_un_k * float(room.standard_normal())
+        self._warm_up_un = settings.warm_up_un * float(room.standard_normal())
+        self._flicker: Flicker | None = None
+        if settings.corner_hz:
+            density = settings.noise_un**2 / (0.5 * math.pi * settings.bandwidth_hz)
+            self._flicker = Flicker(density, settings.corner_hz, slow)
         self.true_gain_v_un = settings.gain_v_un * (
             1.0 + settings.gain_error * float(mounting.standard_normal())
         )
@@ -98,7 +116,16 @@ class ForceSensor:
             return np.full_like(times_s, self.settings.zero_v + half_v)
         if self.dead:
             return np.full_like(times_s, self.true_zero_v)
-        out = self.true_zero_v + self.true_gain_v_un * felt
+        gain = self.true_gain_v_un
+        if self._flicker is not None:
+            felt += self._flicker.at(times_s)
+        if self._gain_k or self._zero_un_k or self._warm_up_un:
+            now_s = float(times_s[-1])
+            warmer_k = self._climate.warmer_k(now_s)
+            gain *= 1.0 + self._gain_k * warmer_k
+            felt += self._zero_un_k * warmer_k
+            felt += self._warm_up_un * math.exp(-now_s / self.settings.warm_up_s)
+        out = self.true_zero_v + gain * felt
         return np.clip(out, self.settings.zero_v - half_v, self.settings.zero_v + half_v)
 
     def _steps_s(self, times_s: Floats) -> Floats:

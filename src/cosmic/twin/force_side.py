@@ -7,6 +7,7 @@ from typing import Final
 from cosmic.twin.felt import Moment
 from cosmic.twin.force_sensor import ForceSensor
 from cosmic.twin.force_settings import FibreSettings
+from cosmic.twin.guideways import Guideways
 from cosmic.twin.kinematics import Point
 from cosmic.twin.settings import TwinSettings
 from cosmic.twin.stage import Stage
@@ -76,11 +77,25 @@ class ForceSide:
             folder=None if truth is NO_TRUTH else folder,
         )
         self.offsets = self._workspace.offsets
-        self._timeline = Timeline(self._workspace, stages, settings.contact.step_s)
+        self.guideways = Guideways(settings, seed)
         self.sensors = {
-            name: ForceSensor(name, each, self.force_un if each.mounted_on else None, seed)
+            name: ForceSensor(
+                name,
+                each,
+                self._signal_un if each.mounted_on else None,
+                seed,
+                climate=self._workspace.climate,
+            )
             for name, each in settings.force_sensors.items()
         }
+        behind = [each for each in self.sensors.values() if each.settings.mounted_on]
+        self._timeline = Timeline(
+            self._workspace,
+            stages,
+            settings.contact.step_s,
+            guideways=self.guideways,
+            sense=behind[0].transducer.signal_un if behind else None,
+        )
 
     def force_un(self, times_s: Floats) -> Floats:
         """Return the true force on the probe, uN, positive when it is pushed back.
@@ -91,6 +106,9 @@ class ForceSide:
             Rising; not later than now, and not more than some seconds ago.
         """
         return self._timeline.force_un(times_s)
+
+    def _signal_un(self, times_s: Floats) -> Floats:
+        return self._timeline.signal_un(times_s)
 
     def moment(self, now_s: float) -> Moment:
         """Return the whole truth now: force, what touches where, each fibre's state."""
@@ -138,5 +156,9 @@ class ForceSide:
 
     def tips(self, now_s: float) -> dict[str, Point]:
         """Return where the tips of the tools are, um, world; see `Workplace.tips`."""
-        values = {name: each.position_then(now_s) for name, each in self._stages.items()}
-        return self._workspace.tips(values, now_s)
+        return self._workspace.tips(self.positions(now_s), now_s)
+
+    def positions(self, at_s: float) -> dict[str, float]:
+        """Return where stages are led to at a moment, in their units; play and lag are not seen."""
+        values = {name: each.position_then(at_s) for name, each in self._stages.items()}
+        return values if self.guideways.true else self.guideways.led(values)

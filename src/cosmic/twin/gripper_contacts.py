@@ -9,6 +9,7 @@ import numpy as np
 
 from cosmic.twin.bonds import Bonds
 from cosmic.twin.centre_line import CentreLine
+from cosmic.twin.climate import Climate
 from cosmic.twin.falls import Falls
 from cosmic.twin.fate import Fate, draw_fate
 from cosmic.twin.fibre import Carried, Fibre, Floats
@@ -148,6 +149,7 @@ class GripperContacts:
         faults: bool,
     ) -> None:
         self._contact, self._handling = settings.contact, settings.handling
+        self._climate = Climate(settings.climate, seed)
         self.fibres = fibres
         self._seed = seed
         self._injected = injected
@@ -263,7 +265,9 @@ class GripperContacts:
 
     def _fate(self, fibre: Fibre, tool: Tool) -> Fate:
         key = f"{fibre.key} {fibre.grasps}"
-        fate = draw_fate(self._handling, self._contact, key, faults=self._faults)
+        fate = draw_fate(
+            self._handling, self._contact, key, faults=self._faults, grasps=fibre.grasps - 1
+        )
         return self._injected.altered(fate, self._handling, tool.name, key)
 
     # ------------------------------------------------------------------ carrying
@@ -274,6 +278,11 @@ class GripperContacts:
             self._slack_um = min(self._slack_um, CARRYING_UM)
         if fibre.on_plate:
             height = max(fibre.height_um(tool), 0.0)
+            pull = fibre.pull_un(height, around.time_s)
+            if height > 0.0 and pull > fate.grip_un:
+                self._record("pulled out", fibre=fibre.number, tool=tool.name, pull_un=pull)
+                self._lose(fibre, tool, around, "slipped")
+                return
             if fibre.peeled_um(height) >= fibre.holds[tool.name].free.length_um:
                 fibre.on_plate = False
                 self._record("lifted", fibre=fibre.number, tool=tool.name, height_um=height)
@@ -325,7 +334,9 @@ class GripperContacts:
         )
         line = _part_of(fibre.line_um, low_um, high_um)
         number = len(self.fibres)
-        return Fibre(number, settings, self._contact, self._handling, self._seed, line)
+        return Fibre(
+            number, settings, self._contact, self._handling, self._seed, line, self._climate
+        )
 
     # ------------------------------------------------------------------ letting go
 

@@ -57,6 +57,10 @@ class TwinLens:
         """Return where the lens truly is at `now_s`, which may lie in the past."""
         return self._motors[axis].leg(now_s).lens_at(now_s)
 
+    def run_s(self, axis: LensAxisName, now_s: float) -> float:
+        """Return when the run began that left the lens where it is at `now_s`, or its rest."""
+        return self._motors[axis].leg(now_s).start_s
+
     def counter(self, axis: LensAxisName, now_s: float) -> int:
         """Return what the controller counts; wrong after lost steps."""
         return round(self._motors[axis].leg(now_s).counter_at(now_s))

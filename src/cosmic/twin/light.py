@@ -30,7 +30,8 @@ class TwinLight:
 
     def given_percent(self, now_s: float) -> float:
         """Return how bright it really is: less than it is told when its LED is worn."""
-        return self._gives * self.percent(now_s)
+        faded = max(1.0 - self.settings.fading_per_h * now_s / 3600.0, 0.0)
+        return self._gives * faded * self.percent(now_s)
 
     def dim(self, part: float) -> None:
         """Have it give only a part of its light; its controller does not notice."""

@@ -39,25 +39,42 @@ class PushCurve:
     travels_um : list of float
         How far the probe's holder went since contact; rises from 0.
     forces_un : list of float
+    alongs_un : list of float
+        Force along the fibre on the probe at each, outwards; empty where there is none.
     reach_um : float
         Way at which the fibre slides off, or the end of what is laid out.
     """
 
-    __slots__ = ("forces_un", "reach_um", "travels_um")
+    __slots__ = ("alongs_un", "forces_un", "reach_um", "travels_um")
 
-    def __init__(self, deflections_um: Floats, forces_un: Floats, sensor_un_um: float) -> None:
+    def __init__(
+        self,
+        deflections_um: Floats,
+        forces_un: Floats,
+        sensor_un_um: float,
+        alongs_un: Floats | None = None,
+    ) -> None:
         travels = deflections_um + forces_un / sensor_un_um
         rises = travels[1:] > np.maximum.accumulate(travels)[:-1]
         if not rises.all():
             kept = np.concatenate([[True], rises])
             travels, forces_un = travels[kept], forces_un[kept]
+            alongs_un = None if alongs_un is None else alongs_un[kept]
         self.travels_um: list[float] = travels.tolist()
         self.forces_un: list[float] = forces_un.tolist()
+        self.alongs_un: list[float] = [] if alongs_un is None else alongs_un.tolist()
         self.reach_um: float = self.travels_um[-1]
 
     def force_un(self, travel_um: float) -> float:
         """Return the force after a travel; the same with the opposite sign on the other side."""
-        travels, forces, pushed_um = self.travels_um, self.forces_un, abs(travel_um)
+        return self._at(self.forces_un, travel_um)
+
+    def along_un(self, travel_um: float) -> float:
+        """Return the force along the fibre on the probe, outwards."""
+        return self._at(self.alongs_un, travel_um) if self.alongs_un else 0.0
+
+    def _at(self, forces: list[float], travel_um: float) -> float:
+        travels, pushed_um = self.travels_um, abs(travel_um)
         if pushed_um >= self.reach_um:
             force = forces[-1]
         else:

@@ -46,3 +46,8 @@ class RubbedPush:
         """Return the force at a travel."""
         one, other = self.growing.force_un(travel_um), self.falling.force_un(travel_um)
         return 0.5 * (one + other) + 0.5 * self.part * (one - other)
+
+    def along_un(self, travel_um: float) -> float:
+        """Return the force along the fibre on the probe at a travel, outwards."""
+        one, other = self.growing.along_un(travel_um), self.falling.along_un(travel_um)
+        return 0.5 * (one + other) + 0.5 * self.part * (one - other)

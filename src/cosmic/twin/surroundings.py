@@ -15,6 +15,7 @@ class Surroundings(Protocol):
     """Where everything is at one look; what is costly is computed when it is asked for."""
 
     tools: Mapping[str, Tool]
+    time_s: float
 
     @abstractmethod
     def plate(self) -> Floats:

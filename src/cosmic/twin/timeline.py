@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosmic.twin.felt import Felt, Moment
+from cosmic.twin.guideways import Guideways
 from cosmic.twin.stage import Path, Stage
 from cosmic.twin.workspace import Workspace
 
@@ -98,8 +99,20 @@ class Timeline:
     that ask, or that keep up when nobody does.
     """
 
-    def __init__(self, workspace: Workspace, stages: Mapping[str, Stage], step_s: float) -> None:
+    def __init__(
+        self,
+        workspace: Workspace,
+        stages: Mapping[str, Stage],
+        step_s: float,
+        *,
+        guideways: Guideways,
+        sense: Callable[[Felt], float] | None = None,
+    ) -> None:
         self._workspace = workspace
+        self._guideways = guideways
+        self._sense = sense
+        self._told: dict[str, float] = {}
+        self._signals_un: deque[float] = deque(maxlen=KEPT)
         self._tracks = tuple(Track(stages[name]) for name in sorted(workspace.stages))
         self._step_s = step_s
         self._lock = Lock()
@@ -141,8 +154,17 @@ class Timeline:
             return np.empty(0)
         with self._lock:
             self._advance(float(times_s[-1]))
-            times, forces = self._looks_since(float(times_s[0]))
+            times, forces = self._looks_since(float(times_s[0]), self._forces_un)
         return np.asarray(np.interp(times_s, times, forces))
+
+    def signal_un(self, times_s: Floats) -> Floats:
+        """Return what the sensor behind the probe believes in; times as for `force_un`."""
+        if not times_s.size:
+            return np.empty(0)
+        with self._lock:
+            self._advance(float(times_s[-1]))
+            times, signals = self._looks_since(float(times_s[0]), self._signals_un)
+        return np.asarray(np.interp(times_s, times, signals))
 
     def moment(self, time_s: float) -> Moment:
         """Return the whole truth at `time_s`, or at the latest look if that is later."""
@@ -162,11 +184,11 @@ class Timeline:
             self._advance(time_s)
             self._workspace.finish()
 
-    def _looks_since(self, time_s: float) -> tuple[list[float], list[float]]:
+    def _looks_since(self, time_s: float, kept: deque[float]) -> tuple[list[float], list[float]]:
         """Return times and forces from the last look before `time_s` on."""
         times: list[float] = []
         forces: list[float] = []
-        for look_s, force in zip(reversed(self._times_s), reversed(self._forces_un), strict=True):
+        for look_s, force in zip(reversed(self._times_s), reversed(kept), strict=True):
             times.append(look_s)
             forces.append(force)
             if look_s <= time_s:
@@ -200,17 +222,24 @@ class Timeline:
         for track in self._tracks:
             path, name = track.path(time_s), track.stage.name
             if self._resting.get(name) is not path:
-                self._values[name] = track.position(time_s)
+                self._told[name] = track.position(time_s)
                 if path.end_s <= time_s:
                     self._resting[name] = path
+        self._values = self._told
+        if not self._guideways.true:
+            self._values = self._guideways.follow(self._told, time_s)
         self._felt = self._workspace.look(self._values, time_s)
         self._times_s.append(time_s)
-        self._forces_un.append(self._felt.total_un)
+        total = self._felt.total_un
+        self._forces_un.append(total)
+        self._signals_un.append(total if self._sense is None else self._sense(self._felt))
 
     def _next_s(self) -> tuple[float, bool]:
         """Return when to look next, and whether all stages stand until then."""
         now_s = self._at * self._step_s
-        until_s = now_s + LONGEST_REST_S
+        until_s = now_s + min(
+            LONGEST_REST_S, self._workspace.restless_s, self._guideways.restless_s
+        )
         at_rest = True
         felt, grippers = self._felt, self._workspace.gripper_stages
         travel = max(LONGEST_TRAVEL, SLACK_PART * felt.slack_um)

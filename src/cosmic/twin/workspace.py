@@ -1,13 +1,15 @@
 """Where grippers, fibres and probe meet: who holds what, and what the probe feels."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
 from cosmic.frame.errors import NotAvailable
+from cosmic.twin.climate import Climate
 from cosmic.twin.contacts import PLATE_HALF_UM, Contacts
 from cosmic.twin.felt import Felt, Moment, Push
-from cosmic.twin.fibre import Fibre, Floats, Line
+from cosmic.twin.fibre import Fibre, Floats, Line, ProbeShape
 from cosmic.twin.fibre_state import state_of
 from cosmic.twin.force_settings import FibreSettings
 from cosmic.twin.gripper_contacts import GripperContacts
@@ -36,7 +38,7 @@ class Around:
         self.tools: Mapping[str, Tool] = tools
         self._workspace = workspace
         self._values = values
-        self._time_s = time_s
+        self.time_s = time_s
         self._plate: Floats | None = None
 
     def plate(self) -> Floats:
@@ -47,7 +49,7 @@ class Around:
 
     def anchor(self, name: str) -> Point:
         """Return a tip by name; see `Workspace.tips`."""
-        return self._workspace.tip(name, self._values, self._time_s)
+        return self._workspace.tip(name, self._values, self.time_s)
 
 
 class Workspace:
@@ -98,6 +100,8 @@ class Workspace:
         self._truth = truth
         self._time_s = 0.0
         self._probe = skeleton.slide(self._geometry.probe)
+        self._probe_shape = ProbeShape(self._geometry.probe_edge_radius_um, sensor_un_um)
+        self.climate = Climate(settings.climate, seed)
         self._grippers = {
             name: Gripper(skeleton, gripper.stage, gripper.jaws, self._geometry.hold_height_um)
             for name, gripper in self._geometry.grippers.items()
@@ -106,7 +110,7 @@ class Workspace:
         wander = settings.handling.default_faults
         self.offsets = ToolOffsets((*self._grippers, PROBE), settings.handling, seed, wander=wander)
         self.fibres = [
-            Fibre(number, fibre, settings.contact, settings.handling, seed)
+            Fibre(number, fibre, settings.contact, settings.handling, seed, climate=self.climate)
             for number, fibre in enumerate(settings.fibres)
         ]
         self._gripper_contacts = GripperContacts(
@@ -198,7 +202,14 @@ class Workspace:
             fibre.gone = fibre.removed = True
         begin = len(self.fibres)
         self.fibres += [
-            Fibre(begin + place, each, self._contact, self._settings.handling, self._seed)
+            Fibre(
+                begin + place,
+                each,
+                self._contact,
+                self._settings.handling,
+                self._seed,
+                climate=self.climate,
+            )
             for place, each in enumerate(fibres)
         ]
         self._gripper_contacts.plate_changed(begin)
@@ -250,24 +261,30 @@ class Workspace:
             fibre.slip(fibre.line(tools).reach_um)
         line = fibre.line(tools)
         touch = self._touches.setdefault(fibre.number, Touch())
-        along = line.abscissa_um(probe[0])
-        travel = line.y_um(along) + fibre.settings.width_um / 2.0 - probe[1]
+        along = line.abscissa_um(probe[0] + self._geometry.probe_contact_um)
+        back = fibre.back_um(along)
+        travel = line.y_um(along) + fibre.seen_um / 2.0 - probe[1] - back
         reach = self._reach(fibre, line, along, probe[2])
-        if not touch.look(reach, travel):
-            self._nothing_before(max(-reach, -travel))
+        jump = fibre.jump_um(along, self._time_s) if line.free is not None else 0.0
+        if not touch.look(reach, travel + jump):
+            self._nothing_before(max(-reach, -travel - jump))
+            fibre.follow(self._time_s, 0.0, along)
             return None
         self._slack_um = 0.0
-        edge = self._geometry.probe_edge_radius_um
-        curve = fibre.push(line, along, travel, edge_um=edge, sensor=self._sensor)
+        curve = fibre.push(line, along, travel, self._probe_shape, self._time_s)
         force = curve.force_un(travel)
         if travel > curve.reach_um or force < -self._contact.pull_off_un:
             touch.lose()
             return None
-        deflection = travel - force / self._sensor
-        if line.free is not None and not self._bears(fibre, along, force, around):
+        deflection = travel + back - force / self._sensor
+        if line.free is None:
+            return Push(fibre.number, force, along, deflection)
+        if not self._bears(fibre, along, force, around):
             touch.lose()
             return None
-        return Push(fibre.number, force, along, deflection)
+        fibre.follow(self._time_s, force, along)
+        outwards = line.towards * curve.along_un(travel)
+        return Push(fibre.number, force, along, deflection, outwards, fibre.up_part * force)
 
     def _bears(self, fibre: Fibre, along: float, force_un: float, around: Around) -> bool:
         """Return whether the fibre bears the bending; a grip that gives way shows later."""
@@ -294,11 +311,27 @@ class Workspace:
         along = {push.fibre: push.abscissa_um for push in pushes}
         for what, force in forces.items():
             if what not in self._peaks_un:
-                at = {"abscissa_um": along[what]} if isinstance(what, int) else {}
+                at = self._of_span(what, along[what]) if isinstance(what, int) else {}
                 self._record("touched", **_named(what), **at)
             self._peaks_un[what] = max(self._peaks_un.get(what, 0.0), abs(force))
         for what in [each for each in self._peaks_un if each not in forces]:
             self._record("left", **_named(what), peak_un=self._peaks_un.pop(what))
+
+    def _of_span(self, number: int, abscissa_um: float) -> dict[str, float]:
+        """Return what is true of a push that begins."""
+        fibre = self.fibres[number]
+        found = {"abscissa_um": abscissa_um}
+        if len(fibre.holds) == 1:
+            found["ei_n_m2"] = fibre.span_ei_n_m2(abscissa_um, self._time_s)
+            found["orientation_deg"] = fibre.orientation_deg
+            found["rh_percent"] = self.climate.rh_percent(self._time_s)
+        return found
+
+    @property
+    def restless_s(self) -> float:
+        """For how long nothing changes that the probe feels, though all stages stand."""
+        held = self._gripper_contacts.held
+        return min((each.restless_s for each in held), default=math.inf)
 
     def _jaw(self, name: str, tool: Tool, probe: Point) -> float:
         """Return the force of a jaw's outer face on the probe's tip."""

@@ -1,5 +1,6 @@
 """The cameras' side of the scene: what each view shows at a moment, and the truth about it."""
 
+import random
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -20,7 +21,7 @@ from cosmic.twin.optics.drawing import (
     RemoteDrawer,
     drawing_process,
 )
-from cosmic.twin.optics.projection import Area, Projection, project
+from cosmic.twin.optics.projection import STEADY, Area, Projection, Wobble, project
 from cosmic.twin.settings import TwinSettings
 from cosmic.twin.stage import Stage
 
@@ -92,6 +93,7 @@ class Optics:
         self._stages = stages
         self._force_side = force_side
         self._lens = lens
+        self._seed = seed
         self._light = light
         self._drawer: Drawer
         if apart:
@@ -160,6 +162,7 @@ class Optics:
             area=self._area(roi, binning),
             binning=binning,
             bits=bits,
+            wobble=self._wobble(view, at_s),
         )
         return self._drawer.begin(view, shot)
 
@@ -199,6 +202,7 @@ class Optics:
             area=self._area(roi, binning),
             binning=binning,
             wavelength_um=self.settings.picture.wavelength_um,
+            wobble=self._wobble(view, at_s),
         )
 
     def centre_lines_um(self, at_s: float) -> tuple[Floats, ...]:
@@ -217,6 +221,18 @@ class Optics:
             width, height = self.sensor_px
             return Area(0, 0, width // binning, height // binning)
         return Area(roi.x_px, roi.y_px, roi.width_px, roi.height_px)
+
+    def _wobble(self, view: str, at_s: float) -> Wobble:
+        each = self.settings.views[view]
+        if not (each.lens and (each.zoom_scale or each.zoom_shift_um or each.zoom_focus_um)):
+            return STEADY
+        chance = random.Random(f"zoom {self._lens.run_s('zoom', at_s):.6f} {self._seed}")
+        return Wobble(
+            1.0 + each.zoom_scale * chance.gauss(0.0, 1.0),
+            each.zoom_shift_um * chance.gauss(0.0, 1.0),
+            each.zoom_shift_um * chance.gauss(0.0, 1.0),
+            each.zoom_focus_um * chance.gauss(0.0, 1.0),
+        )
 
     def _zoom(self, view: str) -> Callable[[float], float]:
         return self._part("zoom", self._lens.zoom_range_counts, view)

@@ -29,6 +29,29 @@ class Area:
 
 
 @dataclass(frozen=True, slots=True)
+class Wobble:
+    """By how much a run of the zoom left the lens elsewhere than the last did.
+
+    Attributes
+    ----------
+    scale : float
+        Of the image.
+    x_um, y_um : float
+        Where the optical axis meets the plate.
+    focus_um : float
+        Height that is sharp.
+    """
+
+    scale: float = 1.0
+    x_um: float = 0.0
+    y_um: float = 0.0
+    focus_um: float = 0.0
+
+
+STEADY: Final = Wobble()
+
+
+@dataclass(frozen=True, slots=True)
 class Projection:
     """A camera's view at one zoom and focus, onto one area of its sensor.
 
@@ -44,6 +67,8 @@ class Projection:
         Of the angle by which the camera is turned.
     blur_um : float
         Standard deviation of the blur by diffraction, um.
+    distortion, middle_px, corner_px
+        By how much the corners are moved outwards; from where, and how far off they are.
     """
 
     axis_px: tuple[float, float]
@@ -56,6 +81,9 @@ class Projection:
     blur_um: float
     focus_um: float
     distance_um: float
+    distortion: float = 0.0
+    middle_px: tuple[float, float] = (0.0, 0.0)
+    corner_px: float = 1.0
 
     def image_px(self, points_um: Floats) -> Floats:
         """Return where points of the world, shape (n, 3), lie in the image, shape (n, 2)."""
@@ -66,6 +94,11 @@ class Projection:
         found[:, 0] = self.axis_px[0] + scale * (self.cos * x + self.sin * y)
         # Rows count downwards, y goes up.
         found[:, 1] = self.axis_px[1] - scale * (self.cos * y - self.sin * x)
+        if self.distortion:
+            aside = found - self.middle_px
+            square = (aside * aside).sum(axis=1) / self.corner_px**2
+            # Far outside the image a cubic would fold back.
+            found += aside * (self.distortion * np.minimum(square, 4.0))[:, None]
         return found
 
     def px_um_at(self, height_um: float) -> float:
@@ -89,6 +122,7 @@ def project(
     area: Area,
     binning: int,
     wavelength_um: float,
+    wobble: Wobble = STEADY,
 ) -> Projection:
     """Return a view with zoom and focus at a part of their ways, 0 to 1."""
     magnification = _between(view.magnification_low, view.magnification_high, zoom)
@@ -99,14 +133,23 @@ def project(
     axis_y = sensor.height_px / 2.0 + zoom * view.zoom_shift_y_px
     return Projection(
         axis_px=(axis_x / binning - 0.5 - area.x_px, axis_y / binning - 0.5 - area.y_px),
-        axis_um=(view.centre_x_um, view.centre_y_um),
-        px_um=magnification / (sensor.pixel_um * binning),
+        axis_um=(view.centre_x_um + wobble.x_um, view.centre_y_um + wobble.y_um),
+        px_um=wobble.scale * magnification / (sensor.pixel_um * binning),
         cos=math.cos(angle),
         sin=math.sin(angle),
         magnification=magnification,
         aperture=aperture,
         blur_um=DIFFRACTION * wavelength_um / aperture,
-        focus_um=view.focus_low_um + focus * (view.focus_high_um - view.focus_low_um),
+        focus_um=view.focus_low_um
+        + focus * (view.focus_high_um - view.focus_low_um)
+        + zoom * view.focus_shift_um
+        + wobble.focus_um,
+        distortion=view.distortion,
+        middle_px=(
+            sensor.width_px / 2.0 / binning - 0.5 - area.x_px,
+            sensor.height_px / 2.0 / binning - 0.5 - area.y_px,
+        ),
+        corner_px=0.5 * math.hypot(sensor.width_px, sensor.height_px) / binning,
         distance_um=view.working_distance_um,
     )
 

@@ -116,7 +116,7 @@ class Subjects:
 
     def at(self, at_s: float) -> Subject:
         """Return what is to be seen at `at_s`, not later than now and some seconds ago at most."""
-        values = {name: each.position_then(at_s) for name, each in self._stages.items()}
+        values = self._force_side.positions(at_s)
         moment = self._force_side.moment(at_s)
         plate = self._force_side.skeleton.pose(self._settings.geometry.plate, values)
         lying = tuple(each for each in moment.fibres if each.where == "plate")
@@ -154,7 +154,7 @@ class Subjects:
     # ------------------------------------------------------------------ held
 
     def _carried(self, moment: Moment, state: FibreState, tips: Mapping[str, Point]) -> Strand:
-        width = state.settings.width_um
+        width = state.seen_um
         push = next((each for each in moment.pushes if each.fibre == state.number), None)
         if state.where != "held":
             return Strand(state.relative_um + tips[state.anchor], width)

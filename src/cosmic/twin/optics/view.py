@@ -12,7 +12,7 @@ import numpy.typing as npt
 from cosmic.twin.optics.canvas import Floats, Layer, cover, patch
 from cosmic.twin.optics.ground import FULL, Dirt, even_light, soil
 from cosmic.twin.optics.noise import Noise
-from cosmic.twin.optics.projection import Area, Projection, project
+from cosmic.twin.optics.projection import STEADY, Area, Projection, Wobble, project
 from cosmic.twin.optics.settings import OpticsSettings, ViewSettings
 from cosmic.twin.optics.strokes import Shade, stroke
 from cosmic.twin.optics.subjects import Solid, Strand, Subject
@@ -147,6 +147,7 @@ class Shot:
     area: Area
     binning: int
     bits: int
+    wobble: Wobble = STEADY
 
 
 class View:
@@ -164,7 +165,10 @@ class View:
         self._dirt = dirt
         self._noise = noise
         image = settings.picture
-        self._shade = Shade(image.wall, image.lumen, image.wall_part)
+        dark = image.contrast
+        self._shade = Shade(
+            1.0 - dark * (1.0 - image.wall), 1.0 - dark * (1.0 - image.lumen), image.wall_part
+        )
         self._lock = Lock()
         self._even_key: object = None
         self._even: Layer = np.empty((0, 0), np.uint16)
@@ -184,6 +188,7 @@ class View:
             area=area,
             binning=shot.binning,
             wavelength_um=self._settings.picture.wavelength_um,
+            wobble=shot.wobble,
         )
         gain = 10.0 ** (shot.gain_db / 20.0)
         grey = self._grey(shot.percent, projection) * shot.exposure_s * gain

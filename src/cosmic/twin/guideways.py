@@ -1,0 +1,87 @@
+"""Where stages truly are when their sensors tell a position: scale, yaw, play and lag."""
+
+import math
+import random
+from collections.abc import Mapping
+
+from cosmic.twin.settings import TwinSettings
+
+
+class Guideways:
+    """The errors of all stages, drawn from the seed; `follow` at one thread at a time.
+
+    Notes
+    -----
+    A tool's stages are those with the same word before the point: the yaw of "left.x" leads the
+    tip aside, along "left.y".
+    """
+
+    def __init__(self, settings: TwinSettings, seed: int) -> None:
+        self._scale: dict[str, float] = {}
+        self._yaw: dict[str, tuple[str, float, float, float]] = {}
+        self._loose: dict[str, tuple[float, float, float]] = {}
+        for name, stage in settings.stages.items():
+            kind = settings.kinds[stage.kind]
+            chance = random.Random(f"guideway {name} {seed}")
+            scale, phase, side = chance.gauss(0, 1), chance.random(), chance.choice((-1.0, 1.0))
+            if kind.scale_error:
+                self._scale[name] = 1.0 + kind.scale_error * scale
+            across = _across(name)
+            if kind.yaw_um and across in settings.stages:
+                rate = math.pi / (kind.high - kind.low)
+                self._yaw[name] = across, 0.5 * side * kind.yaw_um, rate, math.pi * phase
+            if kind.reversal or kind.lag_part:
+                self._loose[name] = 0.5 * kind.reversal, kind.lag_part, kind.lag_s
+        self._play: dict[str, float] = {}
+        self._lag: dict[str, tuple[float, float]] = {}
+        self._time_s = 0.0
+
+    @property
+    def true(self) -> bool:
+        """Whether all stages are where their sensors tell."""
+        return not (self._scale or self._yaw or self._loose)
+
+    def led(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return where stages are after scale and yaw, which depend on the positions alone."""
+        found = dict(values)
+        for name, scale in self._scale.items():
+            if name in found:
+                found[name] *= scale
+        for name, (across, half, rate, phase) in self._yaw.items():
+            if name in values and across in found:
+                found[across] += half * (math.sin(rate * values[name] + phase) - math.sin(phase))
+        return found
+
+    def follow(self, values: Mapping[str, float], time_s: float) -> dict[str, float]:
+        """Return where stages are after play and lag too, which depend on how they came there.
+
+        Times rise from call to call.
+        """
+        found = self.led(values)
+        passed_s, self._time_s = time_s - self._time_s, time_s
+        for name, (half, part, lag_s) in self._loose.items():
+            if name not in values:
+                continue
+            at = values[name]
+            if half:
+                play = min(max(self._play.get(name, at), at - half), at + half)
+                self._play[name] = play
+                found[name] += play - at
+            if part:
+                before, lag = self._lag.get(name, (at, 0.0))
+                lag = (lag + part * (at - before)) * math.exp(-passed_s / lag_s)
+                self._lag[name] = at, lag
+                found[name] -= lag
+        return found
+
+    @property
+    def restless_s(self) -> float:
+        """For how long nothing creeps that could be felt."""
+        largest = max((abs(lag) for _, lag in self._lag.values()), default=0.0)
+        return 0.05 if largest > 0.01 else math.inf
+
+
+def _across(name: str) -> str:
+    tool, _, axis = name.partition(".")
+    other = {"x": "y", "y": "x"}.get(axis, "")
+    return f"{tool}.{other}"

@@ -1,0 +1,78 @@
+"""What of a fibre's bending stays for a while or for good: creep, and plastic set.
+
+The held fibre is cut into cells from the clamp on. Each has a curvature that creeps after that of
+the load, in one element for each decade of time, and one that sets where the surface yields. Both
+move the place where the fibre would stand without the probe; the elastic push does the rest.
+"""
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+CELLS: Final = 16
+TIMES_S: Final = np.array([0.03, 0.3, 3.0, 30.0, 300.0])
+"""One for each decade; what is slower does not show in a measurement."""
+
+FULLEST: Final = 1.45
+"""Moment, in that of first yield, up to which a section is followed; it ends at 1.5."""
+
+SOONEST_S: Final = 0.002
+PART_OF_AGE: Final = 0.05
+LATEST_S: Final = 0.5
+
+
+class Inelastic:
+    """Creep and set of one fibre in one grip.
+
+    Parameters
+    ----------
+    length_um : float
+        From the clamp to the end.
+    slope : float
+        Part of the force that goes in each decade.
+    yield_curvature : float
+        At which the surface yields, 1/um; inf: it does not.
+    """
+
+    def __init__(self, length_um: float, *, slope: float, yield_curvature: float) -> None:
+        self._cell_um = length_um / CELLS
+        self._at_um = (np.arange(CELLS) + 0.5) * self._cell_um
+        self._slope = slope
+        self._yield = yield_curvature
+        self._creeping = np.zeros((len(TIMES_S), CELLS))
+        self._set = np.zeros(CELLS)
+        self._before = np.zeros(CELLS)
+        self._time_s = 0.0
+        self._loaded_s = 0.0
+        self._force_un = 0.0
+
+    def offset_um(self, arm_um: float) -> float:
+        """Return how far the fibre stands back, at so far from the clamp."""
+        arms = np.maximum(arm_um - self._at_um, 0.0) * self._cell_um
+        return float(arms @ (self._slope * self._creeping.sum(axis=0) + self._set))
+
+    def follow(self, time_s: float, force_un: float, arm_um: float, ei_un_um2: float) -> None:
+        """Take note of the force there from now on; times rise."""
+        passed_s, self._time_s = time_s - self._time_s, time_s
+        kept = np.exp(-passed_s / TIMES_S)[:, None]
+        self._creeping = self._before + (self._creeping - self._before) * kept
+        if abs(force_un - self._force_un) > 1e-3 * abs(self._force_un) + 1e-3:
+            self._loaded_s = time_s
+        self._force_un = force_un
+        self._before = np.maximum(arm_um - self._at_um, 0.0) * (force_un / ei_un_um2)
+        part = np.minimum(np.abs(self._before) / self._yield, FULLEST)
+        if part[0] > 1.0:
+            beyond = np.where(part > 1.0, 1.0 / np.sqrt(3.0 - 2.0 * part) - part, 0.0)
+            grown = np.maximum(np.abs(self._set), self._yield * beyond)
+            self._set = np.where(beyond > 0.0, np.copysign(grown, self._before), self._set)
+
+    @property
+    def restless_s(self) -> float:
+        """For how long nothing changes that could be felt, though all stands still."""
+        if not (self._slope and self._force_un):
+            return LATEST_S
+        age_s = self._time_s - self._loaded_s
+        return min(max(SOONEST_S, PART_OF_AGE * age_s), LATEST_S)

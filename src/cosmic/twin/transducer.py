@@ -1,0 +1,95 @@
+"""What a force sensor makes of the load on its probe, before its amplifier."""
+
+import math
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from cosmic.twin.felt import Felt
+from cosmic.twin.force_settings import ForceSensorSettings
+
+Floats = npt.NDArray[np.float64]
+
+PLAY_PART: Final = 0.1
+"""Part of the range within which a force may turn before the lagging part of the signal does."""
+
+TICK_S: Final = 0.01
+SLOWEST_HZ: Final = 0.003
+LONGEST_TICKS: Final = 2000
+
+
+class Transducer:
+    """Linearity, hysteresis, and what loads from other sides add; follows the loads in time.
+
+    Parameters
+    ----------
+    chance : Generator
+        What it is drawn from.
+    """
+
+    def __init__(self, settings: ForceSensorSettings, chance: np.random.Generator) -> None:
+        self._settings = settings
+        self.cross_part = settings.cross_talk * float(chance.standard_normal())
+        self.axial_part = settings.axial_talk * float(chance.standard_normal())
+        self._lag_part = settings.hysteresis / (2.0 * PLAY_PART)
+        self._play_un = PLAY_PART * settings.range_un
+        self._lagging_un = 0.0
+
+    def signal_un(self, felt: Felt) -> float:
+        """Return the force that the sensor believes in, after a load later than the last."""
+        force = felt.total_un
+        signal = force
+        if self.cross_part or self.axial_part:
+            for push in felt.pushes:
+                signal += self.cross_part * push.along_un + self.axial_part * push.up_un
+        if self._settings.linearity:
+            signal *= 1.0 + self._settings.linearity * abs(force) / self._settings.range_un
+        if self._lag_part:
+            low, high = force - self._play_un, force + self._play_un
+            self._lagging_un = min(max(self._lagging_un, low), high)
+            signal += self._lag_part * (self._lagging_un - force)
+        return signal
+
+
+class Flicker:
+    """Noise that grows as the frequency falls: a few random walks that are pulled back.
+
+    Parameters
+    ----------
+    density_un2_hz : float
+        Of the white noise that it equals at its corner.
+    """
+
+    def __init__(
+        self, density_un2_hz: float, corner_hz: float, chance: np.random.Generator
+    ) -> None:
+        self._chance = chance
+        decades = max(math.ceil(math.log10(corner_hz / SLOWEST_HZ)), 1)
+        rates = SLOWEST_HZ * 10.0 ** (np.arange(decades) + 0.5)
+        self._kept = np.exp(-2.0 * math.pi * rates * TICK_S)
+        self._sigma = np.full(decades, math.sqrt(density_un2_hz * corner_hz * math.log(10.0)))
+        self._state = self._sigma * chance.standard_normal(decades)
+        self._tick = 0
+        self._ticks: list[int] = [0]
+        self._values: list[float] = [float(self._state.sum())]
+
+    def at(self, times_s: Floats) -> Floats:
+        """Return the noise at rising times, uN."""
+        last = math.floor(float(times_s[-1]) / TICK_S) + 1
+        if last - self._tick > LONGEST_TICKS:
+            kept = self._kept ** (last - self._tick - LONGEST_TICKS)
+            self._step(last - LONGEST_TICKS, kept)
+        while self._tick < last:
+            self._step(self._tick + 1, self._kept)
+        first = math.floor(float(times_s[0]) / TICK_S) - 1
+        while len(self._ticks) > 2 and self._ticks[1] < first:
+            del self._ticks[0], self._values[0]
+        return np.asarray(np.interp(times_s, TICK_S * np.array(self._ticks), self._values))
+
+    def _step(self, tick: int, kept: Floats) -> None:
+        fresh = self._chance.standard_normal(len(kept))
+        self._state = kept * self._state + self._sigma * np.sqrt(1.0 - kept * kept) * fresh
+        self._tick = tick
+        self._ticks.append(tick)
+        self._values.append(float(self._state.sum()))
