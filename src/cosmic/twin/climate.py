@@ -4,7 +4,12 @@ import math
 import random
 from typing import Final
 
+import numpy as np
+import numpy.typing as npt
+
 from cosmic.twin.force_settings import ClimateSettings
+
+Floats = npt.NDArray[np.float64]
 
 STANDARD_RH: Final = 50.0
 """Humidity at which fibres are as their settings have them."""
@@ -39,6 +44,12 @@ class Climate:
         """Return how much warmer it is than at the start."""
         each = self._settings
         return each.temperature_wander_k * _wave(time_s, each.temperature_period_s, self._phases[1])
+
+    def warmer_at_k(self, times_s: Floats) -> Floats:
+        """Return the same at many times, shape (n,)."""
+        each = self._settings
+        angles = 2.0 * math.pi * times_s / each.temperature_period_s + self._phases[1]
+        return np.asarray(each.temperature_wander_k * (np.sin(angles) - math.sin(self._phases[1])))
 
     def creep(self, time_s: float) -> float:
         """Return how much more fibres creep than at the standard humidity."""

@@ -116,15 +116,14 @@ class ForceSensor:
             return np.full_like(times_s, self.settings.zero_v + half_v)
         if self.dead:
             return np.full_like(times_s, self.true_zero_v)
-        gain = self.true_gain_v_un
+        gain: float | Floats = self.true_gain_v_un
         if self._flicker is not None:
             felt += self._flicker.at(times_s)
         if self._gain_k or self._zero_un_k or self._warm_up_un:
-            now_s = float(times_s[-1])
-            warmer_k = self._climate.warmer_k(now_s)
-            gain *= 1.0 + self._gain_k * warmer_k
+            warmer_k = self._climate.warmer_at_k(times_s)
+            gain = gain * (1.0 + self._gain_k * warmer_k)
             felt += self._zero_un_k * warmer_k
-            felt += self._warm_up_un * math.exp(-now_s / self.settings.warm_up_s)
+            felt += self._warm_up_un * np.exp(-times_s / self.settings.warm_up_s)
         out = self.true_zero_v + gain * felt
         return np.clip(out, self.settings.zero_v - half_v, self.settings.zero_v + half_v)
 

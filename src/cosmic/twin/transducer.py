@@ -77,12 +77,11 @@ class Flicker:
     def at(self, times_s: Floats) -> Floats:
         """Return the noise at rising times, uN."""
         last = math.floor(float(times_s[-1]) / TICK_S) + 1
-        if last - self._tick > LONGEST_TICKS:
-            kept = self._kept ** (last - self._tick - LONGEST_TICKS)
-            self._step(last - LONGEST_TICKS, kept)
+        first = math.floor(float(times_s[0]) / TICK_S) - 1
+        if first - self._tick > LONGEST_TICKS:
+            self._step(first, self._kept ** (first - self._tick))
         while self._tick < last:
             self._step(self._tick + 1, self._kept)
-        first = math.floor(float(times_s[0]) / TICK_S) - 1
         while len(self._ticks) > 2 and self._ticks[1] < first:
             del self._ticks[0], self._values[0]
         return np.asarray(np.interp(times_s, TICK_S * np.array(self._ticks), self._values))
