@@ -6,8 +6,10 @@ from typing import TypeVar
 from contract.fake_scu3d import LINEAR_TYPE, NO_TYPE, ROTARY_TYPE, FakeScu3d
 from contract.fake_scu_serial import FakeScuLines
 from contract.fake_smaractctl import FakeSmaractctl
+from contract.fake_stages import FakePipython, FakePylablib
 from cosmic.frame.clock import ManualClock
 from cosmic.frame.units import AxisUnit
+from cosmic.mico.hw import pipython_stages, pylablib_stages
 from cosmic.mico.hw.interface import (
     Activity,
     ActivityRead,
@@ -96,3 +98,13 @@ def serial_over_fake() -> Controller:
 def mcs2_over_fake() -> Controller:
     devices = {"MCS2-101": "LLL", "MCS2-102": "LLL", "MCS2-103": "LLN", "MCS2-104": "RNN"}
     return SmaractCtlController(FakeSmaractctl(devices))
+
+
+def pylablib_over_fake() -> Controller:
+    package = FakePylablib()
+    return pylablib_stages.make_controller(package.controller_options(), package)
+
+
+def pi_over_fake() -> Controller:
+    package = FakePipython()
+    return pipython_stages.make_controller(package.controller_options(), package)
