@@ -169,8 +169,9 @@ class FakePipython:
     def __init__(self):
         self.devices = {}
 
-    def device(self, controller):
-        return _GcsDevice(controller, self)
+    def connect(self, options):
+        self.devices[options.at] = device = _GcsDevice()
+        return device, device.CloseConnection
 
     def controller_options(self):
         stages = [
@@ -190,14 +191,10 @@ class FakePipython:
 
 
 class _GcsDevice:
-    def __init__(self, controller, package):
-        self.controller, self.package = controller, package
+    def __init__(self):
         self.axes = Axes(["1", "2", "3"])
         self.servo = dict.fromkeys(self.axes.position, False)
         self.limit = 1e6
-
-    def ConnectUSB(self, serialnum):
-        self.package.devices[serialnum] = self
 
     def qIDN(self):
         return "(c)2015 Physik Instrumente (PI) GmbH & Co. KG, C-884.4DB, 0119, 1.2.3.4\n"

@@ -3,6 +3,7 @@
 import importlib
 import re
 from abc import abstractmethod
+from collections.abc import Callable
 from functools import partial
 from typing import Annotated, Any, Final, Literal, Protocol
 
@@ -54,8 +55,8 @@ class Package(Protocol):
     errors: tuple[type[Exception], ...]
 
     @abstractmethod
-    def device(self, controller: str) -> Any:
-        """Return a `GCSDevice`, not connected."""
+    def connect(self, options: PiStage) -> tuple[Any, Callable[[], object]]:
+        """Return a `GCSDevice`, connected, and what closes the connection."""
 
 
 class InstalledPackage(Package):
@@ -80,8 +81,21 @@ class InstalledPackage(Package):
         self.errors = (self._package.GCSError, OSError, ValueError, KeyError)
 
     @override
-    def device(self, controller: str) -> Any:
-        return self._package.GCSDevice(controller)
+    def connect(self, options: PiStage) -> tuple[Any, Callable[[], object]]:
+        make = self._package.GCSDevice
+        if options.connect == "usb":
+            device = make(options.controller)
+            device.ConnectUSB(serialnum=options.at)
+            return device, device.CloseConnection
+        # pipython's own line: PI's library is not needed for it.
+        if options.connect == "tcpip":
+            host, _, port = options.at.partition(":")
+            lines = importlib.import_module("pipython.pidevice.interfaces.pisocket")
+            line = lines.PISocket(host, int(port or 50_000))
+        else:
+            lines = importlib.import_module("pipython.pidevice.interfaces.piserial")
+            line = lines.PISerial(options.at, options.baud)
+        return make(options.controller, gateway=line), line.close
 
 
 class PiUnit(StageUnit):
@@ -93,8 +107,7 @@ class PiUnit(StageUnit):
         self.errors = package.errors
         self._reference = options.reference
         try:
-            self._device = package.device(options.controller)
-            self._connect(options)
+            self._device, self._disconnect = package.connect(options)
             said = str(self._device.qIDN())
         except self.errors as exc:
             raise NotConnectedError(
@@ -104,15 +117,6 @@ class PiUnit(StageUnit):
             ) from exc
         found = re.search(r"\d+\.\d+\.\d+", said.rpartition(",")[2])
         self.firmware = found.group() if found else "0.0.0"
-
-    def _connect(self, options: PiStage) -> None:
-        if options.connect == "usb":
-            self._device.ConnectUSB(serialnum=options.at)
-        elif options.connect == "tcpip":
-            host, _, port = options.at.partition(":")
-            self._device.ConnectTCPIP(ipaddress=host, ipport=int(port or 50_000))
-        else:
-            self._device.ConnectRS232(comport=options.at, baudrate=options.baud)
 
     def _name(self, axis: int) -> str:
         return str(self.axes[axis].axis)
@@ -168,7 +172,7 @@ class PiUnit(StageUnit):
 
     @override
     def close(self) -> None:
-        self._device.CloseConnection()
+        self._disconnect()
 
     @override
     def fault(self, error: Exception) -> DeviceFault:
