@@ -40,7 +40,7 @@ from cosmic.autonomy.bending.span import Span
 
 NAME = "worlds"
 SESSIONS, FIBRES = 20, 16
-LIMITS = SpanLimits(count=5, longest_um=600.0, shortest_part=0.2, shortest_um=110.0)
+LIMITS = SpanLimits()
 STEEPEST_DEG = 40.0
 LEAST_COVER, MOST_COVER = 90.0, 99.0
 OFF_PERCENT, THROWN_PERCENT = 1.0, 15.0

@@ -13,8 +13,10 @@ from typing import Final
 import numpy as np
 
 from cosmic.autonomy.bending.inference import (
+    UNLIKELY,
     VARIATIONS,
     Readings,
+    excess_of,
     fixed_covariance,
     own_mean,
     varied_covariance,
@@ -25,8 +27,9 @@ from cosmic.autonomy.bending.settings import FitSettings
 
 LEAST_SPANS: Final = 2
 LEAST_FOR_ONE_OUT: Final = 4
-UNLIKELY: Final = 1e-3
-LIKELY: Final = 0.05
+MOST_EXCESS: Final = 12.0
+"""Of the variance foreseen: readings that scatter more have a cause that no interval covers."""
+
 SIGMAS: Final = 3.0
 DEEP_PART: Final = 0.25
 """Of the shortest span: a clamp deeper than that is told."""
@@ -84,6 +87,11 @@ def checked(
         flags.add(cause)
         reasons.append(WORDS[cause])
     notes = _notes(result, readings, assessed) | _spoilt(result)
+    excess = _excess(assessed)
+    if cause is None and excess > 1.0:
+        seen = _misfit(used, readings, assessed, settings)
+        notes.add(seen)
+        reasons.append(f"{WORDS[seen]}; the interval is {math.sqrt(excess):.1f} times wider")
     return replace(
         result,
         flags=frozenset(flags),
@@ -108,9 +116,14 @@ def _cause(
     relaxed = [fit.relaxation_part - SIGMAS * fit.relaxation_std_part for fit in fits]
     if relaxed and max(relaxed) > RELAXES_MOST:
         return Quality.RELAXED
-    if assessed.posterior.probability >= UNLIKELY:
+    if not _excess(assessed) > MOST_EXCESS:
         return None
     return _misfit(fits, readings, assessed, settings)
+
+
+def _excess(assessed: Assessed) -> float:
+    likely = assessed.posterior.probability >= UNLIKELY
+    return 1.0 if likely else excess_of(assessed.evidence)
 
 
 def _no_beam(fits: Sequence[SpanFit], readings: Readings) -> bool:

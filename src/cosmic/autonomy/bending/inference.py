@@ -29,6 +29,7 @@ VARIATIONS: Final = np.array([0.0, 0.05, 0.1, 0.17, 0.28, 0.45])
 VARIATION_PRIOR: Final = np.array([0.12, 0.2, 0.24, 0.22, 0.15, 0.07])
 LOW_TAIL, HIGH_TAIL = 0.025, 0.975
 ROUNDS: Final = 60
+UNLIKELY: Final = 1e-3
 LEAST_STD: Final = 0.004
 """Of ln(k): a model is no better than this."""
 
@@ -328,13 +329,26 @@ class Posterior:
     weights: Floats
 
 
+def excess_of(evidence: Evidence) -> float:
+    """Return by how much readings scatter more than foreseen, as a part of the variance.
+
+    The depth's prior is no reading: the best depth stands for the check.
+    """
+    return max(1.0, float(evidence.chi2.min()) / max(evidence.freedom - 1, 1))
+
+
 def posterior_of(evidence: Evidence, prior: Floats) -> Posterior:
-    """Return what follows from evidence and prior weights of depths and variations."""
+    """Return what follows from evidence and prior weights of depths and variations.
+
+    Where readings scatter more than can be chance, the interval is as much wider.
+    """
     prior = prior[:, : evidence.chi2.shape[1]]
-    logs = evidence.log_likelihood + np.log(np.maximum(prior, 1e-300))
+    probability = float(chdtrc(max(evidence.freedom - 1, 1), evidence.chi2.min()))
+    excess = excess_of(evidence) if probability < UNLIKELY else 1.0
+    logs = evidence.log_likelihood / excess + np.log(np.maximum(prior, 1e-300))
     weights = np.exp(logs - logs.max())
     weights /= weights.sum()
-    stds = np.sqrt(evidence.variance)
+    stds = np.sqrt(evidence.variance * excess)
     ends = [_quantile(weights, evidence.log_ei, stds, each) for each in (LOW_TAIL, 0.5, HIGH_TAIL)]
     of_depth = weights.sum(axis=1)
     depths = evidence.depths_um
@@ -347,8 +361,7 @@ def posterior_of(evidence: Evidence, prior: Floats) -> Posterior:
         depth_um=depth,
         depth_std_um=float(np.sqrt(of_depth @ (depths - depth) ** 2)),
         variation=float(weights.sum(axis=0) @ variation),
-        # The depth's prior is no reading: the best depth stands for the check.
-        probability=float(chdtrc(max(evidence.freedom - 1, 1), evidence.chi2.min())),
+        probability=probability,
         weights=weights,
     )
 

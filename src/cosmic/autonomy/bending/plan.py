@@ -44,10 +44,10 @@ class SpanLimits(StrictModel):
         Force that may be reached, and that is enough for a good fit.
     """
 
-    count: int = Field(3, ge=1, le=10)
-    shortest_um: float = Field(150.0, gt=0.0)
-    longest_um: float = Field(500.0, gt=0.0)
-    shortest_part: float = Field(0.5, gt=0.0, lt=1.0)
+    count: int = Field(5, ge=1, le=10)
+    shortest_um: float = Field(110.0, gt=0.0)
+    longest_um: float = Field(600.0, gt=0.0)
+    shortest_part: float = Field(0.2, gt=0.0, lt=1.0)
     shortest_stroke_um: float = Field(2.0, gt=0.0)
     beyond_um: float = Field(80.0, ge=0.0)
     stroke_part: float = Field(0.1, gt=0.0, le=0.2)

@@ -61,6 +61,7 @@ ROOM: Final = 1.5
 PALE: Final = "#9dbfdc"
 FEW: Final = 8
 """Fewer fibres are drawn one by one."""
+LEAST_SHARE: Final = 0.005
 SHORTEST_S: Final = 0.05
 """Of an operation that is drawn."""
 
@@ -250,6 +251,7 @@ def _summary(data: ReportData) -> list[tuple[str, str]]:
         ("Median time of a fibre", duration(now.cycle_s)),
         (f"Geometric mean of EI, {EI_LABEL} (95 %)", mean_words(now.mean)),
         ("Spread between fibres", _spread(now.mean.spread_ln)),
+        ("Scale of the force", _scale_words(data)),
         ("Mean length, width, curl", _shape(data.finished)),
     ]
     if info.hardware == TWIN:
@@ -312,6 +314,34 @@ def _calibration_row(each: CalibrationNote) -> tuple[str, ...]:
     return each.name, residual, when(each.made)
 
 
+def budget_rows(result: BendingResult) -> list[tuple[str, ...]]:
+    """Return the budget of a stiffness as rows of text; contributions too small to see in one."""
+    shown = [line for line in result.budget if line.share >= LEAST_SHARE]
+    rows = [
+        (
+            line.source,
+            line.kind.value,
+            f"{number(line.std, 3)} {line.unit.replace('um', 'µm').replace('uN', 'µN')}".strip(),
+            f"{line.sensitivity:.3g}",
+            f"{100.0 * line.share:.1f}",
+        )
+        for line in shown
+    ]
+    rest = sum(line.share for line in result.budget) - sum(line.share for line in shown)
+    if result.budget and len(shown) < len(result.budget):
+        rows.append(("all others", "", "", "", f"{100.0 * max(rest, 0.0):.1f}"))
+    return rows
+
+
+def _scale_words(data: ReportData) -> str:
+    results = [each.bending for each in data.finished if each.bending is not None]
+    if not results:
+        return NONE
+    if all(each.scale_verified for each in results):
+        return "verified by a standard"
+    return "force scale not verified: the sensor's certificate is in every interval"
+
+
 def _span_rows(result: BendingResult) -> list[tuple[str, ...]]:
     return [
         (
@@ -339,16 +369,18 @@ class _Card:
     record: FibreRecord
     figures: list[Markup]
     span_rows: list[tuple[str, ...]]
+    budget_rows: list[tuple[str, ...]]
 
 
 def _cards(data: ReportData, svg: ShowSvg, png: ShowPng) -> Iterator[_Card]:
     for each in data.finished:
         record = data.whole(each.number)
         figures = [_shown(image, png) for image in record.images[:2]]
-        drawn = force_figure(record), stiffness_figure(record)
+        drawn = force_figure(record), stiffness_figure(record), residual_figure(record)
         figures += [Markup(svg(figure, 430)) for figure in drawn if figure]
         rows = [] if record.bending is None else _span_rows(record.bending)
-        yield _Card(record, figures, rows)
+        budget = [] if record.bending is None else budget_rows(record.bending)
+        yield _Card(record, figures, rows, budget)
 
 
 def _shown(image: FibreImage, png: ShowPng) -> Markup:
@@ -424,6 +456,27 @@ def _draw(plot: Plot, curve: SpanCurve) -> None:
     plot.points(way[curve.loading].tolist(), force[curve.loading].tolist(), BLUE)
     last = int(np.argmax(way))
     plot.note(float(way[last]), float(force[last]), f"{curve.place_um:.0f} µm", end=True)
+
+
+def residual_figure(record: FibreRecord) -> str:
+    """Return what the model leaves of the force over the push, of all spans of a fibre."""
+    curves = [each for each in span_curves(record) if np.isfinite(each.fitted_un).any()]
+    if not curves:
+        return ""
+    left = [each.force_un - each.fitted_un for each in curves]
+    highest = max(float(np.nanmax(np.abs(each))) for each in left)
+    pushes = np.concatenate([each.way_um for each in curves])
+    x = Axis("push beyond the first contact, µm", *around(float(pushes.min()), float(pushes.max())))
+    y = Axis("force less model, µN", -1.1 * highest - 1e-6, 1.1 * highest + 1e-6)
+    plot = Plot(x, y, f"Residuals of fibre {record.number}", height=180.0)
+    plot.line([x.low, x.high], [0.0, 0.0], GREY)
+    for curve, away in zip(curves, left, strict=True):
+        for branch, colour in ((curve.loading, BLUE), (~curve.loading, ORANGE)):
+            shown = branch & np.isfinite(away)
+            plot.points(
+                curve.way_um[shown].tolist(), away[shown].tolist(), colour, hollow=colour == ORANGE
+            )
+    return plot.svg()
 
 
 def stiffness_figure(record: FibreRecord) -> str:

@@ -139,6 +139,7 @@ class OneSpan:
         base = yield from self._baseline()
         contact = yield from self._search(base)
         yield from self._out(base, contact)
+        yield from self._dwell()
         yield from self._back(contact)
         self._keep()
 
@@ -257,6 +258,13 @@ class OneSpan:
             )
         if points.force_un[-1] - base_un > push.limit_un * GROWTH:
             raise OperationFailed(TOO_HIGH, f"{points.force_un[-1] - base_un:.0f} uN")
+
+    def _dwell(self) -> Steps:
+        """Read the force at the farthest point for a while: the fibre may relax."""
+        push = self._push
+        for _ in range(push.dwell_looks):
+            yield push.dwell_s / push.dwell_looks
+            yield from self._measure(push.average_s, loading=True)
 
     def _back(self, contact_um: float) -> Steps:
         push = self._push

@@ -171,6 +171,9 @@ class PushSettings(StrictModel):
         The same while the fibre is looked for.
     steps_out, steps_back : int
         Steps of one push.
+    dwell_s, dwell_looks : float, int
+        How long the probe stays where it pushed farthest, and how often the force is read
+        meanwhile: it shows how the fibre relaxes.
     retreat_um : float
         How far the probe goes back from the fibre between spans.
     tilt_um, tilt_longest_um : float
@@ -200,11 +203,13 @@ class PushSettings(StrictModel):
     search_average_s: float = Field(0.02, gt=0.0)
     steps_out: int = Field(9, ge=4)
     steps_back: int = Field(6, ge=3)
+    dwell_s: float = Field(1.0, ge=0.0)
+    dwell_looks: int = Field(4, ge=0)
     retreat_um: float = Field(12.0, gt=0.0)
     tilt_um: float = Field(55.0, ge=0.0)
     tilt_longest_um: float = Field(330.0, gt=0.0)
     steepest_deg: float = Field(40.0, gt=0.0, le=50.0)
-    spans: SpanLimits = Field(default_factory=lambda: SpanLimits(longest_um=600.0))
+    spans: SpanLimits = Field(default_factory=SpanLimits)
     fit: FitSettings = Field(default_factory=FitSettings)
 
 
