@@ -90,6 +90,53 @@ PAIRS = (
 )
 
 
+PROVOKED: dict[Quality, dict[str, object]] = {
+    Quality.SLIPPED: {"slip": 1.0, "slip_um": (4.0, 10.0)},
+    Quality.RELAXED: {"relaxation": (0.12, 0.01)},
+    Quality.SET: {"yield_strain": (0.002, 0.1), "set_part": 0.5},
+    Quality.HINGE: {"weak": 1.0},
+    Quality.NON_UNIFORM: {"ei_cv": 0.5},
+    Quality.FRICTION: {"friction": (0.55, 0.65)},
+    Quality.CLAMP_DEEP: {"clamp": ("log", 110.0, 0.2)},
+    Quality.MOVED: {"moved": 1.0},
+    Quality.SATURATED: {"range_un": 25.0},
+    Quality.NOT_A_FIBRE: {"not_fibre": 1.0},
+}
+"""Worlds in which one cause acts so strongly that it has to be named."""
+
+SUREST = (
+    Quality.SATURATED,
+    Quality.NOT_A_FIBRE,
+    Quality.BROKEN,
+    Quality.SLIPPED,
+    Quality.SET,
+    Quality.MOVED,
+    Quality.HINGE,
+    Quality.RELAXED,
+    Quality.CLAMP_DEEP,
+    Quality.FRICTION,
+    Quality.NON_UNIFORM,
+)
+
+
+def named(result: BendingResult) -> str:
+    """Return the cause that a result names first."""
+    seen = result.flags | result.notes
+    return next((str(each) for each in SUREST if each in seen), "none")
+
+
+def confusion(sessions: int, fibres: int) -> dict[Quality, Counter[str]]:
+    """Return what is named where each cause acts."""
+    found: dict[Quality, Counter[str]] = {}
+    for cause, change in PROVOKED.items():
+        world, counts = replace(CALM, name=str(cause), **change), Counter[str]()
+        for seed in range(sessions):
+            results, _ = session_of(world, 1000 + seed, fibres, FitSettings())
+            counts.update(named(each) for each in results)
+        found[cause] = counts
+    return found
+
+
 def worlds() -> tuple[World, ...]:
     """Return the worlds, the plain one first."""
     single = [replace(CALM, name=name, **change) for name, change in SINGLE.items()]

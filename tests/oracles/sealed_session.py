@@ -44,6 +44,7 @@ class World:
     reversal_um: float = 0.0
     scale: float = 0.0
     way_um: float = 0.03
+    touch_um: float = 0.2
     moved: float = 0.0
     moved_um: float = 40.0
     # The fibre, drawn once a fibre.
@@ -53,7 +54,7 @@ class World:
     hinges_mm: float = 0.0
     hinge_part: tuple = (0.3, 0.8)
     hinge_um: tuple = (5.0, 30.0)
-    hinge_within_um: float | None = None
+    weak: float = 0.0
     trend: float = 0.0
     arc_deg: tuple | None = None
     image_deg: float = 0.0
@@ -127,6 +128,7 @@ class Fibre:
     nodes_um: Floats
     log_ei: Floats
     shown_deg: float = 0.0
+    held_y_um: float = 100.0
     turn_part: float = 0.0
     slips_in: int = -1
     moves_in: int = -1
@@ -153,11 +155,17 @@ class Fibre:
         log_ei = _along(world, rng, nodes)
         hinged = False
         for _ in range(rng.poisson(world.hinges_mm * 0.8)):
-            reach = world.hinge_within_um or 800.0
-            at, wide_um = rng.uniform(20.0, reach), rng.uniform(*world.hinge_um)
-            log_ei = log_ei + np.log(rng.uniform(*world.hinge_part)) * (
-                np.abs(nodes - at) < wide_um / 2.0
+            log_ei = _weakened(
+                log_ei,
+                nodes,
+                at=rng.uniform(20.0, 800.0),
+                wide=rng.uniform(*world.hinge_um),
+                part=rng.uniform(*world.hinge_part),
             )
+            hinged = True
+        if rng.uniform() < world.weak:
+            at, wide = rng.uniform(150.0, 300.0), 30.0
+            log_ei = _weakened(log_ei, nodes, at=at, wide=wide, part=0.06)
             hinged = True
         log_ei = log_ei + world.trend * rng.standard_normal() * nodes / 1000.0
         thick, thick_spread = world.thickness_um
@@ -221,6 +229,10 @@ class Fibre:
         return np.column_stack([x, y])
 
 
+def _weakened(log_ei: Floats, nodes: Floats, *, at: float, wide: float, part: float) -> Floats:
+    return log_ei + np.log(part) * (np.abs(nodes - at) < wide / 2.0)
+
+
 def _along(world: World, rng: np.random.Generator, nodes: Floats) -> Floats:
     if not world.ei_cv:
         return np.zeros_like(nodes)
@@ -240,8 +252,11 @@ def curves(
     side_un_um: float = 1e6,
     radius_um: float = 25.0,
     spring_un_um: float = 1e9,
-) -> tuple[Floats, Floats, Floats]:
-    """Return travel, force across and force along, each (places, out and back, loads)."""
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return travel, force across and force along, each (places, out and back, loads).
+
+    And where the probe first touches, (places,).
+    """
     shape = (len(places_um), 2, LOADS, LENGTHS)
     length = (places_um + fibre.depth_um)[:, None, None, None]
     load = HEAVIEST * np.linspace(0.0, 1.0, LOADS) ** 1.3
@@ -303,7 +318,7 @@ def curves(
         np.where(wanders, values[:, ::-1], values) for values in (tip_y, across, along)
     )
     travel = tip_y[:, :, :1] - tip_y + across / spring_un_um
-    return travel, across, along
+    return travel, across, along, tip_y[:, 0, 0]
 
 
 @dataclass
@@ -329,7 +344,7 @@ def pushes(
         if number + first == fibre.moves_in:
             true[number] += rng.choice([-1, 1]) * world.moved_um
     true = np.maximum(true, 20.0)
-    travel, across, along = curves(
+    travel, across, along, touch = curves(
         fibre,
         true,
         jaw_un_um=session.jaw_un_um,
@@ -337,12 +352,19 @@ def pushes(
         spring_un_um=session.spring_un_um,
     )
     return [
-        _push(session, fibre, plan[n], number=n + first, curve=(travel[n], across[n], along[n]))
+        _push(
+            session,
+            fibre,
+            plan[n],
+            number=n + first,
+            curve=(travel[n], across[n], along[n]),
+            hinge_um=fibre.held_y_um - touch[n] + world.touch_um * rng.standard_normal(),
+        )
         for n in range(len(plan))
     ]
 
 
-def _push(session: Session, fibre: Fibre, plan, *, number: int, curve) -> Push:
+def _push(session: Session, fibre: Fibre, plan, *, number: int, curve, hinge_um: float) -> Push:
     world, rng = session.world, session.rng
     place, stroke = plan
     travel, across, along = curve
@@ -359,7 +381,6 @@ def _push(session: Session, fibre: Fibre, plan, *, number: int, curve) -> Push:
         pause[len(out) : len(out) + len(dwell)] = world.dwell_s / len(dwell)
     time = session.time_s + np.cumsum(pause)
     session.time_s = float(time[-1]) + 1.5
-    hinge = 100.0 + 3.0 * rng.standard_normal()
     real = way + world.way_um * rng.standard_normal(len(way))
     real = real - world.reversal_um * ~loading
     # Fibre slips in the jaws at some point of the way out, for good.
@@ -408,7 +429,7 @@ def _push(session: Session, fibre: Fibre, plan, *, number: int, curve) -> Push:
     read = read + level + world.noise_un * rng.standard_normal(len(way))
     read = np.clip(read, -world.range_un, world.range_un)
     std = np.full(len(way), max(world.noise_un, 0.004))
-    return Push(place, hinge + way, read, std, time, loading)
+    return Push(place, hinge_um + way, read, std, time, loading)
 
 
 FRIENDLY = World(

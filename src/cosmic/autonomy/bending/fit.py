@@ -5,10 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+import numpy as np
+
 from cosmic.autonomy.bending.checks import checked
 from cosmic.autonomy.bending.inference import FRICTION, Readings, budget_of, readings_of
 from cosmic.autonomy.bending.population import Assessed, Population, assess
-from cosmic.autonomy.bending.response import response_of, straight
+from cosmic.autonomy.bending.response import direction_by_touch, response_of, straight
 from cosmic.autonomy.bending.result import (
     N_M2_PER_UN_UM2,
     UN_UM2_PER_N_M2,
@@ -131,8 +133,21 @@ def measure_fibre(
     if certificate is not None:
         log_ei = math.log(certificate.ei_n_m2 * UN_UM2_PER_N_M2)
         certified = log_ei, certificate.expanded_part / 2.0
+    known = all(spans[n].shape is not None for n in used)
+    direction = direction_by_touch(
+        shapes if known else [],
+        np.array([fits[n].hinge_um for n in used]),
+        radius_um=settings.radius_um,
+        noise_um=settings.touch_std_um,
+        prior_rad=math.radians(settings.direction_std_deg),
+    )
     readings = readings_of(
-        [fits[n] for n in used], response, settings, part=part, certified=certified
+        [fits[n] for n in used],
+        response,
+        settings,
+        part=part,
+        certified=certified,
+        direction=direction,
     )
     return MeasuredFibre(fits, used, readings, tuple(spans), settings, part, certificate)
 

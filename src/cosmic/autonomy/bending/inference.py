@@ -135,6 +135,7 @@ def readings_of(
     *,
     part: float = 0.0,
     certified: tuple[float, float] | None = None,
+    direction: tuple[float, float] | None = None,
 ) -> Readings:
     """Return the readings of the spans of one fibre.
 
@@ -144,7 +145,11 @@ def readings_of(
         Of the campaign that was over, 0 to 1: the gain drifts.
     certified : tuple of float, optional
         Of a standard: ln(EI), EI in uN um2, and its standard uncertainty.
+    direction : tuple of float, optional
+        By how much the fibre leaves the jaws in another direction than the image shows, and the
+        standard deviation of that, rad; by the settings if None.
     """
+    turned, turned_std = direction or (0.0, math.radians(settings.direction_std_deg))
     rows: list[tuple[int, float, float, float]] = []
     for number, fit in enumerate(fits):
         rows.append((number, fit.k_loading_un_um, fit.out_std_part, 1.0))
@@ -182,8 +187,8 @@ def readings_of(
             "direction of the fibre",
             "rad",
             response.by_direction[span],
-            0.0,
-            math.radians(settings.direction_std_deg),
+            turned,
+            turned_std,
         ),
         ("scale of the stage", "", contact * place, 0.0, settings.way_scale_std_part),
     )

@@ -14,6 +14,7 @@ CELLS: Final = 48
 TURNED_RAD: Final = 0.01
 MOVED_UM: Final = 2.0
 BEYOND: Final = 1.5
+LEAST_TOUCHES: Final = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,3 +95,47 @@ def response_of(shapes: Sequence[NaturalShape], *, depth_um: float) -> Response:
         by_square=levers**-2.0,
         slopes=np.array([math.tan(each.slope_rad) for each in shapes]),
     )
+
+
+def direction_by_touch(
+    shapes: Sequence[NaturalShape],
+    hinges_um: Floats,
+    *,
+    radius_um: float,
+    noise_um: float,
+    prior_rad: float,
+) -> tuple[float, float]:
+    """Return how the fibre leaves the jaws, beside what the image shows, by where it was touched.
+
+    The probe meets the fibre where its natural shape is: a second witness to the image, and a much
+    sharper one, as axes repeat better than pixels.
+
+    Parameters
+    ----------
+    hinges_um : ndarray, shape (n,), float64
+        Position of the probe's axis at the first contact of each span, growing as it pushes.
+    noise_um, prior_rad : float
+        How well a first contact repeats, and how well the image shows the direction.
+
+    Returns
+    -------
+    turned_rad, std_rad : float
+    """
+    if len(shapes) < LEAST_TOUCHES:
+        return 0.0, prior_rad
+    places = np.array([each.at_um for each in shapes])
+    off = hinges_um + np.array([_touch_um(each, radius_um) for each in shapes])
+    apart = places - places.mean()
+    information = float(apart @ apart) / noise_um**2 + prior_rad**-2
+    turned = -float(apart @ (off - off.mean())) / noise_um**2 / information
+    left = off - off.mean() + turned * apart
+    excess = max(1.0, float(left @ left) / (len(shapes) - 2) / noise_um**2)
+    return turned, min(math.sqrt(excess / information), prior_rad)
+
+
+def _touch_um(shape: NaturalShape, radius_um: float) -> float:
+    """Return where across the jaws the middle of the probe stands when it touches."""
+    slope = shape.slope_rad
+    ahead = shape.at_um + radius_um * math.sin(slope)
+    aside = float(np.interp(ahead, shape.ahead_um, shape.aside_um))
+    return aside + radius_um * math.cos(slope)

@@ -35,6 +35,8 @@ class FitSettings(StrictModel):
         The probe's round edge and the fibre: a sloping fibre touches nearer to the clamp.
     direction_std_deg : float
         Error of the direction in which the fibre leaves the jaws, as the image shows it.
+    touch_std_um : float
+        How well the place of the first contact across the fibre repeats.
     friction, friction_std : float
         Between probe and fibre.
     cross_std_part : float
@@ -71,6 +73,7 @@ class FitSettings(StrictModel):
     edge_radius_um: float = Field(10.0, ge=0.0)
     fibre_width_um: float = Field(30.0, ge=0.0)
     direction_std_deg: float = Field(1.0, ge=0.0)
+    touch_std_um: float = Field(0.5, gt=0.0)
     friction: float = Field(0.2, ge=0.0, lt=1.0)
     friction_std: float = Field(0.15, ge=0.0)
     cross_std_part: float = Field(0.02, ge=0.0)

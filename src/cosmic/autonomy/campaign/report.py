@@ -317,7 +317,7 @@ def _calibration_row(each: CalibrationNote) -> tuple[str, ...]:
 def budget_rows(result: BendingResult) -> list[tuple[str, ...]]:
     """Return the budget of a stiffness as rows of text; contributions too small to see in one."""
     shown = [line for line in result.budget if line.share >= LEAST_SHARE]
-    rows = [
+    rows: list[tuple[str, ...]] = [
         (
             line.source,
             line.kind.value,
