@@ -34,7 +34,7 @@ from cosmic.autonomy.bending.fit import (
     measure_fibre,
 )
 from cosmic.autonomy.bending.plan import SpanLimits, guess_ei, plan_spans
-from cosmic.autonomy.bending.result import BendingError, BendingResult
+from cosmic.autonomy.bending.result import BendingError, BendingResult, Quality
 from cosmic.autonomy.bending.settings import FitSettings
 from cosmic.autonomy.bending.span import Span
 
