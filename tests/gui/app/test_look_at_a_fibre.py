@@ -38,7 +38,8 @@ def test_a_fibre_is_measured_and_a_gripper_calibrated_and_sent_to_a_pixel(
     lens = window.findChild(LensPanel)
     views = {each.windowTitle(): each for each in window.findChildren(CameraView)}
     view = views["Microscope"]
-    window.dock("Microscope").raise_()
+    window.raise_panel("Camera settings")
+    window.raise_panel("Microscope")
     vico, mico = window.platform.vico, window.platform.mico
     assert lens is not None
     assert vico is not None

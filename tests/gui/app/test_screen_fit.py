@@ -33,7 +33,8 @@ def on(room: QRect, window: QWidget) -> bool:
 
 
 def stop_is_seen(window: QWidget, room: QRect) -> bool:
-    stop = window.findChild(StopButton)
+    bar = window.top_bar if isinstance(window, CosmicServerGui) else window
+    stop = bar.findChild(StopButton)
     place = QRect(stop.mapToGlobal(QPoint(0, 0)), stop.size())
     return stop.isVisible() and room.contains(place) and not stop.visibleRegion().isEmpty()
 

@@ -43,6 +43,12 @@ class Instruments:
             found["vico"] = [*titles, LENS]
         return found
 
+    def add_force(self, window: CosmicServerGui) -> None:
+        """Add the panel of acquisition alone, wherever the window lays it out."""
+        if self.force is not None:
+            window.add_panel(DAQCO, self.force, scroll=False)
+            self.force.close_requested.connect(window.dock(DAQCO).close)
+
     def place(self, window: CosmicServerGui, scene: str, left: str) -> str:
         """Add them to the window, and share its width out; return the first image's title.
 

@@ -103,6 +103,7 @@ class ScenePanel(QWidget):
         self._planned: Path | None = None
         self._replayed = False
         self._movements = Relay(self._on_movement).follow(self._mico.follow_movements)
+        self._compact = False
         self._feed = StateFeed(self._mico, self, period_ms=PERIOD_MS)
         self._feed.set_paused(True)
         self._wait = named(QLabel("The scene is loading"), "sceneWait")
@@ -152,6 +153,7 @@ class ScenePanel(QWidget):
 
         scene = SceneWidget(prefer_gl=self._model is not None)
         self._scene = scene
+        scene.set_compact(self._compact)
         scene.set_model(self._model)
         scene.restore_state(self._stored())
         self._column.replaceWidget(self._wait, scene)
@@ -161,6 +163,14 @@ class ScenePanel(QWidget):
             words.clicked.connect(self.clear_refused)
         scene.refused_cleared.connect(self._on_refused_cleared)
         self._show_all()
+
+    def set_compact(self, compact: bool) -> None:
+        """Show the scene alone, in the room of an inset, or with all that belongs to it."""
+        self._compact = compact
+        least = 12 * STEP_PX if compact else 30 * STEP_PX
+        self.setMinimumSize(least, 9 * STEP_PX if compact else least)
+        if self._scene is not None:
+            self._scene.set_compact(compact)
 
     def _stored(self) -> dict[str, object]:
         try:

@@ -9,15 +9,25 @@ from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 import cosmic
 from cosmic.app.panels.calibrations import CalibrationPanel, add_calibrations
 from cosmic.app.panels.campaign.dock import CAMPAIGN, CampaignDock, can_run
-from cosmic.app.panels.instruments import instruments_of
+from cosmic.app.panels.instruments import DAQCO, LENS, instruments_of
 from cosmic.app.panels.path_preview import PathController, PathPreview, PreviewState
 from cosmic.app.panels.procedures import TRAJECTORIES, ProcedurePanels
 from cosmic.app.panels.scene import ScenePanel
 from cosmic.app.platform import Platform
 from cosmic.app.rig import Rig
 from cosmic.app.stations.host import StationHost
+from cosmic.app.windows.coaching import coach_rules
 from cosmic.app.windows.hint_bar import HintBar, first_steps
 from cosmic.app.windows.stations import WindowStations
+from cosmic.app.windows.tasks import (
+    FORCE,
+    HANDLE,
+    IMAGE,
+    MICO,
+    TOOL,
+    TaskLayout,
+    usable_by_task,
+)
 from cosmic.app.windows.top_bar import ACM, ECM, SCM, CollisionBar, ControlMode, blocked_modes
 from cosmic.daqco.api.daqco import daqco_of
 from cosmic.daqco.gui.limit_indicator import LimitIndicator
@@ -30,6 +40,7 @@ from cosmic.frame.gui.server_gui import LOG_TITLE, CosmicServerGui
 from cosmic.frame.gui.stop_key import StopKeyFilter
 from cosmic.frame.gui.theme import State
 from cosmic.frame.log import RingBufferHandler
+from cosmic.frame.overrides import override
 from cosmic.mico.core.motion.stop_latch import StopState
 from cosmic.mico.gui.mico_widget import MicoWidget
 
@@ -51,7 +62,6 @@ class WindowBridge(QObject):
         self.latch_changed.emit(state)
 
 
-MICO: Final = "MiCo"
 CONSOLE: Final = "Console"
 SCENE: Final = "Scene"
 RATE_MS: Final = 1000
@@ -101,26 +111,21 @@ class OperatorWindow(CosmicServerGui):
         self._scene: ScenePanel | None = None
         self._path: PathController | None = None
         self._bridge = WindowBridge()
+        self._tasks: TaskLayout | None = None
         self._forget_policy = platform.policy.subscribe(self._bridge.report_failure)
+        self._instruments = instruments_of(platform)
+        gui = platform.mico.get_gui() if platform.mico is not None else None
+        self._by_task = usable_by_task(gui, self._instruments)
         self._add_mico(settings)
         images = self._add_instruments()
-        if self._mico_gui is not None and self._scene is not None:
-            self._procedures = ProcedurePanels(
-                self, self._mico_gui, self._scene, self._rig.control, beside=SCENE
-            )
         self._campaign: CampaignDock | None = None
         self._calibrations: LatePanel[CalibrationPanel] | None = None
-        if self._scene is not None and can_run(platform):
-            self._campaign = CampaignDock(
-                self, self._rig, self._scene, platform.policy, beside=MICO
-            )
-            self._campaign.replayed.connect(self._raise_scene)
-            self._calibrations = add_calibrations(self, self._rig, beside=MICO)
-            self.dock(MICO).raise_()
+        self._add_procedures()
         if images:
             self.dock(images).raise_()
+        self._lay_out_by_task(settings)
         self._add_others()
-        self._stations = WindowStations(self, platform, host, self._instruments.panels)
+        self._stations = WindowStations(self, platform, host, self._panels_by_application())
         model = self._mico_gui is not None and self._mico_gui.collision.has_model
         blocked = blocked_modes(
             mico=self._mico_gui is not None, model=model, campaigns=self._campaign is not None
@@ -153,7 +158,9 @@ class OperatorWindow(CosmicServerGui):
         gui.failure_changed.connect(self._on_mico_failure)
         application.manager.latch.subscribe(self._bridge.report_latch)
         self._scene = ScenePanel(gui, settings)
-        self.add_panel(SCENE, self._scene, Qt.DockWidgetArea.RightDockWidgetArea, scroll=False)
+        if not self._by_task:
+            right = Qt.DockWidgetArea.RightDockWidgetArea
+            self.add_panel(SCENE, self._scene, right, scroll=False)
         gui.undo_planned.connect(self._scene.set_planned)
         self._collision_bar = CollisionBar(self.top_bar, gui, self)
         preview = PathPreview()
@@ -165,10 +172,12 @@ class OperatorWindow(CosmicServerGui):
         """Put image and lens in the middle, force below the scene; return the image's title."""
         if self._platform.mico is None:
             self.top_bar.set_collision_model(present=True)  # nothing moves that could collide
-        scene = SCENE if self._scene is not None else ""
-        self._instruments = instruments_of(self._platform)
+        if self._by_task:
+            self._instruments.add_force(self)
+            return ""
         if self._platform.daqco is not None:
             self.top_bar.add_indicator(LimitIndicator(daqco_of(self._platform.daqco)))
+        scene = SCENE if self._scene is not None else ""
         return self._instruments.place(self, scene, MICO if scene else "")
 
     def _add_others(self) -> None:
@@ -181,9 +190,53 @@ class OperatorWindow(CosmicServerGui):
         if beside and self._platform.others:
             self.dock(SCENE).raise_()
 
+    def _add_procedures(self) -> None:
+        """Add what moves by itself: trajectories, loops, calibrations, campaigns."""
+        if self._mico_gui is None or self._scene is None:
+            return
+        beside = MICO if self._by_task else SCENE
+        self._procedures = ProcedurePanels(
+            self, self._mico_gui, self._scene, self._rig.control, beside=beside
+        )
+        if not can_run(self._platform):
+            return
+        self._campaign = CampaignDock(
+            self, self._rig, self._scene, self._platform.policy, beside=MICO
+        )
+        self._campaign.replayed.connect(self._raise_scene)
+        self._calibrations = add_calibrations(self, self._rig, beside=MICO)
+        self.dock(MICO).raise_()
+
+    def _lay_out_by_task(self, settings: QSettings) -> None:
+        """Have the six workspaces, where there are axes and a camera."""
+        if not self._by_task or self._mico_gui is None or self._scene is None:
+            return
+        self._tasks = TaskLayout(
+            self,
+            self._platform,
+            self._rig,
+            self._mico_gui,
+            self._scene,
+            self._instruments,
+            settings,
+        )
+        self._tasks.add_coach(coach_rules(self, self._rig, self._mico_gui, self._tasks))
+        if self._platform.daqco is not None:
+            indicator = LimitIndicator(daqco_of(self._platform.daqco), compact=True)
+            self.top_bar.add_indicator(indicator)
+
+    def _panels_by_application(self) -> dict[str, list[str]]:
+        if self._tasks is None:
+            return self._instruments.panels
+        daqco = [DAQCO] if self._tasks.force is None else [DAQCO, FORCE]
+        return {"daqco": daqco, "vico": [LENS, IMAGE]}
+
     def _add_log(self, ring: RingBufferHandler, *, console: bool) -> None:
         below = Qt.DockWidgetArea.BottomDockWidgetArea
-        self.add_panel(LOG_TITLE, LogPanel(ring), below, scroll=False)
+        if self._tasks is not None:
+            self.drawer.add_page(LOG_TITLE, LogPanel(ring), "What happened, line by line")
+        else:
+            self.add_panel(LOG_TITLE, LogPanel(ring), below, scroll=False)
         if console:
             self._console = ConsolePanel(
                 self._platform.policy,
@@ -192,6 +245,9 @@ class OperatorWindow(CosmicServerGui):
                 banner='Python console: try rig.mico["left.x"].move_by("0.2 mm"). '
                 "Ctrl+C or Interrupt breaks what runs.\n",
             )
+            if self._tasks is not None:
+                self.drawer.add_page(CONSOLE, self._console, "The platform from Python")
+                return
             self.add_panel(CONSOLE, self._console, scroll=False, beside=LOG_TITLE)
             self.share_out((LOG_TITLE, CONSOLE), _SHARES, Qt.Orientation.Horizontal)
 
@@ -200,6 +256,8 @@ class OperatorWindow(CosmicServerGui):
         self._stop_filter.stop_requested.connect(self._on_stop_key)
         self._stop_filter.add_cancel(self._cancel_path)
         self._stop_filter.add_cancel(self._cancel_tool)
+        if self._tasks is not None:
+            self._stop_filter.add_cancel(self.drawer.close_page)
         self.top_bar.reset_requested.connect(self._on_reset)
         self.top_bar.message_clicked.connect(self._on_message_read)
         self.rescan_requested.connect(self._on_rescan)
@@ -251,6 +309,23 @@ class OperatorWindow(CosmicServerGui):
     def procedures(self) -> ProcedurePanels | None:
         """Trajectories, teleoperation and control loops, where MiCo is hosted."""
         return self._procedures
+
+    @property
+    def tasks(self) -> TaskLayout | None:
+        """What the workspaces are made of; None in a window of docks alone."""
+        return self._tasks
+
+    @override
+    def raise_panel(self, title: str) -> None:
+        """Show the panel `title`, or that picture, and bring it to the front."""
+        stage = self._tasks.stage if self._tasks is not None else None
+        if stage is None or self.workspaces is None or title not in stage.titles:
+            super().raise_panel(title)
+            return
+        shown = {each.name: each for each in self.workspaces.all}[self.workspaces.current]
+        if not shown.middle:
+            self.workspaces.choose(HANDLE)
+        stage.show_large(title)
 
     @property
     def mode(self) -> str:
@@ -325,6 +400,8 @@ class OperatorWindow(CosmicServerGui):
         if self._mico_gui is not None:
             self._mico_gui.release_keys()
             self._mico_gui.show_stopped(state.reason)
+        if self._tasks is not None:
+            self._tasks.show_stopped(state.reason)
         if self._path is not None and state.reason is not None:
             self._path.cancel()
 
@@ -343,20 +420,25 @@ class OperatorWindow(CosmicServerGui):
 
     def _on_failure(self, failure: Failure) -> None:
         self.top_bar.set_message(f"{failure.where}: {failure.text}", State.ERROR)
+        if self._tasks is not None:
+            self._tasks.note_failure(failure)
 
     def _on_mico_failure(self, reason: str) -> None:
+        panels = (MICO, TOOL) if self._tasks is not None else (MICO,)
         if reason:
-            self.set_failed(MICO, reason)
+            for title in panels:
+                self.set_failed(title, reason)
             self.top_bar.set_message(f"{MICO}: {reason}", State.ERROR)
         elif self.dock(MICO).failure:
-            self.clear_failed(MICO)
+            for title in panels:
+                self.clear_failed(title)
             self.top_bar.set_message("")
 
     def _on_message_read(self) -> None:
         self.top_bar.set_message("")
 
     def _on_rescan(self, title: str) -> None:
-        if title == MICO and self._mico_gui is not None:
+        if title in (MICO, TOOL) and self._mico_gui is not None:
             self._mico_gui.rescan()
 
     def _on_closing(self) -> None:

@@ -13,6 +13,7 @@ from cosmic.daqco.gui.limit_banner import limit_text
 from cosmic.daqco.gui.plot.units import display_unit
 from cosmic.frame.errors import NotAvailable
 from cosmic.frame.gui.chip import Chip, Tone
+from cosmic.frame.gui.theme import STEP_PX
 
 LOOK_MS: Final = 200
 
@@ -51,11 +52,32 @@ def reading(limit: DaqLimit, unit: str, value: float | None) -> LimitReading:
     return LimitReading(text, "quiet", "Crossing it stops every actuator at once")
 
 
-class LimitIndicator(Chip):
-    """The limit that matters most: crossed, not watched, or else the nearest; GUI thread."""
+def short_text(limit: DaqLimit, value: float | None) -> str:
+    """Return value, limit and whether it is armed in as little room as a bar has."""
+    given = limit.settings
+    low, high = given.low, given.high
+    nearer_low = high is None or (value is not None and low is not None and value < 0.0)
+    side = low if nearer_low else high
+    word = "STOPPED" if limit.crossed else "ARMED" if given.armed else "DISARMED"
+    now = "–" if value is None else f"{value:.1f}"
+    bound = "–" if side is None else f"{side:g}"
+    return f"{given.channel} {now}/{bound} {word}"
 
-    def __init__(self, daqco: Daqco, parent: QWidget | None = None) -> None:
+
+class LimitIndicator(Chip):
+    """The limit that matters most: crossed, not watched, or else the nearest; GUI thread.
+
+    Parameters
+    ----------
+    compact : bool
+        Say it in as little room as there is; the tooltip says the rest.
+    """
+
+    def __init__(
+        self, daqco: Daqco, parent: QWidget | None = None, *, compact: bool = False
+    ) -> None:
         super().__init__("", parent=parent)
+        self._compact = compact
         self._daqco = daqco
         self._timer = QTimer(self, interval=LOOK_MS)
         self._timer.timeout.connect(self.look)
@@ -87,6 +109,12 @@ class LimitIndicator(Chip):
         first = min(limits, key=urgency)
         channel = first.settings.channel
         shown = reading(first, units.get(channel, ""), values.get(channel))
-        self.setText(shown.text)
-        self.setToolTip(shown.tip)
+        if self._compact:
+            self.setText(short_text(first, values.get(channel)))
+            self.setToolTip(f"{shown.text}\n{shown.tip}")
+            widest = self.fontMetrics().horizontalAdvance(f"{channel} -150.0/-150 ARMED")
+            self.setFixedWidth(widest + 3 * STEP_PX)
+        else:
+            self.setText(shown.text)
+            self.setToolTip(shown.tip)
         self.set_tone(shown.tone)

@@ -77,6 +77,10 @@ class ClearanceMeter(QWidget):
         self.setMinimumWidth(self._fixed_px() + 6 * STEP_PX)
         self.show_unknown("")
 
+    def set_compact(self) -> None:
+        """Leave the names to the tooltip where there is no room for them."""
+        self.setMinimumWidth(self._fixed_px())
+
     def _fix_word_width(self) -> None:
         self._word.set_tone("alarm")  # set in bold, which is the widest
         metrics = self._word.fontMetrics()

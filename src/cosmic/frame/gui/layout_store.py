@@ -43,9 +43,8 @@ class LayoutStore:
 
     def restore(self, window: QMainWindow) -> bool:
         """Lay `window` out as it was saved; False where there was nothing usable."""
-        geometry, docks = self._bytes(_GEOMETRY), self._bytes(_DOCKS)
-        if geometry is not None and not window.restoreGeometry(geometry):
-            logger.warning("the saved size of the window is damaged; the default is used")
+        self.restore_geometry(window)
+        docks = self._bytes(_DOCKS)
         if docks is None:
             return False
         if not window.restoreState(docks, _panels(window)):
@@ -54,6 +53,12 @@ class LayoutStore:
             )
             return False
         return True
+
+    def restore_geometry(self, window: QMainWindow) -> None:
+        """Give `window` the size and the place that were saved."""
+        geometry = self._bytes(_GEOMETRY)
+        if geometry is not None and not window.restoreGeometry(geometry):
+            logger.warning("the saved size of the window is damaged; the default is used")
 
     def reset(self, window: QMainWindow) -> None:
         """Put the docks back to where they are at a first start."""

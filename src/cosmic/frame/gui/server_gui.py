@@ -1,22 +1,26 @@
 """The main window that hosts the GUI components of applications (thesis 5.3.1)."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Final
 
 from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
-from PySide6.QtGui import QAction, QActionGroup, QCloseEvent, QKeySequence, QShowEvent
+from PySide6.QtGui import QAction, QActionGroup, QCloseEvent, QKeySequence, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QApplication,
     QDockWidget,
+    QInputDialog,
     QMainWindow,
     QMenu,
     QMenuBar,
     QMessageBox,
+    QStatusBar,
     QTabBar,
     QWidget,
 )
 
 from cosmic.frame.gui.dock import PanelDock
+from cosmic.frame.gui.drawer import Drawer
 from cosmic.frame.gui.keys_dialog import KeyList, KeysDialog
 from cosmic.frame.gui.layout_store import LayoutStore
 from cosmic.frame.gui.palette import ThemeName
@@ -24,9 +28,54 @@ from cosmic.frame.gui.screen_fit import DialogFitter, fit_to_screen
 from cosmic.frame.gui.theme import STEP_PX, apply_theme, current_palette
 from cosmic.frame.gui.top_bar import TopBar
 from cosmic.frame.gui.wheel_guard import WheelGuard
+from cosmic.frame.gui.workspaces import Workspace, Workspaces
 from cosmic.frame.overrides import override
 
 _THEMES: Final = {"dark": "Dark", "light": "Light"}
+
+
+class LayoutMenu(QObject):
+    """View > Layout: the layouts that were kept, by name; GUI thread."""
+
+    def __init__(self, menu: QMenu, owner: QObject) -> None:
+        super().__init__(owner)
+        self._menu = menu
+        self._menu.setToolTipsVisible(True)
+        self._menu.menuAction().setVisible(False)
+        self._dialog: QInputDialog | None = None
+
+    def follow(self, workspaces: Workspaces, window: QWidget) -> None:
+        """Offer the layouts of `workspaces`."""
+        self._workspaces, self._window = workspaces, window
+        self._menu.menuAction().setVisible(True)
+        self._menu.aboutToShow.connect(self._fill)
+        self._fill()
+
+    def _fill(self) -> None:
+        self._menu.clear()
+        for name in self._workspaces.layouts:
+            action = self._menu.addAction(name)
+            action.setToolTip(f"Lay the panels out as they were kept as {name}")
+            action.setCheckable(True)
+            action.setChecked(name == self._workspaces.layout_name)
+            action.triggered.connect(partial(self._workspaces.use, name))
+        self._menu.addSeparator()
+        keep = self._menu.addAction("&Keep as…")
+        keep.setToolTip("Keep the panels as they are under a name")
+        keep.triggered.connect(self._on_keep)
+
+    def _on_keep(self) -> None:
+        dialog = QInputDialog(self._window)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setWindowTitle("Keep the layout")
+        dialog.setLabelText("Name of the layout")
+        dialog.textValueSelected.connect(self._on_named)
+        dialog.open()
+
+    def _on_named(self, name: str) -> None:
+        name = name.strip().replace("/", "-")
+        if name:
+            self._workspaces.save_as(name)
 
 
 class ServerMenus(QObject):
@@ -50,6 +99,7 @@ class ServerMenus(QObject):
         quit_.triggered.connect(self.quit_requested)
         self._separator = self._view.addSeparator()
         self._themes = self._make_themes()
+        self.layouts = LayoutMenu(self._view.addMenu("&Layout"), self)
         reset = self._action(self._view, "&Reset layout", "Reset all panels to the default layout")
         reset.triggered.connect(self.reset_layout_requested)
         keys = self._action(help_, "&Keys", "List every key and what it does", "F1")
@@ -189,6 +239,9 @@ class CosmicServerGui(QMainWindow):
         self._keys_dialog: KeysDialog | None = None
         self._shares: list[tuple[tuple[str, ...], tuple[int, ...], Way]] = []
         self._restored = False
+        self._settings = settings
+        self._workspaces: Workspaces | None = None
+        self._drawer: Drawer | None = None
         self._bar = TopBar(title, stop_key=stop_key)
         self._menus = ServerMenus(self)
         self._bar.set_menu_bar(self._menus.bar)
@@ -263,6 +316,41 @@ class CosmicServerGui(QMainWindow):
             self.restoreDockWidget(dock)
         return dock
 
+    def use_workspaces(self, workspaces: Sequence[Workspace], middle: QWidget) -> Workspaces:
+        """Lay the panels out by task, around `middle`; call it when all panels were added.
+
+        What is not a panel but opens over the picture is added to `drawer` afterwards.
+        """
+        made = Workspaces(self, self._settings)
+        self._workspaces = made
+        self.setCentralWidget(middle)
+        for dock in self._docks.values():
+            made.add_dock(dock)
+        for each in workspaces:
+            made.add(each)
+        self._bar.set_workspaces([(each.name, each.tip) for each in workspaces])
+        self._bar.workspace_requested.connect(made.choose)
+        made.chosen.connect(self._bar.show_workspace)
+        self._menus.layouts.follow(made, self)
+        return made
+
+    @property
+    def workspaces(self) -> Workspaces | None:
+        """What lays the panels out by task; None where the window does one task only."""
+        return self._workspaces
+
+    @property
+    def drawer(self) -> Drawer:
+        """The line at the bottom, made now if need be."""
+        if self._drawer is None:
+            self._drawer = Drawer(self)
+            bar = QStatusBar()
+            bar.setSizeGripEnabled(False)
+            bar.setContentsMargins(0, 0, 0, 0)
+            bar.addWidget(self._drawer, 1)
+            self.setStatusBar(bar)
+        return self._drawer
+
     def share_out(self, titles: Sequence[str], shares: Sequence[int], direction: Way) -> None:
         """Have panels that stand in a row or a column share its length so at a first start."""
         self._shares.append((tuple(titles), tuple(shares), direction))
@@ -277,6 +365,12 @@ class CosmicServerGui(QMainWindow):
 
     def raise_panel(self, title: str) -> None:
         """Show the panel `title` and bring it to the front."""
+        if self._drawer is not None and title in self._drawer.titles:
+            self._drawer.show_page(title)
+            return
+        if self._workspaces is not None:
+            self._workspaces.bring(title)
+            return
         dock = self._docks[title]
         dock.show()
         dock.raise_()
@@ -317,11 +411,15 @@ class CosmicServerGui(QMainWindow):
 
     def reset_layout(self) -> None:
         """Put all panels back to where they are at a first start."""
+        if self._workspaces is not None:
+            self._workspaces.reset()
+            return
         self._store.reset(self)
         hide_stale_tab_bars(self)
 
     def _on_message_clicked(self) -> None:
-        if LOG_TITLE in self._docks:
+        in_drawer = self._drawer is not None and LOG_TITLE in self._drawer.titles
+        if in_drawer or LOG_TITLE in self._docks:
             self.raise_panel(LOG_TITLE)
 
     def _size_panels(self) -> None:
@@ -350,9 +448,13 @@ class CosmicServerGui(QMainWindow):
             if isinstance(app, QApplication):  # not before: making the panels makes many events
                 self._guards = (WheelGuard(app, self), DialogFitter(app, self))
             fit_to_screen(self)
-            self._size_panels()
-            self._store.remember_default(self)
-            self._store.restore(self)
+            if self._workspaces is not None:
+                self._store.restore_geometry(self)
+                self._workspaces.restore()
+            else:
+                self._size_panels()
+                self._store.remember_default(self)
+                self._store.restore(self)
             fit_to_screen(self)
             QTimer.singleShot(0, self, self._after_first_show)
         super().showEvent(event)
@@ -369,7 +471,15 @@ class CosmicServerGui(QMainWindow):
         fit_to_screen(self)
 
     @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if self._workspaces is not None and self._restored:
+            QTimer.singleShot(0, self._workspaces, self._workspaces.fit)
+
+    @override
     def closeEvent(self, event: QCloseEvent) -> None:
         self._store.save(self, self.theme)
+        if self._workspaces is not None:
+            self._workspaces.save()
         self.closing.emit()
         super().closeEvent(event)

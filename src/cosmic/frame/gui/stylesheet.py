@@ -170,6 +170,37 @@ QProgressBar[look="bar"] { min-height: 8px; border: none; }
 #modeButton {
     border-radius: 0px; padding: 3px 9px; margin-left: -1px; min-width: 34px; min-height: 22px;
 }
+#workspaceButton {
+    background: transparent; border: none; border-bottom: 2px solid transparent;
+    border-radius: 0px; color: $dim; padding: 3px 5px; min-height: 22px;
+}
+#workspaceButton:hover, #workspaceButton:focus { color: $text; background: $hover; }
+#workspaceButton:checked { color: $text; border-bottom: 2px solid $accent; }
+#topBar[latched="true"] #workspaceButton { color: $on_stop; }
+#topBar[latched="true"] #workspaceButton:hover { background: $stop; }
+#alarmsButton { background: transparent; padding: 1px 6px; }
+#alarmsButton[alarming="true"] { background: $alarm; color: $ink; border-color: $alarm; }
+#topBar[latched="true"] #alarmsButton[alarming="false"] { color: $on_stop; }
+#drawerLine { background: $window; border-top: 1px solid $border; }
+#drawerLine QToolButton {
+    background: transparent; border: none; border-radius: 0px; color: $dim; padding: 0px 9px;
+    min-height: 20px;
+}
+#drawerLine QToolButton:hover, #drawerLine QToolButton:focus { color: $text; background: $hover; }
+#drawerLine QToolButton:checked { color: $text; border-top: 2px solid $accent; }
+#drawerBody { background: $panel; border-top: 2px solid $accent; }
+#stage { background: $field; }
+#stageInset { background: $panel; border: 1px solid $border_strong; }
+#imageBar { background: $panel; border-radius: 4px; }
+#coach { background: $raised; border: 1px solid $border; border-radius: 4px; }
+#padButton { padding: 0px; min-width: 30px; max-width: 46px; min-height: 26px; }
+#axisTable QPushButton, #axisTable QToolButton, #axisTable QLineEdit {
+    padding: 1px 5px; min-height: 18px;
+}
+#axisTable QLineEdit[refused="true"] { padding: 0px 4px; }
+#toolButton { padding: 2px 0px; }
+#toolPanel QPushButton[look="narrow"] { padding: 3px 3px; }
+
 #resetButton {
     background: $on_stop; color: $ink; border: 1px solid $on_stop; padding: 3px 19px;
     min-height: 22px;

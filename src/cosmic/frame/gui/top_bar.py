@@ -1,12 +1,13 @@
 """The bar on top of every main window: what is in force, what is wrong, and STOP."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
+    QMenu,
     QMenuBar,
     QSizePolicy,
     QStackedWidget,
@@ -15,7 +16,15 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from cosmic.frame.gui.build import named, push_button, restyle, tight_row
+from cosmic.frame.gui.build import (
+    named,
+    push_button,
+    restyle,
+    set_style_property,
+    styled,
+    tight_row,
+    tipped,
+)
 from cosmic.frame.gui.chip import Chip
 from cosmic.frame.gui.clearance_meter import Clearance, ClearanceMeter
 from cosmic.frame.gui.controls_indicator import ControlsIndicator
@@ -53,7 +62,33 @@ class ModeSelector(QWidget):
             row.addWidget(button)
             self._buttons[name] = button
             self.set_available(name, "" if name == "MCM" else "not part of this version")
+        self._menu = QMenu(self)
+        self._menu.setToolTipsVisible(True)
+        self._list = named(QToolButton(), "modeList")
+        self._list.setMenu(self._menu)
+        self._list.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self._list.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        styled(self._list, "menu")
+        self._list.hide()
+        row.addWidget(self._list)
         self.set_mode("MCM")
+
+    def set_compact(self) -> None:
+        """Show the mode in force alone; the others are in its menu."""
+        for button in self._buttons.values():
+            button.hide()
+        self._menu.aboutToShow.connect(self._fill)
+        self._list.show()
+
+    def _fill(self) -> None:
+        self._menu.clear()
+        for name, button in self._buttons.items():
+            action = self._menu.addAction(button.text())
+            action.setToolTip(button.toolTip())
+            action.setEnabled(button.isEnabled())
+            action.setCheckable(True)
+            action.setChecked(name == self._mode)
+            action.triggered.connect(button.click)
 
     @property
     def mode(self) -> str:
@@ -65,6 +100,8 @@ class ModeSelector(QWidget):
         self._mode = name
         for each, button in self._buttons.items():
             button.setChecked(each == name)
+        self._list.setText(f"{self._buttons[name].text()} ▾")
+        self._list.setToolTip(MODES[name])
 
     def set_available(self, name: str, why_not: str = "") -> None:
         """Let `name` be chosen, or say in its tooltip why it cannot be."""
@@ -78,6 +115,47 @@ class ModeSelector(QWidget):
         self.set_mode(self._mode)  # the click alone changes nothing: the owner decides
         if wanted != self._mode:
             self.mode_requested.emit(wanted)
+
+
+class WorkspaceButtons(QWidget):
+    """One button for each workspace; a click only asks."""
+
+    requested = Signal(str)
+
+    def __init__(
+        self, workspaces: Sequence[tuple[str, str]], parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._buttons: dict[str, QToolButton] = {}
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(0)
+        for number, (name, tip) in enumerate(workspaces, start=1):
+            key = f"Ctrl+{number}"
+            button = named(tipped(QToolButton(), f"{tip} ({key})"), "workspaceButton")
+            button.setText(name)
+            button.setCheckable(True)
+            button.setShortcut(key)
+            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+            button.setMinimumWidth(button.fontMetrics().horizontalAdvance(name) + 2 * STEP_PX)
+            button.clicked.connect(self._on_clicked)
+            row.addWidget(button)
+            self._buttons[name] = button
+
+    @property
+    def buttons(self) -> dict[str, QToolButton]:
+        """The buttons by the name of their workspace."""
+        return dict(self._buttons)
+
+    def show_current(self, name: str) -> None:
+        """Show which one is in front."""
+        for each, button in self._buttons.items():
+            button.setChecked(each == name)
+
+    def _on_clicked(self) -> None:
+        wanted = next(name for name, each in self._buttons.items() if each is self.sender())
+        self._buttons[wanted].setChecked(True)
+        self.requested.emit(wanted)
 
 
 NO_COLLISION_MODEL = "no collision model"
@@ -104,6 +182,8 @@ class TopBar(QWidget):
     mode_requested = Signal(str)
     theme_requested = Signal()
     message_clicked = Signal()
+    workspace_requested = Signal(str)
+    alarms_clicked = Signal()
 
     def __init__(
         self, title: str = "CoSMic", *, stop_key: str = "F12", parent: QWidget | None = None
@@ -113,6 +193,7 @@ class TopBar(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # a click on it ends typing in a field
         self._latched = False
+        self._workspaces: WorkspaceButtons | None = None
         self._theme_then = current_palette().name
         self._make_widgets(title, stop_key)
         self._arrange()
@@ -156,6 +237,7 @@ class TopBar(QWidget):
 
     def _arrange(self) -> None:
         normal, row = tight_row(STEP_PX)
+        self._normal_row = row
         for widget in (self._modes, self._no_model, self._rate):
             row.addWidget(widget)
         row.addWidget(self._clearance, 1)
@@ -179,6 +261,7 @@ class TopBar(QWidget):
             self._first_row.addWidget(warning)
         self._first_row.addWidget(self._theme)
         second = QHBoxLayout()
+        self._second_row = second
         second.setSpacing(2 * STEP_PX)
         second.addWidget(self._title)
         second.addWidget(self._simulated)
@@ -197,8 +280,47 @@ class TopBar(QWidget):
         whole.addWidget(warnings, 1)
         whole.addWidget(self._stop)
 
+    def set_workspaces(self, workspaces: Sequence[tuple[str, str]]) -> None:
+        """Offer workspaces, by name and what each is for; they take the place of the title."""
+        buttons = WorkspaceButtons(workspaces)
+        buttons.requested.connect(self.workspace_requested)
+        self._workspaces = buttons
+        self._alarms = named(QToolButton(), "alarmsButton")
+        self._alarms.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self._alarms.clicked.connect(self.alarms_clicked)
+        self.set_alarms(0)
+        self._title.hide()
+        self._clearance.set_compact()
+        self._modes.set_compact()
+        self._second_row.setSpacing(STEP_PX)
+        self._second_row.insertWidget(self._second_row.indexOf(self._pages), buttons)
+        for widget in (self._modes, self._no_model, self._rate):
+            self._normal_row.removeWidget(widget)
+            self._first_row.insertWidget(self._first_row.indexOf(self._theme), widget)
+        self._first_row.insertWidget(self._first_row.indexOf(self._theme), self._alarms)
+
+    @property
+    def workspaces(self) -> WorkspaceButtons | None:
+        """The buttons of the workspaces; None where the window has none."""
+        return self._workspaces
+
+    def show_workspace(self, name: str) -> None:
+        """Show which workspace is in front."""
+        if self._workspaces is not None:
+            self._workspaces.show_current(name)
+
+    def set_alarms(self, count: int, newest: str = "") -> None:
+        """Show how many alarms nobody has acknowledged."""
+        self._alarms.setText(f"▲ alarms {count}" if count else "alarms 0")
+        tip = f"{newest}\n" if newest else ""
+        self._alarms.setToolTip(f"{tip}Open the list of alarms")
+        set_style_property(self._alarms, "alarming", count > 0)
+
     def add_indicator(self, indicator: QWidget) -> None:
         """Add what must be seen from everywhere, stopped or not."""
+        if self._workspaces is not None:
+            self._second_row.addWidget(indicator)
+            return
         self._first_row.insertWidget(self._first_row.indexOf(self._theme), indicator)
 
     def set_menu_bar(self, menu_bar: QMenuBar) -> None:

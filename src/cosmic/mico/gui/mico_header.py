@@ -35,7 +35,11 @@ class MicoHeader(QWidget):
         The operator wants it.
     steps_toggled(bool)
         The steps of the initialisation shall be shown, or not.
+    cards_toggled(bool)
+        The cards shall be shown instead of the table, or not.
     """
+
+    cards_toggled = Signal(bool)
 
     initialise_requested = Signal()
     rescan_requested = Signal()
@@ -72,6 +76,10 @@ class MicoHeader(QWidget):
         self._steps.setCheckable(True)
         tipped(self._steps, "Show the steps of the initialisation")
         self._steps.toggled.connect(self.steps_toggled)
+        self._cards = named(push_button("Cards", "Show every field of each axis"), "showCards")
+        self._cards.setCheckable(True)
+        self._cards.hide()
+        self._cards.toggled.connect(self.cards_toggled)
         self._undo = named(push_button("Undo", ""), "undo")
         self._undo.clicked.connect(self.undo_requested)
         self.set_undo("")
@@ -107,7 +115,7 @@ class MicoHeader(QWidget):
         caption.setProperty("role", "dim")
         # Wraps where the panel is narrow: the picture beside it needs the width.
         line = FlowLayout(STEP_PX)
-        buttons = (self._initialise, self._steps, self._rescan, self._undo)
+        buttons = (self._initialise, self._steps, self._rescan, self._undo, self._cards)
         speeds, row = tight_row(STEP_PX)
         for widget in (caption, *self._speeds.values()):
             row.addWidget(widget)
@@ -140,6 +148,14 @@ class MicoHeader(QWidget):
         self._undo.setEnabled(bool(what))
         why_not = "Not available: there is no movement to undo"
         self._undo.setToolTip(f"Ctrl+Z: {what}" if what else why_not)
+
+    def offer_cards(self) -> None:
+        """Have a button that turns between table and cards."""
+        self._cards.show()
+
+    def show_cards(self, shown: bool) -> None:
+        """Show which of them is seen."""
+        self._cards.setChecked(shown)
 
     def set_steps_shown(self, shown: bool) -> None:
         """Show whether the steps are to be seen."""

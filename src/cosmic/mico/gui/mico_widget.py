@@ -3,11 +3,12 @@
 import logging
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 
 from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.errors import CosmicError, NotAvailable
 from cosmic.frame.gui.relay import Relay
+from cosmic.frame.gui.screen_fit import FittedPanel
 from cosmic.frame.gui.theme import State
 from cosmic.frame.operation import Task
 from cosmic.mico.api.application_base import MicoApplicationBase
@@ -17,6 +18,7 @@ from cosmic.mico.core.motion.links import Link
 from cosmic.mico.core.settings import GroupSettings, MicoSettings, PositionerSettings
 from cosmic.mico.gui.arrangement import arranged_groups
 from cosmic.mico.gui.axis_commands import ConsentRequest
+from cosmic.mico.gui.axis_table import AxisTable
 from cosmic.mico.gui.caution_dialog import CautionDialog
 from cosmic.mico.gui.closed_loop_gui import ClosedLoopGUI
 from cosmic.mico.gui.collision_status import CollisionStatus
@@ -86,6 +88,7 @@ class MicoWidget(QWidget):
         self._steps.hide()
         self._undoing = UndoGui(mico, self)
         self._columns = GroupColumns()
+        self._table = AxisTable()
         self._feed = StateFeed(mico, self)
         self._keys = JogKeys(qt_application(), self._header.speed, self)
         column = QVBoxLayout(self)
@@ -93,7 +96,9 @@ class MicoWidget(QWidget):
         column.setSpacing(0)
         column.addWidget(self._header)
         column.addWidget(self._steps)
-        column.addWidget(self._columns, 1)
+        self._pages = QStackedWidget()
+        self._pages.addWidget(self._columns)
+        column.addWidget(self._pages, 1)
         self._connect()
         self.refresh()
 
@@ -124,6 +129,32 @@ class MicoWidget(QWidget):
     def mico(self) -> Mico:
         """What it commands."""
         return self._mico
+
+    def _fill_table(self) -> None:
+        if self._pages.count() > 1:
+            self._table.set_cards(self._cards, self._settings.defaults)
+
+    def offer_table(self) -> None:
+        """Show all axes as a table of one row each; a button turns to the cards and back."""
+        self._pages.addWidget(FittedPanel(self._table))
+        self._fill_table()
+        self.refresh()
+        self._header.offer_cards()
+        self._header.cards_toggled.connect(self._on_cards_toggled)
+        self._pages.setCurrentIndex(1)
+
+    @property
+    def table(self) -> AxisTable:
+        """The rows of all axes."""
+        return self._table
+
+    def show_cards(self, shown: bool) -> None:
+        """Show the cards with every field, or the table."""
+        self._header.show_cards(shown)
+        self._on_cards_toggled(shown)
+
+    def _on_cards_toggled(self, shown: bool) -> None:
+        self._pages.setCurrentIndex(0 if shown or self._pages.count() == 1 else 1)
 
     @property
     def collision(self) -> CollisionStatus:
@@ -204,6 +235,8 @@ class MicoWidget(QWidget):
             for name, card in group.cards.items():
                 self._feed.add(name, card)
                 self._feed.add(name, group)
+        for name, row in self._table.rows.items():
+            self._feed.add(name, row)
         self._header.set_missing(self._mico.missing)
         self._steps.preview()
         self._on_links_changed()
@@ -217,6 +250,7 @@ class MicoWidget(QWidget):
         self._cards = {}
         groups = [self._make_group(each) for each in arranged_groups(self._mico)]
         self._columns.set_groups(groups)
+        self._fill_table()
         self._keys.set_keys(self._jog_keys())
         self._on_collision_changed()
 

@@ -109,9 +109,12 @@ class PositionerBaseGUI(Card):
     -------
     consent_wanted(ConsentRequest)
         A movement waits for the operator's decision.
+    status_changed()
+        The line at its foot says something else.
     """
 
     consent_wanted = Signal(object)
+    status_changed = Signal()
 
     state_name: ClassVar[str] = "MiCoOL_1"
     title_name: ClassVar[str] = "MiCoOL_2"
@@ -169,7 +172,7 @@ class PositionerBaseGUI(Card):
         self._stop = named(QToolButton(), "stopAxis")
         self._stop.setText("■")
         tipped(self._stop, f"Stop {settings.name}; the other axes go on")
-        self._stop.clicked.connect(self._on_stop_clicked)
+        self._stop.clicked.connect(self.halt)
         self._forward = self._direction_button(settings.forward_text, settings.forward_key, "+")
         self._forward.setObjectName(self.forward_name)
         self._forward.clicked.connect(self._on_forward)
@@ -282,8 +285,16 @@ class PositionerBaseGUI(Card):
         else:
             text = self._note or self._stopped or ("" if self._watched else UNWATCHED_TEXT)
         loud = bool(text)
+        before = self._line.text()
         self._line.set_text(text or self._usual_line(state))
         self._line.set_dim(not loud)
+        if self._line.text() != before:
+            self.status_changed.emit()
+
+    @property
+    def status_text(self) -> str:
+        """What the line at the foot of the card says."""
+        return self._line.text()
 
     def _usual_line(self, state: PositionerState) -> str:  # noqa: ARG002 - other kinds look at it
         return "no sensor: the position is counted from steps"
@@ -314,7 +325,8 @@ class PositionerBaseGUI(Card):
                 self._steps.steps,
             )
 
-    def _on_stop_clicked(self) -> None:
+    def halt(self) -> None:
+        """Stop this axis alone, as the button does."""
         self.commands.abandon_series()
         self.axis.halt()
 

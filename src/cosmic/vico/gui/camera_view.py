@@ -1,6 +1,7 @@
 """`CameraView`: the live image of one camera, with all that belongs beside it."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from datetime import datetime
 from typing import Final
 
@@ -29,6 +30,7 @@ from cosmic.vico.gui.levels import Histogram, histogram
 from cosmic.vico.gui.record_bar import RecordBar
 from cosmic.vico.gui.seen_layer import SeenLayer
 from cosmic.vico.gui.settings_form import SettingsForm
+from cosmic.vico.gui.slider_field import SliderField
 from cosmic.vico.gui.status_row import StatusRow
 from cosmic.vico.gui.tool_row import ToolRow
 from cosmic.vico.hw.interface import FrameStatus, Trigger
@@ -57,6 +59,18 @@ SELDOM: Final = 5
 """Readouts between two looks at the disk."""
 STALE_S: Final = 2.0
 DRAWER_PX: Final = 38 * STEP_PX
+
+
+@dataclass(frozen=True, slots=True)
+class CameraParts:
+    """What stands around the image of a camera, handed out by `CameraView.give_parts`."""
+
+    row: ToolRow
+    exposure: SliderField
+    gain: SliderField
+    status: StatusRow
+    recorder: RecordBar
+    settings: QWidget
 
 
 class CameraView(QWidget):
@@ -110,27 +124,45 @@ class CameraView(QWidget):
         self._relay = Relay(self.refresh).follow(vico.on_change)
         self.refresh()
 
+    @property
+    def camera(self) -> CameraHandle:
+        """Whose images are shown."""
+        return self._camera
+
     # Putting it together
 
     def _build(self) -> None:
         self.view.setMinimumSize(24 * STEP_PX, 14 * STEP_PX)
         self.drawer = self._make_drawer()
-        middle = QHBoxLayout()
-        middle.setSpacing(STEP_PX)
-        middle.addWidget(self.view, 1)
-        middle.addWidget(self.drawer)
+        self._middle = QHBoxLayout()
+        self._middle.setSpacing(STEP_PX)
+        self._middle.addWidget(self.view, 1)
+        self._middle.addWidget(self.drawer)
         light = QHBoxLayout()
         light.setSpacing(2 * STEP_PX)
         light.addWidget(self.form.exposure, 1)
         light.addWidget(self.form.gain, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX // 2)
-        column.setSpacing(STEP_PX // 2)
-        column.addWidget(self.row)
-        column.addLayout(middle, 1)
-        column.addLayout(light)
-        column.addWidget(self.status)
-        column.addWidget(self.recorder)
+        self._column = QVBoxLayout(self)
+        self._column.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX // 2)
+        self._column.setSpacing(STEP_PX // 2)
+        self._column.addWidget(self.row)
+        self._column.addLayout(self._middle, 1)
+        self._column.addLayout(light)
+        self._column.addWidget(self.status)
+        self._column.addWidget(self.recorder)
+
+    def give_parts(self) -> "CameraParts":
+        """Keep the image alone and hand out all around it, for a window to place elsewhere."""
+        settings = self.drawer.takeWidget()
+        self.drawer.hide()
+        self.row.more.hide()
+        for margins in (self._column, self._middle):
+            margins.setContentsMargins(0, 0, 0, 0)
+            margins.setSpacing(0)
+        self.view.setMinimumSize(12 * STEP_PX, 9 * STEP_PX)
+        self.recorder.stack()
+        form = self.form
+        return CameraParts(self.row, form.exposure, form.gain, self.status, self.recorder, settings)
 
     def _make_drawer(self) -> QScrollArea:
         content = QWidget()

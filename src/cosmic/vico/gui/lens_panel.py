@@ -7,7 +7,7 @@ from PySide6.QtCore import QSize, QTimer
 from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QPushButton, QWidget
 
 from cosmic.frame.errors import CosmicError
-from cosmic.frame.gui.build import named, push_button, tight_row, tipped
+from cosmic.frame.gui.build import named, push_button, styled, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.flow_layout import FlowLayout
 from cosmic.frame.gui.relay import Relay
@@ -71,42 +71,35 @@ class LensPanel(QWidget):
 
     def _build(self) -> None:
         self._step_row.setLayout(self._step_flow)
-        head, beside = tight_row(STEP_PX)
-        beside.addWidget(self.badge)
-        beside.addWidget(self.name, 1)
-        beside.addWidget(self.home)
-        beside.addWidget(self.abort)
-        by_steps, buttons = tight_row(STEP_PX // 2)
-        for button in self.focus_steps.values():
-            button.setMinimumWidth(6 * STEP_PX)
-            buttons.addWidget(button)
-        buttons.addStretch(1)
-        sharp, inner = tight_row(STEP_PX // 2)
-        inner.addWidget(self.autofocus)
-        inner.addWidget(self.camera)
-        inner.addStretch(1)
+        head = _flow(self.badge, self.home, self.abort)
+        for button in (*self.focus_steps.values(), self.home, self.abort, self.autofocus):
+            styled(button, "narrow")
+        by_steps = _flow(*self.focus_steps.values())
+        sharp = _flow(self.autofocus, self.camera)
+        self.focus.field.setMinimumWidth(10 * STEP_PX)
         grid = QGridLayout(self)
-        grid.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX // 2)
+        grid.setContentsMargins(STEP_PX // 2, STEP_PX // 2, STEP_PX // 2, STEP_PX // 2)
         grid.setHorizontalSpacing(STEP_PX)
         grid.setVerticalSpacing(STEP_PX // 2)
-        grid.addWidget(head, 0, 0, 1, 3)
-        rows: tuple[tuple[str, tuple[QWidget, ...]], ...] = (
-            ("Zoom", (self.zoom, self._step_row)),
-            ("Focus", (self.focus,)),
-            ("", (by_steps,)),
-            ("", (sharp,)),
-            ("Light", (self.light,)),
+        rows: tuple[tuple[str, QWidget], ...] = (
+            ("", head),
+            ("", self.name),
+            ("Zoom", self.zoom),
+            ("", self._step_row),
+            ("Focus", self.focus),
+            ("", by_steps),
+            ("", sharp),
+            ("Light", self.light),
+            ("", self.tasks),
         )
-        for row, (caption, widgets) in enumerate(rows, start=1):
-            label = QLabel(caption)
-            label.setProperty("role", "dim")
-            grid.addWidget(label, row, 0)
-            grid.addWidget(widgets[0], row, 1, 1, 3 - len(widgets))
-            for column, widget in enumerate(widgets[1:], start=2):
-                grid.addWidget(widget, row, column)
-        grid.addWidget(self.tasks, len(rows) + 1, 0, 1, 3)
-        grid.setColumnStretch(2, 1)
-        grid.setRowStretch(len(rows) + 2, 1)
+        for row, (caption, widget) in enumerate(rows):
+            if caption:
+                label = QLabel(caption)
+                label.setProperty("role", "dim")
+                grid.addWidget(label, row, 0)
+            grid.addWidget(widget, row, 1 if caption else 0, 1, 1 if caption else 2)
+        grid.setColumnStretch(1, 1)
+        grid.setRowStretch(len(rows), 1)
 
     def _connect(self) -> None:
         self.zoom.committed.connect(self._on_zoom)
@@ -184,6 +177,7 @@ class LensPanel(QWidget):
         for step in lens.steps:
             button = push_button(step.name, f"Zoom to {step.zoom:g} x")
             button.setCheckable(True)
+            styled(button, "narrow")
             button.clicked.connect(lambda _=False, zoom=step.zoom: self._on_zoom(zoom))
             self._step_flow.addWidget(button)
             self.steps[step.name] = button
@@ -257,6 +251,15 @@ class LensPanel(QWidget):
     @override
     def sizeHint(self) -> QSize:
         return QSize(44 * STEP_PX, super().sizeHint().height())
+
+
+def _flow(*widgets: QWidget) -> QWidget:
+    """Return widgets side by side, in further lines where it is narrow."""
+    row = QWidget()
+    flow = FlowLayout(STEP_PX // 2, row)
+    for widget in widgets:
+        flow.addWidget(widget)
+    return row
 
 
 def _enable(button: QWidget, reason: str, tip: str) -> None:

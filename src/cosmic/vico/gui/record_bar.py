@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.amounts import duration_text, size_text
-from cosmic.frame.gui.build import named, push_button, tipped
+from cosmic.frame.gui.build import named, push_button, styled, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.overwrite_question import overwrite_question
 from cosmic.frame.gui.task_bar import TaskBar
@@ -152,17 +152,30 @@ class RecordBar(QWidget):
         self._lines.addWidget(self.message)
         self._lines.addWidget(self.tasks)
         self._lines.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        top = QHBoxLayout()
-        top.setSpacing(STEP_PX // 2)
+        self._top = QHBoxLayout()
+        self._top.setSpacing(STEP_PX // 2)
         for button in (self.snap, self.record, self.lapse, self.more):
-            top.addWidget(button)
-        top.addSpacing(STEP_PX // 2)
-        top.addWidget(self._lines, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(STEP_PX // 2)
-        column.addLayout(top)
-        column.addWidget(self._fields)
+            self._top.addWidget(button)
+        self._top.addSpacing(STEP_PX // 2)
+        self._top.addWidget(self._lines, 1)
+        self._column = QVBoxLayout(self)
+        self._column.setContentsMargins(0, 0, 0, 0)
+        self._column.setSpacing(STEP_PX // 2)
+        self._column.addLayout(self._top)
+        self._column.addWidget(self._fields)
+
+    def stack(self) -> None:
+        """Put the buttons above each other, for a column too narrow for a row."""
+        second = QHBoxLayout()
+        second.setSpacing(STEP_PX // 2)
+        for button in (self.lapse, self.more):
+            styled(button, "narrow")
+            self._top.removeWidget(button)
+            second.addWidget(button)
+        second.addStretch(1)
+        self._top.removeWidget(self._lines)
+        self._column.insertLayout(1, second)
+        self._column.insertWidget(2, self._lines)
 
     # Looking
 

@@ -97,6 +97,11 @@ class SceneWidget(QWidget):
         column.addWidget(middle, 1)
         column.addWidget(self._nearest)
 
+    def set_compact(self, compact: bool) -> None:
+        """Show the view alone, as an inset does, or with its buttons and the nearest pair."""
+        for each in (self._toolbar, self._nearest):
+            each.setVisible(not compact)
+
     def _make_view(self, prefer_gl: bool) -> SceneView:
         view: SceneView
         try:

@@ -39,7 +39,7 @@ class SceneView(QWidget):
         # Keys belong to what jogs the axes: this view never takes them.
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumSize(24 * STEP_PX, 18 * STEP_PX)
+        self.setMinimumSize(12 * STEP_PX, 9 * STEP_PX)
 
     def rebuild(self) -> None:
         """Take over another model."""

@@ -1,0 +1,529 @@
+"""The column FORCE: the value, how far it is from its limit, its curve, and the recording."""
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+from typing import Final, TypeVar
+
+import pyqtgraph as pg
+from PySide6.QtCore import QEvent, QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QColor, QPaintEvent, QPen
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QSizePolicy,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from cosmic.daqco.api.daqco import Daqco, DaqLimit
+from cosmic.daqco.api.files import NamedFile
+from cosmic.daqco.core.chunk import DataChunk
+from cosmic.daqco.core.scale import Scale
+from cosmic.daqco.gui.asking import Asking
+from cosmic.daqco.gui.limit_dialog import LimitDialog
+from cosmic.daqco.gui.limit_indicator import distance
+from cosmic.daqco.gui.plot.chart import Chart, Trace
+from cosmic.daqco.gui.plot.inbox import ChunkInbox
+from cosmic.daqco.gui.plot.unit_ranges import UnitRanges
+from cosmic.daqco.gui.plot.units import display_unit
+from cosmic.frame.clock import WALL
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.file_names import NameOption
+from cosmic.frame.gui.amounts import duration_text
+from cosmic.frame.gui.build import named, push_button, styled, tight_row, tipped
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.painting import painting
+from cosmic.frame.gui.palette import OKABE_ITO
+from cosmic.frame.gui.relay import Relay
+from cosmic.frame.gui.theme import STEP_PX, State, current_palette, number_font, state_look
+from cosmic.frame.overrides import override
+from cosmic.mico.gui.mico_widget import MicoWidget
+
+T = TypeVar("T")
+
+READOUT_MS: Final = 100
+CHART_MS: Final = 40
+OLD_S: Final = 1.0
+MEAN_S: Final = 0.1
+VALUE_PX: Final = 26
+SPAN_S: Final = 10.0
+TARE_SHARE: Final = 0.25
+"""Of the limit: a load beyond it is no zero, and Tare refuses it."""
+LOW_PX: Final = 20 * STEP_PX
+"""Below this height an axis has three numbers only."""
+_POINTS: Final = 4000
+_STILL_UM: Final = 0.05
+
+
+def sides_text(low: float | None, high: float | None) -> str:
+    """Return both sides of a limit in as few signs as say it."""
+    if low is not None and high is not None and low == -high:
+        return f"±{high:g}"
+    return " to ".join("free" if each is None else f"{each:g}" for each in (low, high))
+
+
+class LimitBar(QWidget):
+    """The value between the two sides of its limit, and how much of the way there is gone."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value: float | None = None
+        self._low: float | None = None
+        self._high: float | None = None
+        self._armed = False
+        self.setFixedHeight(2 * STEP_PX)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+
+    def show_value(
+        self, value: float | None, low: float | None, high: float | None, *, armed: bool
+    ) -> None:
+        """Show another value; None: it is not measured."""
+        now = (value, low, high, armed)
+        if now != (self._value, self._low, self._high, self._armed):
+            self._value, self._low, self._high, self._armed = now
+            self.update()
+
+    @property
+    def share(self) -> float:
+        """How much of the way to the nearer side is gone, 0 to 1; 0 where nothing is measured."""
+        if self._value is None:
+            return 0.0
+        side = self._high if self._value >= 0.0 else self._low
+        return min(1.0, abs(self._value / side)) if side else 0.0
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        palette = current_palette()
+        with painting(self) as painter:
+            box = QRectF(self.rect()).adjusted(0.5, 2.5, -0.5, -2.5)
+            painter.setPen(QColor(palette.border_strong))
+            painter.setBrush(QColor(palette.field))
+            painter.drawRect(box)
+            middle = box.center().x()
+            if self._value is not None:
+                reach = self.share * box.width() / 2.0
+                colour = "vermillion" if self.share > 0.8 else "orange" if self.share > 0.5 else ""
+                fill = OKABE_ITO[colour] if colour else palette.accent
+                left = middle if self._value >= 0.0 else middle - reach
+                painter.setPen(Qt.PenStyle.NoPen)
+                painter.setBrush(QColor(fill))
+                painter.drawRect(QRectF(left, box.top() + 1.0, reach, box.height() - 1.0))
+            pen = QPen(QColor(palette.text), 1.0)
+            if not self._armed:
+                pen.setStyle(Qt.PenStyle.DotLine)
+            painter.setPen(pen)
+            for x in (box.left(), middle, box.right()):
+                painter.drawLine(round(x), 0, round(x), self.height())
+
+
+class PositionCurve(QWidget):
+    """Force over the position of the axis that moved last."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._points: deque[tuple[float, float]] = deque(maxlen=_POINTS)
+        self.axis = ""
+        self._plot = pg.PlotWidget()
+        self._curve = self._plot.plot([], [], pen=pg.mkPen(OKABE_ITO["orange"], width=1.5))
+        self._plot.setMenuEnabled(False)
+        self._plot.hideButtons()
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self._plot)
+        self._restyle()
+
+    def name_force(self, unit: str) -> None:
+        """Say in which unit the force is drawn."""
+        self._plot.setLabel("left", unit)
+
+    def add(self, axis: str, unit: str, position: float, force: float) -> None:
+        """Add a point; another axis begins anew."""
+        if axis != self.axis:
+            self.axis = axis
+            self._points.clear()
+            self._plot.setLabel("bottom", f"{axis}, {unit}")
+        if self._points and abs(self._points[-1][0] - position) < _STILL_UM:
+            return
+        self._points.append((position, force))
+        places, forces = zip(*self._points, strict=True)
+        self._curve.setData(list(places), list(forces))
+
+    @property
+    def points(self) -> tuple[tuple[float, float], ...]:
+        """Position and force of what is drawn."""
+        return tuple(self._points)
+
+    def _restyle(self) -> None:
+        palette = current_palette()
+        self._plot.setBackground(palette.panel)
+        for side in ("bottom", "left"):
+            axis = self._plot.getAxis(side)
+            axis.setPen(palette.border_strong)
+            axis.setTextPen(palette.text)
+            axis.setStyle(tickFont=number_font(11))
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._restyle()
+
+
+class ForcePanel(QWidget):
+    """Everything about the force that a hand on the tool needs; GUI thread.
+
+    Parameters
+    ----------
+    daqco : Daqco
+        The application.
+    gui : MicoWidget
+        Whose axes the curve is drawn over.
+    folder : callable
+        Returns the folder of this session's files.
+
+    Signals
+    -------
+    written(Path)
+        A recording was closed.
+    """
+
+    written = Signal(object)
+
+    def __init__(
+        self,
+        daqco: Daqco,
+        gui: MicoWidget,
+        folder: Callable[[], Path],
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.setObjectName("forcePanel")
+        self._daqco, self._gui, self._folder = daqco, gui, folder
+        self._inbox = ChunkInbox()
+        self._ranges = UnitRanges()
+        self._key: object = None
+        self._channel = ""
+        self._heard_s: float | None = None
+        self._recent: deque[float] = deque(maxlen=max(1, round(MEAN_S * 1000.0)))
+        self._recording = False
+        self._error = ""
+        self._make_widgets()
+        self._arrange()
+        self._asking = Asking(daqco, self)
+        self._relay = Relay(self._on_changed).follow(daqco.on_change)
+        self._relay.keep(daqco.follow(self._inbox.put))
+        self._look = QTimer(self, interval=READOUT_MS)
+        self._look.timeout.connect(self.read_out)
+        self._look.start()
+        self._draw = QTimer(self, timerType=Qt.TimerType.PreciseTimer, interval=CHART_MS)
+        self._draw.timeout.connect(self.refresh)
+        self._draw.start()
+        self._on_changed()
+
+    # Putting it together
+
+    def _make_widgets(self) -> None:
+        self.title = named(ElidedLabel("FORCE"), "forceTitle")
+        self.value = named(QLabel("–"), "forceValue")
+        self.value.setFont(number_font(VALUE_PX, bold=True))
+        self.value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.value.setMinimumWidth(self.value.fontMetrics().horizontalAdvance("-180.0") + 2)
+        self.unit = QLabel("")
+        self.unit.setProperty("role", "dim")
+        self.bar = LimitBar()
+        self.limit = named(ElidedLabel(), "forceLimit")
+        self.arm = styled(
+            named(push_button("Limit…", "Set, arm or disarm the limit"), "arm"), "narrow"
+        )
+        self.arm.clicked.connect(self._on_limit)
+        self.chart = Chart()
+        self.chart.setMinimumSize(18 * STEP_PX, 9 * STEP_PX)
+        self.over = PositionCurve()
+        self.over.setMinimumSize(18 * STEP_PX, 9 * STEP_PX)
+        self.curves = QStackedWidget()
+        self.curves.addWidget(self.chart)
+        self.curves.addWidget(self.over)
+        self.by_time = self._curve_button("over time", 0)
+        self.by_position = self._curve_button("over position", 1)
+        self.by_time.setChecked(True)
+        self.name = named(tipped(QLineEdit("push"), "Name of the recording"), "recordName")
+        self.note = named(tipped(QLineEdit(), "Note kept in the recording"), "recordNote")
+        self.note.setPlaceholderText("note")
+        self.record = named(push_button("● Record", ""), "recordForce")
+        self.record.setCheckable(True)
+        self.record.clicked.connect(self._on_record)
+        self.tare = styled(named(push_button("Tare", "Call the force now zero"), "tare"), "narrow")
+        self.tare.clicked.connect(self.take_zero)
+        self.mark = styled(named(push_button("Mark", "Write a mark (Ctrl+M)"), "mark"), "narrow")
+        self.mark.setShortcut("Ctrl+M")
+        self.mark.clicked.connect(self._on_mark)
+        self.told = named(ElidedLabel(), "forceTold")
+
+    def _curve_button(self, text: str, page: int) -> QPushButton:
+        button = styled(push_button(text, f"Force {text}"), "narrow")
+        button.setCheckable(True)
+        button.setAutoExclusive(True)
+        button.clicked.connect(lambda: self.curves.setCurrentIndex(page))
+        return button
+
+    def _arrange(self) -> None:
+        head, row = tight_row(STEP_PX // 2)
+        row.addWidget(self.title, 1)
+        row.addWidget(self.value)
+        row.addWidget(self.unit)
+        limit, row = tight_row(STEP_PX // 2)
+        row.addWidget(self.limit, 1)
+        row.addWidget(self.arm)
+        which = QWidget()
+        row = QHBoxLayout(which)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(0)
+        row.addWidget(self.by_time, 1)
+        row.addWidget(self.by_position, 1)
+        buttons, row = tight_row(STEP_PX // 2)
+        row.addWidget(self.record, 1)
+        row.addWidget(self.mark)
+        row.addWidget(self.tare)
+        names, row = tight_row(STEP_PX // 2)
+        row.addWidget(self.name, 1)
+        row.addWidget(self.note, 1)
+        for field in (self.name, self.note):
+            field.setMinimumWidth(6 * STEP_PX)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(STEP_PX, STEP_PX // 2, STEP_PX, STEP_PX // 2)
+        column.setSpacing(STEP_PX // 2)
+        for widget in (head, self.bar, limit, which):
+            column.addWidget(widget)
+        column.addWidget(self.curves, 1)
+        for widget in (names, buttons, self.told):
+            column.addWidget(widget)
+
+    # What is shown
+
+    @property
+    def channel(self) -> str:
+        """The channel that is shown: the first with a limit, else the first."""
+        return self._channel
+
+    @property
+    def force(self) -> float | None:
+        """The newest value; None where it is not measured now."""
+        return self._recent[-1] if self._recent and not self._age_s() else None
+
+    def _age_s(self) -> float:
+        """Return how old the newest sample is, 0 while samples come."""
+        if self._heard_s is None:
+            return math.inf
+        age_s = WALL.now_s() - self._heard_s
+        return 0.0 if self._daqco.running and age_s <= OLD_S else age_s
+
+    def _limit_in_force(self) -> DaqLimit | None:
+        limits = self._daqco.limits
+        return next((each for each in limits if each.settings.channel == self._channel), None)
+
+    def _on_changed(self) -> None:
+        daqco = self._daqco
+        channels, limits = daqco.channels, daqco.limits
+        limited = [each.settings.channel for each in limits if each.settings.channel in channels]
+        self._channel = next(iter([*limited, *channels]), "")
+        key = (self._channel, daqco.rate_hz, daqco.scales.get(self._channel))
+        if key != self._key and self._channel:
+            self._key = key
+            settings = next(e for e in daqco.settings.channel if e.name == self._channel)
+            unit = daqco.units.get(self._channel, "")
+            self._ranges = UnitRanges()
+            self._ranges.add([settings], daqco.settings.scales())
+            self.chart.begin([Trace(self._channel, unit, settings.colour)], daqco.rate_hz)
+            self.chart.set_span(SPAN_S)
+            self._show_ranges()
+            self.over.name_force(display_unit(unit))
+            self.title.set_text(self._channel.upper())
+            self.unit.setText(display_unit(unit))
+        self._show_recording()
+        self.read_out()
+
+    def refresh(self) -> None:
+        """Draw what has come since the last time."""
+        mine = [self._own(chunk) for chunk in self._inbox.take() if self._channel in chunk.channels]
+        if not mine:
+            return
+        self._heard_s = WALL.now_s()
+        for chunk in mine:
+            self._recent.extend(chunk.values[0].tolist())
+        self.chart.feed(mine)
+        seen = self.isVisible() and self.curves.currentIndex() == 0
+        if seen and self._ranges.fit(self.chart.traces, self.chart.visible_columns()):
+            self._show_ranges()
+        self._add_point()
+
+    def _show_ranges(self) -> None:
+        """Have as many lines as can be told apart in the height there is."""
+        shown = self._ranges.shown(self.chart.traces)
+        if self.chart.height() < LOW_PX:
+            shown = {
+                unit: replace(each, step=(each.high - each.low) / 2.0)
+                for unit, each in shown.items()
+            }
+        self.chart.set_ranges(shown)
+
+    def _own(self, chunk: DataChunk) -> DataChunk:
+        """Return what a chunk has of the channel shown."""
+        row = chunk.channels.index(self._channel)
+        return replace(
+            chunk,
+            channels=(self._channel,),
+            volts=chunk.volts[row : row + 1],
+            scales=(chunk.scales[row],),
+        )
+
+    def _add_point(self) -> None:
+        force = self._mean()
+        moving = next((each for each in self._gui.mico if each.details.in_motion), None)
+        if force is None or moving is None:
+            return
+        state = moving.details
+        if state.shown_position is not None:
+            self.over.add(state.name, display_unit(state.unit), state.shown_position, force)
+
+    def _mean(self) -> float | None:
+        return sum(self._recent) / len(self._recent) if self._recent else None
+
+    def read_out(self) -> None:
+        """Show the value, its limit and how far it is from it."""
+        age_s, value = self._age_s(), self._mean()
+        fresh = age_s == 0.0 and value is not None
+        self.value.setText("–" if value is None else f"{value:.1f}")
+        self.value.setEnabled(fresh)
+        if not fresh:
+            old = f", {age_s:.0f} s old" if math.isfinite(age_s) else ""
+            self.value.setToolTip(f"Not measured now{old}")
+            self.title.set_text(f"{self._channel.upper()} not measured{old}")
+        elif "not measured" in self.title.text():
+            self.value.setToolTip("")
+            self.title.set_text(self._channel.upper())
+        limit = self._limit_in_force()
+        low = limit.settings.low if limit is not None else None
+        high = limit.settings.high if limit is not None else None
+        armed = limit is not None and limit.settings.armed
+        self.bar.show_value(value if fresh else None, low, high, armed=armed)
+        self.limit.set_text(self._limit_words(limit, value if fresh else None))
+        if self._recording:
+            self._show_recording()
+
+    def _limit_words(self, limit: DaqLimit | None, value: float | None) -> str:
+        unit = display_unit(self._daqco.units.get(self._channel, ""))
+        if limit is None:
+            return "▲ no limit"
+        sides = sides_text(limit.settings.low, limit.settings.high)
+        if limit.crossed:
+            return f"■ crossed {sides} {unit}"
+        if not limit.settings.armed:
+            return f"▲ DISARMED {sides} {unit}"
+        left = f", {distance(limit, value):.0f} to go" if value is not None else ""
+        return f"ARMED {sides} {unit}{left}"
+
+    # Commands
+
+    def _on_limit(self) -> None:
+        dialog = LimitDialog(self._daqco, self._channel, self)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.open()
+
+    def take_zero(self) -> None:
+        """Call the present force zero, by another scale; refused while the sensor is loaded."""
+        value = self._mean()
+        scale = self._daqco.scales.get(self._channel)
+        if value is None or self._age_s() or scale is None:
+            self._tell("Tare needs a force that is measured now", refused=True)
+            return
+        limit = self._limit_in_force()
+        sides = (limit.settings.low, limit.settings.high) if limit is not None else ()
+        least = min((abs(each) for each in sides if each is not None), default=math.inf)
+        if abs(value) > TARE_SHARE * least:
+            text = f"{value:.0f} is a load, no zero: take the tool off the fibre first"
+            self._tell(text, refused=True)
+            return
+        first, *rest = scale.coefficients
+        zeroed = Scale(scale.name, scale.unit, (first - value, *rest))
+        self._ask(
+            lambda: self._daqco.set_scale(self._channel, zeroed), f"zero moved by {value:.1f}"
+        )
+
+    def _ask(self, action: Callable[[], T], told: str, *, slow: bool = False) -> None:
+        def done(_result: T | None, error: CosmicError | None) -> None:
+            self._tell(str(error) if error is not None else told, refused=error is not None)
+            self._on_changed()
+
+        self._asking.ask(action, done, slow=slow)
+
+    def _tell(self, text: str, *, refused: bool = False) -> None:
+        self._error = text if refused else ""
+        self.told.set_text(f"{state_look(State.REFUSED).glyph} {text}" if refused else text)
+
+    # Recording
+
+    def _on_record(self) -> None:
+        self.record.setChecked(self._recording)  # the recorder decides
+        if self._daqco.recording.active:
+            path = self._daqco.recording.path
+
+            def closed(_result: object, error: CosmicError | None) -> None:
+                self._tell(str(error) if error else f"written: {path.name if path else ''}")
+                if error is None and path is not None:
+                    self.written.emit(path)
+
+            self._asking.ask(self._daqco.stop_recording, closed, slow=True)
+            return
+        when = datetime.now().astimezone()
+        try:
+            folder = self._daqco.directory if self._daqco.elsewhere else self._folder()
+        except OSError as exc:
+            self._tell(str(exc), refused=True)
+            return
+        base = self.name.text()
+        self._asking.ask(
+            lambda: self._daqco.name_recording(base, NameOption.TIME, folder, when), self._on_named
+        )
+
+    def _on_named(self, found: NamedFile | None, error: CosmicError | None) -> None:
+        if found is None:
+            self._tell(str(error), refused=True)
+            return
+        note = self.note.text().strip()
+
+        def begin() -> None:
+            self._daqco.start_recording(found.path)
+            if note:
+                self._daqco.mark(f"note: {note}")
+
+        self._ask(begin, f"recording {found.path.name}")
+
+    def _on_mark(self) -> None:
+        text = self.note.text().strip() or "mark"
+        self._ask(lambda: self._daqco.mark(text), f"marked: {text}")
+
+    def _show_recording(self) -> None:
+        recording = self._daqco.recording
+        self._recording = recording.active
+        self.record.setChecked(recording.active)
+        text = f"■ Stop {duration_text(recording.duration_s)}" if recording.active else "● Record"
+        if self.record.text() != text:
+            self.record.setText(text)
+        usable = recording.active or self._daqco.running
+        self.record.setEnabled(usable)
+        tip = (
+            "Record what is acquired, under this name" if usable else "Start the acquisition first"
+        )
+        self.record.setToolTip("Stop recording and close the file" if recording.active else tip)
+        self.mark.setEnabled(recording.active)
+
+    @override
+    def sizeHint(self) -> QSize:
+        return QSize(30 * STEP_PX, 50 * STEP_PX)

@@ -1,0 +1,507 @@
+"""The column TOOL: one tool is chosen, and moved by a pad, by targets, to poses, or back."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QComboBox,
+    QGridLayout,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.build import named, push_button, styled, tight_row, tipped
+from cosmic.frame.gui.quantity_field import QuantityField
+from cosmic.frame.gui.relay import Relay
+from cosmic.frame.gui.theme import STEP_PX, State, number_font, state_look
+from cosmic.frame.operation import Progress
+from cosmic.frame.overrides import override
+from cosmic.frame.units import DISPLAY, format_quantity
+from cosmic.frame.verdict import MoveVerdict
+from cosmic.mico.api.axis import Axis
+from cosmic.mico.core.motion.positioner import Confidence, PositionerState
+from cosmic.mico.gui.detour_request import Goal
+from cosmic.mico.gui.key_names import key_text
+from cosmic.mico.gui.mico_widget import MicoWidget
+from cosmic.mico.gui.move_row import StepField
+from cosmic.mico.gui.state_feed import StateFeed
+from cosmic.mico.hw.interface import PositionerKind
+
+USUAL_STEP_UM: Final = 10.0
+USUAL_STEP_DEG: Final = 1.0
+_DIRECTIONS: Final = ("x", "y", "z")
+_PLACES: Final = {("x", -1): (1, 0), ("x", 1): (1, 2), ("y", 1): (0, 1), ("y", -1): (2, 1)}
+_Z_PLACES: Final = {1: (0, 3), -1: (2, 3)}
+_SIGNS: Final = {
+    ("x", -1): "←",
+    ("x", 1): "→",
+    ("y", 1): "↑",
+    ("y", -1): "↓",
+    ("z", 1): "⤒",
+    ("z", -1): "⤓",
+    ("rotation", 1): "↺",
+    ("rotation", -1): "↻",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Tool:
+    """What is moved as one.
+
+    Attributes
+    ----------
+    name : str
+        The first part of the names of its axes, such as "left".
+    axes : dict of str to str
+        Names of its axes by the part behind the point, such as "x" or "gripper".
+    """
+
+    name: str
+    axes: Mapping[str, str]
+
+
+def tools_of(names: list[str]) -> list[Tool]:
+    """Return the tools that the names of axes tell of, in their order."""
+    found: dict[str, dict[str, str]] = {}
+    for name in names:
+        tool, _, part = name.partition(".")
+        found.setdefault(tool, {})[part or tool] = name
+    return [Tool(name, axes) for name, axes in found.items()]
+
+
+class _TargetRow:
+    """Where one axis stands, and where it is to go."""
+
+    def __init__(self, axis: Axis, caption: str, go: Callable[[], None]) -> None:
+        self.axis = axis
+        self._set = False
+        self.caption = QLabel(caption)
+        self.caption.setFixedWidth(STEP_PX + 2)
+        self.position = named(QLabel("–"), "toolPosition")
+        self.position.setFont(number_font(bold=True))
+        self.position.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        widest = self.position.fontMetrics().horizontalAdvance("-5000.0")
+        self.position.setMinimumWidth(widest)
+        self.target = named(
+            QuantityField(axis.unit, name=f"Target of {axis.name}; Enter moves there"), "toolTarget"
+        )
+        self.target.setMinimumWidth(9 * STEP_PX)
+        self.target.entered.connect(lambda _value: go())
+
+    def show_state(self, state: PositionerState) -> None:
+        """Show the newest state of the axis."""
+        here = state.shown_position
+        text = "–" if here is None else format_quantity(here, state.unit).split(" ")[0]
+        if text != self.position.text():
+            self.position.setText(text)
+        sure = state.confidence is Confidence.KNOWN
+        self.position.setEnabled(sure)
+        tip = "" if sure else "The position is not known; initialise first"
+        if self.position.toolTip() != tip:
+            self.position.setToolTip(tip)
+        if not self._set and state.shown_position is not None:
+            self._set = True
+            self.target.set_value(round(state.shown_position, 1))
+        self.target.setEnabled(state.present)
+
+
+class ToolPanel(QWidget):
+    """Moves the chosen tool; every command is that of the axis' card, and so passes the gate.
+
+    Parameters
+    ----------
+    gui : MicoWidget
+        Whose axes are moved; questions and refusals are shown as its own.
+
+    Signals
+    -------
+    tool_chosen(str)
+        Another tool is in use.
+    """
+
+    tool_chosen = Signal(str)
+
+    def __init__(self, gui: MicoWidget, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("toolPanel")
+        self._gui = gui
+        self._mico = gui.mico
+        self._tools = {each.name: each for each in tools_of(list(self._mico.names))}
+        self._tool = next(iter(self._tools), "")
+        self._rows: dict[str, _TargetRow] = {}
+        self._steps: dict[str, float] = {}
+        self._stopped = ""
+        self._feed = StateFeed(self._mico, self)
+        self._relay = Relay(self._on_progressed)
+        self._make_widgets()
+        self._arrange()
+        self._gui.refreshed.connect(self._on_refreshed)
+        self._gui.verdict_given.connect(self._on_refused)
+        self._gui.undoing.available.connect(self._on_undo_available)
+        self._gui.undoing.said.connect(self._on_said)
+        self._gui.undoing.show_available()
+        self._build_tool()
+
+    # Putting it together
+
+    def _make_widgets(self) -> None:
+        self._group = QButtonGroup(self)
+        self.choices: dict[str, QToolButton] = {}
+        for name in self._tools:
+            button = named(tipped(QToolButton(), f"Move the {name} from here on"), "toolButton")
+            button.setText(name)
+            button.setCheckable(True)
+            button.setChecked(name == self._tool)
+            button.clicked.connect(self._on_tool)
+            self._group.addButton(button)
+            self.choices[name] = button
+        self.step = named(StepField("um", value=USUAL_STEP_UM, name="Step of the pad"), "padStep")
+        self.smaller = styled(push_button("÷10", "A step of a tenth"), "narrow")
+        self.larger = styled(push_button("×10", "A step ten times as large"), "narrow")
+        self.smaller.clicked.connect(lambda: self._scale_step(0.1))
+        self.larger.clicked.connect(lambda: self._scale_step(10.0))
+        self.go = named(push_button("Go to", "Move to all targets, together"), "toolGo")
+        styled(self.go, "narrow")
+        self.step.setMinimumWidth(9 * STEP_PX)
+        self.go.clicked.connect(self.go_to_targets)
+        self.undo = styled(named(push_button("Undo", ""), "toolUndo"), "narrow")
+        self.undo.clicked.connect(self._gui.undoing.undo)
+        self.stop = styled(
+            named(push_button("■", "Stop this tool; the others go on"), "stopAxis"), "narrow"
+        )
+        self.stop.clicked.connect(self._on_halt)
+        self.poses = named(tipped(QComboBox(), "Named poses"), "toolPoses")
+        self.poses.setMinimumWidth(7 * STEP_PX)
+        self.poses.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.go_pose = named(push_button("Go", "Move to the pose, all its axes together"), "goPose")
+        styled(self.go_pose, "narrow")
+        self.keep = styled(push_button("Keep", "Keep where this tool stands as a pose"), "narrow")
+        self.pose_name = named(tipped(QLineEdit(), "Name of the pose; Enter keeps it"), "poseName")
+        self.pose_name.setPlaceholderText("name, then Enter")
+        self.pose_name.hide()
+        self.go_pose.clicked.connect(self._on_go_pose)
+        self.keep.clicked.connect(self._on_keep)
+        self.pose_name.returnPressed.connect(self._on_pose_named)
+        self.line = named(QLabel(), "toolLine")
+        self.line.setWordWrap(True)
+        self.line.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.line.setMinimumHeight(4 * STEP_PX)
+        self.line.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+
+    def _arrange(self) -> None:
+        choices = QGridLayout()
+        choices.setSpacing(STEP_PX // 2)
+        for number, button in enumerate(self.choices.values()):
+            choices.addWidget(button, number // 4, number % 4)
+            button.setSizePolicy(
+                button.sizePolicy().Policy.Expanding, button.sizePolicy().Policy.Fixed
+            )
+        step, row = tight_row(STEP_PX // 2)
+        row.addWidget(self.smaller)
+        row.addWidget(self.step, 1)
+        row.addWidget(self.larger)
+        last, row = tight_row(STEP_PX // 2)
+        row.addWidget(self.go, 1)
+        row.addWidget(self.undo, 1)
+        row.addWidget(self.stop)
+        poses, row = tight_row(STEP_PX // 2)
+        row.addWidget(self.poses, 1)
+        row.addWidget(self.go_pose)
+        row.addWidget(self.keep)
+        self._body = QWidget()
+        self._column = QVBoxLayout(self)
+        self._column.setContentsMargins(STEP_PX // 2, STEP_PX // 2, STEP_PX // 2, STEP_PX // 2)
+        self._column.setSpacing(STEP_PX // 2)
+        self._column.addLayout(choices)
+        self._column.addWidget(self._body)
+        for widget in (step, last, poses, self.pose_name, self.line):
+            self._column.addWidget(widget)
+        self._column.addStretch(1)
+
+    def _build_tool(self) -> None:
+        """Make pad and targets of the chosen tool."""
+        old, self._body = self._body, QWidget()
+        self._feed.clear()
+        self._rows = {}
+        body = QVBoxLayout(self._body)
+        body.setContentsMargins(0, 0, 0, 0)
+        body.setSpacing(STEP_PX // 2)
+        body.addWidget(self._make_pad())
+        targets, grid = QWidget(), QGridLayout()
+        targets.setLayout(grid)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setSpacing(STEP_PX // 2)
+        for part, name in self._tools[self._tool].axes.items():
+            axis = self._mico[name]
+            if axis.kind is PositionerKind.OPEN_LOOP:
+                body.addWidget(self._make_gripper(axis))
+                continue
+            row = _TargetRow(axis, part[0].upper(), self._mover(name))
+            number = len(self._rows)
+            for column, widget in enumerate((row.caption, row.position, row.target)):
+                grid.addWidget(widget, number, column)
+            grid.setColumnStretch(2, 1)
+            self._rows[name] = row
+            self._feed.add(name, row)
+        body.insertWidget(1, targets)
+        self._column.replaceWidget(old, self._body)
+        old.hide()
+        old.deleteLater()
+        self._body.show()
+        self._show_step()
+        self.refresh_poses()
+
+    def _make_pad(self) -> QWidget:
+        pad, grid = QWidget(), QGridLayout()
+        pad.setLayout(grid)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setSpacing(STEP_PX // 4)
+        self.pad: dict[tuple[str, int], QPushButton] = {}
+        for part, name in self._tools[self._tool].axes.items():
+            if self._mico[name].kind is PositionerKind.OPEN_LOOP:
+                continue
+            for direction in (-1, 1):
+                button = self._pad_button(part, name, direction)
+                place = _PLACES.get((part, direction))
+                if part == "z":
+                    place = _Z_PLACES[direction]
+                elif place is None:
+                    place = (1, 0) if direction > 0 else (1, 2)
+                grid.addWidget(button, *place)
+                self.pad[part, direction] = button
+        return pad
+
+    def _pad_button(self, part: str, name: str, direction: int) -> QPushButton:
+        settings = self._gui.cards[name].settings
+        text = settings.forward_text if direction > 0 else settings.backward_text
+        key = key_text(settings.forward_key if direction > 0 else settings.backward_key)
+        sign = _SIGNS.get((part, direction), text)
+        held = f"; hold the key {key} to move on and on" if key else ""
+        short = key if len(key) == 1 else ""
+        button = named(push_button(f"{sign} {short}".strip(), ""), "padButton")
+        tipped(button, f"Move {name} {text} by the step{held}")
+        button.setAccessibleName(f"{name} {text}")
+        button.clicked.connect(lambda: self.move_once(name, direction))
+        return button
+
+    def _make_gripper(self, axis: Axis) -> QWidget:
+        row, line = tight_row(STEP_PX // 2)
+        for direction, text in ((-1, "close"), (1, "open")):
+            button = styled(push_button(text, f"{text} the jaws by the step"), "narrow")
+            button.setAccessibleName(f"{axis.name} {text}")
+            button.clicked.connect(lambda _=False, d=direction: self.move_once(axis.name, d))
+            line.addWidget(button, 1)
+        return row
+
+    # What is chosen
+
+    @property
+    def tool(self) -> Tool:
+        """What is moved."""
+        return self._tools[self._tool]
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes of the chosen tool."""
+        return tuple(self.tool.axes.values())
+
+    def choose(self, name: str) -> None:
+        """Move another tool from here on."""
+        if name not in self._tools:
+            return
+        self.choices[name].setChecked(True)
+        if name != self._tool:
+            self._tool = name
+            self._build_tool()
+            self.tool_chosen.emit(name)
+
+    def _on_tool(self) -> None:
+        self.choose(next(name for name, each in self.choices.items() if each.isChecked()))
+
+    @property
+    def _unit(self) -> str:
+        units = {self._mico[name].unit for name in self.axes}
+        return "deg" if units == {"deg"} else "um"
+
+    def _scale_step(self, factor: float) -> None:
+        if self.step.commit():
+            self.step.set_value(round(self.step.value() * factor, 4))
+            self._steps[self._unit] = self.step.value()
+
+    def _show_step(self) -> None:
+        usual = USUAL_STEP_DEG if self._unit == "deg" else USUAL_STEP_UM
+        self.step.setAccessibleName(f"Step of the pad in {DISPLAY[self._unit]}")
+        self.step.set_value(self._steps.get(self._unit, usual))
+
+    # Commanding
+
+    def move_once(self, name: str, direction: int) -> None:
+        """Move one axis of the tool by the step, forwards (1) or backwards (-1)."""
+        card = self._gui.cards.get(name)
+        if card is None or not self.step.commit():
+            return
+        self._say("")
+        axis, amount = card.axis, self.step.value()
+        self._steps[self._unit] = amount
+        defaults = self._mico.settings.defaults
+        if axis.kind is PositionerKind.OPEN_LOOP:
+            size_um = card.settings.step_um or 1.0
+            count = max(1, round(amount / size_um))
+            card.commands.issue(
+                "make steps",
+                lambda consent: axis.steps(
+                    direction * count,
+                    amplitude_v=defaults.amplitude_v,
+                    frequency_hz=defaults.frequency_hz,
+                    wait=False,
+                    consent=consent,
+                ),
+                self.step,
+            )
+            return
+        state = axis.details
+        here = state.shown_position
+        goal = None if here is None else self._goal(state, here + direction * amount)
+        card.commands.issue(
+            "move by a distance",
+            lambda consent: axis.move_by(direction * amount, wait=False, consent=consent),
+            self.step,
+            goal=goal,
+        )
+
+    @staticmethod
+    def _goal(state: PositionerState, shown: float) -> Goal:
+        return Goal(target=shown + state.zero, shown=shown, unit=state.unit)
+
+    def _mover(self, name: str) -> Callable[[], None]:
+        return lambda: self.move_to_target(name)
+
+    def move_to_target(self, name: str) -> None:
+        """Move one axis to the target in its field."""
+        row, card = self._rows[name], self._gui.cards.get(name)
+        if card is None or not row.target.commit():
+            return
+        self._say("")
+        there = row.target.value()
+        card.commands.issue(
+            "move to a position",
+            lambda consent: row.axis.move_to(there, wait=False, consent=consent),
+            row.target,
+            goal=self._goal(row.axis.details, there),
+        )
+
+    def go_to_targets(self) -> None:
+        """Move all axes whose target is elsewhere there, together."""
+        judged = [row.target.commit() for row in self._rows.values()]  # each shows its reason
+        if not all(judged):
+            return
+        wanted = {
+            name: row.target.value()
+            for name, row in self._rows.items()
+            if abs(row.target.value() - (row.axis.details.shown_position or 0.0)) > 0.06
+        }
+        if len(wanted) == 1:
+            self.move_to_target(next(iter(wanted)))
+        elif wanted:
+            self._say("")
+            try:
+                self._mico.move(wanted, wait=False)
+            except CosmicError as exc:
+                self._refuse(str(exc))
+
+    def _on_halt(self) -> None:
+        for name in self.axes:
+            card = self._gui.cards.get(name)
+            if card is not None:
+                card.halt()
+
+    # Poses
+
+    def refresh_poses(self) -> None:
+        """Show the poses there are now."""
+        names, chosen = list(self._mico.poses.names), self.poses.currentText()
+        self.poses.clear()
+        self.poses.addItems(names)
+        if chosen in names:
+            self.poses.setCurrentText(chosen)
+        self.go_pose.setEnabled(bool(names))
+
+    def _on_go_pose(self) -> None:
+        try:
+            task = self._mico.poses.go(self.poses.currentText(), wait=False)
+        except CosmicError as exc:
+            self._refuse(str(exc))
+            return
+        self._say("")
+        task.subscribe(self._relay)
+
+    def _on_progressed(self, progress: Progress) -> None:
+        if progress.done and progress.error:
+            self._refuse(progress.error)
+
+    def _on_keep(self) -> None:
+        self.pose_name.setVisible(not self.pose_name.isVisible())
+        self.pose_name.setFocus()
+
+    def _on_pose_named(self) -> None:
+        name = self.pose_name.text().strip()
+        try:
+            self._mico.poses.teach(name, list(self.axes))
+        except CosmicError as exc:
+            self._refuse(str(exc))
+            return
+        self.pose_name.clear()
+        self.pose_name.hide()
+        self.refresh_poses()
+        self.poses.setCurrentText(name)
+        self._say(f"Pose {name} kept")
+
+    # What is said
+
+    def show_stopped(self, reason: str | None) -> None:
+        """Show that the stop is latched, and why; None: no longer."""
+        self._stopped = f"■ STOPPED: {reason}; Reset allows movements again" if reason else ""
+        self._say("")
+
+    def _say(self, text: str) -> None:
+        shown = self._stopped or text
+        self.line.setText(shown)
+        self.line.setToolTip(shown)
+
+    def _refuse(self, reason: str) -> None:
+        look = state_look(State.REFUSED)
+        self._say(f"{look.glyph} {reason}")
+
+    def _on_refused(self, verdict: MoveVerdict) -> None:
+        if not verdict.axis or verdict.axis in self.axes:
+            self._refuse(str(verdict))
+
+    def _on_said(self, text: str, state: object) -> None:
+        glyph = state_look(state).glyph if isinstance(state, State) else ""
+        self._say(f"{glyph} {text}".strip())
+
+    def _on_undo_available(self, what: str) -> None:
+        self.undo.setEnabled(bool(what))
+        self.undo.setToolTip(f"Ctrl+Z: {what}" if what else "Not available: nothing has moved")
+
+    def _on_refreshed(self) -> None:
+        tools = {each.name: each for each in tools_of(list(self._mico.names))}
+        if tools == self._tools:
+            self._feed.clear()
+            for name, row in self._rows.items():
+                self._feed.add(name, row)
+
+    @override
+    def setVisible(self, visible: bool) -> None:
+        super().setVisible(visible)
+        if visible:
+            self.refresh_poses()

@@ -1,0 +1,189 @@
+"""What the coach of the operator's window proposes, the most urgent first."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+from cosmic.app.panels.coach import Rule, Step
+from cosmic.app.panels.force import ForcePanel
+from cosmic.app.panels.tool import ToolPanel
+from cosmic.app.rig import Rig
+from cosmic.app.windows.stage import Stage
+from cosmic.daqco.core.settings import LimitSettings
+from cosmic.frame.errors import CosmicError
+from cosmic.frame.gui.server_gui import CosmicServerGui
+from cosmic.mico.core.motion.positioner import Confidence
+from cosmic.mico.gui.mico_widget import MicoWidget
+from cosmic.mico.hw.interface import PositionerKind
+from cosmic.vico.hw.peripherals import LensAxis
+
+
+class Parts(Protocol):
+    """What of the workspaces the rules look at."""
+
+    stage: Stage
+    tool: ToolPanel
+    force: ForcePanel | None
+
+
+def coach_rules(
+    window: CosmicServerGui, rig: Rig, gui: MicoWidget, parts: Parts
+) -> tuple[Rule, ...]:
+    """Return the rules of a window: trouble first, then what is missing, then the task in hand."""
+    rules = _Rules(window, rig, gui, parts)
+    first = (rules.not_ready, rules.stopped, rules.limit_crossed, rules.position_unknown)
+    missing = (rules.lens_unknown, rules.camera_stopped, rules.nothing_acquired, rules.disarmed)
+    return (*first, *missing, rules.task)
+
+
+class _Rules:
+    """Each looks at one thing and returns what to do about it, or None."""
+
+    def __init__(self, window: CosmicServerGui, rig: Rig, gui: MicoWidget, parts: Parts) -> None:
+        self._window, self._rig, self._gui, self._parts = window, rig, gui, parts
+
+    def _try(self, act: Callable[[], object]) -> Callable[[], None]:
+        def attempt() -> None:
+            try:
+                act()
+            except CosmicError as exc:
+                self._window.top_bar.set_message(str(exc))
+
+        return attempt
+
+    def not_ready(self) -> Step | None:
+        """Look for the axes."""
+        mico = self._gui.mico
+        if mico.failure:
+            text = f"The axes cannot be used: {mico.failure}. Check power and cable, then rescan."
+            return Step(text, "Rescan", self._gui.rescan)
+        return None if mico.ready else Step("The devices are being opened; this takes a moment.")
+
+    def stopped(self) -> Step | None:
+        """Look at the stop."""
+        reason = self._rig.stopped
+        if reason is None:
+            return None
+        text = f"Motion is stopped ({reason}). Look at the tool, then allow movements again."
+        return Step(text, "Reset", self._try(self._rig.reset_stop))
+
+    def limit_crossed(self) -> Step | None:
+        """Look at the limits."""
+        if self._parts.force is None:
+            return None
+        daqco = self._rig.daqco
+        crossed = next((each for each in daqco.limits if each.crossed), None)
+        if crossed is None:
+            return None
+        name = crossed.settings.channel
+        text = f"The {name} crossed its limit. Move the tool off, then reset the limit."
+        return Step(text, "Reset limit", self._try(lambda: daqco.reset_limit(name)))
+
+    def position_unknown(self) -> Step | None:
+        """Look at what is known of the positions."""
+        unknown = [
+            axis.name
+            for axis in self._gui.mico
+            if axis.kind is not PositionerKind.OPEN_LOOP
+            and axis.details.present
+            and axis.details.confidence is Confidence.UNKNOWN
+        ]
+        if not unknown:
+            return None
+        named = unknown[0] if len(unknown) == 1 else f"{len(unknown)} axes"
+        text = f"The position of {named} is unknown. Initialise finds the references."
+        return Step(text, "Initialise", self._gui.initialise)
+
+    def lens_unknown(self) -> Step | None:
+        """Look at the lens."""
+        lens = self._rig.vico.lens
+        if lens is None or lens.problem:
+            return None
+        states = [lens.state(axis) for axis in LensAxis]
+        if all(state is not None and (state.homed or state.moving) for state in states):
+            return None
+        text = "The lens does not know its zoom and focus yet. Home both motors."
+        return Step(text, "Home lens", self._try(lens.home))
+
+    def camera_stopped(self) -> Step | None:
+        """Look at the camera shown."""
+        camera = self._parts.stage.camera.camera
+        if camera.running or camera.problem:
+            return None
+        return Step(
+            "The camera is stopped. Start it to see the tools.",
+            "Start camera",
+            self._try(camera.start),
+        )
+
+    def nothing_acquired(self) -> Step | None:
+        """Look at the acquisition."""
+        if self._parts.force is None or self._rig.daqco.running or self._rig.daqco.away:
+            return None
+        text = "The force is not measured, so no limit protects the probe. Start the acquisition."
+        return Step(text, "Start", self._try(self._rig.daqco.start))
+
+    def disarmed(self) -> Step | None:
+        """Look for limits that watch nothing."""
+        if self._parts.force is None:
+            return None
+        daqco = self._rig.daqco
+        off = next((each for each in daqco.limits if not each.settings.armed), None)
+        if off is None or off.reason:
+            return None
+        limit: LimitSettings = off.settings.model_copy(update={"armed": True})
+        text = f"The limit of {limit.channel} is disarmed; the probe can break. Arm it."
+        return Step(text, "Arm limit", self._try(lambda: daqco.set_limit(limit)))
+
+    def task(self) -> Step | None:
+        """Propose what the workspace in front is for."""
+        spaces = self._window.workspaces
+        words = {
+            "Set up": self._set_up,
+            "Look": self._look,
+            "Handle": self._handle,
+            "Measure": self._measure,
+            "Campaign": self._campaign,
+        }
+        found = words.get(spaces.current if spaces is not None else "")
+        return found() if found is not None else None
+
+    def _go(self, workspace: str) -> Callable[[], None]:
+        def go() -> None:
+            if self._window.workspaces is not None:
+                self._window.workspaces.choose(workspace)
+
+        return go
+
+    def _set_up(self) -> Step:
+        return Step("All axes are ready. Look at the plate next.", "Look", self._go("Look"))
+
+    def _look(self) -> Step:
+        camera = self._parts.stage.camera.camera
+        if camera.calibration_problem:
+            text = (
+                "Click-to-move needs a calibration: Calibrate in the column at the left moves a "
+                "tool and finds it in the image."
+            )
+            return Step(text)
+        return Step("The image is calibrated. Choose a tool next.", "Handle", self._go("Handle"))
+
+    def _handle(self) -> Step:
+        tool = self._parts.tool.tool.name
+        text = f"The pad moves the {tool} by the step. Take the force of a fibre in Measure."
+        return Step(text, "Measure", self._go("Measure"))
+
+    def _measure(self) -> Step | None:
+        force = self._parts.force
+        if force is None:
+            return None
+        if self._rig.daqco.recording.active:
+            text = "Recording. Push with the pad in small steps, then stop the recording."
+            return Step(text, "Stop recording", force.record.click)
+        return Step(
+            "Name the recording and press Record, then push with the pad.",
+            "Record",
+            force.record.click,
+        )
+
+    def _campaign(self) -> Step:
+        return Step("Choose a recipe and a folder, then press Start.")

@@ -1,0 +1,294 @@
+"""The operator's window by task: six workspaces around one picture, with coach and drawer."""
+
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import Final
+
+from PySide6.QtCore import QObject, QSettings, QStandardPaths, QTimer
+from PySide6.QtWidgets import QStackedWidget, QWidget
+
+from cosmic.app.panels.alarms import AlarmBook, AlarmPanel, Level
+from cosmic.app.panels.calibrations import CALIBRATIONS
+from cosmic.app.panels.campaign.dock import CAMPAIGN
+from cosmic.app.panels.coach import Coach, Rule
+from cosmic.app.panels.force import ForcePanel
+from cosmic.app.panels.history import HistoryPanel
+from cosmic.app.panels.image_bar import ImageBar
+from cosmic.app.panels.instruments import DAQCO, LENS, Instruments
+from cosmic.app.panels.procedures import CONTROL, TELEOPERATION, TRAJECTORIES
+from cosmic.app.panels.results import ResultsPanel
+from cosmic.app.panels.scene import ScenePanel
+from cosmic.app.panels.tool import ToolPanel
+from cosmic.app.platform import Platform
+from cosmic.app.rig import Rig
+from cosmic.app.windows.stage import Stage, column_of
+from cosmic.frame.failure import Failure
+from cosmic.frame.gui.server_gui import CosmicServerGui
+from cosmic.frame.gui.theme import STEP_PX
+from cosmic.frame.gui.workspaces import Area, Place, Workspace
+from cosmic.mico.gui.mico_widget import MicoWidget
+from cosmic.vico.gui.camera_view import CameraParts
+
+MICO: Final = "MiCo"
+TOOL: Final = "Tool"
+FORCE: Final = "Force"
+COACH: Final = "Next step"
+IMAGE: Final = "Image"
+CAMERA: Final = "Camera settings"
+RESULTS: Final = "Results"
+ALARMS: Final = "Alarms"
+HISTORY: Final = "History"
+
+SET_UP: Final = "Set up"
+LOOK: Final = "Look"
+HANDLE: Final = "Handle"
+MEASURE: Final = "Measure"
+
+_LEFT: Final = Area.LeftDockWidgetArea
+_RIGHT: Final = Area.RightDockWidgetArea
+_COACH_PX: Final = 17 * STEP_PX
+WATCH_MS: Final = 500
+
+
+def _left(title: str) -> Place:
+    return Place(title, _LEFT, share=0.165, least_px=188, most_px=40 * STEP_PX)
+
+
+def _right(title: str) -> Place:
+    return Place(title, _RIGHT, share=0.195, least_px=212, most_px=50 * STEP_PX)
+
+
+def _coach(below: str) -> Place:
+    return Place(COACH, _RIGHT, below=below, height_px=_COACH_PX)
+
+
+def workspaces() -> tuple[Workspace, ...]:
+    """Return the six workspaces, in order."""
+    return (
+        Workspace(
+            SET_UP,
+            "Axes, devices, calibrations and configuration",
+            (
+                Place(MICO, _LEFT, share=0.8),
+                Place(CALIBRATIONS, _LEFT, tabbed=MICO),
+                Place(DAQCO, _LEFT, tabbed=MICO),
+                Place(CONTROL, _LEFT, tabbed=MICO),
+                _right(COACH),
+            ),
+        ),
+        Workspace(
+            LOOK,
+            "Camera, lens, light, and measuring on the image",
+            (_left(IMAGE), _right(LENS), _coach(LENS), Place(CAMERA, _RIGHT, tabbed=LENS)),
+            middle=True,
+        ),
+        Workspace(
+            HANDLE,
+            "Move one tool: pad, targets, poses, trajectories, gamepad",
+            (
+                _left(TOOL),
+                Place(TRAJECTORIES, _LEFT, tabbed=TOOL, shown=False),
+                Place(TELEOPERATION, _LEFT, tabbed=TOOL, shown=False),
+                _right(FORCE),
+                _coach(FORCE),
+            ),
+            middle=True,
+        ),
+        Workspace(
+            MEASURE,
+            "Force, its limit, and recordings",
+            (_left(TOOL), _right(FORCE), _coach(FORCE)),
+            middle=True,
+        ),
+        Workspace(
+            CAMPAIGN,
+            "Many fibres by one recipe",
+            (Place(CAMPAIGN, _LEFT, share=0.8), _right(COACH)),
+        ),
+        Workspace(RESULTS, "What was recorded", (Place(RESULTS, _LEFT),)),
+    )
+
+
+class SessionFolder:
+    """The folder of one session's files in the user's documents; made when the first is written."""
+
+    def __init__(self, now: Callable[[], datetime] = datetime.now) -> None:
+        place = QStandardPaths.StandardLocation.DocumentsLocation
+        self.home = Path(QStandardPaths.writableLocation(place)) / "CoSMic" / "sessions"
+        self._folder = self.home / f"{now():%Y-%m-%d_%H-%M}"
+
+    def __call__(self) -> Path:
+        """Return it, made now if need be; raises `OSError`."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        return self._folder
+
+
+class TaskLayout(QObject):
+    """Makes what the workspaces need beside the panels there are, and joins them; GUI thread.
+
+    Parameters
+    ----------
+    window : CosmicServerGui
+        Where they are laid out.
+    gui, scene : MicoWidget, ScenePanel
+        The axes and the scene.
+    instruments : Instruments
+        Image and force.
+    """
+
+    def __init__(
+        self,
+        window: CosmicServerGui,
+        platform: Platform,
+        rig: Rig,
+        gui: MicoWidget,
+        scene: ScenePanel,
+        instruments: Instruments,
+        settings: QSettings,
+    ) -> None:
+        super().__init__(window)
+        self._window, self._platform, self._rig = window, platform, rig
+        self._gui = gui
+        images = instruments.images
+        if images is None:
+            raise ValueError("workspaces need a camera")
+        self._images = images
+        self.folder = SessionFolder()
+        gui.offer_table()
+        cameras = {view.windowTitle(): view for view in images.cameras.values()}
+        self._parts = {title: view.give_parts() for title, view in cameras.items()}
+        self.stage = Stage(cameras, scene)
+        self.bar = ImageBar(rig.vico, {title: each.exposure for title, each in self._parts.items()})
+        self.stage.set_bar(self.bar)
+        self.tool = ToolPanel(gui)
+        self.force = ForcePanel(rig.daqco, gui, self.folder) if instruments.force else None
+        self.results = ResultsPanel(self._folders)
+        self.book = AlarmBook(self)
+        self._add_panels()
+        window.use_workspaces(workspaces(), self.stage)
+        self._add_drawer()
+        self._settings = settings
+        self._connect()
+
+    def _add_panels(self) -> None:
+        add = self._window.add_panel
+        add(TOOL, self.tool, _LEFT, scroll=False)
+        if self.force is not None:
+            add(FORCE, self.force, _RIGHT, scroll=False)
+        add(LENS, self._images.lens, _RIGHT, scroll=False)
+        self._columns = {title: self._image_column(each) for title, each in self._parts.items()}
+        self._image, self._camera = QStackedWidget(), QStackedWidget()
+        for title, parts in self._parts.items():
+            self._image.addWidget(self._columns[title])
+            self._camera.addWidget(parts.settings)
+        add(IMAGE, self._image, _LEFT, scroll=False)
+        add(CAMERA, self._camera, _RIGHT)
+        add(RESULTS, self.results, _LEFT, scroll=False)
+
+    @staticmethod
+    def _image_column(parts: CameraParts) -> QWidget:
+        parts.gain.slider.hide()
+        parts.exposure.slider.hide()
+        return column_of(parts.row, parts.gain, parts.status, parts.recorder)
+
+    def add_coach(self, rules: tuple[Rule, ...]) -> Coach:
+        """Have a coach with these rules; before the workspaces are shown."""
+        coach = Coach(rules, self._settings)
+        dock = self._window.add_panel(COACH, coach, _RIGHT, scroll=False)
+        made = self._window.workspaces
+        if made is not None:
+            made.add_dock(dock)
+        return coach
+
+    def _add_drawer(self) -> None:
+        drawer = self._window.drawer
+        drawer.add_page(ALARMS, AlarmPanel(self.book), "Alarms: when, why, what to do")
+        drawer.add_page(HISTORY, HistoryPanel(self._gui), "Movements that can be taken back")
+
+    def _connect(self) -> None:
+        stage, bar, window = self.stage, self.bar, self._window
+        bar.camera_chosen.connect(stage.show_large)
+        bar.swap_requested.connect(stage.swap)
+        bar.fit_requested.connect(lambda: stage.camera.view.fit())
+        bar.inset_toggled.connect(stage.set_inset_shown)
+        bar.told.connect(lambda text: stage.camera.say(text))
+        stage.changed.connect(self._on_large_changed)
+        self.book.changed.connect(self._on_alarms_changed)
+        window.top_bar.alarms_clicked.connect(lambda: window.raise_panel(ALARMS))
+        made = window.workspaces
+        if made is not None:
+            made.chosen.connect(self._on_workspace)
+        if self.force is not None:
+            self.force.written.connect(self._on_written)
+        self._watch = QTimer(self, interval=WATCH_MS)
+        self._watch.timeout.connect(self.watch)
+        self._watch.start()
+
+    # Reactions
+
+    def _on_large_changed(self, title: str) -> None:
+        if title in self._columns:
+            self._image.setCurrentWidget(self._columns[title])
+            self._camera.setCurrentWidget(self._parts[title].settings)
+            self.bar.show_camera(title)
+
+    def _on_workspace(self, name: str) -> None:
+        if name == RESULTS:
+            self.results.refresh()
+
+    def _on_written(self, path: object) -> None:
+        if isinstance(path, Path):
+            self._window.drawer.line.set_text(f"written: {path}")
+
+    def _folders(self) -> tuple[Path, ...]:
+        own = () if self._rig_elsewhere() else (self._rig.daqco.directory,)
+        return (self.folder.home, *own) if self.force is not None else (self.folder.home,)
+
+    def _rig_elsewhere(self) -> bool:
+        return self.force is None or bool(self._rig.daqco.elsewhere)
+
+    # Alarms
+
+    def _on_alarms_changed(self) -> None:
+        unseen = self.book.unseen
+        newest = unseen[0].cause if unseen else ""
+        self._window.top_bar.set_alarms(len(unseen), newest)
+
+    def note_failure(self, failure: Failure) -> None:
+        """Take a failure into the list of alarms."""
+        advice = "Motion was stopped; look at the log" if failure.defect else "Look at the log"
+        level = Level.CRITICAL if failure.defect else Level.WARNING
+        self.book.raise_alarm(failure.where, level, f"{failure.where}: {failure.text}", advice)
+
+    def show_stopped(self, reason: str | None) -> None:
+        """Show everywhere that the stop is latched, and why; None: no longer."""
+        self.tool.show_stopped(reason)
+
+    def watch(self) -> None:
+        """Look at what raises alarms and is not told by itself."""
+        if self.force is None:
+            return
+        daqco, book = self._rig.daqco, self.book
+        crossed = [each for each in daqco.limits if each.crossed]
+        for each in crossed:
+            name = each.settings.channel
+            value = f" at {each.value:.0f}" if each.value is not None else ""
+            advice = "Move the tool off, reset the stop, then reset the limit"
+            book.raise_alarm(
+                f"limit {name}", Level.CRITICAL, f"{name} crossed its limit{value}", advice
+            )
+        for each in daqco.limits:
+            if not each.crossed:
+                book.end(f"limit {each.settings.channel}")
+        if daqco.problem:
+            advice = "Check the board, then start the acquisition"
+            book.raise_alarm("acquisition", Level.CRITICAL, daqco.problem, advice)
+        else:
+            book.end("acquisition")
+
+
+def usable_by_task(gui: object, instruments: Instruments) -> bool:
+    """Tell whether a window has what workspaces are laid out around: axes and a camera."""
+    images = instruments.images
+    return isinstance(gui, MicoWidget) and images is not None and bool(images.cameras)

@@ -1,0 +1,344 @@
+"""Workspaces: one window, laid out by task; each keeps the panels as the operator left them."""
+
+import zlib
+from dataclasses import dataclass
+from typing import Final
+
+from PySide6.QtCore import QByteArray, QObject, QSettings, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QDockWidget, QMainWindow
+
+Area = Qt.DockWidgetArea
+_GROUP: Final = "workspaces"
+_LAYOUT: Final = f"{_GROUP}/layout"
+_SHOWN: Final = f"{_GROUP}/shown"
+USUAL: Final = "usual"
+"""The layout that a window opens with until another one was named."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a panel stands in a workspace at a first start.
+
+    Attributes
+    ----------
+    title : str
+        The panel's.
+    area : Qt.DockWidgetArea
+        The side of the window.
+    below, tabbed : str
+        Title of a panel that it stands below, or shares its place with.
+    share : float
+        Part of the window's width, 0 to 1; 0 leaves it to Qt.
+    least_px, most_px : int
+        Bounds of that width.
+    height_px : int
+        Its height; 0 leaves it to Qt.
+    shown : bool
+        It is there at a first start; else it comes when it is asked for.
+    """
+
+    title: str
+    area: Area = Area.LeftDockWidgetArea
+    below: str = ""
+    tabbed: str = ""
+    share: float = 0.0
+    least_px: int = 0
+    most_px: int = 10_000
+    height_px: int = 0
+    shown: bool = True
+
+    def width_px(self, window_px: int) -> int:
+        """Return how wide it is in a window of that width."""
+        return min(self.most_px, max(self.least_px, round(self.share * window_px)))
+
+
+@dataclass(frozen=True, slots=True)
+class Workspace:
+    """What one task needs.
+
+    Attributes
+    ----------
+    name : str
+        Stands on its button.
+    tip : str
+        What it is for.
+    places : tuple of Place
+        Its panels; those of a shared place: the first is in front.
+    middle : bool
+        The middle of the window, with image and scene, is part of it.
+    """
+
+    name: str
+    tip: str
+    places: tuple[Place, ...]
+    middle: bool = False
+
+
+class Workspaces(QObject):
+    """Lays the docks of a window out for the task in hand; GUI thread.
+
+    A layout is named: what is docked, floats and is hidden in every workspace. The one in use is
+    kept for the next start.
+
+    Parameters
+    ----------
+    window : QMainWindow
+        Whose docks they are; its central widget is the middle.
+    settings : QSettings
+        Where layouts are kept.
+
+    Signals
+    -------
+    chosen(str)
+        Another workspace is shown.
+    """
+
+    chosen = Signal(str)
+
+    def __init__(self, window: QMainWindow, settings: QSettings) -> None:
+        super().__init__(window)
+        self._window = window
+        self._settings = settings
+        self._known: dict[str, Workspace] = {}
+        self._docks: dict[str, QDockWidget] = {}
+        self._states: dict[str, QByteArray] = {}
+        self._usual: frozenset[tuple[object, ...]] = frozenset()
+        self._current = ""
+        self._layout = str(settings.value(_LAYOUT, USUAL)) or USUAL
+
+    def add_dock(self, dock: QDockWidget) -> None:
+        """Take a panel in; it is shown where a workspace has a place for it."""
+        self._docks[dock.windowTitle()] = dock
+        self._window.removeDockWidget(dock)
+        action: QAction = dock.toggleViewAction()
+        action.triggered.connect(self._on_toggled)
+
+    def add(self, workspace: Workspace) -> None:
+        """Add a workspace; the order is that of the buttons."""
+        self._known[workspace.name] = workspace
+
+    @property
+    def all(self) -> tuple[Workspace, ...]:
+        """All of them, in order."""
+        return tuple(self._known.values())
+
+    @property
+    def current(self) -> str:
+        """Name of the one that is shown; empty before the first."""
+        return self._current
+
+    def holder_of(self, title: str) -> str:
+        """Return the workspace that has a place for a panel: the one shown, if it has."""
+        names = [self._current, *self._known] if self._current else list(self._known)
+        for name in names:
+            if any(place.title == title for place in self._known[name].places):
+                return name
+        return ""
+
+    def choose(self, name: str) -> None:
+        """Show a workspace; the one before keeps its panels as they are."""
+        if name == self._current or name not in self._known:
+            return
+        self._keep()
+        self._show(name)
+        self.chosen.emit(name)
+
+    def bring(self, title: str) -> None:
+        """Show a panel in front, in the workspace that has a place for it."""
+        dock = self._docks.get(title)
+        if dock is None:
+            return
+        holder = self.holder_of(title)
+        if not dock.isFloating() and holder != self._current and self._is_placed(dock):
+            holder = ""  # the operator put it here
+        if holder:
+            self.choose(holder)
+        self._place_lost(dock)
+        dock.show()
+        dock.raise_()
+
+    def _is_placed(self, dock: QDockWidget) -> bool:
+        return self._window.dockWidgetArea(dock) != Area.NoDockWidgetArea
+
+    def restore(self) -> None:
+        """Show what was shown last."""
+        self._load()
+        last = str(self._settings.value(_SHOWN, ""))
+        self._current = ""
+        self._show(last if last in self._known else next(iter(self._known)))
+        self.chosen.emit(self._current)
+
+    def save(self) -> None:
+        """Keep the layout in use for the next start."""
+        self._keep()
+        self._store(self._layout)
+        self._settings.setValue(_SHOWN, self._current)
+        self._settings.sync()
+
+    def reset(self) -> None:
+        """Put the panels of every workspace back to where they are at a first start."""
+        self._states.clear()
+        name, self._current = self._current, ""
+        self._show(name)
+
+    # Layouts by name
+
+    @property
+    def layouts(self) -> tuple[str, ...]:
+        """Names of the layouts that were kept."""
+        self._settings.beginGroup(f"{_GROUP}/layouts")
+        names = tuple(self._settings.childGroups())
+        self._settings.endGroup()
+        return names
+
+    @property
+    def layout_name(self) -> str:
+        """Name of the layout in use."""
+        return self._layout
+
+    def save_as(self, name: str) -> None:
+        """Keep the layout in use under a name, and use that from now on."""
+        self._keep()
+        self._layout = name
+        self._store(name)
+        self._settings.setValue(_LAYOUT, name)
+
+    def use(self, name: str) -> None:
+        """Lay the panels out as they were kept under a name."""
+        self._keep()
+        self._store(self._layout)
+        self._layout = name
+        self._settings.setValue(_LAYOUT, name)
+        self._load()
+        shown, self._current = self._current, ""
+        self._show(shown)
+
+    def _store(self, layout: str) -> None:
+        for name, state in self._states.items():
+            self._settings.setValue(f"{_GROUP}/layouts/{layout}/{name}", state)
+
+    def _load(self) -> None:
+        self._states.clear()
+        for name in self._known:
+            kept = self._settings.value(f"{_GROUP}/layouts/{self._layout}/{name}")
+            if isinstance(kept, QByteArray) and not kept.isEmpty():
+                self._states[name] = kept
+
+    # Laying out
+
+    def _keep(self) -> None:
+        """Keep the panels as they are, where the operator put them elsewhere."""
+        if self._current and self._places() != self._usual:
+            self._states[self._current] = self._window.saveState(self._version)
+
+    def _places(self) -> frozenset[tuple[object, ...]]:
+        """Return where each panel is, whatever the size of the window."""
+        window = self._window
+        return frozenset(
+            (
+                title,
+                window.dockWidgetArea(dock),
+                dock.isFloating(),
+                dock.isHidden(),
+                frozenset(each.windowTitle() for each in window.tabifiedDockWidgets(dock)),
+            )
+            for title, dock in self._docks.items()
+            if window.dockWidgetArea(dock) != Area.NoDockWidgetArea or dock.isFloating()
+        )
+
+    @property
+    def _version(self) -> int:
+        """A number for the panels there are: an old layout tears them apart from a new one."""
+        names = "\n".join(sorted(self._docks))
+        return zlib.crc32(names.encode()) & 0x7FFFFFFF
+
+    def _show(self, name: str) -> None:
+        window, workspace = self._window, self._known[name]
+        window.setUpdatesEnabled(False)
+        self._current = name
+        for dock in self._docks.values():
+            if not dock.isFloating():
+                window.removeDockWidget(dock)
+            else:
+                dock.hide()
+        middle = window.centralWidget()
+        if middle is not None:
+            middle.setVisible(workspace.middle)
+        state = self._states.get(name)
+        # Qt brings a layout back at the size it was kept at, and makes the window as large.
+        fits = state is not None and window.restoreState(state, self._version)
+        if not fits or not _within(window.minimumSizeHint(), window.size()):
+            self._arrange(workspace)
+            self._usual = self._places()
+        else:
+            self._usual = frozenset()
+        window.setUpdatesEnabled(True)
+        QTimer.singleShot(0, self, self.fit)
+
+    def _arrange(self, workspace: Workspace) -> None:
+        window, docks = self._window, self._docks
+        for dock in docks.values():
+            dock.setFloating(False)
+            window.removeDockWidget(dock)
+        fronts: list[QDockWidget] = []
+        for place in workspace.places:
+            if place.title not in docks or not place.shown:
+                continue
+            dock = docks[place.title]
+            if place.tabbed in docks:
+                window.tabifyDockWidget(docks[place.tabbed], dock)
+            elif place.below in docks:
+                window.splitDockWidget(docks[place.below], dock, Qt.Orientation.Vertical)
+            else:
+                window.addDockWidget(place.area, dock)
+            if not place.tabbed:
+                fronts.append(dock)
+            dock.show()
+        for dock in fronts:
+            dock.raise_()
+        self._size(workspace)
+
+    def _size(self, workspace: Workspace) -> None:
+        sized = [each for each in workspace.places if each.share and each.title in self._docks]
+        room = self._window.width()
+        self._window.resizeDocks(
+            [self._docks[each.title] for each in sized],
+            [each.width_px(room) for each in sized],
+            Qt.Orientation.Horizontal,
+        )
+        high = [each for each in workspace.places if each.height_px and each.title in self._docks]
+        self._window.resizeDocks(
+            [self._docks[each.title] for each in high],
+            [each.height_px for each in high],
+            Qt.Orientation.Vertical,
+        )
+
+    def fit(self) -> None:
+        """Give the columns beside the middle the width that they have in a window of this size."""
+        workspace = self._known.get(self._current)
+        if workspace is not None and workspace.middle:
+            self._size(workspace)
+
+    def _place_lost(self, dock: QDockWidget) -> None:
+        """Give a panel that no side of the window has its place, or one at the right."""
+        if dock.isFloating() or self._is_placed(dock):
+            return
+        places = self._known[self._current].places if self._current else ()
+        place = next((each for each in places if each.title == dock.windowTitle()), None)
+        beside = self._docks.get(place.tabbed) if place is not None else None
+        if beside is not None and self._is_placed(beside):
+            self._window.tabifyDockWidget(beside, dock)
+        else:
+            area = place.area if place is not None else Area.RightDockWidgetArea
+            self._window.addDockWidget(area, dock)
+
+    def _on_toggled(self, shown: bool) -> None:
+        action = self.sender()
+        for dock in self._docks.values():
+            if shown and dock.toggleViewAction() is action:
+                self._place_lost(dock)
+
+
+def _within(least: QSize, room: QSize) -> bool:
+    return least.width() <= room.width() and least.height() <= room.height()
