@@ -53,7 +53,7 @@ def test_a_fibre_is_measured_and_a_gripper_calibrated_and_sent_to_a_pixel(
     qtbot.mouseClick(lens.steps["2x"], LEFT)
     qtbot.waitUntil(lambda: zoom(api) == pytest.approx(2.0, abs=1e-3), timeout=15_000)
 
-    qtbot.mouseClick(view.row.more, LEFT)
+    window.raise_panel("Camera settings")
     tick(qtbot, view.chain.ticks["fibres"])
     assert view.chain.ticks["fibres"].isChecked()
 
@@ -64,7 +64,6 @@ def test_a_fibre_is_measured_and_a_gripper_calibrated_and_sent_to_a_pixel(
 
     qtbot.waitUntil(whole_fibre, timeout=15_000)
     tick(qtbot, view.chain.ticks["fibres"])
-    qtbot.mouseClick(view.row.more, LEFT)
 
     drive(window, qtbot, "right.x", -3000.0)
     drive(window, qtbot, "right.z", -1450.0)
@@ -77,6 +76,7 @@ def test_a_fibre_is_measured_and_a_gripper_calibrated_and_sent_to_a_pixel(
     height_um = mico.manager.state("right.z").position
     actions = {action.text(): action for action in view.row.menu.actions()}
     actions["right"].trigger()
+    window.raise_panel("Microscope")
     there = view.view.to_screen.map(QPointF(*PIXEL)).toPoint()
     qtbot.mouseClick(view.view.viewport(), LEFT, pos=there)
     assert "Right gripper moves to x" in view.message.text

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pytestqt.qtbot import QtBot
 
 from cosmic.app.panels.scene import ScenePanel
-from cosmic.app.windows.operator_window import SCENE, OperatorWindow
+from cosmic.app.windows.operator_window import MICO, SCENE, OperatorWindow
 from cosmic.mico.gui.mico_widget import MicoWidget
 from cosmic.mico.gui.positioner_gui import PositionerBaseGUI
 from cosmic.mico.gui.scene.scene_widget import SceneWidget
@@ -45,6 +45,9 @@ def scene(window: OperatorWindow, qtbot: QtBot) -> SceneWidget:
 
 def go_to(window: OperatorWindow, qtbot: QtBot, axis: str, target_um: float) -> None:
     """Send an axis to a place, as the operator does."""
+    if window.tasks is not None:
+        window.raise_panel(MICO)
+        mico(window).show_cards(True)
     enter(qtbot, field(card(window, axis), "target"), str(target_um))
     click(qtbot, card(window, axis), "MiCoCL_9")
 

@@ -1,0 +1,260 @@
+"""The window by task: what each workspace shows at each size, and that nothing is cut off."""
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import pytest
+from PySide6.QtCore import QPoint, QRect, QSettings, Qt
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractScrollArea,
+    QApplication,
+    QComboBox,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QScrollArea,
+    QWidget,
+)
+from pytestqt.qtbot import QtBot
+
+from cosmic.app.windows.operator_window import OperatorWindow
+from cosmic.app.windows.stage import Stage
+from cosmic.app.windows.tasks import HANDLE, LOOK, MEASURE, SET_UP, TaskLayout
+from cosmic.frame.gui.elided_label import ElidedLabel
+from cosmic.frame.gui.stop_button import StopButton
+from gui.app.windows import Make, mico
+from gui.mico.panels import part, position
+
+SIZES = {
+    "1024x600": (1024, 600),
+    "1366x768": (1366, 768),
+    "1920x1080 at 150 %": (1280, 720),
+    "1920x1080": (1920, 1080),
+}
+WITH_PICTURE = (LOOK, HANDLE, MEASURE)
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def whole(make: Make, qtbot: QtBot) -> OperatorWindow:
+    """A window of all applications whose first image is there."""
+    window = make(applications=("mico", "daqco", "vico"))
+    qtbot.waitUntil(lambda: tasks(window).stage.camera.view.image is not None)
+    return window
+
+
+def tasks(window: OperatorWindow) -> TaskLayout:
+    assert window.tasks is not None
+    return window.tasks
+
+
+def choose(window: OperatorWindow, qtbot: QtBot, name: str) -> None:
+    """Show a workspace as a click on its button does, and let it settle."""
+    buttons = window.top_bar.workspaces
+    assert buttons is not None
+    qtbot.mouseClick(buttons.buttons[name], LEFT)
+    assert window.workspaces is not None
+    assert window.workspaces.current == name
+    qtbot.wait(60)
+
+
+def seen(window: QWidget) -> Iterator[QWidget]:
+    """Yield the widgets that are shown, of panels in front."""
+    for each in window.findChildren(QWidget):
+        if each.isVisible() and each.window() is window and each.width() > 0:
+            yield each
+
+
+def clipped(window: QWidget) -> list[str]:
+    """Return the widgets that are cut off, or have less room than their text needs."""
+    found: list[str] = []
+    kinds = (QAbstractButton, QLineEdit, QComboBox, QLabel)
+    for each in seen(window):
+        if not isinstance(each, kinds) or each.visibleRegion().isEmpty():
+            continue
+        name = f"{type(each).__name__} {each.objectName()} {getattr(each, 'text', str)()!r}"
+        held = each.parentWidget()
+        while held is not None and held is not window:
+            if isinstance(held, QAbstractScrollArea) and not isinstance(held, QScrollArea):
+                break  # a list of many lines scrolls by itself
+            inside = held.rect().contains(QRect(each.mapTo(held, QPoint(0, 0)), each.size()))
+            if not inside:
+                found.append(f"{name} is cut off by {type(held).__name__} {held.objectName()}")
+                break
+            held = held.parentWidget()
+        if isinstance(each, QAbstractButton) and each.text():
+            needed = each.fontMetrics().horizontalAdvance(each.text().replace("&", ""))
+            if each.width() < needed:
+                found.append(f"{name} is {each.width()} wide and needs {needed}")
+        if isinstance(each, QLabel) and not isinstance(each, ElidedLabel) and not each.wordWrap():
+            needed = each.fontMetrics().horizontalAdvance(each.text())
+            if each.width() + 1 < needed:
+                found.append(f"{name} is {each.width()} wide and needs {needed}")
+    return found
+
+
+def overlapping(window: QWidget) -> list[str]:
+    """Return pairs of widgets of one layout that lie over each other."""
+    found: list[str] = []
+    for parent in seen(window):
+        if isinstance(parent, Stage) or parent.layout() is None:
+            continue
+        layout = parent.layout()
+        items = [layout.itemAt(row).widget() for row in range(layout.count())]
+        shown = [each for each in items if each is not None and each.isVisible()]
+        for one, other in combinations(shown, 2):
+            if one.geometry().intersects(other.geometry()):
+                found.append(f"{one.objectName() or one} over {other.objectName() or other}")
+    return found
+
+
+def scrolled(window: QWidget) -> list[str]:
+    """Return the panels that do not fit into their place."""
+    return [
+        f"{area.widget().objectName() or type(area.widget()).__name__}: "
+        f"{area.horizontalScrollBar().maximum()}, {area.verticalScrollBar().maximum()}"
+        for area in window.findChildren(QScrollArea, "dockScroll")
+        if area.isVisible()
+        and not area.visibleRegion().isEmpty()
+        and (area.horizontalScrollBar().maximum() or area.verticalScrollBar().maximum())
+    ]
+
+
+@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES)
+@pytest.mark.parametrize("theme", ["dark", pytest.param("light", marks=pytest.mark.slow)])
+def test_the_picture_has_most_of_the_window_and_nothing_is_cut_off(
+    make: Make, qtbot: QtBot, size: tuple[int, int], theme: str
+) -> None:
+    window = make(applications=("mico", "daqco", "vico"), size=size)
+    qtbot.waitUntil(lambda: tasks(window).stage.camera.view.image is not None)
+    window.set_theme(theme)
+    assert window.workspaces is not None
+    for name in [each.name for each in window.workspaces.all]:
+        choose(window, qtbot, name)
+        assert (window.width(), window.height()) == size, name
+        assert clipped(window) == [], name
+        assert overlapping(window) == [], name
+        if name in (*WITH_PICTURE, SET_UP):
+            assert scrolled(window) == [], name
+        if name in WITH_PICTURE:
+            drawn = tasks(window).stage.picture_rect()
+            share = drawn.width() * drawn.height() / (size[0] * size[1])
+            assert share >= 0.45, f"{name}: {share:.1%}"
+        stop = window.top_bar.findChild(StopButton)
+        place = QRect(stop.mapTo(window, QPoint(0, 0)), stop.size())
+        assert window.rect().contains(place)
+
+
+def test_all_eleven_axes_are_seen_at_once_in_set_up(make: Make, qtbot: QtBot) -> None:
+    window = make(applications=("mico", "daqco", "vico"), size=(1366, 768))
+    choose(window, qtbot, SET_UP)
+    rows = mico(window).table.rows
+    assert len(rows) == 11
+    for row in rows.values():
+        for cell in row.cells:
+            if cell.isVisible():
+                assert cell.visibleRegion().boundingRect() == cell.rect(), row.name.text()
+
+
+def test_a_row_moves_its_axis_through_the_gate(whole: OperatorWindow, qtbot: QtBot) -> None:
+    choose(whole, qtbot, SET_UP)
+    row = mico(whole).table.rows["left.x"]
+    qtbot.waitUntil(row.forward.isEnabled)
+    qtbot.mouseClick(row.forward, LEFT)
+    qtbot.waitUntil(lambda: abs(position(row.card) - 100.0) < 1.0)
+    row.target.setText("9 mm")
+    qtbot.mouseClick(row.go_to, LEFT)
+    qtbot.waitUntil(lambda: "9" in row.target.reason)
+    qtbot.waitUntil(lambda: "REFUSED" in row.line.text())
+
+
+def test_one_key_swaps_image_and_scene(whole: OperatorWindow, qtbot: QtBot) -> None:
+    choose(whole, qtbot, HANDLE)
+    stage = tasks(whole).stage
+    before = stage.camera.geometry()
+    qtbot.keyClick(whole, Qt.Key.Key_F6)
+    assert stage.large == "Scene"
+    assert stage.camera.width() < before.width() / 2
+    qtbot.keyClick(whole, Qt.Key.Key_F6)
+    assert stage.large == "Microscope"
+    assert stage.camera.geometry() == before
+
+
+def test_the_drawer_opens_over_the_picture_and_escape_closes_it(
+    whole: OperatorWindow, qtbot: QtBot
+) -> None:
+    choose(whole, qtbot, MEASURE)
+    before = tasks(whole).stage.picture_rect()
+    whole.raise_panel("Log")
+    QApplication.processEvents()
+    assert whole.drawer.open_page == "Log"
+    assert tasks(whole).stage.picture_rect() == before
+    whole.setFocus()
+    qtbot.keyClick(whole, Qt.Key.Key_Escape)
+    assert whole.drawer.open_page == ""
+    assert not whole.top_bar.latched
+
+
+def test_the_pad_moves_the_chosen_tool_by_the_step(whole: OperatorWindow, qtbot: QtBot) -> None:
+    choose(whole, qtbot, HANDLE)
+    tool = tasks(whole).tool
+    card = mico(whole).cards["right.y"]
+    qtbot.waitUntil(lambda: card.axis.details.present)
+    qtbot.mouseClick(tool.choices["right"], LEFT)
+    tool.step.setText("25")
+    qtbot.mouseClick(tool.pad["y", -1], LEFT)
+    qtbot.waitUntil(lambda: abs(position(card) + 25.0) < 1.0)
+    tool.step.setText("-25")
+    qtbot.mouseClick(tool.pad["y", -1], LEFT)
+    assert "no sign" in tool.step.reason
+
+
+def test_a_stop_is_shown_beside_the_tool_and_the_coach_resets_it(
+    whole: OperatorWindow, qtbot: QtBot
+) -> None:
+    choose(whole, qtbot, HANDLE)
+    coach = whole.findChild(QWidget, "coach")
+    button = part(coach, "coachButton", QPushButton)
+    whole.stop("a hand on the button")
+    qtbot.waitUntil(lambda: "STOPPED" in tasks(whole).tool.line.text())
+    qtbot.waitUntil(lambda: button.text() == "Reset")
+    qtbot.mouseClick(button, LEFT)
+    qtbot.waitUntil(lambda: not whole.top_bar.latched)
+    assert "STOPPED" not in tasks(whole).tool.line.text()
+
+
+def test_the_force_is_told_with_its_limit_and_greyed_when_it_is_not_measured(
+    whole: OperatorWindow, qtbot: QtBot
+) -> None:
+    choose(whole, qtbot, MEASURE)
+    force = tasks(whole).force
+    assert force is not None
+    qtbot.waitUntil(lambda: "ARMED ±150" in force.limit.text() and "to go" in force.limit.text())
+    assert force.value.isEnabled()
+    application = whole.platform.daqco
+    assert application is not None
+    application.stop_acquisition()
+    qtbot.waitUntil(lambda: not force.value.isEnabled())
+    assert "not measured" in force.title.text()
+
+
+def test_a_layout_is_kept_by_name_and_reset(
+    make: Make, qtbot: QtBot, stored: QSettings
+) -> None:
+    window = make(applications=("mico", "daqco", "vico"), hardware=False)
+    spaces = window.workspaces
+    assert spaces is not None
+    choose(window, qtbot, HANDLE)
+    window.dock("Next step").hide()
+    spaces.save_as("mine")
+    window.reset_layout()
+    assert window.dock("Next step").isVisible()
+    spaces.use("mine")
+    assert not window.dock("Next step").isVisible()
+    window.close()
+    again = make(applications=("mico", "daqco", "vico"), hardware=False)
+    assert again.workspaces is not None
+    assert again.workspaces.layout_name == "mine"
+    assert again.workspaces.current == HANDLE
+    assert not again.dock("Next step").isVisible()
