@@ -40,8 +40,14 @@ LEFT = Qt.MouseButton.LeftButton
 def whole(make: Make, qtbot: QtBot) -> OperatorWindow:
     """A window of all applications whose first image is there."""
     window = make(applications=("mico", "daqco", "vico"))
-    qtbot.waitUntil(lambda: tasks(window).stage.camera.view.image is not None)
+    with_image(window, qtbot)
     return window
+
+
+def with_image(window: OperatorWindow, qtbot: QtBot) -> None:
+    """Wait for the first image; a camera that nobody sees draws none."""
+    choose(window, qtbot, LOOK)
+    qtbot.waitUntil(lambda: tasks(window).stage.camera.view.image is not None)
 
 
 def tasks(window: OperatorWindow) -> TaskLayout:
@@ -127,7 +133,7 @@ def test_the_picture_has_most_of_the_window_and_nothing_is_cut_off(
     make: Make, qtbot: QtBot, size: tuple[int, int], theme: str
 ) -> None:
     window = make(applications=("mico", "daqco", "vico"), size=size)
-    qtbot.waitUntil(lambda: tasks(window).stage.camera.view.image is not None)
+    with_image(window, qtbot)
     window.set_theme(theme)
     assert window.workspaces is not None
     for name in [each.name for each in window.workspaces.all]:
@@ -239,9 +245,7 @@ def test_the_force_is_told_with_its_limit_and_greyed_when_it_is_not_measured(
     assert "not measured" in force.title.text()
 
 
-def test_a_layout_is_kept_by_name_and_reset(
-    make: Make, qtbot: QtBot, stored: QSettings
-) -> None:
+def test_a_layout_is_kept_by_name_and_reset(make: Make, qtbot: QtBot, stored: QSettings) -> None:
     window = make(applications=("mico", "daqco", "vico"), hardware=False)
     spaces = window.workspaces
     assert spaces is not None

@@ -8,8 +8,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final, TypeVar
 
+import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPaintEvent, QPen
 from PySide6.QtWidgets import (
     QHBoxLayout,
@@ -22,11 +23,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from cosmic.app.panels.curve_frame import CurveFrame
 from cosmic.daqco.api.daqco import Daqco, DaqLimit
 from cosmic.daqco.api.files import NamedFile
 from cosmic.daqco.core.chunk import DataChunk
 from cosmic.daqco.core.scale import Scale
 from cosmic.daqco.gui.asking import Asking
+from cosmic.daqco.gui.colours import readable
 from cosmic.daqco.gui.limit_dialog import LimitDialog
 from cosmic.daqco.gui.limit_indicator import distance
 from cosmic.daqco.gui.plot.chart import Chart, Trace
@@ -40,7 +43,7 @@ from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, push_button, styled, tight_row, tipped
 from cosmic.frame.gui.elided_label import ElidedLabel
 from cosmic.frame.gui.painting import painting
-from cosmic.frame.gui.palette import OKABE_ITO
+from cosmic.frame.gui.palette import OKABE_ITO, Palette
 from cosmic.frame.gui.relay import Relay
 from cosmic.frame.gui.theme import STEP_PX, State, current_palette, number_font, state_look
 from cosmic.frame.overrides import override
@@ -54,6 +57,7 @@ OLD_S: Final = 1.0
 MEAN_S: Final = 0.1
 VALUE_PX: Final = 26
 SPAN_S: Final = 10.0
+AXIS_PX: Final = 48
 TARE_SHARE: Final = 0.25
 """Of the limit: a load beyond it is no zero, and Tare refuses it."""
 LOW_PX: Final = 20 * STEP_PX
@@ -123,57 +127,45 @@ class LimitBar(QWidget):
                 painter.drawLine(round(x), 0, round(x), self.height())
 
 
-class PositionCurve(QWidget):
+class PositionCurve(CurveFrame):
     """Force over the position of the axis that moved last."""
 
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(AXIS_PX)
         self._points: deque[tuple[float, float]] = deque(maxlen=_POINTS)
         self.axis = ""
-        self._plot = pg.PlotWidget()
-        self._curve = self._plot.plot([], [], pen=pg.mkPen(OKABE_ITO["orange"], width=1.5))
-        self._plot.setMenuEnabled(False)
-        self._plot.hideButtons()
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self._plot)
+        box, self._left = self._add_field("force")
+        self._below = self._add_axis_below("position")
+        self._curve = pg.PlotCurveItem()
+        box.addItem(self._curve)
         self._restyle()
 
     def name_force(self, unit: str) -> None:
         """Say in which unit the force is drawn."""
-        self._plot.setLabel("left", unit)
+        self._names[self._left] = f"force, {unit}"
+        self._restyle()
 
     def add(self, axis: str, unit: str, position: float, force: float) -> None:
         """Add a point; another axis begins anew."""
         if axis != self.axis:
             self.axis = axis
             self._points.clear()
-            self._plot.setLabel("bottom", f"{axis}, {unit}")
+            self._names[self._below] = f"{axis}, {unit}"
+            self._restyle()
         if self._points and abs(self._points[-1][0] - position) < _STILL_UM:
             return
         self._points.append((position, force))
         places, forces = zip(*self._points, strict=True)
-        self._curve.setData(list(places), list(forces))
+        self._curve.setData(np.array(places), np.array(forces))
 
     @property
     def points(self) -> tuple[tuple[float, float], ...]:
         """Position and force of what is drawn."""
         return tuple(self._points)
 
-    def _restyle(self) -> None:
-        palette = current_palette()
-        self._plot.setBackground(palette.panel)
-        for side in ("bottom", "left"):
-            axis = self._plot.getAxis(side)
-            axis.setPen(palette.border_strong)
-            axis.setTextPen(palette.text)
-            axis.setStyle(tickFont=number_font(11))
-
     @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange:
-            self._restyle()
+    def _colour(self, palette: Palette) -> None:
+        self._curve.setPen(pg.mkPen(readable(OKABE_ITO["orange"]), width=1.5))
 
 
 class ForcePanel(QWidget):
@@ -483,7 +475,7 @@ class ForcePanel(QWidget):
             return
         when = datetime.now().astimezone()
         try:
-            folder = self._daqco.directory if self._daqco.elsewhere else self._folder()
+            folder = self._daqco.directory if self._daqco.remote else self._folder()
         except OSError as exc:
             self._tell(str(exc), refused=True)
             return

@@ -31,7 +31,7 @@ class HistoryPanel(QWidget):
     def refresh(self, _newest: str = "") -> None:
         """Show what can be taken back now."""
         mico = self._gui.mico
-        states = mico.application.manager.states()
+        states = mico.states()
         self.list.clear()
         for entry in mico.undo_entries:
             self.list.addItem(f"{entry.group}: back to where {undo_text(entry, states)}")

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
@@ -19,33 +19,75 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from cosmic.app.panels.curve_frame import CurveFrame
 from cosmic.daqco.api.recording import Recording, open_recording
+from cosmic.daqco.core.chunk import Values
+from cosmic.daqco.gui.colours import readable
 from cosmic.daqco.gui.plot.units import display_unit
 from cosmic.frame.errors import CosmicError
 from cosmic.frame.gui.amounts import duration_text
 from cosmic.frame.gui.build import named, push_button
 from cosmic.frame.gui.log_panel import SearchField
-from cosmic.frame.gui.palette import OKABE_ITO
-from cosmic.frame.gui.theme import STEP_PX, current_palette, number_font
+from cosmic.frame.gui.palette import OKABE_ITO, Palette
+from cosmic.frame.gui.theme import STEP_PX, number_font
 from cosmic.frame.overrides import override
 
 logger = logging.getLogger(__name__)
 
 MOST_POINTS: Final = 4000
 MOST_FILES: Final = 500
+AXIS_PX: Final = 56
 _PATH: Final = Qt.ItemDataRole.UserRole
 
 
 def recordings_below(folders: Sequence[Path]) -> list[Path]:
-    """Return the recordings in folders and in those below them, newest first."""
+    """Return the recordings in folders and in those just below them, newest first."""
     found: dict[Path, float] = {}
     for folder in folders:
         try:
-            for file in folder.rglob("*.h5"):
-                found[file] = file.stat().st_mtime
+            for pattern in ("*.h5", "*/*.h5"):
+                found |= {file: file.stat().st_mtime for file in folder.glob(pattern)}
         except OSError as exc:
             logger.debug("%s cannot be listed: %s", folder, exc)
     return sorted(found, key=lambda file: found[file], reverse=True)[:MOST_FILES]
+
+
+class ResultCurve(CurveFrame):
+    """One channel over time, with two cursors that a hand moves."""
+
+    moved = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(AXIS_PX)
+        box, self._left = self._add_field("")
+        self._add_axis_below("time, s")
+        self._curve = pg.PlotCurveItem()
+        self.cursors = pg.LinearRegionItem(movable=True)
+        self.cursors.sigRegionChanged.connect(self.moved)
+        self.cursors.hide()
+        for item in (self._curve, self.cursors):
+            box.addItem(item)
+        self._restyle()
+
+    def show_curve(self, name: str, times: Values, values: Values) -> None:
+        """Draw another curve, with the cursors at a third and two thirds of it."""
+        self._names[self._left] = name
+        self._curve.setData(times, values)
+        self.cursors.setVisible(len(times) > 1)
+        if len(times) > 1:
+            third = float(times[-1] - times[0]) / 3.0
+            self.cursors.setRegion((float(times[0]) + third, float(times[-1]) - third))
+        self._restyle()
+
+    @property
+    def region(self) -> tuple[float, float]:
+        """Times of the two cursors."""
+        low, high = self.cursors.getRegion()
+        return float(low), float(high)
+
+    @override
+    def _colour(self, palette: Palette) -> None:
+        self._curve.setPen(pg.mkPen(readable(OKABE_ITO["orange"]), width=1.2))
 
 
 class ResultsPanel(QWidget):
@@ -76,19 +118,12 @@ class ResultsPanel(QWidget):
         self.list.setHeaderLabels(["Recording", "Made", "Size"])
         self.list.setRootIsDecorated(False)
         self.list.currentItemChanged.connect(self._on_chosen)
-        self.plot = pg.PlotWidget()
-        self.plot.setMenuEnabled(False)
-        self.plot.setLabel("bottom", "time, s")
-        self._curve = self.plot.plot([], [], pen=pg.mkPen(OKABE_ITO["orange"], width=1.2))
-        self.cursors = pg.LinearRegionItem(movable=True)
-        self.cursors.sigRegionChanged.connect(self._show_slope)
-        self.plot.addItem(self.cursors)
-        self.cursors.hide()
+        self.curve = ResultCurve()
+        self.curve.moved.connect(self._show_slope)
         self.facts, self.slope = QLabel("Choose a recording"), named(QLabel(), "resultsSlope")
         self.slope.setFont(number_font())
         self.facts.setWordWrap(True)
         self._arrange()
-        self._restyle()
 
     def _arrange(self) -> None:
         left, right = QWidget(), QWidget()
@@ -102,7 +137,7 @@ class ResultsPanel(QWidget):
         column = QVBoxLayout(right)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.facts)
-        column.addWidget(self.plot, 1)
+        column.addWidget(self.curve, 1)
         column.addWidget(self.slope)
         split = QSplitter(Qt.Orientation.Horizontal)
         split.addWidget(left)
@@ -170,13 +205,7 @@ class ResultsPanel(QWidget):
         step = max(1, len(values) // MOST_POINTS)
         self._times, self._values = np.asarray(times)[::step], np.asarray(values)[::step]
         self._unit = display_unit(recording.units.get(channel, ""))
-        self._curve.setData(self._times, self._values)
-        self.plot.setLabel("left", f"{channel}, {self._unit}")
-        self.cursors.setVisible(len(self._times) > 0)
-        if len(self._times):
-            first, last = float(self._times[0]), float(self._times[-1])
-            third = (last - first) / 3.0
-            self.cursors.setRegion((first + third, last - third))
+        self.curve.show_curve(f"{channel}, {self._unit}", self._times, self._values)
         whole = "" if recording.complete else ", ended early"
         length = duration_text(len(values) / recording.rate_hz)
         notes = [each.text for each in recording.events if "note:" in each.text]
@@ -187,7 +216,7 @@ class ResultsPanel(QWidget):
         self._show_slope()
 
     def _show_slope(self) -> None:
-        low, high = self.cursors.getRegion()
+        low, high = self.curve.region
         chosen = (self._times >= low) & (self._times <= high)
         if int(chosen.sum()) < 2:
             self.slope.setText("")
@@ -199,17 +228,3 @@ class ResultsPanel(QWidget):
             f"between the cursors: {high - low:.3f} s   difference {difference:.2f} {self._unit}   "
             f"slope {slope:.3f} {self._unit}/s   mean {float(values.mean()):.2f} {self._unit}"
         )
-
-    def _restyle(self) -> None:
-        palette = current_palette()
-        self.plot.setBackground(palette.panel)
-        for side in ("bottom", "left"):
-            axis = self.plot.getAxis(side)
-            axis.setPen(palette.border_strong)
-            axis.setTextPen(palette.text)
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "cursors"):
-            self._restyle()

@@ -123,8 +123,8 @@ class OperatorWindow(CosmicServerGui):
         self._add_procedures()
         if images:
             self.dock(images).raise_()
-        self._lay_out_by_task(settings)
         self._add_others()
+        self._lay_out_by_task(settings)
         self._stations = WindowStations(self, platform, host, self._panels_by_application())
         model = self._mico_gui is not None and self._mico_gui.collision.has_model
         blocked = blocked_modes(
@@ -182,12 +182,12 @@ class OperatorWindow(CosmicServerGui):
 
     def _add_others(self) -> None:
         """Put applications of other packages beside the scene, as far as they have a widget."""
-        beside = SCENE if self._scene is not None else ""
+        docked = self._scene is not None and not self._by_task
         for application in self._platform.others.values():
             gui = application.get_gui()
             if isinstance(gui, QWidget):
-                self.add_panel(application.title, gui, beside=beside)
-        if beside and self._platform.others:
+                self.add_panel(application.title, gui, beside=SCENE if docked else "")
+        if docked and self._platform.others:
             self.dock(SCENE).raise_()
 
     def _add_procedures(self) -> None:

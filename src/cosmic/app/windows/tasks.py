@@ -63,8 +63,8 @@ def _coach(below: str) -> Place:
     return Place(COACH, _RIGHT, below=below, height_px=_COACH_PX)
 
 
-def workspaces() -> tuple[Workspace, ...]:
-    """Return the six workspaces, in order."""
+def workspaces(others: tuple[str, ...] = ()) -> tuple[Workspace, ...]:
+    """Return the six workspaces, in order; `others` are titles of further panels in Set up."""
     return (
         Workspace(
             SET_UP,
@@ -74,6 +74,7 @@ def workspaces() -> tuple[Workspace, ...]:
                 Place(CALIBRATIONS, _LEFT, tabbed=MICO),
                 Place(DAQCO, _LEFT, tabbed=MICO),
                 Place(CONTROL, _LEFT, tabbed=MICO),
+                *(Place(title, _LEFT, tabbed=MICO) for title in others),
                 _right(COACH),
             ),
         ),
@@ -166,7 +167,8 @@ class TaskLayout(QObject):
         self.results = ResultsPanel(self._folders)
         self.book = AlarmBook(self)
         self._add_panels()
-        window.use_workspaces(workspaces(), self.stage)
+        others = tuple(each.title for each in platform.others.values())
+        window.use_workspaces(workspaces(others), self.stage)
         self._add_drawer()
         self._settings = settings
         self._connect()
@@ -246,7 +248,7 @@ class TaskLayout(QObject):
         return (self.folder.home, *own) if self.force is not None else (self.folder.home,)
 
     def _rig_elsewhere(self) -> bool:
-        return self.force is None or bool(self._rig.daqco.elsewhere)
+        return self.force is None or bool(self._rig.daqco.remote)
 
     # Alarms
 

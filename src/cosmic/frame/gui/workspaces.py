@@ -103,7 +103,8 @@ class Workspaces(QObject):
         self._known: dict[str, Workspace] = {}
         self._docks: dict[str, QDockWidget] = {}
         self._states: dict[str, QByteArray] = {}
-        self._usual: frozenset[tuple[object, ...]] = frozenset()
+        self._altered = False
+        self._laying = False
         self._current = ""
         self._layout = str(settings.value(_LAYOUT, USUAL)) or USUAL
 
@@ -113,6 +114,8 @@ class Workspaces(QObject):
         self._window.removeDockWidget(dock)
         action: QAction = dock.toggleViewAction()
         action.triggered.connect(self._on_toggled)
+        dock.topLevelChanged.connect(self._on_altered)
+        dock.dockLocationChanged.connect(self._on_altered)
 
     def add(self, workspace: Workspace) -> None:
         """Add a workspace; the order is that of the buttons."""
@@ -229,23 +232,18 @@ class Workspaces(QObject):
 
     def _keep(self) -> None:
         """Keep the panels as they are, where the operator put them elsewhere."""
-        if self._current and self._places() != self._usual:
+        if self._current and (self._altered or self._missing()):
             self._states[self._current] = self._window.saveState(self._version)
 
-    def _places(self) -> frozenset[tuple[object, ...]]:
-        """Return where each panel is, whatever the size of the window."""
-        window = self._window
-        return frozenset(
-            (
-                title,
-                window.dockWidgetArea(dock),
-                dock.isFloating(),
-                dock.isHidden(),
-                frozenset(each.windowTitle() for each in window.tabifiedDockWidgets(dock)),
-            )
-            for title, dock in self._docks.items()
-            if window.dockWidgetArea(dock) != Area.NoDockWidgetArea or dock.isFloating()
-        )
+    def _missing(self) -> bool:
+        """Tell whether a panel was hidden that has its place here."""
+        docks = (self._docks.get(each.title) for each in self._known[self._current].places)
+        placed = [dock for dock in docks if dock is not None and self._is_placed(dock)]
+        return any(dock.isHidden() for dock in placed)
+
+    def _on_altered(self) -> None:
+        if not self._laying:
+            self._altered = True
 
     @property
     def _version(self) -> int:
@@ -254,10 +252,11 @@ class Workspaces(QObject):
         return zlib.crc32(names.encode()) & 0x7FFFFFFF
 
     def _show(self, name: str) -> None:
-        window, workspace = self._window, self._known[name]
+        window, workspace, docks = self._window, self._known[name], self._docks.values()
         window.setUpdatesEnabled(False)
+        self._laying = True
         self._current = name
-        for dock in self._docks.values():
+        for dock in docks:
             if not dock.isFloating():
                 window.removeDockWidget(dock)
             else:
@@ -267,12 +266,14 @@ class Workspaces(QObject):
             middle.setVisible(workspace.middle)
         state = self._states.get(name)
         # Qt brings a layout back at the size it was kept at, and makes the window as large.
-        fits = state is not None and window.restoreState(state, self._version)
-        if not fits or not _within(window.minimumSizeHint(), window.size()):
+        self._altered = state is not None and window.restoreState(state, self._version)
+        for dock in docks:
+            if not dock.isFloating() and not self._is_placed(dock):
+                dock.hide()
+        if not self._altered or not _within(window.minimumSizeHint(), window.size()):
+            self._altered = False
             self._arrange(workspace)
-            self._usual = self._places()
-        else:
-            self._usual = frozenset()
+        self._laying = False
         window.setUpdatesEnabled(True)
         QTimer.singleShot(0, self, self.fit)
 
@@ -334,6 +335,7 @@ class Workspaces(QObject):
             self._window.addDockWidget(area, dock)
 
     def _on_toggled(self, shown: bool) -> None:
+        self._altered = True
         action = self.sender()
         for dock in self._docks.values():
             if shown and dock.toggleViewAction() is action:

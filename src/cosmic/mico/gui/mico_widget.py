@@ -88,7 +88,8 @@ class MicoWidget(QWidget):
         self._steps.hide()
         self._undoing = UndoGui(mico, self)
         self._columns = GroupColumns()
-        self._table = AxisTable()
+        self._table = AxisTable(self)
+        self._table.hide()
         self._feed = StateFeed(mico, self)
         self._keys = JogKeys(qt_application(), self._header.speed, self)
         column = QVBoxLayout(self)
@@ -137,6 +138,7 @@ class MicoWidget(QWidget):
     def offer_table(self) -> None:
         """Show all axes as a table of one row each; a button turns to the cards and back."""
         self._pages.addWidget(FittedPanel(self._table))
+        self._table.show()
         self._fill_table()
         self.refresh()
         self._header.offer_cards()
