@@ -16,6 +16,12 @@ from cosmic.frame.plugins import Kind, names
 
 KINDS: Final = {
     "controller": Kind.CONTROLLER,
+    "board": Kind.BOARD,
+    "camera": Kind.CAMERA,
+    "lens": Kind.LENS,
+    "procedure": Kind.PROCEDURE,
+    "analysis": Kind.ANALYSIS,
+    "exporter": Kind.EXPORTER,
 }
 _TEMPLATES: Final = files("cosmic.app") / "templates"
 _ENDING: Final = ".txt"
