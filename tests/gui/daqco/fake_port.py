@@ -8,6 +8,7 @@ import numpy as np
 
 from cosmic.daqco.api.files import NamedFile, named_file, recordings_in
 from cosmic.daqco.core.chunk import DataChunk
+from cosmic.daqco.core.output_control import OutputState
 from cosmic.daqco.core.settings import (
     COLOURS,
     ChannelSettings,
@@ -98,6 +99,8 @@ class FakePort:
         self.problem = ""
         self.away = ""
         self.remote = ""
+        self.outputs: tuple[OutputState, ...] = ()
+        self.outputs_stopped = ""
         self.counters = Counted()
         self.recording = Recorded()
         self.limits: tuple[Limited, ...] = tuple(Limited(each) for each in given.limit)
@@ -199,6 +202,30 @@ class FakePort:
         self._do("apply", given)
         self.next_sample = 0
         self.change(settings=given)
+
+    # outputs
+
+    def _give(self, name: str, value: float, *call: object) -> None:
+        self._do(*call)
+        self.change(
+            outputs=tuple(
+                replace(each, value=value) if each.name == name else each for each in self.outputs
+            )
+        )
+
+    def set_output(self, name: str, volts: float) -> None:
+        self._give(name, volts, "set output", name, volts)
+
+    def set_line(self, name: str, *, high: bool) -> None:
+        self._give(name, float(high), "set line", name, high)
+
+    def stop_outputs(self) -> None:
+        self._do("stop outputs")
+        self.change(outputs_stopped="stop of the outputs")
+
+    def reset_outputs(self) -> None:
+        self._do("reset outputs")
+        self.change(outputs_stopped="")
 
     # recording
 

@@ -264,6 +264,6 @@ def test_a_recording_that_the_application_ends_is_reported_by_the_widget(qtbot, 
 def test_a_main_widget_that_goes_stops_listening(qtbot, tmp_path):
     port = FakePort(settings(), tmp_path)
     made = UDaqMainWidget(port)
-    assert port.listened == 4
+    assert port.listened == 5
     made.deleteLater()
     qtbot.waitUntil(lambda: port.listened == 0)

@@ -31,6 +31,7 @@ from cosmic.app.windows.tasks import (
 from cosmic.app.windows.top_bar import ACM, ECM, SCM, CollisionBar, ControlMode, blocked_modes
 from cosmic.daqco.api.daqco import daqco_of
 from cosmic.daqco.gui.limit_indicator import LimitIndicator
+from cosmic.frame.errors import CosmicError
 from cosmic.frame.failure import Failure
 from cosmic.frame.gui.console_panel import ConsolePanel
 from cosmic.frame.gui.late_panel import LatePanel
@@ -347,7 +348,14 @@ class OperatorWindow(CosmicServerGui):
     def stop(self, reason: str) -> None:
         """Stop everything and keep it stopped."""
         if self._platform.mico is not None:
-            self._platform.mico.manager.stop(reason)
+            self._platform.mico.manager.stop(reason)  # which stops outputs as well
+        elif self._platform.daqco is not None:
+            daqco = daqco_of(self._platform.daqco)
+            daqco.carry_out(lambda: daqco.stop_outputs(reason), self._on_outputs_stopped)
+
+    def _on_outputs_stopped(self, _result: None, error: CosmicError | None) -> None:
+        if error is not None:
+            self._platform.policy.report(error, "stop of the outputs")
 
     def halt_all(self) -> None:
         """Stop the axes that move, without latching; any thread."""

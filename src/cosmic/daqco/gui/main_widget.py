@@ -22,6 +22,7 @@ from cosmic.daqco.gui.configure_dialog import UDaqConfigureDialog
 from cosmic.daqco.gui.export_dialog import StationExportDialog, export_kinds
 from cosmic.daqco.gui.file_widget import UDaqFileWidget
 from cosmic.daqco.gui.limit_dialog import LimitDialog
+from cosmic.daqco.gui.outputs_panel import OutputsPanel
 from cosmic.daqco.gui.plotter import UDaqPlotter
 from cosmic.frame.application import CosmicApplicationBase
 from cosmic.frame.errors import CosmicError
@@ -55,6 +56,7 @@ class UDaqMainWidget(QWidget):
         self.setWindowTitle("DAQCo")
         self._daqco = daqco
         self.plotter = UDaqPlotter(daqco)
+        self.outputs = OutputsPanel(daqco)
         self.files = UDaqFileWidget(daqco)
         tip = "Cancel the export and delete its file"
         self.export_bar = TaskBar(cancel_tip=tip, closable=True)
@@ -87,6 +89,7 @@ class UDaqMainWidget(QWidget):
         column.setSpacing(0)
         column.addLayout(head)
         column.addWidget(self.plotter, 1)
+        column.addWidget(self.outputs)
         column.addWidget(self.export_bar)
         column.addWidget(self.files)
 
